@@ -1,0 +1,37 @@
+"""Every tolerance of granforce: what it means and the scale it is relative to.
+
+Lengths are relative to the largest radius, forces to the mean normal force ⟨f_n⟩.
+"""
+
+# Two grains whose gap (in largest radii) is below this when a packing comes to rest touch;
+# the final projection then brings the gap of every touching pair to rounding error.
+TOUCHING = 1e-6
+
+# Largest overlap (in largest radii) that a finished rigid packing may show.
+OVERLAP = 1e-9
+
+# Overlap (in largest radii) of user-given disks from which a list of rigid disks is refused.
+RIGID_OVERLAP = 1e-4
+
+# A force network is an equilibrium of the paper's walk when its residual is below this:
+# what Gauss–Seidel reaches in affordable time (PRE 79, 052302 does not state its own).
+EQUILIBRIUM = 1e-6
+
+# Residual of a finished packing's own force network, and of the direct solvers.
+BALANCED = 1e-10
+
+# Cones: how far (in ⟨f_n⟩) f_n may be negative or |f_t| exceed μ f_n in an admissible state.
+ADMISSIBLE = 1e-9
+
+# A contact whose largest possible f_n (in ⟨f_n⟩) is below this carries nothing.
+CARRYING = 1e-7
+
+# The certificate of jamming: relative distance |f − f_dyn| / |f_dyn| between the dynamic forces
+# and the nearest admissible network on the same contacts.
+JAMMED_DISTANCE = 1e-2
+
+# Feasibility tolerance asked of the linear and quadratic programs (forces in ⟨f_n⟩).
+PROGRAM = 1e-10
+
+# Friction coefficients are compared and stored on this relative grid (0.1 + 0.2 is 0.3).
+MU_DIGITS = 9
