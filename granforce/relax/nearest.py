@@ -1,0 +1,72 @@
+"""The admissible network nearest to given forces, as a quadratic program (PIQP)."""
+
+import time
+
+import numpy as np
+import piqp
+from scipy import sparse
+
+from granforce.records import Relaxation
+from granforce.tolerances import BALANCED
+
+
+def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
+    """The point of S with the least Σ |F_c − F_start,c|².
+
+    start (N_c, 2). Solved in cone coordinates y ≥ 0 (p = f_n + f_t/μ, q = f_n − f_t/μ), in units
+    of ⟨f_n⟩. Returns a Relaxation; ``converged`` is False where S is empty.
+    """
+    begin = time.perf_counter()
+    A, T = ensemble.cone_form
+    target = ensemble.to_vector(start) / ensemble.force_scale
+    solver = _solver(max_iterations)
+    solver.setup(
+        sparse.csc_matrix(T.T @ T),
+        -(T.T @ target),
+        A,
+        ensemble.b / ensemble.force_scale,
+        x_l=np.zeros(A.shape[1]),
+    )
+    status = solver.solve()
+    # The interior-point iterate may be negative by its tolerance: y ≥ 0 is set exactly, so that
+    # only the residual has to be judged.
+    y = np.maximum(solver.result.x, 0.0)
+    forces = ensemble.to_forces(T @ y * ensemble.force_scale)
+    residual = ensemble.residual(forces)
+    return Relaxation(
+        forces,
+        int(solver.result.info.iter),
+        residual,
+        ensemble.violation(forces),
+        bool(status == piqp.PIQP_SOLVED and residual <= tolerance),
+        time.perf_counter() - begin,
+    )
+
+
+def least_unbalanced(A, b):
+    """y ≥ 0 with the least |A y − b|², and that residual vector, shapes (n,) and (m,)."""
+    rows, columns = A.shape
+    solver = _solver(200)
+    quadratic = sparse.block_diag(
+        [1e-10 * sparse.eye(columns), sparse.eye(rows)], format="csc"
+    )
+    lower = np.concatenate([np.zeros(columns), np.full(rows, -np.inf)])
+    solver.setup(
+        quadratic,
+        np.zeros(columns + rows),
+        sparse.hstack([A, sparse.eye(rows)], format="csc"),
+        b,
+        x_l=lower,
+    )
+    solver.solve()
+    y = np.maximum(solver.result.x[:columns], 0.0)
+    return y, A @ y - b
+
+
+def _solver(max_iterations):
+    solver = piqp.SparseSolver()
+    solver.settings.verbose = False
+    solver.settings.max_iter = max_iterations
+    solver.settings.eps_abs = 1e-12
+    solver.settings.eps_rel = 1e-13
+    return solver
