@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.tolerances import MU_DIGITS
+from granforce.tolerances import MU_DIGITS, TOUCHING
 
 
 class InputError(ValueError):
@@ -27,14 +27,10 @@ class Contacts(NamedTuple):
     i: np.ndarray  # (N_c,) int64, first grain
     j: np.ndarray  # (N_c,) int64, second grain
     normal: np.ndarray  # (N_c, 2) unit vector n from i to j
-    arm_i: np.ndarray  # (N_c,) lever arm a_i from the centre of i to the contact point
-    arm_j: np.ndarray  # (N_c,) lever arm a_j; a_i + a_j = ℓ, the centre distance
+    length: np.ndarray  # (N_c,) centre distance ℓ
     gap: np.ndarray  # (N_c,) ℓ − r_i − r_j, negative where grains overlap
-
-    @property
-    def length(self):
-        """Centre distance ℓ per contact, shape (N_c,)."""
-        return self.arm_i + self.arm_j
+    arm_i: np.ndarray  # (N_c,) lever arm a_i from the centre of i to the contact point
+    arm_j: np.ndarray  # (N_c,) lever arm a_j
 
 
 class Packing(NamedTuple):
@@ -112,31 +108,34 @@ def positive(value, name):
     return number
 
 
-def make_contacts(i, j, normal, arm_i, arm_j, gap, grains):
-    """Contacts from array-likes, cast once: int64 grains, contiguous float64, unit normals.
+def make_contacts(i, j, normal, length, r):
+    """Contacts from array-likes, cast once: grains i, j and centre distances (N_c,), normals.
 
-    Raises InputError for grain numbers outside 0 … grains − 1, self-contacts, or zero normals.
+    Lever arms are the radii r where no contact overlaps by more than TOUCHING (rigid disks), and
+    reach the middle of the overlap, a = r − overlap/2, otherwise (soft disks).
+
+    Raises InputError for grain numbers outside 0 … N − 1, self-contacts, normals that are not unit
+    vectors, or distances ≤ 0.
     """
     i, j = (np.ascontiguousarray(k, dtype=np.int64) for k in (i, j))
     if i.ndim != 1 or i.shape != j.shape:
         raise InputError(f"contact lists i and j differ in shape: {i.shape} and {j.shape}")
     count = len(i)
-    if count and (min(i.min(), j.min()) < 0 or max(i.max(), j.max()) >= grains):
-        raise InputError(f"a contact names a grain outside 0 … {grains - 1}")
+    if count and (min(i.min(), j.min()) < 0 or max(i.max(), j.max()) >= len(r)):
+        raise InputError(f"a contact names a grain outside 0 … {len(r) - 1}")
     if np.any(i == j):
         raise InputError(f"contact {int(np.argmax(i == j))} joins a grain with itself")
     normal = float_array(normal, (count, 2), "contact normals")
     norm = np.hypot(normal[:, 0], normal[:, 1])
     if np.any(np.abs(norm - 1) > 1e-6):
         raise InputError("contact normals must be unit vectors")
-    return Contacts(
-        i,
-        j,
-        normal / norm[:, None],
-        float_array(arm_i, (count,), "lever arms"),
-        float_array(arm_j, (count,), "lever arms"),
-        float_array(gap, (count,), "gaps"),
-    )
+    length = float_array(length, (count,), "centre distances")
+    if np.any(length <= 0):
+        raise InputError(f"contact {int(np.argmax(length <= 0))} has centre distance ≤ 0")
+    gap = length - r[i] - r[j]
+    soft = count > 0 and gap.min() < -TOUCHING * r.max()
+    inward = gap / 2 if soft else np.zeros(count)
+    return Contacts(i, j, normal / norm[:, None], length, gap, r[i] + inward, r[j] + inward)
 
 
 def make_packing(x, r, box, contacts, forces, mu, pressure=np.nan, load=None, info=None):
