@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.tolerances import MU_DIGITS, TOUCHING
+from granforce.tolerances import MU_DIGITS, RIGID_OVERLAP
 
 
 class InputError(ValueError):
@@ -111,7 +111,7 @@ def positive(value, name):
 def make_contacts(i, j, normal, length, r):
     """Contacts from array-likes, cast once: grains i, j and centre distances (N_c,), normals.
 
-    Lever arms are the radii r where no contact overlaps by more than TOUCHING (rigid disks), and
+    Lever arms are the radii r where no contact overlaps by more than RIGID_OVERLAP (rigid disks), and
     reach the middle of the overlap, a = r − overlap/2, otherwise (soft disks).
 
     Raises InputError for grain numbers outside 0 … N − 1, self-contacts, normals that are not unit
@@ -133,7 +133,7 @@ def make_contacts(i, j, normal, length, r):
     if np.any(length <= 0):
         raise InputError(f"contact {int(np.argmax(length <= 0))} has centre distance ≤ 0")
     gap = length - r[i] - r[j]
-    soft = count > 0 and gap.min() < -TOUCHING * r.max()
+    soft = count > 0 and gap.min() < -RIGID_OVERLAP * r.max()
     inward = gap / 2 if soft else np.zeros(count)
     return Contacts(i, j, normal / norm[:, None], length, gap, r[i] + inward, r[j] + inward)
 

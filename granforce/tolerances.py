@@ -10,8 +10,9 @@ TOUCHING = 1e-6
 # Largest overlap (in largest radii) that a finished rigid packing may show.
 OVERLAP = 1e-9
 
-# Overlap (in largest radii) of user-given disks from which a list of rigid disks is refused.
-RIGID_OVERLAP = 1e-4
+# Contacts that overlap by more than this (in largest radii) belong to soft disks: their contact
+# point lies midway in the overlap. Below it disks are rigid and lever arms are the radii.
+RIGID_OVERLAP = 1e-5
 
 # A force network is an equilibrium of the paper's walk when its residual is below this:
 # what Gauss–Seidel reaches in affordable time (PRE 79, 052302 does not state its own).
