@@ -21,6 +21,10 @@ class NotJammedError(InputError):
     """No admissible force network exists, or none was reached within the budget."""
 
 
+class Cancelled(Exception):
+    """The work was cancelled on request; nothing was kept of the unit under way."""
+
+
 class Contacts(NamedTuple):
     """Geometry of N_c contacts."""
 

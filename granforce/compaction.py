@@ -1,0 +1,433 @@
+"""From a dilute gas of disks to a jammed packing, at constant pressure (arXiv:0803.3566).
+
+The dynamics runs until a certificate of jamming is found: an admissible force network on the
+present contacts, close to the dynamic forces. Then the geometry is finished: at μ > 0 the grains
+move by the least amount that closes every contact exactly; at μ = 0, where contact dynamics alone
+does not reach isostaticity, linear programs shrink the box under linearised non-overlap.
+"""
+
+import highspy
+import numpy as np
+import piqp
+from numba import njit
+from scipy import sparse
+
+from granforce import contact_dynamics as dynamics
+from granforce import programs
+from granforce.ensemble import ensemble
+from granforce.neighbours import find_pairs, separations
+from granforce.records import (
+    Cancelled,
+    InputError,
+    NotJammedError,
+    float_array,
+    friction,
+    make_contacts,
+    make_packing,
+    positive,
+)
+from granforce.relax.nearest import nearest
+from granforce.tolerances import BALANCED, CARRYING, JAMMED_DISTANCE, OVERLAP, TOUCHING
+
+INITIAL_FRACTION = 0.5
+# A certificate is looked for every so many steps, once grains and box are nearly at rest.
+CHECK_EVERY = 100
+NEARLY_BALANCED = 0.3
+# Strain of the box per step below which frictionless grains are handed to the linear programs.
+BOX_AT_REST = 1e-6
+# Skin of the neighbour list and reach of the finishing programs, in largest radii.
+SKIN = 0.2
+# Largest displacement of a grain that the finishing of a frictional packing may need.
+LARGEST_CORRECTION = 1e-2
+# Largest move of a grain in one of the linear programs, along each axis.
+TRUST = 0.05
+
+
+def pack(
+    n,
+    mu,
+    seed,
+    *,
+    radii="uniform:0.5,1",
+    pressure=1.0,
+    dt=0.01,
+    box_mass=100.0,
+    sweeps=100,
+    accuracy=1e-9,
+    max_steps=100_000,
+    progress=None,
+    cancel=None,
+):
+    """A jammed packing of n disks with friction coefficient μ in a doubly periodic square box.
+
+    radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii.
+    pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
+    radius, P0 and the mass density; sweeps, accuracy: Gauss–Seidel sweeps a step ends after, or
+    the relative change of forces in a sweep. progress(step, message) is called now and then;
+    cancel() returning True raises Cancelled.
+
+    Returns a Packing whose forces balance to BALANCED ⟨f_n⟩ and whose overlaps are below OVERLAP.
+    Raises NotJammedError after max_steps, with the state reached, and InputError for bad input.
+    """
+    mu = friction(mu)
+    pressure = positive(pressure, "pressure")
+    if int(n) != n or n < 3:
+        raise InputError(f"a packing needs at least 3 disks, got {n}")
+    for name, value in (("dt", dt), ("box_mass", box_mass), ("accuracy", accuracy)):
+        positive(value, name)
+    if sweeps < 1 or max_steps < 1:
+        raise InputError("sweeps and max_steps must be at least 1")
+    rng = np.random.default_rng(seed)
+    r = draw_radii(radii, int(n), rng)
+    unit = r.max()
+    motion = _dilute_gas(r / unit, rng)
+    settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
+    counters = np.zeros(4, dtype=np.int64)
+    work = {"list_rebuilds": 0, "certificates_tried": 0, "linear_programs": 0}
+    tell = progress or (lambda step, message: None)
+    while True:
+        motion, unbalance = _advance(motion, mu, settings, counters, work)
+        step = int(counters[dynamics.STEPS])
+        tell(step, f"φ = {_fraction(motion):.4f}, unbalance {unbalance:.1e} ⟨f_n⟩")
+        if cancel is not None and cancel():
+            raise Cancelled(f"compaction cancelled after {step} steps")
+        finished = _finish(motion, mu, settings, unbalance, work, cancel)
+        if finished is not None:
+            break
+        if step >= max_steps:
+            raise NotJammedError(
+                f"not jammed after {step} steps: φ = {_fraction(motion):.4f}, unbalance "
+                f"{unbalance:.1e} ⟨f_n⟩, strain rate {motion.dilation[0]:.1e}; allow more steps "
+                "(max_steps) or more sweeps"
+            )
+    info = {
+        "seed": seed,
+        "radii": radii if isinstance(radii, str) else "list",
+        **settings,
+        "steps": step,
+        "sweeps_done": int(counters[dynamics.SWEEPS]),
+        "contact_updates": int(counters[dynamics.UPDATES]),
+        **work,
+    }
+    return _in_users_units(finished, unit, pressure, info)
+
+
+def draw_radii(spec, n, rng):
+    """n radii from "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list."""
+    if not isinstance(spec, str):
+        r = float_array(spec, (n,), "radii")
+    else:
+        kind, _, numbers = spec.partition(":")
+        try:
+            values = [float(v) for v in numbers.split(",")]
+        except ValueError:
+            values = []
+        if kind == "uniform" and len(values) == 2 and 0 < values[0] <= values[1] < np.inf:
+            r = rng.uniform(*values, n)
+        elif kind == "bidisperse" and len(values) == 3 and 0 <= values[2] <= 1:
+            r = np.full(n, values[0])
+            r[rng.permutation(n)[: round(values[2] * n)]] = values[1]
+        else:
+            raise InputError(
+                f"radii {spec!r} not understood: give uniform:LOW,HIGH or "
+                "bidisperse:SMALL,LARGE,FRACTION_LARGE with 0 < LOW ≤ HIGH"
+            )
+    if not np.all(np.isfinite(r)) or np.any(r <= 0):
+        raise InputError("radii must be finite and > 0")
+    return r
+
+
+def _dilute_gas(r, rng):
+    fraction = INITIAL_FRACTION
+    largest_first = np.argsort(-r, kind="stable")
+    while True:
+        side = np.sqrt(np.pi * np.sum(r**2) / fraction)
+        x, placed = _insert(r, largest_first, side, rng, 20_000)
+        if placed:
+            break
+        # Few or very unequal disks may not fit at once: begin more dilute.
+        fraction *= 0.9
+    n = len(r)
+    velocity = np.zeros((n, 3))
+    return _with_new_list(
+        dynamics.Motion(
+            x, velocity, r, np.pi * r**2, np.full(2, side), np.zeros(1), *_no_pairs(), np.zeros(1)
+        )
+    )
+
+
+def _no_pairs():
+    return (
+        np.zeros(0, np.int64),
+        np.zeros(0, np.int64),
+        np.zeros((0, 2), np.int64),
+        np.zeros((0, 2)),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _insert(r, order, side, rng, attempts):
+    """Random sequential insertion in a periodic square; False where a disk found no place."""
+    x = np.empty((len(r), 2))
+    for k in range(len(order)):
+        a = order[k]
+        for _ in range(attempts):
+            x[a, 0] = rng.random() * side
+            x[a, 1] = rng.random() * side
+            free = 2.0 * r[a] < side
+            for m in range(k):
+                b = order[m]
+                d_x = abs(x[a, 0] - x[b, 0])
+                d_y = abs(x[a, 1] - x[b, 1])
+                d_x = min(d_x, side - d_x)
+                d_y = min(d_y, side - d_y)
+                if d_x * d_x + d_y * d_y < (r[a] + r[b]) ** 2:
+                    free = False
+                    break
+            if free:
+                break
+        else:
+            return x, False
+    return x, True
+
+
+def _with_new_list(motion):
+    if motion.box[0] <= 2 * motion.r.max():
+        raise NotJammedError(
+            "the box shrank to the largest disk's diameter without jamming: too few disks"
+        )
+    i, j, shift = find_pairs(motion.x, motion.r, motion.box, SKIN)
+    force = _carry_over(motion.i, motion.j, motion.shift, motion.force, i, j, shift)
+    return motion._replace(i=i, j=j, shift=shift, force=force, drift=np.zeros(1))
+
+
+@njit(cache=True, nogil=True)
+def _carry_over(old_i, old_j, old_shift, old_force, i, j, shift):
+    """Forces of the old pairs on the new ones, by grain numbers and image."""
+    grains = 1 + max(old_i.max() if len(old_i) else 0, i.max() if len(i) else 0)
+    start = np.zeros(grains + 1, np.int64)
+    # Lists come grouped by i, so the old pairs of one grain lie side by side.
+    for a in old_i:
+        start[a + 1] += 1
+    start = np.cumsum(start)
+    force = np.zeros((len(i), 2))
+    for p in range(len(i)):
+        for q in range(start[i[p]], start[i[p] + 1]):
+            same = shift[p, 0] == old_shift[q, 0] and shift[p, 1] == old_shift[q, 1]
+            if old_j[q] == j[p] and same:
+                force[p] = old_force[q]
+    return force
+
+
+def _advance(motion, mu, settings, counters, work):
+    """CHECK_EVERY time steps; returns the motion (a new record after a list rebuild), unbalance."""
+    goal = counters[dynamics.STEPS] + CHECK_EVERY
+    while counters[dynamics.STEPS] < goal:
+        _, unbalance = dynamics.advance(
+            motion,
+            mu,
+            1.0,
+            settings["box_mass"],
+            settings["dt"],
+            settings["sweeps"],
+            settings["accuracy"],
+            SKIN,
+            int(goal - counters[dynamics.STEPS]),
+            counters,
+        )
+        if motion.drift[0] > 0.5 * SKIN:
+            motion = _with_new_list(motion)
+            work["list_rebuilds"] += 1
+    return motion, unbalance
+
+
+def _fraction(motion):
+    return float(np.pi * np.sum(motion.r**2) / np.prod(motion.box))
+
+
+def _finish(motion, mu, settings, unbalance, work, cancel):
+    """The finished packing in natural units, or None while it is not jammed."""
+    if mu == 0:
+        if abs(motion.dilation[0]) * settings["dt"] > BOX_AT_REST:
+            return None
+        return _shrink_to_isostatic(motion, work, cancel)
+    if unbalance > NEARLY_BALANCED:
+        return None
+    work["certificates_tried"] += 1
+    return _certified(motion, mu)
+
+
+def _certified(motion, mu):
+    """The packing at rest, if an admissible network lies close to the dynamic forces."""
+    normal, length, gap = separations(
+        motion.x, motion.r, motion.box, motion.i, motion.j, motion.shift
+    )
+    touching = (motion.force[:, 0] > 0) | (gap < TOUCHING)
+    if not touching.any():
+        return None
+    packing = _packing_of(motion, motion.x, motion.box, touching, motion.force, mu)
+    found = nearest(ensemble(packing, prune=False), packing.forces)
+    far = np.linalg.norm(found.forces - packing.forces)
+    if not found.converged or far > JAMMED_DISTANCE * np.linalg.norm(packing.forces):
+        return None
+    closed = _close_contacts(motion, touching, normal, gap)
+    if closed is None:
+        return None
+    packing = _packing_of(motion, *closed, touching, motion.force, mu)
+    return _balanced(packing)
+
+
+def _balanced(packing):
+    """The packing with the nearest balanced network as its own, or None if there is none."""
+    try:
+        S = ensemble(packing)
+    except NotJammedError:
+        return None
+    found = nearest(S, S.original)
+    if not found.converged:
+        return None
+    return packing._replace(forces=S.expand(found.forces))
+
+
+def _packing_of(motion, x, box, touching, force, mu):
+    i, j, shift = motion.i[touching], motion.j[touching], motion.shift[touching]
+    normal, length, _ = separations(x, motion.r, box, i, j, shift)
+    contacts = make_contacts(i, j, normal, np.maximum(length, 0), motion.r)
+    # Overlap that contact dynamics left is closed before the packing is handed out: rigid arms.
+    contacts = contacts._replace(arm_i=motion.r[i], arm_j=motion.r[j])
+    return make_packing(x, motion.r, box, contacts, force[touching], mu, 1.0)
+
+
+def _close_contacts(motion, touching, normal, gap):
+    """Centres and box moved as little as brings touching gaps to 0 and keeps others ≥ 0.
+
+    Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box: near μ = 0 the
+    contacts are as many as the coordinates, and close only together with the box. Newton on the
+    gaps, each step a quadratic program; None where the contacts cannot all close.
+    """
+    x, box = motion.x.copy(), motion.box.copy()
+    near = touching | (gap < SKIN / 2)
+    i, j, shift = motion.i[near], motion.j[near], motion.shift[near]
+    exact = touching[near]
+    for _ in range(6):
+        normal, length, gap = separations(x, motion.r, box, i, j, shift)
+        if max(np.abs(gap[exact]).max(), -gap.min()) < 1e-3 * OVERLAP:
+            return x, box
+        weight = box[0] * np.sqrt(len(x))
+        R = sparse.hstack(
+            [_approach(i, j, normal, len(x)), sparse.csc_matrix(length[:, None] / weight)]
+        )
+        move = _least_motion(sparse.csr_matrix(R), gap, exact)
+        if move is None or np.abs(move[:-1]).max() > LARGEST_CORRECTION:
+            return None
+        strain = move[-1] / weight
+        x = x * (1 + strain) + move[:-1].reshape(-1, 2)
+        box = box * (1 + strain)
+    return None
+
+
+def _approach(i, j, normal, n):
+    """Sparse (pairs, 2n) matrix: first-order change of each gap with the displacements."""
+    row = np.repeat(np.arange(len(i)), 4)
+    column = np.column_stack([2 * i, 2 * i + 1, 2 * j, 2 * j + 1]).ravel()
+    value = np.column_stack([-normal, normal]).ravel()
+    return sparse.csc_matrix((value, (row, column)), shape=(len(i), 2 * n))
+
+
+def _least_motion(R, gap, exact):
+    """u with the least |u|² such that R u = −gap (exact) and R u ≥ −gap (others)."""
+    solver = piqp.SparseSolver()
+    solver.settings.eps_abs = solver.settings.eps_rel = 1e-14
+    # Forces are gap-sized: everything is scaled by the largest gap to be closed.
+    scale = max(np.abs(gap[exact]).max(), 1e-300)
+    n = R.shape[1]
+    others = ~exact
+    solver.setup(
+        sparse.identity(n, format="csc"),
+        np.zeros(n),
+        sparse.csc_matrix(R[exact]),
+        -gap[exact] / scale,
+        sparse.csc_matrix(R[others]),
+        -gap[others] / scale,
+        np.full(int(others.sum()), np.inf),
+    )
+    solver.solve()
+    move = np.array(solver.result.x) * scale
+    missed = np.abs(R[exact] @ move + gap[exact]).max() / scale
+    return move if missed < 1e-3 else None
+
+
+def _shrink_to_isostatic(motion, work, cancel):
+    """Frictionless finish: linear programs that shrink the box until no grain can make room.
+
+    minimise ε subject to gap_c + n_c·(u_j − u_i) + ε ℓ_c ≥ 0, |u| ≤ TRUST. Distances are convex
+    in the displacements, so no step makes an overlap; at the end the contacts that carry force
+    are exactly isostatic, N_c = 2M − 1.
+    """
+    x, box = motion.x.copy(), motion.box.copy()
+    x, box = _without_overlap(x, box, motion)
+    for _ in range(60):
+        if cancel is not None and cancel():
+            raise Cancelled("compaction cancelled in its last step")
+        i, j, shift = find_pairs(x, motion.r, box, 4 * TRUST)
+        normal, length, gap = separations(x, motion.r, box, i, j, shift)
+        move, strain = _shrink_program(i, j, normal, length, gap, len(x))
+        work["linear_programs"] += 1
+        x = x * (1 + strain) + move
+        box = box * (1 + strain)
+        # Rattlers move at the programs' whim to the end; only the box tells that nothing is left.
+        if strain > -1e-13:
+            break
+    i, j, shift = find_pairs(x, motion.r, box, TOUCHING)
+    at_rest = motion._replace(i=i, j=j, shift=shift)
+    touching = np.ones(len(i), bool)
+    packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), 0.0)
+    return _balanced(packing)
+
+
+def _without_overlap(x, box, motion):
+    """Expand the box until the largest overlap is gone: the programs start feasible."""
+    normal, length, gap = separations(x, motion.r, box, motion.i, motion.j, motion.shift)
+    growth = 1 + max(0.0, float(np.max(-gap / length, initial=0.0)))
+    return x * growth, box * growth
+
+
+def _shrink_program(i, j, normal, length, gap, n):
+    """Displacements (n, 2) and strain of the box of the linear program, by HiGHS."""
+    R = sparse.hstack([_approach(i, j, normal, n), sparse.csc_matrix(length[:, None])])
+    R = sparse.csc_matrix(R)
+    lp = highspy.HighsLp()
+    columns = 2 * n + 1
+    lp.num_col_, lp.num_row_ = columns, len(gap)
+    lp.col_cost_ = np.append(np.zeros(2 * n), 1.0)
+    # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the pairs' reach.
+    lp.col_lower_ = np.append(np.full(2 * n, -TRUST), -TRUST / 2)
+    lp.col_upper_ = np.append(np.full(2 * n, TRUST), 0.0)
+    lp.row_lower_ = -gap
+    lp.row_upper_ = np.full(len(gap), highspy.kHighsInf)
+    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    lp.a_matrix_.start_, lp.a_matrix_.index_ = R.indptr, R.indices
+    lp.a_matrix_.value_ = R.data
+    model = programs.silent_model()
+    model.passModel(lp)
+    status, u = programs.solve(model)
+    if status != programs.OPTIMAL:
+        raise NotJammedError("the last step of the frictionless compaction did not converge")
+    return u[:-1].reshape(-1, 2), float(u[-1])
+
+
+def _in_users_units(packing, unit, pressure, info):
+    contacts = packing.contacts
+    lengths = {
+        name: getattr(contacts, name) * unit for name in ("length", "gap", "arm_i", "arm_j")
+    }
+    return make_packing(
+        np.mod(packing.x, packing.box) * unit,
+        packing.r * unit,
+        packing.box * unit,
+        contacts._replace(**lengths),
+        packing.forces * unit * pressure,
+        packing.mu,
+        pressure,
+        info=info,
+    )
