@@ -66,7 +66,7 @@ VARIABLES: dict[str, Variable] = {
     "mu": Variable((), "float64", "1", "friction coefficient μ"),
     "pressure": Variable((), "float64", "force/length", "pressure P0, NaN where not prescribed"),
     "load": Variable(
-        ("grain", "load_component"), "float64", "force", "load F_x, F_y, torque/length"
+        ("grain", "load_component"), "float64", "force; force*length", "load F_x, F_y; torque"
     ),
     "contact_i": Variable(("contact",), "int64", "1", "first grain i of the contact"),
     "contact_j": Variable(("contact",), "int64", "1", "second grain j of the contact"),
