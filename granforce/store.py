@@ -544,7 +544,7 @@ def _write(folder, variables, attrs):
             compressors=(ZstdCodec(level=3),),
             dimension_names=variable.dims,
             attributes={"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
-            config={"write_empty_chunks": True},  # an all −0.0 chunk would come back as 0.0
+            config={"write_empty_chunks": True},  # else Zarr 3.0 loses a chunk of −0.0
         )
         array[...] = variable.values
 

@@ -162,9 +162,10 @@ def test_packing_without_contacts(store):
 
 
 def test_negative_zeros_survive(store):
-    """Zarr leaves out chunks that equal the fill value 0, and −0.0 does."""
-    saved = labelled({"states": np.full((3, 2, 2), -0.0)})
-    store.save("walk", PARAMS, saved, version=1)
+    """Zarr leaves out chunks that equal the fill value 0; in Zarr 3.0.8 those of −0.0 too."""
+    saved = labelled({"states": np.full((3, 2, 2), -0.0), "residual": np.zeros(3)})
+    name = store.save("walk", PARAMS, saved, version=1)
+    assert (store.path / name / "residual" / "c").exists()
     assert np.signbit(store.load("walk", PARAMS, version=1)["states"]).all()
 
 
@@ -209,11 +210,10 @@ def test_checksum_is_that_of_the_result(tmp_path):
     assert sums[0] == sums[1] and len(set(sums)) == 4
 
 
-def test_saving_twice_keeps_the_first(store):
+def test_saving_twice_keeps_the_first(store, monkeypatch):
     name = store.save("walk", PARAMS, walk_dataset(0), version=1)
-    before = (store.path / name).stat().st_ino
+    monkeypatch.setattr(store_module, "_write", None)
     assert store.save("walk", PARAMS, walk_dataset(1), version=1) == name
-    assert (store.path / name).stat().st_ino == before
     xr.testing.assert_equal(store.load("walk", PARAMS, version=1), walk_dataset(0))
 
 
@@ -372,6 +372,7 @@ DAMAGES = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:Object at states")
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES.keys())
 def test_damage_is_reported_and_replaced(store, damage):
     saved = walk_dataset().assign_attrs(note="first note")
@@ -389,6 +390,15 @@ def test_damage_is_reported_and_replaced(store, damage):
         xr.testing.assert_equal(store.load("walk", PARAMS, version=1), saved)
     assert len(before) == len((store.path / name / "zarr.json").read_bytes())
     assert list(store.path.glob(".tmp-*")) == []
+
+
+def test_entry_under_the_name_of_another_is_not_taken_for_it(store):
+    name = store.save("walk", PARAMS, walk_dataset(), version=1)
+    other = store.name("walk", PARAMS | {"mu": 0.2}, version=1)
+    shutil.copytree(store.path / name, store.path / other)
+    with pytest.warns(UserWarning, match=other):
+        assert store.load("walk", PARAMS | {"mu": 0.2}, version=1) is None
+    assert list(store) == [name]
 
 
 def test_entry_with_damaged_metadata_is_left_out(store):
@@ -638,7 +648,7 @@ def test_killed_writers_leave_no_broken_entry(tmp_path):
 def test_import_is_light():
     code = (
         "import sys, granforce.store\n"
-        "print(*{m.split('.')[0] for m in sys.modules} & {'numba', 'panel', 'holoviews', 'scipy'})"
+        "print(*{m.split('.')[0] for m in sys.modules} & {'numba', 'panel', 'holoviews'})"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert loaded.returncode == 0 and loaded.stdout.split() == []
