@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from granforce.neighbours import find_pairs, separations
-from granforce.records import InputError, make_contacts, make_packing
+from granforce.records import InputError, make_contacts, make_packing, positive
 
 # Contacts may overlap, or gape, by this part of the smaller radius before the file must be wrong.
 OVERLAP_ALLOWED = 0.2
@@ -39,10 +39,20 @@ def branches(x, box, i, j):
 
 
 def touching(x, r, box, tolerance):
-    """Contacts between all grains whose gap is below tolerance (in largest radii)."""
+    """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1)."""
+    tolerance = positive(tolerance, "tolerance")
+    if tolerance > 1:
+        raise InputError(f"tolerance is in largest radii and must not exceed 1, got {tolerance:g}")
     i, j, shift = find_pairs(x, r, box, tolerance * r.max())
     normal, length, _ = separations(x, r, box, i, j, shift)
     return make_contacts(i, j, normal, length, r)
+
+
+def overlapping(x, r, box):
+    """Grains i, j (P,) of all pairs that overlap, and their gaps (P,) < 0; centres may coincide."""
+    i, j, shift = find_pairs(x, r, box, 0.0)
+    side = np.where(np.isfinite(box), box, 0.0)
+    return i, j, np.hypot(*(x[j] - x[i] + shift * side).T) - r[i] - r[j]
 
 
 def listed(x, r, box, i, j, place, branch=None):
@@ -65,7 +75,7 @@ def listed(x, r, box, i, j, place, branch=None):
 
 
 def check_contacts(contacts, r, place):
-    """InputError naming a contact of disks that do not touch or overlap too much, or a repeated one."""
+    """InputError naming a contact whose disks overlap or gape too much, or that is given twice."""
     i, j, gap = contacts.i, contacts.j, contacts.gap
     for c in np.flatnonzero(np.abs(gap) > OVERLAP_ALLOWED * np.minimum(r[i], r[j]))[:1]:
         state = "overlap" if gap[c] < 0 else "are apart"
@@ -93,8 +103,7 @@ def check_disks(x, r, box, place):
             "contact; shift the origin, or check the unit of the radii"
         )
     _check_crowding(x, r, box)
-    i, j, shift = find_pairs(x, r, box, 0.0)
-    gap = separations(x, r, box, i, j, shift)[2]
+    i, j, gap = overlapping(x, r, box)
     for c in np.flatnonzero(-gap > OVERLAP_ALLOWED * np.minimum(r[i], r[j]))[:1]:
         raise InputError(
             f"{place(j[c])}: {_pair(i, j, c)} overlap by {-gap[c]:.3g}, more than "

@@ -1,4 +1,4 @@
-"""Packings from LAMMPS dumps: ``dump custom`` of the particles and ``dump local`` of the contacts."""
+"""Packings from LAMMPS: ``dump custom`` of the particles, ``dump local`` of the contacts."""
 
 from typing import NamedTuple
 
@@ -124,7 +124,7 @@ def _box(name, items):
     for k in np.flatnonzero(high <= low)[:1]:
         raise InputError(f"{bounds.place(k)}: the upper bound of the box is not above the lower")
     # Dumps of old versions have no flags, and were periodic by default.
-    is_open = np.array([flag != "pp" for flag in (flags + ["pp", "pp"])[:2]])
+    is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
     return low, np.where(is_open, np.inf, high - low)
 
 

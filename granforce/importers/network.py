@@ -3,12 +3,13 @@
 import numpy as np
 
 from granforce.ensemble import ensemble
-from granforce.neighbours import find_pairs, separations
+from granforce.importers.geometry import overlapping
 from granforce.records import InputError, NotJammedError
-from granforce.relax.nearest import nearest
+from granforce.relax.nearest import least_unbalanced, nearest
+from granforce.tolerances import CARRYING
 
-# External loads of an open set may miss balance by this part of their mean: rounding in the file,
-# spread over the loaded grains; S would be empty otherwise.
+# The loads of an open set may miss balance by this part of ⟨f_n⟩ (digits lost in the file); the
+# difference is then taken off them, since S would be empty otherwise.
 LOAD_MISFIT = 1e-3
 
 
@@ -37,15 +38,12 @@ def find(packing, **info):
 
     Needs a pressure, or loads in an open box. Raises NotJammedError where no network exists.
     """
+    if not len(packing.contacts.i):
+        raise NotJammedError("no grains touch; check the radii, or raise the tolerance")
     if np.isnan(packing.pressure):
-        packing = _with_settled_loads(packing)
-        guess = np.hypot(*packing.load[:, :2].T).sum() / max(1, np.count_nonzero(packing.load))
+        packing, S = _under_loads(packing)
     else:
-        guess = packing.pressure * packing.r.max()
-    uniform = np.zeros_like(packing.forces)
-    uniform[:, 0] = guess or 1.0
-    packing = packing._replace(forces=uniform)
-    S = ensemble(packing)
+        S = ensemble(packing)
     start = np.zeros_like(S.original)
     start[:, 0] = S.force_scale
     relaxed = nearest(S, start)
@@ -88,7 +86,7 @@ def report(packing, ens=None):
 
 
 def _judged(packing):
-    """Residual and violation of the packing's own forces on all its contacts.
+    """Residual and violation of the packing's own forces, and the grains they leave without load.
 
     Without pruning, so that it can be said of any network, also where S is empty.
     """
@@ -96,62 +94,76 @@ def _judged(packing):
     return {
         "residual": whole.residual(packing.forces),
         "violation": whole.violation(packing.forces),
-        "rattlers": whole.skipped["rattlers"],
+        "rattlers": len(packing.r) - len(_held(whole)),
     }
 
 
+def _held(whole):
+    """Grains on which the packing's own network presses by more than its noise."""
+    pressing = whole.original[:, 0] > CARRYING * whole.force_scale
+    return np.union1d(whole.contacts.i[pressing], whole.contacts.j[pressing])
+
+
 def _largest_overlap(packing):
-    x, r, box = packing.x, packing.r, packing.box
-    i, j, shift = find_pairs(x, r, box, 0.0)
-    gap = separations(x, r, box, i, j, shift)[2]
-    return float(max(0.0, -gap.min(initial=0.0)) / r.max())
+    gap = overlapping(packing.x, packing.r, packing.box)[2]
+    return float(-gap.min(initial=0.0) / packing.r.max())
 
 
 def _left_over(packing):
     """Loads (N, 3) that balance every grain under the packing's own contact forces.
 
-    All of them, not only the large ones: then the network lies in S to rounding, and what rigid
-    lever arms lack of the centre distance stays consistent.
+    All that carry force, not only those with a large rest: then the network lies in S to rounding,
+    and what rigid lever arms lack of the centre distance stays consistent. Rattlers get none: what
+    noise leaves on them need not lie in any cone.
     """
     whole = ensemble(packing, prune=False)
     rest = (whole.A @ whole.to_vector(packing.forces)).reshape(len(whole.grains), -1)
     load = np.zeros((len(packing.r), 3))
     load[whole.grains, : rest.shape[1]] = -rest
     load[:, 2] *= packing.r
+    load[np.setdiff1d(whole.grains, _held(whole))] = 0.0
     return load
 
 
-def _with_settled_loads(packing):
-    """Lever arms that meet midway and loads that balance as a whole, to rounding.
+def _under_loads(packing):
+    """The packing of an open set, its loads in balance to rounding, and its ensemble.
 
-    With a_i + a_j = ℓ the balance of all grains implies that of the loads; arms that miss ℓ by a
-    gap would instead demand a particular Σ gap f_t.
+    Lever arms meet midway: with a_i + a_j = ℓ the balance of all grains implies that of the loads,
+    while arms that miss ℓ by a gap would demand one particular Σ gap f_t.
     """
-    contacts, r = packing.contacts, packing.r
-    contacts = contacts._replace(
-        arm_i=r[contacts.i] + contacts.gap / 2, arm_j=r[contacts.j] + contacts.gap / 2
-    )
-    loaded = np.flatnonzero(packing.load.any(axis=1))
-    if not len(loaded):
+    if not packing.load.any():
         raise InputError(
             "an open set needs loads (columns fx, fy, torque of the grains) or forces "
             "(columns fn, ft of the contacts); a periodic one its box"
         )
-    unit = r.max()
-    load = packing.load[loaded] / [1.0, 1.0, unit]
-    arm = (packing.x[loaded] - packing.x[loaded].mean(axis=0)) / unit
-    total = np.zeros((3, len(loaded), 3))  # force, force, torque of all from the load on each
-    total[0, :, 0] = total[1, :, 1] = total[2, :, 2] = 1.0
-    total[2, :, 0], total[2, :, 1] = -arm[:, 1], arm[:, 0]
-    # A periodic direction has no centre to turn about.
-    total = total[: 3 if np.all(np.isinf(packing.box)) else 2].reshape(-1, load.size)
-    correction = np.linalg.lstsq(total, total @ load.ravel())[0].reshape(load.shape)
-    scale = np.abs(load).max(axis=1).mean()
-    if np.abs(correction).max() > LOAD_MISFIT * scale:
-        rest = ", ".join(f"{value:.3g}" for value in total @ load.ravel())
-        raise InputError(
-            f"the loads do not balance: their sums (fx, fy, torque/r) are {rest}; correct them"
+    contacts, r = packing.contacts, packing.r
+    arms = {"arm_i": r[contacts.i] + contacts.gap / 2, "arm_j": r[contacts.j] + contacts.gap / 2}
+    force = np.abs(packing.load / [1.0, 1.0, r.max()]).max(axis=1)
+    forces = np.zeros_like(packing.forces)
+    forces[:, 0] = force[force > 0].mean()  # the scale that tolerances are relative to
+    packing = packing._replace(contacts=contacts._replace(**arms), forces=forces)
+    settled = _settled(packing)
+    try:
+        return packing, ensemble(packing)
+    except NotJammedError:
+        return settled, ensemble(settled)
+
+
+def _settled(packing):
+    """The packing with the loads nearest to its own that contact forces can balance."""
+    whole = ensemble(packing, prune=False)
+    rest = least_unbalanced(whole.cone_form[0], whole.b / whole.force_scale)[1]
+    rest = rest.reshape(len(whole.grains), -1)
+    unbalanced = np.abs(rest).max(axis=1)
+    if unbalanced.max() > LOAD_MISFIT:
+        named = ", ".join(str(whole.grains[k]) for k in np.argsort(-unbalanced, kind="stable")[:5])
+        total = ", ".join(f"{value:.3g}" for value in packing.load[:, :2].sum(axis=0))
+        raise NotJammedError(
+            f"no forces balance the loads, whose sum is ({total}); correct loads or contacts: "
+            f"most is left over at grains {named} (counted from 0)"
         )
-    settled = packing.load.copy()
-    settled[loaded] = (load - correction) * [1.0, 1.0, unit]
-    return packing._replace(contacts=contacts, load=settled)
+    load = packing.load.copy()
+    unit = np.column_stack([np.ones((len(whole.grains), 2)), packing.r[whole.grains]])
+    width = rest.shape[1]
+    load[whole.grains, :width] -= whole.force_scale * rest * unit[:, :width]
+    return packing._replace(load=load)

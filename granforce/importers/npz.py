@@ -102,6 +102,8 @@ def _packing(arrays):
         if array.dtype.kind not in kind:
             raise InputError(f"array {key} has type {array.dtype}; store plain numbers")
     r = float_array(arrays["r"], (-1,), "r")
+    if not len(r):
+        raise InputError("it holds no grains")
     if np.any(r <= 0):
         raise InputError(f"radius of grain {int(np.argmax(r <= 0))} is not positive")
     contacts = _contacts(arrays, r)

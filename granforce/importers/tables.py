@@ -31,8 +31,7 @@ def read_table(
     if contacts is None:
         if forces:
             raise InputError("forces need a table of contacts with columns i, j, fn, ft")
-        tolerance = positive(tolerance, "tolerance")
-        joined, given = touching(x, r, box, min(tolerance, 1.0)), None
+        joined, given = touching(x, r, box, tolerance), None
     else:
         joined, given = _joined(read_csv(contacts), table, x, r, box, forces, mu)
     closed = bool(np.all(np.isfinite(box)))
