@@ -450,10 +450,11 @@ def test_open_set_under_known_loads_finds_a_network():
     part = cluster(load_packing(SMALL), 5.0)
     load = dict(zip(("fx", "fy", "torque"), part.load.T, strict=True))
     rounded = {name: np.round(column, 6) for name, column in load.items()}
-    for given_load in (load, rounded):
+    for given_load, corrected in ((load, False), (rounded, True)):
         found = read_table(*tables(part, forces=False, **given_load), mu=part.mu)
         assert found.info["residual"] < 1e-9 and found.info["violation"] < 1e-9
         np.testing.assert_allclose(found.load, part.load, atol=1e-5)
+        assert (found.info.get("load_change", 0.0) > 1e-7) == corrected
     arms = found.contacts.arm_i + found.contacts.arm_j
     np.testing.assert_allclose(arms, found.contacts.length, rtol=1e-15)
 
@@ -612,7 +613,8 @@ def test_garbled_dumps_never_break_the_reader(data):
         for _ in range(data.draw(st.integers(0, 2))):
             row = data.draw(st.integers(0, 14))
             words = text[row].split()
-            words[data.draw(st.integers(0, len(words) - 1))] = data.draw(WORDS)
+            at = data.draw(st.integers(0, len(words)))
+            words[at : at + 1] = [data.draw(WORDS)]
             text[row] = " ".join(words)
         pair.append(io.StringIO("\n".join(text)))
     survives(read_lammps, *pair, 0.3)

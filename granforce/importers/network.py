@@ -36,7 +36,8 @@ def adopt(packing, **info):
 def find(packing, **info):
     """The packing with the admissible force network nearest to equal normal forces.
 
-    Needs a pressure, or loads in an open box. Raises NotJammedError where no network exists.
+    Needs a pressure, or loads in an open box; loads that miss balance by rounding are corrected
+    (info["load_change"]). Raises NotJammedError where no network exists.
     """
     if not len(packing.contacts.i):
         raise NotJammedError("no grains touch; check the radii, or raise the tolerance")
@@ -150,7 +151,10 @@ def _under_loads(packing):
 
 
 def _settled(packing):
-    """The packing with the loads nearest to its own that contact forces can balance."""
+    """The packing with the loads nearest to its own that contact forces can balance.
+
+    info["load_change"] is the largest change, in ⟨f_n⟩.
+    """
     whole = ensemble(packing, prune=False)
     rest = least_unbalanced(whole.cone_form[0], whole.b / whole.force_scale)[1]
     rest = rest.reshape(len(whole.grains), -1)
@@ -166,4 +170,5 @@ def _settled(packing):
     unit = np.column_stack([np.ones((len(whole.grains), 2)), packing.r[whole.grains]])
     width = rest.shape[1]
     load[whole.grains, :width] -= whole.force_scale * rest * unit[:, :width]
-    return packing._replace(load=load)
+    change = {"load_change": float(unbalanced.max())}
+    return packing._replace(load=load, info={**packing.info, **change})
