@@ -27,7 +27,7 @@ from granforce.records import (
     positive,
 )
 from granforce.relax.nearest import nearest
-from granforce.tolerances import BALANCED, CARRYING, JAMMED_DISTANCE, OVERLAP, TOUCHING
+from granforce.tolerances import JAMMED_DISTANCE, OVERLAP, TOUCHING
 
 INITIAL_FRACTION = 0.5
 # A certificate is looked for every so many steps, once grains and box are nearly at rest.
@@ -50,8 +50,8 @@ def pack(
     *,
     radii="uniform:0.5,1",
     pressure=1.0,
-    dt=0.01,
-    box_mass=100.0,
+    dt=0.05,
+    box_mass=30.0,
     sweeps=100,
     accuracy=1e-9,
     max_steps=100_000,
@@ -259,34 +259,36 @@ def _finish(motion, mu, settings, unbalance, work, cancel):
 
 def _certified(motion, mu):
     """The packing at rest, if an admissible network lies close to the dynamic forces."""
-    normal, length, gap = separations(
-        motion.x, motion.r, motion.box, motion.i, motion.j, motion.shift
-    )
+    normal, _, gap = separations(motion.x, motion.r, motion.box, motion.i, motion.j, motion.shift)
     touching = (motion.force[:, 0] > 0) | (gap < TOUCHING)
     if not touching.any():
         return None
-    packing = _packing_of(motion, motion.x, motion.box, touching, motion.force, mu)
-    found = nearest(ensemble(packing, prune=False), packing.forces)
-    far = np.linalg.norm(found.forces - packing.forces)
-    if not found.converged or far > JAMMED_DISTANCE * np.linalg.norm(packing.forces):
+    as_it_moves = _packing_of(motion, motion.x, motion.box, touching, motion.force, mu)
+    if _near_forces(as_it_moves) is None:
         return None
     closed = _close_contacts(motion, touching, normal, gap)
     if closed is None:
         return None
-    packing = _packing_of(motion, *closed, touching, motion.force, mu)
-    return _balanced(packing)
+    x, box, touching = closed
+    packing = _packing_of(motion, x, box, touching, motion.force, mu)
+    found = _near_forces(packing)
+    if found is None:
+        # Overlap had jammed more contacts than rigid disks can have: go on from where they fit.
+        motion.x[:], motion.box[:] = x, box
+        return None
+    return packing._replace(forces=found)
 
 
-def _balanced(packing):
-    """The packing with the nearest balanced network as its own, or None if there is none."""
+def _near_forces(packing):
+    """The balanced network nearest to the packing's forces, or None if it is not close to them."""
     try:
         S = ensemble(packing)
     except NotJammedError:
         return None
     found = nearest(S, S.original)
-    if not found.converged:
-        return None
-    return packing._replace(forces=S.expand(found.forces))
+    forces = S.expand(found.forces)
+    far = np.linalg.norm(forces - packing.forces) / np.linalg.norm(packing.forces)
+    return forces if found.converged and far <= JAMMED_DISTANCE else None
 
 
 def _packing_of(motion, x, box, touching, force, mu):
@@ -309,16 +311,20 @@ def _close_contacts(motion, touching, normal, gap):
     near = touching | (gap < SKIN / 2)
     i, j, shift = motion.i[near], motion.j[near], motion.shift[near]
     exact = touching[near]
-    for _ in range(6):
+    force = motion.force[near, 0]
+    for _ in range(8):
         normal, length, gap = separations(x, motion.r, box, i, j, shift)
         if max(np.abs(gap[exact]).max(), -gap.min()) < 1e-3 * OVERLAP:
-            return x, box
+            closed = np.zeros(len(touching), bool)
+            closed[near] = exact
+            return x, box, closed
         weight = box[0] * np.sqrt(len(x))
         R = sparse.hstack(
             [_approach(i, j, normal, len(x)), sparse.csc_matrix(length[:, None] / weight)]
         )
-        move = _least_motion(sparse.csr_matrix(R), gap, exact)
-        if move is None or np.abs(move[:-1]).max() > LARGEST_CORRECTION:
+        move, opened = _least_motion(sparse.csr_matrix(R), gap, exact, force)
+        exact &= ~opened
+        if np.abs(move[:-1]).max() > LARGEST_CORRECTION or not exact.any():
             return None
         strain = move[-1] / weight
         x = x * (1 + strain) + move[:-1].reshape(-1, 2)
@@ -334,27 +340,41 @@ def _approach(i, j, normal, n):
     return sparse.csc_matrix((value, (row, column)), shape=(len(i), 2 * n))
 
 
-def _least_motion(R, gap, exact):
-    """u with the least |u|² such that R u = −gap (exact) and R u ≥ −gap (others)."""
-    solver = piqp.SparseSolver()
-    solver.settings.eps_abs = solver.settings.eps_rel = 1e-14
-    # Forces are gap-sized: everything is scaled by the largest gap to be closed.
-    scale = max(np.abs(gap[exact]).max(), 1e-300)
-    n = R.shape[1]
+def _least_motion(R, gap, exact, force):
+    """u with the least |u|² such that R u = −gap (exact) and R u ≥ −gap (others); who had to open.
+
+    Overlap that piled up during the dynamics can leave more contacts than rigid disks can close
+    at once (near μ = 0). Then those open whose work Σ f_n · opening is least.
+    """
     others = ~exact
-    solver.setup(
-        sparse.identity(n, format="csc"),
-        np.zeros(n),
-        sparse.csc_matrix(R[exact]),
-        -gap[exact] / scale,
-        sparse.csc_matrix(R[others]),
-        -gap[others] / scale,
-        np.full(int(others.sum()), np.inf),
-    )
-    solver.solve()
-    move = np.array(solver.result.x) * scale
-    missed = np.abs(R[exact] @ move + gap[exact]).max() / scale
-    return move if missed < 1e-3 else None
+    n, closed = R.shape[1], int(exact.sum())
+    # Scaled by the largest gap to be closed, so that the solver's tolerance is relative to it.
+    scale = max(np.abs(gap[exact]).max(), -gap.min(), 1e-300)
+    cost = 1e4 * (force[exact] / max(force.mean(), 1e-300) + 1e-3)
+    for slack in (0, closed):
+        opening = sparse.eye(closed, slack)
+        solver = piqp.SparseSolver()
+        solver.settings.eps_abs = solver.settings.eps_rel = 1e-14
+        solver.setup(
+            sparse.block_diag([sparse.identity(n), 1e-8 * sparse.identity(slack)], format="csc"),
+            np.concatenate([np.zeros(n), cost[:slack]]),
+            sparse.csc_matrix(sparse.hstack([R[exact], -opening])),
+            -gap[exact] / scale,
+            sparse.csc_matrix(
+                sparse.hstack([R[others], sparse.csr_matrix((int(others.sum()), slack))])
+            ),
+            -gap[others] / scale,
+            np.full(int(others.sum()), np.inf),
+            np.concatenate([np.full(n, -np.inf), np.zeros(slack)]),
+        )
+        solver.solve()
+        move = np.array(solver.result.x)[:n]
+        left = R[exact] @ move + gap[exact] / scale
+        if np.abs(left).max() < 1e-3:
+            break
+    opened = np.zeros(len(gap), bool)
+    opened[exact] = left > 1e-3
+    return move * scale, opened
 
 
 def _shrink_to_isostatic(motion, work, cancel):
@@ -382,12 +402,14 @@ def _shrink_to_isostatic(motion, work, cancel):
     at_rest = motion._replace(i=i, j=j, shift=shift)
     touching = np.ones(len(i), bool)
     packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), 0.0)
-    return _balanced(packing)
+    S = ensemble(packing)
+    found = nearest(S, S.original)
+    return packing._replace(forces=S.expand(found.forces)) if found.converged else None
 
 
 def _without_overlap(x, box, motion):
     """Expand the box until the largest overlap is gone: the programs start feasible."""
-    normal, length, gap = separations(x, motion.r, box, motion.i, motion.j, motion.shift)
+    _, length, gap = separations(x, motion.r, box, motion.i, motion.j, motion.shift)
     growth = 1 + max(0.0, float(np.max(-gap / length, initial=0.0)))
     return x * growth, box * growth
 
