@@ -41,14 +41,18 @@ class Ensemble:
         """Whether the pressure is prescribed (a periodic box without frozen contacts)."""
         return self.A.shape[0] % (1 + self.per_contact) == 1
 
-    @property
+    @cached_property
     def dimension(self):
-        """Generic dimension h of S: 2N_c − (3M − 1) in a periodic box (N_c − (2M − 1) at μ = 0).
+        """Dimension h of S: unknowns less independent balance rows.
 
-        Redundant balance rows beyond the two translations (crystals) make the true one larger.
+        With a prescribed pressure the generic value 2N_c − (3M − 1) (at μ = 0, N_c − (2M − 1));
+        crystals, whose rows depend on each other, have more. With frozen contacts or boundary
+        loads the rank of A, by singular values.
         """
-        redundant = 2 if self.has_pressure_row else 0
-        return max(0, self.A.shape[1] - (self.A.shape[0] - redundant))
+        rows, unknowns = self.A.shape
+        if self.has_pressure_row:
+            return max(0, unknowns - (rows - 2))
+        return unknowns - int(np.linalg.matrix_rank(self.A.toarray())) if unknowns else 0
 
     @property
     def coordination(self):
@@ -96,7 +100,8 @@ class Ensemble:
         normal force. NaN forces give NaN.
         """
         x = self.to_vector(forces)
-        rows = np.abs(self.A @ x.reshape(-1, x.shape[-1]).T - self.b[:, None])
+        columns = x.reshape(int(np.prod(x.shape[:-1])), x.shape[-1]).T
+        rows = np.abs(self.A @ columns - self.b[:, None])
         worst = rows.max(axis=0, initial=0.0) / self.force_scale
         return _plain(worst.reshape(x.shape[:-1]))
 
@@ -265,6 +270,8 @@ def _carrying(full):
     while idle.any():
         programs.set_cost(model, -(normal_rows.T @ idle.astype(float)))
         status, y = programs.solve(model)
+        if status == programs.INFEASIBLE and known is not None:
+            break  # feasible within BALANCED but not exactly: what is known to carry, carries
         if status == programs.INFEASIBLE:
             raise NotJammedError(_unbalanced_message(full))
         if status != programs.OPTIMAL:

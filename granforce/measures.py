@@ -1,0 +1,79 @@
+"""Measures of force indeterminacy (PRE 79, 052302), of any states from anywhere.
+
+States are arrays (S, N_c, 2) of force networks (f_n, f_t) on the same contacts.
+"""
+
+import numpy as np
+from scipy import stats
+
+
+def mean_network(states):
+    """G_c = ⟨F_c⟩, the mean force of each contact over states, shape (N_c, 2)."""
+    return states.mean(axis=0)
+
+
+def eta1(states):
+    """η1 = ⟨δF_c⟩_c / ⟨|G_c|⟩_c with δF_c = sqrt⟨|F_c − G_c|²⟩ over states."""
+    mean = mean_network(states)
+    spread = np.sqrt(((states - mean) ** 2).sum(axis=2).mean(axis=0))
+    return float(spread.mean() / np.linalg.norm(mean, axis=1).mean())
+
+
+def eta2(states):
+    """η2 = sqrt(⟨Σ_c |F_c − F'_c|²⟩ / Σ_c |G_c|²) over all pairs of different states.
+
+    The mean over pairs is 2 S/(S − 1) times the variance, so no pair is ever formed; 0 for S = 1.
+    """
+    count = len(states)
+    if count < 2:
+        return 0.0
+    mean = mean_network(states)
+    variance = ((states - mean) ** 2).sum() / count
+    return float(np.sqrt(2 * count / (count - 1) * variance / (mean**2).sum()))
+
+
+def eta3(low, high):
+    """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩ over all 2N_c components.
+
+    low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact.
+    """
+    return float((high - low).mean() / ((high + low) / 2).mean())
+
+
+def intervals_seen(states):
+    """Smallest and largest value of each component over states, two arrays (N_c, 2)."""
+    return states.min(axis=0), states.max(axis=0)
+
+
+def normal_extent(low, high):
+    """ΔF_n, the length of the interval of f_n of each contact, shape (N_c,)."""
+    return high[:, 0] - low[:, 0]
+
+
+def correlation(normal_forces, extent):
+    """corr(f_n, ΔF_n) over contacts (Pearson); nan where one of them does not vary."""
+    if np.ptp(extent) <= 1e-12 * np.abs(normal_forces).max(initial=0) or np.ptp(normal_forces) == 0:
+        return float("nan")
+    return float(stats.pearsonr(normal_forces, extent).statistic)
+
+
+def correlation_range(states, extent):
+    """Smallest and largest corr(f_n, ΔF_n) with any state in place of the original network.
+
+    The paper's error bar of the correlation.
+    """
+    values = [correlation(state[:, 0], extent) for state in states]
+    return float(np.min(values)), float(np.max(values))
+
+
+def distances(states, centre):
+    """Distance |F − centre| of each state in force space, shape (S,)."""
+    return np.sqrt(((states - centre) ** 2).sum(axis=(1, 2)))
+
+
+def growing_eta3(states):
+    """η3 from the first 1, 2, … S states, shape (S,)."""
+    low = np.minimum.accumulate(states, axis=0)
+    high = np.maximum.accumulate(states, axis=0)
+    extent, middle = (high - low).mean(axis=(1, 2)), (high + low).mean(axis=(1, 2)) / 2
+    return extent / middle

@@ -1,0 +1,136 @@
+"""Relaxation by contact dynamics: the paper's Gauss–Seidel-like sweeps on a fixed geometry."""
+
+import time
+
+import numpy as np
+from numba import njit
+
+from granforce.contact_dynamics import StepProblem, add_forces, set_stiffness, sweep
+from granforce.records import Relaxation
+from granforce.tolerances import EQUILIBRIUM
+
+# Inertia M_λ of the box in masses ρ r_max²: between 1 and 100 it changes the number of sweeps by
+# less than 10 % for μ from 0.01 to 10.
+BOX_MASS = 10.0
+# Sweeps between two looks at the residual, which costs about as much as a sweep.
+LOOK_EVERY = 20
+# Forces that change by less than this part of the residual in a sweep have settled while grains
+# still move: contacts slide or open for good, and the state is no equilibrium.
+SETTLED = 1e-6
+
+
+def gauss_seidel(
+    ensemble,
+    start,
+    *,
+    tolerance=EQUILIBRIUM,
+    max_iterations=100_000,
+    order="sequential",
+    seed=0,
+):
+    """One step of contact dynamics from rest, with the given forces (N_c, 2) as first guess.
+
+    Sweeps until the residual falls to the tolerance (in ⟨f_n⟩), until grains are seen to move
+    steadily (``converged`` with a residual above the tolerance: no equilibrium), or until
+    max_iterations. order: "sequential" or "random" (a fresh permutation each sweep, from seed).
+    """
+    begin = time.perf_counter()
+    problem, velocity, dilation, unit = _from_rest(ensemble)
+    force = np.ascontiguousarray(start, dtype=np.float64) / ensemble.force_scale
+    sweeps, settled = _relax(
+        problem,
+        velocity,
+        dilation,
+        unit,
+        ensemble.mu,
+        force,
+        tolerance,
+        max_iterations,
+        order == "random",
+        np.random.default_rng(seed),
+    )
+    forces = force * ensemble.force_scale
+    residual = ensemble.residual(forces)
+    return Relaxation(
+        forces,
+        int(sweeps),
+        residual,
+        ensemble.violation(forces),
+        bool(settled or residual <= tolerance),
+        time.perf_counter() - begin,
+    )
+
+
+def _from_rest(ensemble):
+    """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
+
+    The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the
+    grains and on the box besides the unknown contact forces. Δt = 1 throughout.
+    """
+    contacts, grains = ensemble.contacts, ensemble.grains
+    longest = float(ensemble.packing.r.max())
+    r = ensemble.packing.r[grains] / longest
+    row_of = np.full(len(ensemble.packing.r), -1)
+    row_of[grains] = np.arange(len(grains))
+    size = 1 + ensemble.per_contact
+    count = len(contacts.i)
+    velocity = np.zeros((len(grains), 3))
+    outer = -ensemble.b[: size * len(grains)].reshape(-1, size) / ensemble.force_scale
+    mass = np.pi * r**2
+    inertia = 0.5 * mass * r**2
+    velocity[:, :2] = outer[:, :2] / mass[:, None]
+    if size == 3:
+        velocity[:, 2] = outer[:, 2] * r / inertia
+    compliance = dilation = 0.0
+    length = contacts.length / longest
+    if ensemble.has_pressure_row:
+        # 2 V in units of r_max² and P0 in ⟨f_n⟩/r_max: P0 · 2 V = Σ ℓ, by the choice of ⟨f_n⟩.
+        twice_volume = 2 * ensemble.packing.volume / longest**2
+        compliance = 1 / (twice_volume * BOX_MASS)
+        dilation = -length.sum() * compliance
+    problem = StepProblem(
+        row_of[contacts.i],
+        row_of[contacts.j],
+        contacts.normal[:, 0].copy(),
+        contacts.normal[:, 1].copy(),
+        length,
+        contacts.arm_i / longest,
+        contacts.arm_j / longest,
+        np.zeros(count),
+        np.empty(count),
+        np.empty(count),
+        1 / mass,
+        1 / inertia,
+        compliance,
+    )
+    # What turns velocities (v_x, v_y, ω) and λ back into forces in ⟨f_n⟩.
+    box_unit = 1 / (compliance * length.sum()) if compliance else 0.0
+    unit = np.append(np.column_stack([mass, mass, inertia / r]).ravel(), box_unit)
+    return problem, velocity, dilation, unit
+
+
+@njit(cache=True, nogil=True)
+def _relax(problem, velocity, dilation, unit, mu, force, tolerance, max_sweeps, shuffle, rng):
+    set_stiffness(problem)
+    dilation = add_forces(problem, force, velocity, dilation)
+    order = np.arange(force.shape[0])
+    for k in range(max_sweeps):
+        if shuffle:
+            rng.shuffle(order)
+        dilation, change, total = sweep(problem, order, mu, force, velocity, dilation)
+        if (k + 1) % LOOK_EVERY == 0:
+            residual = _residual(velocity, dilation, unit)
+            if residual <= tolerance:
+                return k + 1, True
+            if change <= SETTLED * residual * total:
+                return k + 1, True
+    return max_sweeps, False
+
+
+@njit(cache=True, nogil=True)
+def _residual(velocity, dilation, unit):
+    worst = abs(dilation * unit[-1])
+    for k in range(velocity.shape[0]):
+        for a in range(3):
+            worst = max(worst, abs(velocity[k, a]) * unit[3 * k + a])
+    return worst
