@@ -31,6 +31,9 @@ CARRYING = 1e-7
 # and the nearest admissible network on the same contacts.
 JAMMED_DISTANCE = 1e-2
 
+# Largest duality gap (in ⟨f_n⟩) of a certified bound on a force, or of a limit load.
+INTERVAL_GAP = 1e-8
+
 # Feasibility tolerance asked of the linear and quadratic programs (forces in ⟨f_n⟩).
 PROGRAM = 1e-10
 
