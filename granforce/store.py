@@ -1,4 +1,4 @@
-"""The store: the schema of every array that is kept, and a content-addressed cache of datasets.
+"""The store: a content-addressed cache of datasets in Zarr.
 
 A store is a folder and a Zarr v3 group; each entry is a sub-group `<kind>-<key>` that zarr and
 xarray open too. The key is a hash of kind, parameters (seed among them), algorithm and schema
@@ -29,7 +29,8 @@ import xarray as xr
 import zarr
 from zarr.codecs import ZstdCodec
 
-from granforce.records import Contacts, InputError, Packing
+from granforce.records import InputError
+from granforce.schema import VARIABLES, declared, to_builtin
 from granforce.tolerances import MU_DIGITS
 
 # Raised when the meaning of a stored array changes; entries of another schema are never found.
@@ -44,53 +45,6 @@ _ENTRY = re.compile(rf"[a-z][a-z0-9_]*-[0-9a-f]{{{KEY_DIGITS}}}")
 _LIBRARIES = ("granforce", "numpy", "numba", "xarray", "zarr")
 _IDENTITY = ("kind", "parameters", "seed", "algorithm_version", "schema_version")
 _PROVENANCE = ("created", "checksum", *(f"{library}_version" for library in _LIBRARIES))
-
-
-class Variable(NamedTuple):
-    """One row of the schema: what an array of this name is, in every dataset."""
-
-    dims: tuple[str, ...]
-    dtype: str
-    units: str
-    long_name: str
-
-
-_CONTACT_ARRAYS = ("contact_i", "contact_j", *Contacts._fields[2:])
-_COMPONENT = "components f_n, f_t"
-
-VARIABLES: dict[str, Variable] = {
-    # the packing
-    "x": Variable(("grain", "axis"), "float64", "length", "centres of the grains"),
-    "r": Variable(("grain",), "float64", "length", "radii of the grains"),
-    "box": Variable(("axis",), "float64", "length", "box sides, infinite where open"),
-    "mu": Variable((), "float64", "1", "friction coefficient μ"),
-    "pressure": Variable((), "float64", "force/length", "pressure P0, NaN where not prescribed"),
-    "load": Variable(
-        ("grain", "load_component"), "float64", "force; force*length", "load F_x, F_y; torque"
-    ),
-    "contact_i": Variable(("contact",), "int64", "1", "first grain i of the contact"),
-    "contact_j": Variable(("contact",), "int64", "1", "second grain j of the contact"),
-    "normal": Variable(("contact", "axis"), "float64", "1", "unit normal from i to j"),
-    "length": Variable(("contact",), "float64", "length", "centre distance ℓ"),
-    "gap": Variable(("contact",), "float64", "length", "gap ℓ − r_i − r_j"),
-    "arm_i": Variable(("contact",), "float64", "length", "lever arm from i to the contact point"),
-    "arm_j": Variable(("contact",), "float64", "length", "lever arm from j to the contact point"),
-    "forces": Variable(
-        ("contact", "component"), "float64", "force", f"original force network, {_COMPONENT}"
-    ),
-    # states of the ensemble: the contact dimension is that of the backbone
-    "backbone": Variable(("contact",), "int64", "1", "position of the contact in the packing"),
-    "states": Variable(
-        ("state", "contact", "component"), "float64", "force", f"admissible networks, {_COMPONENT}"
-    ),
-    "residual": Variable(("state",), "float64", "mean normal force", "largest unbalance"),
-    "violation": Variable(("state",), "float64", "mean normal force", "largest cone violation"),
-    "sweeps": Variable(("state",), "int64", "1", "solver sweeps or iterations spent"),
-    "attempts": Variable(("state",), "int64", "1", "attempts until the state was accepted"),
-    "distance_to_centre": Variable(
-        ("state",), "float64", "mean normal force", "distance from the centre of the ensemble"
-    ),
-}
 
 
 class Entry(NamedTuple):
@@ -147,51 +101,6 @@ def _quantised(value, where):
         raise TypeError(f"{where} cannot enter a key: {value} is not finite")
     number = float(f"{number:.{MU_DIGITS}g}")
     return int(number) if number.is_integer() and abs(number) < 2**53 else number
-
-
-def labelled(arrays, attrs=None):
-    """A dataset from {name: array-like}, with dims, dtype, units and long_name from VARIABLES.
-
-    Raises ValueError for an undeclared name or a wrong number of dimensions.
-    """
-    variables = {}
-    for name, values in arrays.items():
-        declared = _declared(name)
-        described = {"units": declared.units, "long_name": declared.long_name}
-        array = np.asarray(values, dtype=declared.dtype)
-        if array.ndim != len(declared.dims):
-            raise ValueError(f"{name!r} must have dims {declared.dims}, got shape {array.shape}")
-        variables[name] = xr.Variable(declared.dims, array, described)
-    return xr.Dataset(variables, attrs=attrs)
-
-
-def _declared(name):
-    if name not in VARIABLES:
-        raise ValueError(f"{name!r} is not declared: add a row to granforce.store.VARIABLES")
-    return VARIABLES[name]
-
-
-def packing_dataset(packing):
-    """A Packing as a dataset with dims grain, contact, axis, component; info as JSON in attrs."""
-    arrays = packing._asdict()
-    info, contacts = arrays.pop("info"), arrays.pop("contacts")
-    arrays |= zip(_CONTACT_ARRAYS, contacts, strict=True)
-    return labelled(arrays, {"info": json.dumps(info, default=_to_builtin)})
-
-
-def dataset_packing(dataset):
-    """The Packing that packing_dataset made this dataset from, to the last bit.
-
-    Tuples in info come back as lists.
-    """
-    arrays = {name: dataset[name].values for name in ("x", "r", "box", "forces", "load")}
-    return Packing(
-        contacts=Contacts(*(dataset[name].values for name in _CONTACT_ARRAYS)),
-        mu=float(dataset["mu"]),
-        pressure=float(dataset["pressure"]),
-        info=json.loads(dataset.attrs["info"]),
-        **arrays,
-    )
 
 
 def default_path():
@@ -486,14 +395,14 @@ def _conforming(dataset, dtypes):
     """The dataset's variables as they will be stored; ValueError where VARIABLES says otherwise."""
     stored = {}
     for name, variable in dataset.variables.items():
-        declared = _declared(name)
-        dtype = np.dtype(dtypes.get(name, declared.dtype))
-        if variable.dims != declared.dims:
-            raise ValueError(f"{name!r} must have dims {declared.dims}, got {variable.dims}")
-        if dtype != declared.dtype and (dtype.kind, np.dtype(declared.dtype).kind) != ("f", "f"):
-            raise ValueError(f"{name!r} is {declared.dtype} and cannot be stored as {dtype}")
-        if variable.dtype not in (dtype, np.dtype(declared.dtype)):
-            raise ValueError(f"{name!r} must be {declared.dtype}, got {variable.dtype}")
+        row = declared(name)
+        dtype = np.dtype(dtypes.get(name, row.dtype))
+        if variable.dims != row.dims:
+            raise ValueError(f"{name!r} must have dims {row.dims}, got {variable.dims}")
+        if dtype != row.dtype and (dtype.kind, np.dtype(row.dtype).kind) != ("f", "f"):
+            raise ValueError(f"{name!r} is {row.dtype} and cannot be stored as {dtype}")
+        if variable.dtype not in (dtype, np.dtype(row.dtype)):
+            raise ValueError(f"{name!r} must be {row.dtype}, got {variable.dtype}")
         stored[name] = xr.Variable(variable.dims, np.asarray(variable.values, dtype, order="C"))
     return stored
 
@@ -507,18 +416,12 @@ def _attributes(kind, params, version, given):
     attrs |= {"algorithm_version": version, "schema_version": SCHEMA_VERSION}
     attrs |= {"created": datetime.now(UTC).isoformat(timespec="seconds"), **_library_versions()}
     # What comes back from JSON is what the checksum must see.
-    return json.loads(json.dumps(attrs, default=_to_builtin))
+    return json.loads(json.dumps(attrs, default=to_builtin))
 
 
 @functools.cache
 def _library_versions():
     return {f"{library}_version": metadata.version(library) for library in _LIBRARIES}
-
-
-def _to_builtin(value):
-    if isinstance(value, (np.generic, np.ndarray)):
-        return value.tolist()
-    raise TypeError(f"attributes must be plain values, got {type(value).__name__}")
 
 
 def _checksum(variables, attrs):

@@ -20,15 +20,8 @@ import zarr
 
 from granforce import store as store_module
 from granforce.records import Contacts, InputError, Packing, make_contacts, make_packing
-from granforce.store import (
-    VARIABLES,
-    canonical,
-    dataset_packing,
-    default_path,
-    labelled,
-    open_store,
-    packing_dataset,
-)
+from granforce.schema import VARIABLES, dataset_packing, labelled, packing_dataset
+from granforce.store import canonical, default_path, open_store
 
 PARAMS = {"mu": 0.1, "grains": 400, "seed": 3}
 

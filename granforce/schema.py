@@ -1,0 +1,137 @@
+"""The schema: every array that granforce keeps, declared once, and packings as datasets."""
+
+import json
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce.records import Contacts, Packing
+
+
+class Variable(NamedTuple):
+    """One row of the schema: what an array of this name is, in every dataset."""
+
+    dims: tuple[str, ...]
+    dtype: str
+    units: str
+    long_name: str
+
+
+_CONTACT_ARRAYS = ("contact_i", "contact_j", *Contacts._fields[2:])
+_COMPONENT = "components f_n, f_t"
+
+VARIABLES: dict[str, Variable] = {
+    # the packing
+    "x": Variable(("grain", "axis"), "float64", "length", "centres of the grains"),
+    "r": Variable(("grain",), "float64", "length", "radii of the grains"),
+    "box": Variable(("axis",), "float64", "length", "box sides, infinite where open"),
+    "mu": Variable((), "float64", "1", "friction coefficient μ"),
+    "pressure": Variable((), "float64", "force/length", "pressure P0, NaN where not prescribed"),
+    "load": Variable(
+        ("grain", "load_component"), "float64", "force; force*length", "load F_x, F_y; torque"
+    ),
+    "contact_i": Variable(("contact",), "int64", "1", "first grain i of the contact"),
+    "contact_j": Variable(("contact",), "int64", "1", "second grain j of the contact"),
+    "normal": Variable(("contact", "axis"), "float64", "1", "unit normal from i to j"),
+    "length": Variable(("contact",), "float64", "length", "centre distance ℓ"),
+    "gap": Variable(("contact",), "float64", "length", "gap ℓ − r_i − r_j"),
+    "arm_i": Variable(("contact",), "float64", "length", "lever arm from i to the contact point"),
+    "arm_j": Variable(("contact",), "float64", "length", "lever arm from j to the contact point"),
+    "forces": Variable(
+        ("contact", "component"), "float64", "force", f"original force network, {_COMPONENT}"
+    ),
+    # states of the ensemble: the contact dimension is that of the backbone
+    "backbone": Variable(("contact",), "int64", "1", "position of the contact in the packing"),
+    "states": Variable(
+        ("state", "contact", "component"), "float64", "force", f"admissible networks, {_COMPONENT}"
+    ),
+    "residual": Variable(("state",), "float64", "mean normal force", "largest unbalance"),
+    "violation": Variable(("state",), "float64", "mean normal force", "largest cone violation"),
+    "sweeps": Variable(("state",), "int64", "1", "solver sweeps or iterations spent"),
+    "attempts": Variable(("state",), "int64", "1", "attempts until the state was accepted"),
+    "distance_to_centre": Variable(
+        ("state",), "float64", "mean normal force", "distance from the centre of the ensemble"
+    ),
+    # what a set of states says: bounds seen, measures, and what it took
+    "original": Variable(
+        ("contact", "component"), "float64", "force", f"the packing's own network, {_COMPONENT}"
+    ),
+    "low": Variable(("contact", "component"), "float64", "force", f"smallest value, {_COMPONENT}"),
+    "high": Variable(("contact", "component"), "float64", "force", f"largest value, {_COMPONENT}"),
+    "eta1": Variable((), "float64", "1", "indeterminacy η1 = ⟨δF⟩/⟨|G|⟩"),
+    "eta2": Variable((), "float64", "1", "indeterminacy η2 from pairs of states"),
+    "eta3": Variable((), "float64", "1", "indeterminacy η3 from intervals"),
+    "correlation": Variable((), "float64", "1", "corr(f_n, ΔF_n) of the original network"),
+    "correlation_low": Variable((), "float64", "1", "smallest corr(f_n, ΔF_n) of any state"),
+    "correlation_high": Variable((), "float64", "1", "largest corr(f_n, ΔF_n) of any state"),
+    "packing_fraction": Variable((), "float64", "1", "packing fraction φ, rattlers included"),
+    "coordination": Variable((), "float64", "1", "mean coordination number z of the backbone"),
+    "dimension": Variable((), "int64", "1", "dimension h of the ensemble"),
+    "force_scale": Variable((), "float64", "force", "mean normal force ⟨f_n⟩"),
+    "original_distance": Variable(
+        (), "float64", "mean normal force", "distance of the original network from the centre"
+    ),
+    "acceptance": Variable((), "float64", "1", "accepted states per attempt"),
+    "accepted": Variable((), "int64", "1", "attempts that gave a new state"),
+    "rejected": Variable((), "int64", "1", "attempts that ended in no equilibrium"),
+    "unconverged": Variable((), "int64", "1", "attempts that ran out of iterations"),
+    "skipped": Variable((), "int64", "1", "states that needed no relaxation (h = 0)"),
+    "rattlers": Variable((), "int64", "1", "grains outside the backbone"),
+    "unloaded_contacts": Variable((), "int64", "1", "contacts that can carry nothing"),
+    "tangential_unknowns": Variable((), "int64", "1", "tangential unknowns dropped at μ = 0"),
+    "seconds": Variable((), "float64", "s", "wall time of the computation"),
+}
+
+
+def labelled(arrays, attrs=None):
+    """A dataset from {name: array-like}, with dims, dtype, units and long_name from VARIABLES.
+
+    Raises ValueError for an undeclared name or a wrong number of dimensions.
+    """
+    variables = {}
+    for name, values in arrays.items():
+        row = declared(name)
+        described = {"units": row.units, "long_name": row.long_name}
+        array = np.asarray(values, dtype=row.dtype)
+        if array.ndim != len(row.dims):
+            raise ValueError(f"{name!r} must have dims {row.dims}, got shape {array.shape}")
+        variables[name] = xr.Variable(row.dims, array, described)
+    return xr.Dataset(variables, attrs=attrs)
+
+
+def declared(name):
+    """The schema's row for this name; ValueError where there is none."""
+    if name not in VARIABLES:
+        raise ValueError(f"{name!r} is not declared: add a row to granforce.schema.VARIABLES")
+    return VARIABLES[name]
+
+
+def packing_dataset(packing):
+    """A Packing as a dataset with dims grain, contact, axis, component; info as JSON in attrs."""
+    arrays = packing._asdict()
+    info, contacts = arrays.pop("info"), arrays.pop("contacts")
+    arrays |= zip(_CONTACT_ARRAYS, contacts, strict=True)
+    return labelled(arrays, {"info": json.dumps(info, default=to_builtin)})
+
+
+def dataset_packing(dataset):
+    """The Packing that packing_dataset made this dataset from, to the last bit.
+
+    Tuples in info come back as lists.
+    """
+    arrays = {name: dataset[name].values for name in ("x", "r", "box", "forces", "load")}
+    return Packing(
+        contacts=Contacts(*(dataset[name].values for name in _CONTACT_ARRAYS)),
+        mu=float(dataset["mu"]),
+        pressure=float(dataset["pressure"]),
+        info=json.loads(dataset.attrs["info"]),
+        **arrays,
+    )
+
+
+def to_builtin(value):
+    """Numpy values as plain ones, for json.dumps(default=…)."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    raise TypeError(f"attributes must be plain values, got {type(value).__name__}")

@@ -1,0 +1,255 @@
+"""Cells of a study: one packing and one walk each, found in the store or computed and kept.
+
+A cell is named by plain parameters. Cells are independent and seeded, so a sweep over processes
+gives the same result for any number of workers, and one that was cut short goes on where it was.
+"""
+
+import hashlib
+import multiprocessing
+import time
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+
+import numpy as np
+
+from granforce import measures
+from granforce.compaction import pack
+from granforce.ensemble import ensemble
+from granforce.records import InputError, friction
+from granforce.relax.gauss_seidel import gauss_seidel
+from granforce.relax.nearest import nearest
+from granforce.schema import dataset_packing, labelled, packing_dataset
+from granforce.store import open_store
+from granforce.tolerances import BALANCED, EQUILIBRIUM
+from granforce.walk import walk
+
+# Raised when an algorithm gives other numbers for the same parameters: older entries are not used.
+PACKING_VERSION = 1
+WALK_VERSION = 1
+
+RELAXATIONS = {"gauss_seidel": gauss_seidel, "nearest": nearest}
+# What a state must balance to, by solver: an interior point reaches far more than sweeps do.
+TOLERANCES = {"gauss_seidel": EQUILIBRIUM, "nearest": BALANCED}
+
+
+def packing_parameters(n, mu, seed, **options):
+    """The parameters that name a packing in the store; options as for `pack`."""
+    return {"n": int(n), "mu": friction(mu), "seed": int(seed), **options}
+
+
+def imported_parameters(packing):
+    """The parameters that name a packing made elsewhere: a hash of its arrays."""
+    digest = hashlib.sha256()
+    arrays = (packing.x, packing.r, packing.box, packing.forces, packing.load, *packing.contacts)
+    for array in (*arrays, np.array([packing.mu, packing.pressure])):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return {"imported": digest.hexdigest(), "mu": packing.mu}
+
+
+def walk_parameters(packing, states, seed=0, *, mu=None, relax="gauss_seidel", chains=1, keep=None):
+    """The parameters that name a walk: those of its packing, and how it goes.
+
+    mu: friction coefficient of the ensemble, by default the packing's. keep: number of evenly
+    spaced states that are stored (measures always come from all).
+    """
+    if relax not in RELAXATIONS:
+        raise InputError(f"unknown relaxation {relax!r}: take one of {', '.join(RELAXATIONS)}")
+    if int(states) < 1 or (keep is not None and int(keep) < 1):
+        raise InputError("states and keep must be at least 1")
+    return {
+        "packing": packing,
+        "mu": packing["mu"] if mu is None else friction(mu),
+        "states": int(states),
+        "seed": int(seed),
+        "relax": relax,
+        "chains": int(chains),
+        "keep": None if keep is None or keep >= states else int(keep),
+    }
+
+
+def get_packing(store, parameters, *, progress=None, cancel=None):
+    """The packing of these parameters and whether it came from the store."""
+    found = store.load("packing", parameters, version=PACKING_VERSION)
+    if found is not None:
+        return dataset_packing(found), True
+    if "imported" in parameters:
+        raise InputError("the imported packing is not in this store: import it again")
+    packing = pack(**parameters, progress=progress, cancel=cancel)
+    keep_packing(store, parameters, packing)
+    return packing, False
+
+
+def keep_packing(store, parameters, packing):
+    """Save a packing under its parameters; returns the entry's name."""
+    return store.save("packing", parameters, packing_dataset(packing), version=PACKING_VERSION)
+
+
+def get_walk(store, parameters, *, workers=1, dtypes=None, progress=None, cancel=None):
+    """The dataset of this walk with all its measures, and whether it came from the store.
+
+    progress(done, total) counts states; dtypes as for Store.save.
+    """
+    found = store.load("walk", parameters, version=WALK_VERSION)
+    if found is not None:
+        return found, True
+    packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
+    S = ensemble(packing, parameters["mu"])
+    relax = parameters["relax"]
+    begin = time.perf_counter()
+    done = walk(
+        S,
+        parameters["states"],
+        parameters["seed"],
+        chains=parameters["chains"],
+        workers=workers,
+        relax=RELAXATIONS[relax],
+        tolerance=TOLERANCES[relax],
+        progress=progress,
+        cancel=cancel,
+    )
+    seconds = time.perf_counter() - begin
+    dataset = walk_dataset(S, done, keep=parameters["keep"], seconds=seconds)
+    store.save("walk", parameters, dataset, version=WALK_VERSION, dtypes=dtypes)
+    return dataset, False
+
+
+def walk_dataset(S, done, *, keep=None, seconds=0.0):
+    """A Walk with its measures as a dataset; only `keep` evenly spaced states are kept, if given."""
+    states = done.states
+    centre = measures.mean_network(states)
+    low, high = measures.intervals_seen(states)
+    extent = measures.normal_extent(low, high)
+    in_error = measures.correlation_range(states, extent)
+    distance = measures.distances(states, centre) / S.force_scale
+    start = measures.distances(S.original[None], centre)[0] / S.force_scale
+    pick = slice(None) if keep is None else np.linspace(0, len(states) - 1, keep).astype(int)
+    return labelled(
+        {
+            "states": states[pick],
+            "residual": done.residual[pick],
+            "violation": done.violation[pick],
+            "sweeps": done.sweeps[pick],
+            "attempts": done.attempts[pick],
+            "distance_to_centre": distance[pick],
+            "backbone": S.index,
+            "original": S.original,
+            "low": low,
+            "high": high,
+            "eta1": measures.eta1(states),
+            "eta2": measures.eta2(states),
+            "eta3": measures.eta3(low, high),
+            "correlation": measures.correlation(S.original[:, 0], extent),
+            "correlation_low": in_error[0],
+            "correlation_high": in_error[1],
+            "packing_fraction": S.packing.packing_fraction,
+            "coordination": S.coordination,
+            "dimension": S.dimension,
+            "force_scale": S.force_scale,
+            "original_distance": start,
+            "acceptance": done.acceptance,
+            **done.counts,
+            **S.skipped,
+            "seconds": seconds,
+        }
+    )
+
+
+ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")
+ROW_COUNTS = ("accepted", "rejected", "unconverged", "skipped", "rattlers", "unloaded_contacts")
+
+
+def row(parameters, dataset, cached):
+    """One line of a sweep's table: plain numbers of one cell."""
+    packing = parameters["packing"]
+    return {
+        "mu": packing["mu"],
+        "seed": packing.get("seed"),
+        **{name: dataset[name].item() for name in (*ROW, *ROW_COUNTS)},
+        "residual": float(dataset["residual"].max()),
+        "cached": cached,
+    }
+
+
+def sweep(path, cells, *, workers=2, dtypes=None, progress=None, on_row=None):
+    """Run cells (lists of walk parameters) over processes, keeping each in the store at path.
+
+    Finished cells are found, not computed. progress(states done, states in all); on_row(row) after
+    each cell. Returns the rows in the order of the cells and a list of (cell, error message).
+    Interrupted, it loses the cells under way only.
+    """
+    store = open_store(path)
+    store.clean()
+    rows, failed, todo = {}, [], []
+    for k, cell in enumerate(cells):
+        found = store.load("walk", cell, version=WALK_VERSION)
+        if found is None:
+            todo.append(k)
+        else:
+            rows[k] = row(cell, found, True)
+            _tell(on_row, rows[k])
+    if todo:
+        warm_up()
+        _run(path, cells, todo, workers, dtypes, progress, on_row, rows, failed)
+    return [rows[k] for k in sorted(rows)], failed
+
+
+def _run(path, cells, todo, workers, dtypes, progress, on_row, rows, failed):
+    context = multiprocessing.get_context("spawn")
+    counter = context.Value("q", 0)
+    total = sum(cells[k]["states"] for k in todo)
+    pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
+    try:
+        waiting = {pool.submit(run_cell, path, cells[k], dtypes): k for k in todo}
+        while waiting:
+            ended, _ = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
+            if progress is not None:
+                progress(counter.value, total)
+            for future in ended:
+                k = waiting.pop(future)
+                try:
+                    rows[k] = future.result()
+                    _tell(on_row, rows[k])
+                except InputError as error:
+                    failed.append((cells[k], str(error)))
+    except BaseException:
+        # Workers would go on with the cell under way: what they hold is lost either way.
+        for process in list(pool._processes.values()):
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _tell(on_row, line):
+    if on_row is not None:
+        on_row(line)
+
+
+_counter = None
+
+
+def _share(counter):
+    global _counter
+    _counter = counter
+
+
+def run_cell(path, cell, dtypes=None):
+    """Compute one cell into the store at path; returns its row. Runs in a worker process."""
+    seen = 0
+
+    def count(done, total):
+        nonlocal seen
+        if _counter is not None:
+            with _counter.get_lock():
+                _counter.value += done - seen
+        seen = done
+
+    dataset, cached = get_walk(open_store(path), cell, dtypes=dtypes, progress=count)
+    count(cell["states"], cell["states"])
+    return row(cell, dataset, cached)
+
+
+def warm_up():
+    """Compile (or load from numba's cache) every kernel once, before workers do it each."""
+    packing = pack(12, 0.5, 0)
+    walk(ensemble(packing), 2, 0, tolerance=1.0)
+
