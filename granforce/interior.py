@@ -39,7 +39,7 @@ class Lanes(NamedTuple):
     border: np.ndarray  # (LANES,) λ of the pressure row
     loaded: np.ndarray  # (LANES,) column of A whose grains the load acts on
     load: np.ndarray  # (7, LANES) entries of the load column; the last is the pressure row's
-    gap: np.ndarray  # (LANES,) y·s before the last step
+    gap: np.ndarray  # (LANES,) y·s
     unbalance: np.ndarray  # (LANES,) largest |b − A y − a F| before the last step
     slackness: np.ndarray  # (LANES,) largest |c − Aᵀλ − s| before the last step
 
@@ -183,7 +183,7 @@ def assemble(columns, lanes, D, L):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _residuals(columns, lanes, work, b, b_border):
+def residuals(columns, lanes, work, b, b_border):
     """c − Aᵀλ − s, b − A y, D = y/s, and the numbers that tell how far each program has come."""
     y, slack, D, dual = lanes.y, lanes.s, work.D, work.dual
     _transposed(columns, lanes, lanes.multiplier, lanes.border, dual)
@@ -302,10 +302,12 @@ def _step(lanes, work, inside):
     """Take the step, up to the fraction ``inside`` of the way to the boundary."""
     _reach(lanes, work, inside)
     primal, dual = work.small[5], work.small[6]
+    lanes.gap[:] = 0.0
     for k in range(len(lanes.y)):
         for s in range(LANES):
             lanes.y[k, s] += primal[s] * work.dy[k, s]
             lanes.s[k, s] += dual[s] * work.ds[k, s]
+            lanes.gap[s] += lanes.y[k, s] * lanes.s[k, s]
     for i in range(len(work.r)):
         for s in range(LANES):
             lanes.multiplier[i, s] += dual[s] * work.r[i, s]
@@ -316,7 +318,7 @@ def _step(lanes, work, inside):
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def advance(columns, lanes, work, b, b_border, start, row, target):
     """One predictor–corrector step of every lane; b (3 grains,), start, row, target: Pattern."""
-    _residuals(columns, lanes, work, b, b_border)
+    residuals(columns, lanes, work, b, b_border)
     _factor(columns, lanes, work, start, row, target)
     for k in range(len(lanes.y)):
         for s in range(LANES):
@@ -325,13 +327,13 @@ def advance(columns, lanes, work, b, b_border, start, row, target):
     _reach(lanes, work, 1.0)
     _corrected(lanes, work)
     _direction(columns, lanes, work, start, row)
-    _step(lanes, work, 0.995)
+    _step(lanes, work, 0.9995)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def recentre(columns, lanes, work, b, b_border, start, row, target):
     """One Newton step of every lane towards y s = 1; at c = 0 that is the analytic centre of S."""
-    _residuals(columns, lanes, work, b, b_border)
+    residuals(columns, lanes, work, b, b_border)
     _factor(columns, lanes, work, start, row, target)
     for k in range(len(lanes.y)):
         for s in range(LANES):

@@ -19,11 +19,12 @@ from granforce.tolerances import BALANCED, INTERVAL_GAP
 _DEPENDENT = 1e-11
 # θ relative to the smallest for which c + θ s° ≥ 0; from 1.2 to 20 it costs the same within 4 %.
 _CENTRING = 1.5
-# A program leaves its lane at this gap and unbalance, in ⟨f_n⟩; one Newton step on A y = b
-# afterwards brings the unbalance to rounding error.
+# A program leaves its lane at this gap and unbalance, in ⟨f_n⟩; a Newton step or two on A y = b
+# afterwards bring the unbalance to rounding error.
 _LEAVE_GAP = 0.5 * INTERVAL_GAP
 _LEAVE_UNBALANCE = 1e-7
 _MOST_STEPS = 60
+_MOST_BALANCING = 4
 # Stands for zero (in ⟨f_n⟩) where a solver ended on the boundary itself.
 _TINY = 1e-12
 
@@ -217,7 +218,7 @@ def _outcome(batch, lanes, lane, number, loaded, steps):
 
 
 def balanced(batch, outcomes, work=None):
-    """Up to LANES outcomes after one Newton step on A y + a F = b, weighted with D = y².
+    """Up to LANES outcomes after Newton steps on A y + a F = b, weighted with D = y².
 
     The weight changes every y by a small fraction of itself: no force is driven below zero.
     """
@@ -229,14 +230,19 @@ def balanced(batch, outcomes, work=None):
             lanes.y[-1, lane] = max(outcome.load, _TINY)
             lanes.loaded[lane] = outcome.loaded * batch.per_contact
             lanes.load[:, lane] = batch.loads[outcome.loaded]
-    # y s = 1 already and c = s: the step towards the centre is then the one that restores A y = b.
-    lanes.s[:] = 1.0 / lanes.y
-    lanes.c[:] = lanes.s
-    layout = batch.layout
-    interior.recentre(
-        batch.columns, lanes, work, batch.b, batch.b_border,
-        layout.start, layout.row, layout.target,
-    )  # fmt: skip
+    layout, sides = batch.layout, (batch.b, batch.b_border)
+    for _ in range(_MOST_BALANCING):
+        interior.residuals(batch.columns, lanes, work, *sides)
+        if lanes.unbalance[: len(outcomes)].max() <= 0.1 * BALANCED:
+            break
+        # With c = s and y s = 1 the step towards the centre is the one that restores A y = b.
+        lanes.s[:] = 1.0 / lanes.y
+        lanes.c[:] = lanes.s
+        lanes.multiplier[:] = 0.0
+        lanes.border[:] = 0.0
+        interior.recentre(
+            batch.columns, lanes, work, *sides, layout.start, layout.row, layout.target
+        )
     return [
         outcome._replace(
             y=lanes.y[:-1, lane].copy(),

@@ -113,7 +113,7 @@ def get_walk(store, parameters, *, workers=1, dtypes=None, progress=None, cancel
 
 
 def walk_dataset(S, done, *, keep=None, seconds=0.0):
-    """A Walk with its measures as a dataset; only `keep` evenly spaced states are kept, if given."""
+    """A Walk with its measures as a dataset; `keep` evenly spaced states are kept, or all."""
     states = done.states
     centre = measures.mean_network(states)
     low, high = measures.intervals_seen(states)
