@@ -1,0 +1,39 @@
+"""granforce: how undetermined are the contact forces in a packing of rigid frictional disks?"""
+
+import importlib
+
+# Names are looked up on first use, so that `granforce --help` need not load numba and HiGHS.
+_HOME = {
+    "Cancelled": "records",
+    "Contacts": "records",
+    "InputError": "records",
+    "NotJammedError": "records",
+    "Packing": "records",
+    "make_contacts": "records",
+    "make_packing": "records",
+    "pack": "compaction",
+    "Ensemble": "ensemble",
+    "ensemble": "ensemble",
+    "gauss_seidel": "relax.gauss_seidel",
+    "nearest": "relax.nearest",
+    "walk": "walk",
+    "intervals": "intervals",
+    "limit_loads": "intervals",
+    "load_packing": "importers",
+    "save_packing": "importers",
+    "read_lammps": "importers",
+    "read_table": "importers",
+    "report": "importers",
+    "open_store": "store",
+    "measures": "",
+}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name):
+    if name not in _HOME:
+        raise AttributeError(f"module 'granforce' has no attribute {name!r}")
+    if not _HOME[name]:
+        return importlib.import_module(f"granforce.{name}")
+    return getattr(importlib.import_module(f"granforce.{_HOME[name]}"), name)
