@@ -440,9 +440,7 @@ def _shrink_program(i, j, normal, length, gap, n):
 
 def _in_users_units(packing, unit, pressure, info):
     contacts = packing.contacts
-    lengths = {
-        name: getattr(contacts, name) * unit for name in ("length", "gap", "arm_i", "arm_j")
-    }
+    lengths = {name: getattr(contacts, name) * unit for name in ("length", "gap", "arm_i", "arm_j")}
     return make_packing(
         np.mod(packing.x, packing.box) * unit,
         packing.r * unit,

@@ -162,7 +162,7 @@ def _step(motion, mu, pressure, box_mass, dt, sweeps, accuracy, counters):
     set_stiffness(problem)
     dilation = add_forces(problem, force, velocity, free)
     order = np.arange(count)
-    for k in range(sweeps):
+    for _ in range(sweeps):
         dilation, change, total = sweep(problem, order, mu, force, velocity, dilation)
         counters[SWEEPS] += 1
         counters[UPDATES] += count

@@ -54,3 +54,15 @@ def solve(model):
     """Run the model; its status and the point y reached (n,)."""
     model.run()
     return model.getModelStatus(), np.array(model.getSolution().col_value)
+
+
+def basis(model):
+    """Rows and columns (positions) of the square basis matrix of a solved model, None without.
+
+    Rows whose own logical is basic are implied by the others and left out.
+    """
+    found = model.getBasis()
+    basic = highspy.HighsBasisStatus.kBasic
+    columns = np.flatnonzero([status == basic for status in found.col_status])
+    rows = np.flatnonzero([status != basic for status in found.row_status])
+    return (rows, columns) if found.valid and len(rows) == len(columns) else None

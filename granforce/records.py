@@ -115,8 +115,8 @@ def positive(value, name):
 def make_contacts(i, j, normal, length, r):
     """Contacts from array-likes, cast once: grains i, j and centre distances (N_c,), normals.
 
-    Lever arms are the radii r where no contact overlaps by more than RIGID_OVERLAP (rigid disks), and
-    reach the middle of the overlap, a = r − overlap/2, otherwise (soft disks).
+    Lever arms are the radii r where no contact overlaps by more than RIGID_OVERLAP (rigid disks),
+    and reach the middle of the overlap, a = r − overlap/2, otherwise (soft disks).
 
     Raises InputError for grain numbers outside 0 … N − 1, self-contacts, normals that are not unit
     vectors, or distances ≤ 0.

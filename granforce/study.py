@@ -31,9 +31,12 @@ RELAXATIONS = {"gauss_seidel": gauss_seidel, "nearest": nearest}
 TOLERANCES = {"gauss_seidel": EQUILIBRIUM, "nearest": BALANCED}
 
 
-def packing_parameters(n, mu, seed, **options):
-    """The parameters that name a packing in the store; options as for `pack`."""
-    return {"n": int(n), "mu": friction(mu), "seed": int(seed), **options}
+def packing_parameters(
+    n, mu, seed, *, radii="uniform:0.5,1", pressure=1.0, dt=0.01, box_mass=100.0, sweeps=100
+):
+    """The parameters that name a packing in the store; as for `pack`."""
+    named = {"n": int(n), "mu": friction(mu), "seed": int(seed), "radii": radii}
+    return {**named, "pressure": pressure, "dt": dt, "box_mass": box_mass, "sweeps": sweeps}
 
 
 def imported_parameters(packing):
@@ -66,14 +69,14 @@ def walk_parameters(packing, states, seed=0, *, mu=None, relax="gauss_seidel", c
     }
 
 
-def get_packing(store, parameters, *, progress=None, cancel=None):
+def get_packing(store, parameters, *, max_steps=100_000, progress=None, cancel=None):
     """The packing of these parameters and whether it came from the store."""
     found = store.load("packing", parameters, version=PACKING_VERSION)
     if found is not None:
         return dataset_packing(found), True
     if "imported" in parameters:
         raise InputError("the imported packing is not in this store: import it again")
-    packing = pack(**parameters, progress=progress, cancel=cancel)
+    packing = pack(**parameters, max_steps=max_steps, progress=progress, cancel=cancel)
     keep_packing(store, parameters, packing)
     return packing, False
 
@@ -252,4 +255,3 @@ def warm_up():
     """Compile (or load from numba's cache) every kernel once, before workers do it each."""
     packing = pack(12, 0.5, 0)
     walk(ensemble(packing), 2, 0, tolerance=1.0)
-

@@ -47,9 +47,7 @@ def least_unbalanced(A, b):
     """y ≥ 0 with the least |A y − b|², and that residual vector, shapes (n,) and (m,)."""
     rows, columns = A.shape
     solver = _solver(200)
-    quadratic = sparse.block_diag(
-        [1e-10 * sparse.eye(columns), sparse.eye(rows)], format="csc"
-    )
+    quadratic = sparse.block_diag([1e-10 * sparse.eye(columns), sparse.eye(rows)], format="csc")
     lower = np.concatenate([np.zeros(columns), np.full(rows, -np.inf)])
     solver.setup(
         quadratic,
