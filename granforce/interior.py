@@ -15,6 +15,8 @@ from granforce import block_cholesky
 from granforce.block_cholesky import LANES
 
 _BLOCK = 9 * LANES
+# Weight of cone coordinates that are zero when the balance is restored (1: those of size ⟨f_n⟩).
+_LIGHT = 1e-10
 
 
 class Columns(NamedTuple):
@@ -340,3 +342,21 @@ def recentre(columns, lanes, work, b, b_border, start, row, target):
             work.v[k, s] = 1.0 / lanes.s[k, s] - lanes.y[k, s]
     _direction(columns, lanes, work, start, row)
     _step(lanes, work, 0.95)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def rebalance(columns, lanes, work, b, b_border, start, row, target):
+    """One Newton step of every lane on A y + a F = b alone, whatever the signs of y and F.
+
+    The weight D = max(y, _LIGHT) leaves what is zero nearly alone, yet lets degenerate optima, where
+    fewer y > 0 than there are rows, find their balance.
+    """
+    residuals(columns, lanes, work, b, b_border)
+    for k in range(len(lanes.y)):
+        for s in range(LANES):
+            work.D[k, s] = max(lanes.y[k, s], _LIGHT)
+    work.dual[:] = 0.0
+    work.v[:] = 0.0
+    _factor(columns, lanes, work, start, row, target)
+    _direction(columns, lanes, work, start, row)
+    lanes.y[:] += work.dy

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from granforce import program_batch, programs
 from granforce.program_batch import Outcome, Program
@@ -85,10 +86,12 @@ def intervals(
     total = len(upper) + len(tangential) + len(lower)
     solver = _Solver(ensemble, workers, total, progress, cancel)
     solver.see(states)
-    bounds = solver.solve(upper + tangential, [_bound(solver.system, *key) for key in upper + tangential])
+    bounds = solver.solve(
+        upper + tangential, [_bound(solver.system, *key) for key in upper + tangential]
+    )
     seen = solver.least[contacts] <= INTERVAL_GAP if skip else np.zeros(len(contacts), dtype=bool)
     for key in (key for key, known in zip(lower, seen, strict=True) if known):
-        bounds[key] = (0.0, max(0.0, float(solver.least[key[0]])))
+        bounds[key] = (max(0.0, float(solver.least[key[0]])), 0.0)
     rest = [key for key, known in zip(lower, seen, strict=True) if not known]
     bounds |= solver.solve(rest, [_bound(solver.system, *key) for key in rest])
     counts = solver.counts | {
@@ -102,9 +105,9 @@ def _intervals(ensemble, contacts, bounds, counts):
     value = np.full((len(contacts), 2, 2), np.nan)
     gap = np.full_like(value, np.nan)
     place = {int(c): k for k, c in enumerate(contacts)}
-    for (contact, component, side), (least, its_gap) in bounds.items():
-        value[place[contact], component, side] = -least if side else least
-        gap[place[contact], component, side] = its_gap
+    for (contact, component, side), (attained, bound) in bounds.items():
+        value[place[contact], component, side] = -attained if side else attained
+        gap[place[contact], component, side] = abs(attained - bound)
     if ensemble.mu == 0:
         value[:, 1], gap[:, 1] = 0.0, 0.0
     value *= ensemble.force_scale
@@ -135,7 +138,8 @@ def limit_load_bounds(ensemble, contacts=None, *, workers=1, progress=None, canc
     load, gap = np.full(len(keys), np.nan), np.full(len(keys), np.nan)
     for k, key in enumerate(keys):
         if key in bounds:
-            load[k], gap[k] = -bounds[key][0] * ensemble.force_scale, bounds[key][1]
+            attained, bound = bounds[key]
+            load[k], gap[k] = -attained * ensemble.force_scale, abs(attained - bound)
     return LimitLoads(contacts, load, gap, *_judged(gap), solver.counts)
 
 
@@ -187,16 +191,16 @@ class _Solver:
         self.least = np.minimum(self.least, normal.min(axis=0, initial=np.inf))
 
     def solve(self, keys, tasks):
-        """{key: (least value, duality gap)} of the programs that were reached."""
+        """{key: (value attained in S, value that bounds it from below)} of those reached."""
         bounds = {}
 
         def finished(outcomes):
-            value, gap = certify(self.system, outcomes, tasks)
+            attained, bound = certify(self.system, outcomes, tasks)
             with self.lock:
-                for outcome, its_value, its_gap in zip(outcomes, value, gap, strict=True):
-                    bounds[keys[outcome.number]] = (its_value, its_gap)
+                for k, outcome in enumerate(outcomes):
+                    bounds[keys[outcome.number]] = (attained[k], bound[k])
                     self.counts["iterations"] += outcome.steps
-                    if outcome.loaded < 0 and its_gap <= INTERVAL_GAP:
+                    if outcome.loaded < 0 and np.isfinite(attained[k]):
                         normal = outcome.y.reshape(len(self.least), -1).mean(axis=1)
                         np.minimum(self.least, normal, out=self.least)
                 self.counts["programs"] += len(outcomes)
@@ -210,20 +214,20 @@ class _Solver:
         for number, key in enumerate(keys):
             if self.cancel():
                 break
-            if bounds.get(key, (0.0, np.inf))[1] > INTERVAL_GAP:
-                self._again(number, key, tasks, bounds)
+            attained, bound = bounds.get(key, (np.inf, -np.inf))
+            if not attained - bound <= INTERVAL_GAP:
+                if key not in bounds:
+                    self.counts["programs"] += 1
+                    self._report(1)
+                bounds[key] = self._again(number, tasks, attained, bound)
         return bounds
 
-    def _again(self, number, key, tasks, bounds):
-        """Solve one program from scratch by HiGHS; keep what is better."""
+    def _again(self, number, tasks, attained, bound):
+        """Solve one program from scratch by HiGHS; keep the better of either side."""
         outcome = from_scratch(self.system, number, tasks[number])
-        value, gap = certify(self.system, [outcome], tasks)
+        again = certify(self.system, [outcome], tasks)
         self.counts["again"] += 1
-        if key not in bounds:
-            self.counts["programs"] += 1
-            self._report(1)
-        if gap[0] <= bounds.get(key, (0.0, np.inf))[1]:
-            bounds[key] = (float(value[0]), float(gap[0]))
+        return min(attained, again[0][0]), max(bound, again[1][0])
 
     def _report(self, count):
         self.done += count
@@ -232,9 +236,10 @@ class _Solver:
 
 
 def certify(system, outcomes, tasks):
-    """Value attained by each outcome and its duality gap, from A, b and c alone (⟨f_n⟩).
+    """Value attained by each outcome, and a bound on the minimum from A, b and c alone (⟨f_n⟩).
 
-    The gap is infinite where the state is not one of S to BALANCED.
+    The value is inf where the state is not one of S to BALANCED; the bound is −inf where the
+    multipliers bound nothing.
     """
     y = np.stack([outcome.y for outcome in outcomes], axis=1)
     multiplier = np.stack([outcome.multiplier for outcome in outcomes], axis=1)
@@ -252,9 +257,9 @@ def certify(system, outcomes, tasks):
             multiplier[:, k] *= 1 / pull if pull > 0 else np.nan
     slack = cost - system.A.T @ multiplier
     short = np.maximum(np.max(-slack / system.weight[:, None], axis=0), 0.0)
-    gap = np.abs(value - (system.b @ multiplier - system.total * short))
+    bound = system.b @ multiplier - system.total * short
     admitted = (np.abs(unbalance).max(axis=0) <= BALANCED) & (y.min(axis=0) >= 0)
-    return value, np.where(admitted & np.isfinite(gap), gap, np.inf)
+    return np.where(admitted, value, np.inf), np.where(np.isfinite(bound), bound, -np.inf)
 
 
 def from_scratch(system, number, task):
@@ -268,9 +273,25 @@ def from_scratch(system, number, task):
     programs.set_cost(model, cost)
     _, y = programs.solve(model)
     multiplier = np.array(model.getSolution().row_dual)
+    basis = programs.basis(model)
+    if basis is not None:
+        y, multiplier = _vertex(A, system.b, cost, *basis)
     load = float(y[-1]) if task.loaded >= 0 else 0.0
-    outcome = Outcome(number, task.loaded, y[: len(system.weight)], load, multiplier, 0)
-    return program_batch.balanced(system.batch, [outcome])[0]
+    y = y[: len(system.weight)]
+    return program_batch.balanced(
+        system.batch, [Outcome(number, task.loaded, y, load, multiplier, 0)]
+    )[0]
+
+
+def _vertex(A, b, cost, rows, columns):
+    """y and λ of a basis by its own LU factors: rounding error in place of tolerances."""
+    factors = splu(sparse.csc_matrix(A.tocsr()[rows][:, columns]))
+    y, multiplier = np.zeros(A.shape[1]), np.zeros(A.shape[0])
+    for _ in range(2):
+        y[columns] += factors.solve((b - A @ y)[rows])
+        rest = cost - A.T @ multiplier
+        multiplier[rows] += factors.solve(rest[columns], trans="T")
+    return y, multiplier
 
 
 def _system(ensemble):

@@ -23,10 +23,10 @@ _CENTRING = 1.5
 # afterwards bring the unbalance to rounding error.
 _LEAVE_GAP = 0.5 * INTERVAL_GAP
 _LEAVE_UNBALANCE = 1e-7
+# A gap so far below that does not improve the balance any more (large μ, degenerate vertices).
+_HOPELESS = 1e-3
 _MOST_STEPS = 60
 _MOST_BALANCING = 4
-# Stands for zero (in ⟨f_n⟩) where a solver ended on the boundary itself.
-_TINY = 1e-12
 
 
 class Program(NamedTuple):
@@ -128,7 +128,9 @@ def _with_centre(layout, columns, b, b_border, row, per_contact):
     lanes.c[-1] = 1.0
     centred = False
     for _ in range(_MOST_STEPS):
-        interior.recentre(columns, lanes, work, b, b_border, layout.start, layout.row, layout.target)
+        interior.recentre(
+            columns, lanes, work, b, b_border, layout.start, layout.row, layout.target
+        )
         off = np.abs(lanes.y[:, 0] * lanes.s[:, 0] - 1).max()
         unbalance = max(lanes.unbalance[0], lanes.slackness[0])
         centred = bool(off < 0.3 and unbalance < BALANCED)
@@ -155,7 +157,9 @@ def run(batch, programs, *, workers=1, finished, stop):
         _work(batch, programs, waiting, finished, stop)
         return
     with ThreadPoolExecutor(workers) as pool:
-        tasks = [pool.submit(_work, batch, programs, waiting, finished, stop) for _ in range(workers)]
+        tasks = [
+            pool.submit(_work, batch, programs, waiting, finished, stop) for _ in range(workers)
+        ]
         for task in tasks:
             task.result()
 
@@ -171,7 +175,8 @@ def _work(batch, programs, waiting, finished, stop):
     arrived = []
     while not stop():
         there = (lanes.gap <= _LEAVE_GAP) & (lanes.unbalance <= _LEAVE_UNBALANCE)
-        there |= (steps >= _MOST_STEPS) | ~np.isfinite(lanes.gap)
+        there |= (lanes.gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(lanes.gap)
+        there |= steps >= _MOST_STEPS
         for lane in np.flatnonzero((number < 0) | (there & (steps > 0))):
             if number[lane] >= 0:
                 loaded = programs[number[lane]].loaded
@@ -218,35 +223,34 @@ def _outcome(batch, lanes, lane, number, loaded, steps):
 
 
 def balanced(batch, outcomes, work=None):
-    """Up to LANES outcomes after Newton steps on A y + a F = b, weighted with D = y².
+    """Up to LANES outcomes moved into S, if they are close to it.
 
-    The weight changes every y by a small fraction of itself: no force is driven below zero.
+    First A y + a F = b is restored; what this drove below zero is then undone by mixing in as
+    little as it takes of the centre, which is balanced and positive.
     """
     work = work or interior.make_workspace(batch.layout, batch.columns)
     lanes = interior.make_lanes(batch.columns)
     for lane, outcome in enumerate(outcomes):
-        lanes.y[:-1, lane] = np.maximum(outcome.y, _TINY)
+        lanes.y[:-1, lane] = outcome.y
         if outcome.loaded >= 0:
-            lanes.y[-1, lane] = max(outcome.load, _TINY)
+            lanes.y[-1, lane] = outcome.load
             lanes.loaded[lane] = outcome.loaded * batch.per_contact
             lanes.load[:, lane] = batch.loads[outcome.loaded]
-    layout, sides = batch.layout, (batch.b, batch.b_border)
+    layout = batch.layout
+    arguments = (batch.b, batch.b_border, layout.start, layout.row, layout.target)
     for _ in range(_MOST_BALANCING):
-        interior.residuals(batch.columns, lanes, work, *sides)
+        interior.residuals(batch.columns, lanes, work, *arguments[:2])
         if lanes.unbalance[: len(outcomes)].max() <= 0.1 * BALANCED:
             break
-        # With c = s and y s = 1 the step towards the centre is the one that restores A y = b.
-        lanes.s[:] = 1.0 / lanes.y
-        lanes.c[:] = lanes.s
-        lanes.multiplier[:] = 0.0
-        lanes.border[:] = 0.0
-        interior.recentre(
-            batch.columns, lanes, work, *sides, layout.start, layout.row, layout.target
-        )
+        interior.rebalance(batch.columns, lanes, work, *arguments)
+    y, load = lanes.y[:-1], lanes.y[-1]
+    if batch.centred:
+        share = np.max(np.maximum(-y, 0.0) / (batch.y[:, None] + np.maximum(-y, 0.0)), axis=0)
+        y += share * (batch.y[:, None] - y)
+        load *= 1 - share
     return [
         outcome._replace(
-            y=lanes.y[:-1, lane].copy(),
-            load=float(lanes.y[-1, lane]) if outcome.loaded >= 0 else 0.0,
+            y=np.maximum(y[:, lane], 0.0), load=float(load[lane]) if outcome.loaded >= 0 else 0.0
         )
         for lane, outcome in enumerate(outcomes)
     ]
