@@ -1,4 +1,4 @@
-"""Sparse Cholesky factors of many matrices with one pattern at once: 3×3 blocks, LANES side by side.
+"""Sparse Cholesky factors of LANES matrices with one pattern side by side, in 3×3 blocks.
 
 A packing's normal matrix A D Aᵀ has one 3×3 block per grain and per pair of grains in contact. Its
 graph is planar, so minimum degree leaves little fill, and the pattern is the same for every

@@ -12,7 +12,7 @@ from scipy import sparse
 from granforce import programs
 from granforce.records import Contacts, InputError, NotJammedError, Packing, friction
 from granforce.relax.nearest import least_unbalanced
-from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING, EQUILIBRIUM
+from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class Ensemble:
         excess = np.maximum(-normal, np.abs(tangential) - self.mu * np.maximum(normal, 0.0))
         return _plain(np.maximum(excess.max(axis=-1, initial=0.0), 0.0) / self.force_scale)
 
-    def admits(self, forces, residual=EQUILIBRIUM, violation=ADMISSIBLE):
+    def admits(self, forces, residual=BALANCED, violation=ADMISSIBLE):
         """Whether forces (N_c, 2) are an equilibrium inside the cones, to the given tolerances."""
         return bool(self.residual(forces) <= residual and self.violation(forces) <= violation)
 
@@ -260,7 +260,7 @@ def _carrying(full):
     A state in which all of them carry is sought: contacts without force in the known state are
     asked to carry as much as they can together; when their sum can only be 0, each is 0.
     """
-    known = full.original[:, 0].copy() if full.admits(full.original, BALANCED) else None
+    known = full.original[:, 0].copy() if full.admits(full.original) else None
     idle = np.ones(len(full.index), bool) if known is None else known <= CARRYING * full.force_scale
     if not idle.any():
         return ~idle

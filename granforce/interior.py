@@ -94,19 +94,19 @@ def _transposed(columns, lanes, x, border, out):
     n = len(columns.high)
     for k in range(n):
         a, p = columns.value[k], columns.pressure[k]
-        h, l = 3 * columns.high[k], 3 * columns.low[k]
-        h0, h1, h2, l0, l1, l2 = x[h], x[h + 1], x[h + 2], x[l], x[l + 1], x[l + 2]
+        i, j = 3 * columns.high[k], 3 * columns.low[k]
+        i0, i1, i2, j0, j1, j2 = x[i], x[i + 1], x[i + 2], x[j], x[j + 1], x[j + 2]
         o = out[k]
         for s in range(LANES):
             o[s] = (
-                a[0] * h0[s] + a[1] * h1[s] + a[2] * h2[s]
-                + a[3] * l0[s] + a[4] * l1[s] + a[5] * l2[s] + p * border[s]
+                a[0] * i0[s] + a[1] * i1[s] + a[2] * i2[s]
+                + a[3] * j0[s] + a[4] * j1[s] + a[5] * j2[s] + p * border[s]
             )  # fmt: skip
     for s in range(LANES):
-        h, l = 3 * columns.high[lanes.loaded[s]], 3 * columns.low[lanes.loaded[s]]
+        i, j = 3 * columns.high[lanes.loaded[s]], 3 * columns.low[lanes.loaded[s]]
         total = lanes.load[6, s] * border[s]
         for a in range(3):
-            total += lanes.load[a, s] * x[h + a, s] + lanes.load[3 + a, s] * x[l + a, s]
+            total += lanes.load[a, s] * x[i + a, s] + lanes.load[3 + a, s] * x[j + a, s]
         out[n, s] = total
 
 
@@ -116,22 +116,22 @@ def _add_product(columns, lanes, v, out, border, sign):
     n = len(columns.high)
     for k in range(n):
         a, p, w = columns.value[k], columns.pressure[k], v[k]
-        h, l = 3 * columns.high[k], 3 * columns.low[k]
-        h0, h1, h2, l0, l1, l2 = out[h], out[h + 1], out[h + 2], out[l], out[l + 1], out[l + 2]
+        i, j = 3 * columns.high[k], 3 * columns.low[k]
+        i0, i1, i2, j0, j1, j2 = out[i], out[i + 1], out[i + 2], out[j], out[j + 1], out[j + 2]
         for s in range(LANES):
             u = sign * w[s]
-            h0[s] += a[0] * u
-            h1[s] += a[1] * u
-            h2[s] += a[2] * u
-            l0[s] += a[3] * u
-            l1[s] += a[4] * u
-            l2[s] += a[5] * u
+            i0[s] += a[0] * u
+            i1[s] += a[1] * u
+            i2[s] += a[2] * u
+            j0[s] += a[3] * u
+            j1[s] += a[4] * u
+            j2[s] += a[5] * u
             border[s] += p * u
     for s in range(LANES):
-        h, l = 3 * columns.high[lanes.loaded[s]], 3 * columns.low[lanes.loaded[s]]
+        i, j = 3 * columns.high[lanes.loaded[s]], 3 * columns.low[lanes.loaded[s]]
         for a in range(3):
-            out[h + a, s] += sign * lanes.load[a, s] * v[n, s]
-            out[l + a, s] += sign * lanes.load[3 + a, s] * v[n, s]
+            out[i + a, s] += sign * lanes.load[a, s] * v[n, s]
+            out[j + a, s] += sign * lanes.load[3 + a, s] * v[n, s]
         border[s] += sign * lanes.load[6, s] * v[n, s]
 
 
@@ -166,21 +166,21 @@ def assemble(columns, lanes, D, L):
     for k in range(n):
         high, low = columns.value[k, :3], columns.value[k, 3:]
         h = columns.diagonal[columns.high[k]] * _BLOCK
-        l = columns.diagonal[columns.low[k]] * _BLOCK
+        g = columns.diagonal[columns.low[k]] * _BLOCK
         c = columns.block[k] * _BLOCK
         _add_outer(L[h : h + _BLOCK], high, high, D[k])
-        _add_outer(L[l : l + _BLOCK], low, low, D[k])
+        _add_outer(L[g : g + _BLOCK], low, low, D[k])
         _add_outer(L[c : c + _BLOCK], high, low, D[k])
     for s in range(LANES):
         k = lanes.loaded[s]
         h = columns.diagonal[columns.high[k]] * _BLOCK + s
-        l = columns.diagonal[columns.low[k]] * _BLOCK + s
+        g = columns.diagonal[columns.low[k]] * _BLOCK + s
         c = columns.block[k] * _BLOCK + s
         for a in range(3):
             for b in range(3):
                 at = (3 * a + b) * LANES
                 L[h + at] += D[n, s] * lanes.load[a, s] * lanes.load[b, s]
-                L[l + at] += D[n, s] * lanes.load[3 + a, s] * lanes.load[3 + b, s]
+                L[g + at] += D[n, s] * lanes.load[3 + a, s] * lanes.load[3 + b, s]
                 L[c + at] += D[n, s] * lanes.load[a, s] * lanes.load[3 + b, s]
 
 
@@ -348,8 +348,8 @@ def recentre(columns, lanes, work, b, b_border, start, row, target):
 def rebalance(columns, lanes, work, b, b_border, start, row, target):
     """One Newton step of every lane on A y + a F = b alone, whatever the signs of y and F.
 
-    The weight D = max(y, _LIGHT) leaves what is zero nearly alone, yet lets degenerate optima, where
-    fewer y > 0 than there are rows, find their balance.
+    The weight D = max(y, _LIGHT) leaves what is zero nearly alone, yet lets degenerate optima,
+    where fewer y > 0 than there are rows, find their balance.
     """
     residuals(columns, lanes, work, b, b_border)
     for k in range(len(lanes.y)):

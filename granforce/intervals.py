@@ -128,7 +128,7 @@ def limit_load_bounds(ensemble, contacts=None, *, workers=1, progress=None, canc
 
     One program per contact (positions; default all), for the static limit load of PRE 79, 052302.
     The pair adds F to the normal force on the contact, in the balance and in the pressure, but not
-    in the contact's own cone. (Were F left out of the pressure, the limit would be F/(1 − F ℓ/2P0V).)
+    in the contact's own cone. (Left out of the pressure, the limit would be F/(1 − F ℓ/2P0V).)
     Options and errors as in `intervals`.
     """
     contacts = _positions(ensemble, contacts)

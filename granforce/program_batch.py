@@ -113,7 +113,9 @@ def _pin_dependent_rows(layout, columns, b):
         before = work.L.reshape(-1, 9, LANES)[columns.diagonal, ::4, 0]
         block_cholesky.factor(work.L, layout.start, layout.target)
         inverse = work.L.reshape(-1, 9, LANES)[columns.diagonal, ::4, 0]
-        dependent = (inverse**-2 <= _DEPENDENT * before) & (columns.pinned == 0)
+        # A pivot above the diagonal is not one: rounding had made it negative.
+        pivot = inverse**-2 / before
+        dependent = ((pivot <= _DEPENDENT) | (pivot > 2.0)) & (columns.pinned == 0)
         if not dependent.any():
             return
         grain, component = np.argwhere(dependent)[0]

@@ -19,16 +19,18 @@ from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
 from granforce.schema import dataset_packing, labelled, packing_dataset
 from granforce.store import open_store
-from granforce.tolerances import BALANCED, EQUILIBRIUM
+from granforce.tolerances import EQUILIBRIUM
 from granforce.walk import walk
 
 # Raised when an algorithm gives other numbers for the same parameters: older entries are not used.
 PACKING_VERSION = 1
 WALK_VERSION = 1
 
-RELAXATIONS = {"gauss_seidel": gauss_seidel, "nearest": nearest}
-# What a state must balance to, by solver: an interior point reaches far more than sweeps do.
-TOLERANCES = {"gauss_seidel": EQUILIBRIUM, "nearest": BALANCED}
+RELAXATIONS = {
+    "gauss_seidel": {"relax": gauss_seidel},
+    "gauss_seidel_only": {"relax": gauss_seidel, "rest": None, "tolerance": EQUILIBRIUM},
+    "nearest": {"relax": nearest},
+}
 
 
 def packing_parameters(
@@ -96,7 +98,6 @@ def get_walk(store, parameters, *, workers=1, dtypes=None, progress=None, cancel
         return found, True
     packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
     S = ensemble(packing, parameters["mu"])
-    relax = parameters["relax"]
     begin = time.perf_counter()
     done = walk(
         S,
@@ -104,8 +105,7 @@ def get_walk(store, parameters, *, workers=1, dtypes=None, progress=None, cancel
         parameters["seed"],
         chains=parameters["chains"],
         workers=workers,
-        relax=RELAXATIONS[relax],
-        tolerance=TOLERANCES[relax],
+        **RELAXATIONS[parameters["relax"]],
         progress=progress,
         cancel=cancel,
     )
@@ -254,4 +254,4 @@ def run_cell(path, cell, dtypes=None):
 def warm_up():
     """Compile (or load from numba's cache) every kernel once, before workers do it each."""
     packing = pack(12, 0.5, 0)
-    walk(ensemble(packing), 2, 0, tolerance=1.0)
+    walk(ensemble(packing), 2, 0)

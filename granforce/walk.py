@@ -8,7 +8,7 @@ import numpy as np
 from granforce.records import Cancelled, InputError, NotJammedError
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
-from granforce.tolerances import ADMISSIBLE, EQUILIBRIUM
+from granforce.tolerances import ADMISSIBLE, BALANCED
 
 
 class Walk(NamedTuple):
@@ -62,13 +62,13 @@ def step(ensemble, state, *, relax=gauss_seidel, **options):
     if ensemble.mu == 0:
         kick[:, 1] = 0.0
     relaxation = relax(ensemble, state.forces + kick, **options)
-    outcome = judge(relaxation, options.get("tolerance", EQUILIBRIUM))
+    outcome = judge(relaxation, options.get("tolerance", BALANCED))
     if outcome == "accepted":
         state = state._replace(forces=relaxation.forces)
     return state, relaxation, outcome
 
 
-def judge(relaxation, tolerance=EQUILIBRIUM):
+def judge(relaxation, tolerance=BALANCED):
     """ "accepted", "rejected" or "unconverged", by residual and violation in ⟨f_n⟩."""
     if relaxation.residual <= tolerance and relaxation.violation <= ADMISSIBLE:
         return "accepted"
