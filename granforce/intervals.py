@@ -248,7 +248,7 @@ def certify(system, outcomes, tasks):
     for k, outcome in enumerate(outcomes):
         task = tasks[outcome.number]
         cost[task.columns, k] = task.costs
-        value[k] = cost[:, k] @ y[:, k] - outcome.load
+        value[k] = np.dot(task.costs, outcome.y[task.columns]) - outcome.load
         if task.loaded >= 0:
             load = system.loads[:, task.loaded]
             unbalance[:, k] += outcome.load * load

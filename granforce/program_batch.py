@@ -242,9 +242,13 @@ def balanced(batch, outcomes, work=None):
     arguments = (batch.b, batch.b_border, layout.start, layout.row, layout.target)
     for _ in range(_MOST_BALANCING):
         interior.residuals(batch.columns, lanes, work, *arguments[:2])
-        if lanes.unbalance[: len(outcomes)].max() <= 0.1 * BALANCED:
+        balanced_already = lanes.unbalance <= 0.1 * BALANCED
+        if balanced_already[: len(outcomes)].all():
             break
+        # Those are put back, so that no outcome depends on the company it came in.
+        kept = lanes.y[:, balanced_already]
         interior.rebalance(batch.columns, lanes, work, *arguments)
+        lanes.y[:, balanced_already] = kept
     y, load = lanes.y[:-1], lanes.y[-1]
     if batch.centred:
         share = np.max(np.maximum(-y, 0.0) / (batch.y[:, None] + np.maximum(-y, 0.0)), axis=0)
