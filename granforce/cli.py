@@ -242,24 +242,25 @@ def _walk_source(arguments, store):
     """The walk's parameters; a packing from a file is kept in the store first."""
     from granforce import study
 
+    options = {
+        "mu": arguments.ensemble_mu,
+        "relax": arguments.relax,
+        "chains": arguments.chains,
+    }
+    size = arguments.states, arguments.walk_seed
     if arguments.packing:
         from granforce.importers import load_packing
 
         packing = load_packing(arguments.packing)
         named = study.imported_parameters(packing)
+        parameters = study.walk_parameters(named, *size, **options)
         study.keep_packing(store, named, packing)
-    else:
-        named = _packing_parameters(arguments, _required_mu(arguments), arguments.seed)
-        with _Steps("compaction", "step") as progress:
-            study.get_packing(store, named, progress=progress)
-    return study.walk_parameters(
-        named,
-        arguments.states,
-        arguments.walk_seed,
-        mu=arguments.ensemble_mu,
-        relax=arguments.relax,
-        chains=arguments.chains,
-    )
+        return parameters
+    named = _packing_parameters(arguments, _required_mu(arguments), arguments.seed)
+    parameters = study.walk_parameters(named, *size, **options)
+    with _Steps("compaction", "step") as progress:
+        study.get_packing(store, named, progress=progress)
+    return parameters
 
 
 def _walked(arguments):

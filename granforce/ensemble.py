@@ -14,6 +14,9 @@ from granforce.records import Contacts, InputError, NotJammedError, Packing, fri
 from granforce.relax.nearest import least_unbalanced
 from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING
 
+# Rows beyond which the dense eigenvalues that give a rank are not worth their time.
+LARGEST_RANK = 3000
+
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
@@ -45,14 +48,17 @@ class Ensemble:
     def dimension(self):
         """Dimension h of S: unknowns less independent balance rows.
 
-        With a prescribed pressure the generic value 2N_c − (3M − 1) (at μ = 0, N_c − (2M − 1));
-        crystals, whose rows depend on each other, have more. With frozen contacts or boundary
-        loads the rank of A, by singular values.
+        2N_c − (3M − 1) in a disordered packing with prescribed pressure (N_c − (2M − 1) at μ = 0),
+        more in crystals, whose rows depend on each other: rows are counted by the eigenvalues of
+        A Aᵀ. Beyond LARGEST_RANK rows the generic value is given.
         """
         rows, unknowns = self.A.shape
-        if self.has_pressure_row:
-            return max(0, unknowns - (rows - 2))
-        return unknowns - int(np.linalg.matrix_rank(self.A.toarray())) if unknowns else 0
+        if rows > LARGEST_RANK:
+            return max(0, unknowns - (rows - (2 if self.has_pressure_row else 3)))
+        if not unknowns:
+            return 0
+        square = np.linalg.eigvalsh((self.A @ self.A.T).toarray())
+        return unknowns - int(np.sum(square > 1e-12 * square[-1]))
 
     @property
     def coordination(self):

@@ -6,6 +6,7 @@ gives the same result for any number of workers, and one that was cut short goes
 
 import hashlib
 import multiprocessing
+import signal
 import time
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 
@@ -58,8 +59,8 @@ def walk_parameters(packing, states, seed=0, *, mu=None, relax="gauss_seidel", c
     """
     if relax not in RELAXATIONS:
         raise InputError(f"unknown relaxation {relax!r}: take one of {', '.join(RELAXATIONS)}")
-    if int(states) < 1 or (keep is not None and int(keep) < 1):
-        raise InputError("states and keep must be at least 1")
+    if int(states) < 1 or not 1 <= int(chains) <= int(states) or (keep or 1) < 1 or keep == 0:
+        raise InputError("states, keep and chains must be at least 1, and chains ≤ states")
     return {
         "packing": packing,
         "mu": packing["mu"] if mu is None else friction(mu),
@@ -233,6 +234,8 @@ _counter = None
 def _share(counter):
     global _counter
     _counter = counter
+    # Ctrl-C goes to the whole process group: the parent ends the workers, each without a word.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def run_cell(path, cell, dtypes=None):

@@ -1,0 +1,69 @@
+"""Measures against their definitions, pair by pair."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from granforce import measures
+
+
+@pytest.fixture
+def states(rng):
+    return rng.normal(1.0, 0.3, (7, 5, 2))
+
+
+def test_eta1_by_its_definition(states):
+    mean = states.mean(axis=0)
+    spread = [np.sqrt(np.mean([np.sum((s[c] - mean[c]) ** 2) for s in states])) for c in range(5)]
+    expected = np.mean(spread) / np.mean([np.hypot(*g) for g in mean])
+    assert measures.eta1(states) == pytest.approx(expected)
+
+
+def test_eta2_over_all_pairs(states):
+    pairs = itertools.combinations(states, 2)
+    mean_square = np.mean([np.sum((a - b) ** 2) for a, b in pairs])
+    expected = np.sqrt(mean_square / np.sum(states.mean(axis=0) ** 2))
+    assert measures.eta2(states) == pytest.approx(expected)
+
+
+def test_eta3_of_intervals():
+    low = np.array([[1.0, -1.0], [0.0, 0.0]])
+    high = np.array([[3.0, 1.0], [2.0, 0.0]])
+    # lengths 2, 2, 2, 0; middles 2, 0, 1, 0
+    assert measures.eta3(low, high) == pytest.approx(6 / 3)
+
+
+def test_one_state_is_fully_determined(states):
+    one = np.repeat(states[:1], 4, axis=0)
+    assert measures.eta1(one) == measures.eta2(one) == 0
+    assert measures.eta2(states[:1]) == 0
+    assert measures.eta3(*measures.intervals_seen(one)) == 0
+
+
+def test_measures_do_not_depend_on_the_unit_of_force(states):
+    for eta in (measures.eta1, measures.eta2):
+        assert eta(1e9 * states) == pytest.approx(eta(states))
+
+
+def test_growing_eta3_ends_at_eta3(states):
+    growing = measures.growing_eta3(states)
+    assert growing[0] == 0
+    assert growing[-1] == pytest.approx(measures.eta3(*measures.intervals_seen(states)))
+
+
+def test_correlation_and_its_range(states):
+    low, high = measures.intervals_seen(states)
+    extent = measures.normal_extent(low, high)
+    forces = states[0, :, 0]
+    expected = np.corrcoef(forces, extent)[0, 1]
+    assert measures.correlation(forces, extent) == pytest.approx(expected)
+    least, most = measures.correlation_range(states, extent)
+    assert least <= expected <= most
+    assert np.isnan(measures.correlation(forces, np.zeros(5)))
+
+
+def test_distances_from_the_centre(states):
+    centre = measures.mean_network(states)
+    expected = [np.linalg.norm((s - centre).ravel()) for s in states]
+    assert measures.distances(states, centre) == pytest.approx(expected)
