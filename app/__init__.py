@@ -1,0 +1,1 @@
+"""The app: `panel serve app` from the repository's root."""

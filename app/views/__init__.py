@@ -1,0 +1,1 @@
+"""One view a file: each takes the state and makes something to lay out."""

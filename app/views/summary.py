@@ -1,0 +1,66 @@
+"""Numbers of the walk on screen, and what was left out or went wrong on the way."""
+
+import panel as pn
+
+TILE = '<div class="tile" title="{title}"><div class="name">{name}</div><div>{value}</div></div>'
+STYLE = """
+.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(78px, 1fr)); gap: 6px; }
+.tile { padding: 5px 8px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
+  font-variant-numeric: tabular-nums; font-size: 15px; }
+.tile .name { font-size: 11px; opacity: 0.75; }
+.rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
+"""
+
+TILES = (
+    ("N", "n", "d", "number of disks"),
+    ("φ", "packing_fraction", ".4f", "packing fraction, rattlers included"),
+    ("z", "coordination", ".3f", "mean coordination number of the backbone"),
+    ("h", "dimension", "d", "dimension of the set of admissible networks"),
+    ("η1", "eta1", ".4f", "mean spread of a contact force over mean force"),
+    ("η2", "eta2", ".4f", "distance of two states over the mean state"),
+    ("0.15 η3", "scaled_eta3", ".4f", "mean interval over mean force, times 0.15"),
+    ("accepted", "acceptance", ".0%", "accepted states per attempt"),
+)
+
+
+def numbers(summary):
+    """The tiles and the line below them, as HTML."""
+    values = summary | {"scaled_eta3": 0.15 * summary["eta3"]}
+    tiles = "".join(
+        TILE.format(name=name, value=format(values[key], form), title=title)
+        for name, key, form, title in TILES
+    )
+    return f'<div class="tiles">{tiles}</div><div class="rest">{left_out(summary)}</div>'
+
+
+def left_out(summary):
+    """One line on work that was skipped and attempts that failed."""
+    counts = (
+        f"{summary['rattlers']} rattlers",
+        f"{summary['unloaded_contacts']} unloaded contacts",
+        f"{summary['tangential_unknowns']} tangential unknowns (μ = 0)",
+        f"{summary['skipped']} states without relaxation (h = 0)",
+    )
+    kept = ""
+    if summary["kept"] < summary["states"]:
+        kept = f" Shown: {summary['kept']} evenly spaced of {summary['states']} states."
+    return (
+        f"Left out: {', '.join(counts)}. Failed: {summary['rejected']} rejected, "
+        f"{summary['unconverged']} unconverged.{kept}"
+    )
+
+
+class SummaryView:
+    """The numbers of the replay on screen."""
+
+    def __init__(self, state):
+        self.pane = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
+        self.show(state.replay)
+
+    def panel(self):
+        """The tiles."""
+        return self.pane
+
+    def show(self, replay):
+        """Take over the numbers."""
+        self.pane.object = numbers(replay.summary) if replay is not None else ""
