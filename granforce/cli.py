@@ -40,6 +40,9 @@ def _parser():
     _add_walk(commands)
     _add_measure(commands)
     _add_sweep(commands)
+    _add_intervals(commands)
+    _add_limit_loads(commands)
+    _add_import(commands)
     _add_cache(commands)
     return parser
 
@@ -164,6 +167,65 @@ def _add_sweep(commands):
     command.add_argument("--float32", action="store_true", help="store states in single precision")
 
 
+def _add_exact(command):
+    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
+    _add_packing(command)
+    group = command.add_argument_group("the ensemble")
+    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument("--contacts", help="only these contacts, numbers separated by commas")
+    group.add_argument(
+        "--slice",
+        metavar="X0,X1,Y0,Y1",
+        help="freeze the forces on contacts outside this part of the box, such as 0.2,0.8,0,1",
+    )
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    group.add_argument("--csv", metavar="FILE.csv", help="write the result per contact")
+    _add_store(command)
+
+
+def _add_intervals(commands):
+    command = _command(
+        commands,
+        "intervals",
+        _intervals,
+        "compute the exact interval of every contact force",
+        "granforce intervals -n 400 --mu 0.1 --seed 1 --csv bounds.csv",
+    )
+    _add_exact(command)
+
+
+def _add_limit_loads(commands):
+    command = _command(
+        commands,
+        "limit-loads",
+        _limit_loads,
+        "compute the largest force pair each contact can be pushed apart with",
+        "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
+    )
+    _add_exact(command)
+
+
+def _add_import(commands):
+    command = _command(
+        commands,
+        "import",
+        _import,
+        "read a packing from elsewhere, check it and keep it",
+        "granforce import lammps particles.dump contacts.dump --mu 0.3 --out packing.npz\n"
+        "  granforce import table grains.csv contacts.csv --box 30 30 --mu 0.3 --out packing.npz",
+    )
+    command.add_argument("format", choices=["lammps", "table"])
+    command.add_argument("grains", help="LAMMPS particle dump, or table with x, y, r")
+    command.add_argument("contacts", nargs="?", help="LAMMPS contact dump, or table with i, j")
+    command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
+    command.add_argument(
+        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="table: box sides"
+    )
+    command.add_argument("--forces", action="store_true", help="table: fn, ft must be given")
+    command.add_argument("--pressure", type=float, default=1.0, help="table without forces: P0")
+    command.add_argument("--out", metavar="FILE.npz", help="save the packing to this file")
+
+
 def _add_cache(commands):
     command = _command(
         commands,
@@ -238,36 +300,33 @@ def _pack(arguments):
     _report(lines, arguments.json)
 
 
-def _walk_source(arguments, store):
-    """The walk's parameters; a packing from a file is kept in the store first."""
+def _named_packing(arguments, store):
+    """The packing's parameters: one from a file is kept in the store, another made if need be."""
     from granforce import study
 
-    options = {
-        "mu": arguments.ensemble_mu,
-        "relax": arguments.relax,
-        "chains": arguments.chains,
-    }
-    size = arguments.states, arguments.walk_seed
     if arguments.packing:
         from granforce.importers import load_packing
 
         packing = load_packing(arguments.packing)
         named = study.imported_parameters(packing)
-        parameters = study.walk_parameters(named, *size, **options)
         study.keep_packing(store, named, packing)
-        return parameters
+        return named
     named = _packing_parameters(arguments, _required_mu(arguments), arguments.seed)
-    parameters = study.walk_parameters(named, *size, **options)
     with _Steps("compaction", "step") as progress:
         study.get_packing(store, named, progress=progress)
-    return parameters
+    return named
 
 
 def _walked(arguments):
     from granforce import study
 
+    size = arguments.states, arguments.walk_seed
+    options = {"relax": arguments.relax, "chains": arguments.chains}
+    # Bad sizes are told before a packing is made.
+    study.walk_parameters({"mu": 0.0}, *size, mu=arguments.ensemble_mu, **options)
     store = _store(arguments)
-    parameters = _walk_source(arguments, store)
+    named = _named_packing(arguments, store)
+    parameters = study.walk_parameters(named, *size, mu=arguments.ensemble_mu, **options)
     with _Bar("random walk", "state") as progress:
         dataset, cached = study.get_walk(
             store, parameters, workers=arguments.workers, progress=progress
@@ -310,27 +369,136 @@ def _measure(arguments):
         "original_distance": dataset["original_distance"].item(),
     }
     if arguments.contacts:
-        _write_contacts(arguments.contacts, dataset)
+        columns = {"contact": dataset["backbone"].values}
+        for name, source in (("f_n", "original"), ("f_n_min", "low"), ("f_n_max", "high")):
+            columns[name] = dataset[source].values[:, 0]
+        _write_csv(arguments.contacts, columns)
     _report(lines, arguments.json)
 
 
-def _write_contacts(path, dataset):
+def _write_csv(path, columns):
+    """Columns {name: array} as a table; whole numbers stay whole."""
     import numpy as np
 
     from granforce.records import InputError
 
-    columns = [dataset["backbone"], *(dataset[k][:, 0] for k in ("original", "low", "high"))]
     try:
         np.savetxt(
             path,
-            np.column_stack(columns),
-            fmt=["%d", "%.17g", "%.17g", "%.17g"],
+            np.column_stack(list(columns.values())),
+            fmt=["%d" if v.dtype.kind == "i" else "%.17g" for v in columns.values()],
             delimiter=",",
-            header="contact,f_n,f_n_min,f_n_max",
+            header=",".join(columns),
             comments="",
         )
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}") from None
+
+
+def _exact_source(arguments, store):
+    from granforce import study
+    from granforce.records import InputError
+
+    try:
+        chosen = arguments.contacts and [int(text) for text in arguments.contacts.split(",")]
+        edges = arguments.slice and [float(text) for text in arguments.slice.split(",")]
+    except ValueError:
+        raise InputError("--contacts and --slice take numbers separated by commas") from None
+    if arguments.workers < 1:
+        raise InputError("--workers must be at least 1")
+    named = _named_packing(arguments, store)
+    options = {"mu": arguments.ensemble_mu, "contacts": chosen, "slice_": edges}
+    return study.exact_parameters(named, **options)
+
+
+def _intervals(arguments):
+    import numpy as np
+
+    from granforce import study
+
+    store = _store(arguments)
+    parameters = _exact_source(arguments, store)
+    with _Bar("exact bounds", "bound") as progress:
+        dataset, cached = study.get_intervals(
+            store, parameters, workers=arguments.workers, progress=progress
+        )
+    scale = dataset["force_scale"].item()
+    extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    position = dataset["position"].values
+    cluster = dataset["cluster"].values
+    histogram = np.histogram(position[np.isfinite(position)], bins=10, range=(0, 1))[0]
+    lines = {
+        "contacts": len(extent),
+        "dimension": dataset["dimension"].item(),
+        "coordination": dataset["coordination"].item(),
+        "exact_eta3": dataset["eta3"].item(),
+        "mean_extent_of_f_n": float(extent.mean() / scale),
+        "largest_extent_of_f_n": float(extent.max() / scale),
+        "correlation": dataset["correlation"].item(),
+        "determined_contacts": int(np.sum(cluster < 0)),
+        "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
+        "position_of_f_n_in_tenths": histogram.tolist(),
+        **json.loads(dataset.attrs["counts"]),
+        "largest_duality_gap": dataset["max_gap"].item(),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    if arguments.csv:
+        columns = {"contact": dataset["backbone"].values}
+        for name, side in (("min", "low"), ("max", "high")):
+            columns |= {f"f_n_{name}": dataset[side].values[:, 0]}
+            columns |= {f"f_t_{name}": dataset[side].values[:, 1]}
+        _write_csv(arguments.csv, columns | {"cluster": cluster})
+    _report(lines, arguments.json)
+
+
+def _limit_loads(arguments):
+    from granforce import study
+
+    store = _store(arguments)
+    parameters = _exact_source(arguments, store)
+    with _Bar("limit loads", "contact") as progress:
+        dataset, cached = study.get_limit_loads(
+            store, parameters, workers=arguments.workers, progress=progress
+        )
+    load = dataset["limit_load"].values / dataset["force_scale"].item()
+    lines = {
+        "contacts": len(load),
+        "mean_limit_load": float(load.mean()),
+        "least_limit_load": float(load.min()),
+        "largest_limit_load": float(load.max()),
+        **json.loads(dataset.attrs["counts"]),
+        "largest_duality_gap": dataset["max_gap"].item(),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    if arguments.csv:
+        names = {"contact": "backbone", "limit_load": "limit_load"}
+        _write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
+    _report(lines, arguments.json)
+
+
+def _import(arguments):
+    from granforce.importers import read_lammps, read_table, report, save_packing
+    from granforce.records import InputError
+
+    if arguments.format == "lammps":
+        if arguments.contacts is None:
+            raise InputError("import lammps needs two dumps: particles and contacts")
+        packing = read_lammps(arguments.grains, arguments.contacts, arguments.mu)
+    else:
+        packing = read_table(
+            arguments.grains,
+            arguments.contacts,
+            mu=arguments.mu,
+            box=arguments.box,
+            forces=True if arguments.forces else None,
+            pressure=arguments.pressure,
+        )
+    lines = report(packing) | {k: v for k, v in packing.info.items() if k == "contacts_skipped"}
+    if arguments.out:
+        save_packing(packing, arguments.out)
+    _report(lines, arguments.json)
 
 
 def _sweep(arguments):

@@ -4,7 +4,8 @@ States are arrays (S, N_c, 2) of force networks (f_n, f_t) on the same contacts.
 """
 
 import numpy as np
-from scipy import stats
+from scipy import sparse, stats
+from scipy.sparse import csgraph
 
 
 def mean_network(states):
@@ -77,3 +78,35 @@ def growing_eta3(states):
     high = np.maximum.accumulate(states, axis=0)
     extent, middle = (high - low).mean(axis=(1, 2)), (high + low).mean(axis=(1, 2)) / 2
     return extent / middle
+
+
+def position_in_interval(normal_forces, low, high):
+    """Where each f_n lies in its interval, 0 at the least and 1 at the largest; nan where ΔF_n = 0.
+
+    normal_forces (N_c,); low, high (N_c, 2).
+    """
+    extent = normal_extent(low, high)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(extent > 0, (normal_forces - low[:, 0]) / extent, np.nan)
+
+
+def undetermined_clusters(i, j, extent, tolerance):
+    """Clusters of contacts whose forces are not fixed: connected through shared grains.
+
+    i, j (N_c,) grains; extent (N_c, 2) lengths of the intervals of f_n and f_t; a contact is
+    undetermined where one of them exceeds the tolerance. Returns the cluster of each contact
+    (N_c,), −1 for determined ones, and the number of contacts of each cluster, largest first.
+    """
+    loose = np.asarray(extent).max(axis=1) > tolerance
+    label = np.full(len(i), -1)
+    if not loose.any():
+        return label, np.zeros(0, dtype=int)
+    size = max(i.max(), j.max()) + 1
+    bonds = sparse.coo_matrix((np.ones(loose.sum()), (i[loose], j[loose])), shape=(size, size))
+    component = csgraph.connected_components(bonds, directed=False)[1][i[loose]]
+    names, cluster, count = np.unique(component, return_inverse=True, return_counts=True)
+    order = np.argsort(-count, kind="stable")
+    rank = np.empty(len(names), dtype=int)
+    rank[order] = np.arange(len(names))
+    label[loose] = rank[cluster]
+    return label, count[order]

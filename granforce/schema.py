@@ -65,6 +65,23 @@ VARIABLES: dict[str, Variable] = {
     "correlation": Variable((), "float64", "1", "corr(f_n, ΔF_n) of the original network"),
     "correlation_low": Variable((), "float64", "1", "smallest corr(f_n, ΔF_n) of any state"),
     "correlation_high": Variable((), "float64", "1", "largest corr(f_n, ΔF_n) of any state"),
+    "interval_gap": Variable(
+        ("contact", "component", "side"),
+        "float64",
+        "mean normal force",
+        "duality gap of the bounds",
+    ),
+    "cluster": Variable(
+        ("contact",), "int64", "1", "cluster of undetermined contacts, −1 where determined"
+    ),
+    "position": Variable(
+        ("contact",), "float64", "1", "place of the original f_n in its interval, 0 to 1"
+    ),
+    "limit_load": Variable(("contact",), "float64", "force", "limit load of a normal force pair"),
+    "load_gap": Variable(
+        ("contact",), "float64", "mean normal force", "duality gap of the limit loads"
+    ),
+    "max_gap": Variable((), "float64", "mean normal force", "largest duality gap"),
     "packing_fraction": Variable((), "float64", "1", "packing fraction φ, rattlers included"),
     "coordination": Variable((), "float64", "1", "mean coordination number z of the backbone"),
     "dimension": Variable((), "int64", "1", "dimension h of the ensemble"),

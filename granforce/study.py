@@ -5,6 +5,7 @@ gives the same result for any number of workers, and one that was cut short goes
 """
 
 import hashlib
+import json
 import multiprocessing
 import signal
 import time
@@ -15,7 +16,8 @@ import numpy as np
 from granforce import measures
 from granforce.compaction import pack
 from granforce.ensemble import ensemble
-from granforce.records import InputError, friction
+from granforce.intervals import intervals, limit_load_bounds
+from granforce.records import Cancelled, InputError, friction
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
 from granforce.schema import dataset_packing, labelled, packing_dataset
@@ -26,6 +28,11 @@ from granforce.walk import walk
 # Raised when an algorithm gives other numbers for the same parameters: older entries are not used.
 PACKING_VERSION = 1
 WALK_VERSION = 1
+INTERVALS_VERSION = 1
+LIMIT_LOADS_VERSION = 1
+
+# Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
+UNDETERMINED = 1e-6
 
 RELAXATIONS = {
     "gauss_seidel": {"relax": gauss_seidel},
@@ -155,6 +162,136 @@ def walk_dataset(S, done, *, keep=None, seconds=0.0):
             "seconds": seconds,
         }
     )
+
+
+def exact_parameters(packing, *, mu=None, contacts=None, slice_=None):
+    """The parameters that name exact bounds or limit loads of one packing.
+
+    mu: friction coefficient of the ensemble, by default the packing's. contacts: positions in the
+    packing's contact list, by default all that carry. slice_: (x0, x1, y0, y1) in parts of the
+    box: contacts with a grain outside are frozen at their original forces.
+    """
+    mu = packing["mu"] if mu is None else friction(mu)
+    chosen = None if contacts is None else sorted({int(c) for c in contacts})
+    return {
+        "packing": packing,
+        "mu": mu,
+        "contacts": chosen,
+        "slice": None if slice_ is None else [float(edge) for edge in slice_],
+    }
+
+
+def exact_ensemble(store, parameters, *, cancel=None):
+    """The ensemble that exact_parameters name, and the asked contacts as positions in it."""
+    packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
+    frozen = None
+    if parameters["slice"] is not None:
+        frozen = outside_slice(packing, parameters["slice"])
+    S = ensemble(packing, parameters["mu"], frozen=frozen)
+    if parameters["contacts"] is None:
+        return S, np.arange(len(S.index))
+    asked = np.array(parameters["contacts"], dtype=int)
+    unknown = np.setdiff1d(asked, S.index)
+    if len(unknown):
+        raise InputError(
+            f"contact {unknown[0]} is none of the {len(S.index)} that carry a load in this packing"
+        )
+    return S, np.searchsorted(S.index, asked)
+
+
+def get_intervals(store, parameters, *, workers=2, progress=None, cancel=None):
+    """Dataset of exact bounds and η3, clusters of undetermined contacts; and if it was kept."""
+    found = store.load("intervals", parameters, version=INTERVALS_VERSION)
+    if found is not None:
+        return found, True
+    S, contacts = exact_ensemble(store, parameters, cancel=cancel)
+    begin = time.perf_counter()
+    bounds = intervals(S, contacts, workers=workers, progress=progress, cancel=cancel)
+    seconds = time.perf_counter() - begin
+    _complete(bounds, "exact bounds", cancel)
+    low, high = bounds.lower, bounds.upper
+    original = S.original[contacts]
+    i, j = S.contacts.i[contacts], S.contacts.j[contacts]
+    tolerance = UNDETERMINED * S.force_scale
+    cluster, _ = measures.undetermined_clusters(i, j, high - low, tolerance)
+    extent = measures.normal_extent(low, high)
+    dataset = labelled(
+        {
+            "backbone": S.index[contacts],
+            "original": original,
+            "low": low,
+            "high": high,
+            "interval_gap": bounds.gap,
+            "max_gap": bounds.max_gap,
+            "position": measures.position_in_interval(original[:, 0], low, high),
+            "cluster": cluster,
+            "eta3": measures.eta3(low, high),
+            "correlation": measures.correlation(original[:, 0], extent),
+            "dimension": S.dimension,
+            "coordination": S.coordination,
+            "force_scale": S.force_scale,
+            **S.skipped,
+            "seconds": seconds,
+        },
+        {"counts": json.dumps(bounds.counts)},
+    )
+    store.save("intervals", parameters, dataset, version=INTERVALS_VERSION)
+    return dataset, False
+
+
+def get_limit_loads(store, parameters, *, workers=2, progress=None, cancel=None):
+    """Dataset of the limit loads of contacts, and whether it came from the store."""
+    found = store.load("limit_loads", parameters, version=LIMIT_LOADS_VERSION)
+    if found is not None:
+        return found, True
+    S, contacts = exact_ensemble(store, parameters, cancel=cancel)
+    begin = time.perf_counter()
+    loads = limit_load_bounds(S, contacts, workers=workers, progress=progress, cancel=cancel)
+    seconds = time.perf_counter() - begin
+    _complete(loads, "limit loads", cancel)
+    dataset = labelled(
+        {
+            "backbone": S.index[contacts],
+            "original": S.original[contacts],
+            "limit_load": loads.load,
+            "load_gap": loads.gap,
+            "max_gap": loads.max_gap,
+            "force_scale": S.force_scale,
+            "seconds": seconds,
+        },
+        {"counts": json.dumps(loads.counts)},
+    )
+    store.save("limit_loads", parameters, dataset, version=LIMIT_LOADS_VERSION)
+    return dataset, False
+
+
+def _complete(result, what, cancel):
+    """Only finished results are kept: Cancelled or InputError for others."""
+    if cancel is not None and cancel():
+        raise Cancelled(f"{what} cancelled")
+    if not result.converged:
+        raise InputError(f"{what} not certified: largest duality gap {result.max_gap:.1e} ⟨f_n⟩")
+
+
+def outside_slice(packing, edges):
+    """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (parts of the box).
+
+    Raises InputError unless 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1.
+    """
+    if len(edges) != 4:
+        raise InputError("a slice is given by four numbers x0,x1,y0,y1")
+    x0, x1, y0, y1 = edges
+    if not (0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1):
+        raise InputError(f"slice {edges} must satisfy 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1")
+    place = np.mod(packing.x, packing.box) / packing.box
+    inside = np.all((place >= (x0, y0)) & (place <= (x1, y1)), axis=1)
+    contacts = packing.contacts
+    # A contact that reaches across the box's edge leaves the slice even if both grains are in it.
+    step = (
+        packing.x[contacts.j] - packing.x[contacts.i] - contacts.normal * contacts.length[:, None]
+    )
+    crossing = np.any(np.abs(step) > 0.5 * packing.box, axis=1)
+    return ~(inside[contacts.i] & inside[contacts.j]) | crossing
 
 
 ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")
