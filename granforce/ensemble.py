@@ -276,14 +276,16 @@ def _carrying(full):
     while idle.any():
         programs.set_cost(model, -(normal_rows.T @ idle.astype(float)))
         status, y = programs.solve(model)
-        if status == programs.INFEASIBLE and known is not None:
-            break  # feasible within BALANCED but not exactly: what is known to carry, carries
-        if status == programs.INFEASIBLE:
-            raise NotJammedError(_unbalanced_message(full))
         if status != programs.OPTIMAL:
-            raise NotJammedError(
-                "the forces on this packing are not bounded: is its pressure or boundary load set?"
-            )
+            # Asked without a goal, HiGHS tells an empty S from one without bounds.
+            programs.set_cost(model, np.zeros(A.shape[1]))
+            if programs.solve(model)[0] == programs.OPTIMAL:
+                raise NotJammedError(
+                    "the forces on this packing are not bounded: is a pressure or load set?"
+                )
+            if known is None:
+                raise NotJammedError(_unbalanced_message(full))
+            break  # feasible within BALANCED but not exactly: what is known to carry, carries
         normal = normal_rows @ y
         newly = idle & (normal > CARRYING)
         if not newly.any():

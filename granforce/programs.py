@@ -8,7 +8,6 @@ from granforce.tolerances import PROGRAM
 
 OPTIMAL = highspy.HighsModelStatus.kOptimal
 INFEASIBLE = highspy.HighsModelStatus.kInfeasible
-UNBOUNDED = highspy.HighsModelStatus.kUnbounded
 
 
 def standard_form(A, b, *, solver="choose", threads=1):
