@@ -17,7 +17,7 @@ from granforce.store import open_store
 SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 
-SOLVERS = {"nearest": "nearest state (interior point)", "gauss_seidel": "paper's Gauss–Seidel"}
+SOLVERS = {"nearest": "nearest admissible state", "gauss_seidel": "paper's Gauss–Seidel"}
 
 # Width of the strip around the periodic box in which images are drawn, in largest radii.
 MARGIN = 1.0
@@ -164,7 +164,8 @@ def series_name(params):
         words = [f"imported {packing['imported'][:8]}"]
     else:
         words = [f"N = {packing['n']}", f"seed {packing['seed']}"]
-        more = {name: packing[name] for name in packing if name not in ("n", "mu", "seed")}
+        usual = study.packing_parameters(packing["n"], packing["mu"], packing["seed"])
+        more = {name: value for name, value in packing.items() if usual.get(name) != value}
         words += [f"{name} {value}" for name, value in sorted(more.items())]
     if params["mu"] != packing["mu"]:
         words.append(f"packed at μ = {packing['mu']:g}")
@@ -173,7 +174,7 @@ def series_name(params):
         words.append(f"walk seed {params['seed']}")
     if params["chains"] > 1:
         words.append(f"{params['chains']} chains")
-    words.append({"nearest": "nearest", "gauss_seidel": "Gauss–Seidel"}[params["relax"]])
+    words.append(SOLVERS.get(params["relax"], params["relax"]))
     return ", ".join(words)
 
 

@@ -19,7 +19,7 @@ pn.extension()
 
 def page():
     """One user's page."""
-    state = AppState(Library())
+    state = AppState(pn.state.as_cached("library", Library))
     state.message = state.message or " ".join(state.library.notes)
     player = Player(sizing_mode="stretch_width")
     packing, intervals = PackingView(state), IntervalsView(state)
@@ -34,7 +34,8 @@ def page():
 
     state.param.watch(show, "replay")
     _poll_while_running(state)
-    left = pn.Column(player, packing.panel(), sizing_mode="stretch_width")
+    source = pmui.Typography(state.param.source, variant="subtitle2", margin=(8, 10, 0, 10))
+    left = pn.Column(source, player, packing.panel(), sizing_mode="stretch_width")
     right = pn.Column(
         summary.panel(),
         intervals.panel(),

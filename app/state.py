@@ -72,8 +72,8 @@ class AppState(param.Parameterized):
             self.message = str(error)
             return
         shipped = cell.store is self.library.shipped
-        where = "results that come with granforce" if shipped else "your cache"
-        self.source = f"μ = {cell.mu:g}, {cell.series} — from {where}"
+        where = "finished results" if shipped else "your cache"
+        self.source = f"μ = {cell.mu:g}, {cell.series} (from {where})"
         self.replay = replay
 
     def compute(self, n, mu, seed, states, relax):

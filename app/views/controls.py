@@ -17,8 +17,12 @@ class Controls:
     def __init__(self, state):
         self.state = state
         wide = {"sizing_mode": "stretch_width"}
-        self.series = pmui.Select.from_param(state.param.series, name="Series in the store", **wide)
-        self.mu = pmui.Select.from_param(state.param.mu, name="Friction coefficient μ", **wide)
+        self.series = pmui.Select.from_param(
+            state.param.series, name="Series", description=None, **wide
+        )
+        self.mu = pmui.Select.from_param(
+            state.param.mu, name="Friction coefficient μ", description=None, **wide
+        )
         self.new_mu = pmui.TextInput(name="μ", value="0.3", **wide)
         self.n = pmui.IntInput(name="Disks N", value=400, start=3, end=4000, step=100, **wide)
         self.seed = pmui.IntInput(name="Seed", value=1, start=0, **wide)
@@ -31,7 +35,6 @@ class Controls:
         self.bar = pmui.LinearProgress(visible=False, **wide)
         self.stage = pn.pane.Markdown("", visible=False, **wide)
         self.error = pmui.Alert(severity="error", visible=False, **wide)
-        self.source = pn.pane.Markdown(pn.bind(_source, state.param.source), **wide)
         self.go.on_click(self._compute)
         self.new_mu.param.watch(self._compute, "enter_pressed")
         self.cancel.on_click(lambda event: state.cancel())
@@ -45,7 +48,6 @@ class Controls:
             pmui.Typography("Show", **heading),
             self.series,
             self.mu,
-            self.source,
             pmui.Typography("Another walk", **heading),
             pn.Row(self.new_mu, self.n, sizing_mode="stretch_width"),
             pn.Row(self.seed, self.states, sizing_mode="stretch_width"),
@@ -82,7 +84,3 @@ class Controls:
 
     def _tell(self, *events):
         self.error.param.update(title=self.state.message, visible=bool(self.state.message))
-
-
-def _source(text):
-    return f"Shown: {text}" if text else ""

@@ -4,7 +4,7 @@ import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource, FixedTicker, Range1d, TapTool
 
-from .style import SERIES, hover, plot
+from .style import SERIES, hover, plot, quiet_legend
 
 MEASURES = (("eta1", "η1", "circle"), ("eta2", "η2", "square"), ("eta3", "0.15 η3", "triangle"))
 
@@ -15,7 +15,7 @@ class CurveView:
     def __init__(self, state):
         self.state = state
         self.source = ColumnDataSource(name="curve")
-        self.here = ColumnDataSource({"at": [], "zero": []}, name="here")
+        self.here = ColumnDataSource({"at": []}, name="here")
         self.figure = self._figure()
         self.source.selected.on_change("indices", self._tapped)
         state.param.watch(self._update, ["catalogue", "series"])
@@ -40,6 +40,8 @@ class CurveView:
         }
         places = self.source.data["at"]
         if len(places):
+            largest = max(max(self.source.data[name]) for name, _, _ in MEASURES)
+            self.figure.y_range.update(start=0, end=1.3 * max(largest, 1e-6))
             self.figure.x_range.update(start=places.min() - 0.4, end=places.max() + 0.4)
             self.figure.xaxis.ticker = FixedTicker(ticks=_ticks(places, mu))
             self.figure.xaxis.major_label_overrides = _labels(places, mu)
@@ -57,13 +59,13 @@ class CurveView:
 
     def _figure(self):
         fig = plot(
-            "Indeterminacy against friction (tap a point to see it)",
+            "Indeterminacy against friction (tap a point to show it)",
             "friction coefficient μ",
             "η",
             x_range=Range1d(-4, 1),
-            height=230,
+            y_range=Range1d(0, 1),
+            height=200,
         )
-        fig.y_range.start = 0
         fig.vspan(x="at", source=self.here, line_width=10, line_alpha=0.2, line_color="#888888")
         points = []
         for (name, label, marker), colour in zip(MEASURES, SERIES, strict=True):
@@ -80,10 +82,7 @@ class CurveView:
                     legend_label=label,
                 )
             )
-        fig.legend.location = "top_right"
-        fig.legend.label_text_font_size = "11px"
-        fig.legend.border_line_alpha = 0
-        fig.legend.background_fill_alpha = 0
+        quiet_legend(fig, "top_left")
         rows = ("μ", "@mu"), ("η1", "@eta1{0.000}"), ("η2", "@eta2{0.000}")
         more = ("0.15 η3", "@eta3{0.000}"), ("z", "@z{0.00}"), ("h", "@h")
         fig.add_tools(hover(points[:1], *rows, *more, mode="vline"), TapTool(renderers=points))

@@ -4,7 +4,7 @@ import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource, Range1d, Span
 
-from .style import DOT, PALE, SERIES, hover, plot
+from .style import DOT, ORIGINAL, PALE, SERIES, hover, plot, quiet_legend
 
 BARS, GROWTH = "bars", "growth"  # names under which the player finds the sources
 
@@ -51,43 +51,40 @@ class IntervalsView:
 
     def _bars_figure(self):
         fig = plot(
-            "Interval of the normal force of each contact, seen so far",
-            "contacts, sorted by original f_n",
-            "f_n  [⟨f_n⟩]",
+            "Interval of each contact's normal force seen so far",
+            "contacts, sorted by original fₙ",
+            "fₙ / ⟨fₙ⟩",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1),
-            height=300,
+            height=280,
         )
         bars = fig.vbar(
             x="rank",
             bottom="low",
             top="high",
-            width=0.9,
+            width=1,
             source=self.bars,
             fill_color=PALE,
+            fill_alpha=0.75,
             line_color=None,
             legend_label="seen",
         )
+        fig.scatter("rank", "now", source=self.bars, size=2.2, color=DOT, legend_label="now")
         fig.line(
             "rank",
             "original",
             source=self.bars,
-            color=SERIES[1],
+            color=ORIGINAL,
             line_width=1.5,
             legend_label="original",
         )
-        fig.scatter("rank", "now", source=self.bars, size=2.6, color=DOT, legend_label="now")
-        fig.legend.location = "top_left"
-        fig.legend.orientation = "horizontal"
-        fig.legend.label_text_font_size = "11px"
-        fig.legend.border_line_alpha = 0
-        fig.legend.background_fill_alpha = 0
+        quiet_legend(fig, "top_left")
         fig.add_tools(
             hover(
                 [bars],
                 ("contact", "@contact"),
-                ("f_n now", "@now{0.000} ⟨f_n⟩"),
-                ("original", "@original{0.000} ⟨f_n⟩"),
+                ("fₙ now", "@now{0.000} ⟨fₙ⟩"),
+                ("original", "@original{0.000} ⟨fₙ⟩"),
                 ("seen", "@low{0.000} … @high{0.000}"),
             )
         )
@@ -95,12 +92,12 @@ class IntervalsView:
 
     def _growth_figure(self):
         fig = plot(
-            "Indeterminacy seen by the walk",
-            "states",
+            "Indeterminacy η3 seen so far (dashed: all states)",
+            "states of the walk",
             "η3",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1),
-            height=230,
+            height=170,
         )
         fig.line("state", "eta3", source=self.growth, line_width=2, color=SERIES[0])
         fig.add_layout(self.final)

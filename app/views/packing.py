@@ -2,10 +2,10 @@
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, Range1d
+from bokeh.models import ColumnDataSource, CustomJS, Range1d
 from bokeh.transform import linear_cmap
 
-from .style import DISK, EDGE, NEUTRAL, RATTLER, diverging, hover, plot
+from .style import DISK, EDGE, FADED, IMAGE, NEUTRAL, OPAQUE, diverging, hover, plot
 
 # The names under which the player finds these in the page.
 FIGURE, LINKS = "packing", "links"
@@ -15,12 +15,13 @@ LIVE = ("width", "colour", "f_n", "f_t", "mobilised", "low", "high")
 
 LEGEND = """
 <div style="display:flex;flex-wrap:wrap;gap:4px 22px;align-items:center;font-size:12px">
- <span>width: normal force f<sub>n</sub>
+ <span>width: normal force fₙ
   <svg width="64" height="12" style="vertical-align:middle"><polygon points="0,5.5 64,0 64,12 0,6.5"
    fill="{neutral}"/></svg></span>
- <span>colour: mobilisation f<sub>t</sub>/(μ f<sub>n</sub>) {bar}</span>
+ <span>colour: mobilisation fₜ/(μ fₙ) {bar}</span>
  <span><svg width="12" height="12" style="vertical-align:middle"><circle cx="6" cy="6" r="5"
-  fill="{rattler}" stroke="{edge}"/></svg> rattler</span>
+  fill="{disk}" fill-opacity="{faded}" stroke="{edge}"/></svg> rattler</span>
+ <span>box {sides} largest radii, dashed; outside it images</span>
 </div>
 """
 BAR = """−1 <span style="display:inline-block;width:110px;height:10px;vertical-align:middle;
@@ -36,13 +37,13 @@ class PackingView:
         self.links = ColumnDataSource(name=LINKS)
         self.box = ColumnDataSource(name="box")
         self.figure = self._figure()
-        self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(0, 10))
+        self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
         self.show(state.replay)
 
     def panel(self):
         """The plot and its legend."""
         return pn.Column(
-            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
+            pn.pane.Bokeh(self.figure, sizing_mode="scale_width", aspect_ratio=1, margin=0),
             self.legend,
             sizing_mode="stretch_width",
         )
@@ -58,15 +59,11 @@ class PackingView:
         for axis, low, high in (("x_range", x_low, x_high), ("y_range", y_low, y_high)):
             getattr(self.figure, axis).update(start=low, end=high, reset_start=low, reset_end=high)
         sides = " × ".join(f"{side:.2f}" for side in replay.box)
-        self.figure.title.text = (
-            f"Force network of {replay.summary['n']} disks in a periodic box of {sides} "
-            "(lengths in largest radii)"
-        )
-        self.legend.object = _legend(replay.summary["mu"])
+        self.legend.object = _legend(replay.summary["mu"], sides)
 
     def _figure(self):
         fig = plot(
-            "Force network",
+            None,
             None,
             None,
             name=FIGURE,
@@ -74,9 +71,15 @@ class PackingView:
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1),
             aspect_ratio=1,
-            toolbar_location="right",
-            min_border=0,
+            sizing_mode="scale_width",
+            # Nothing may stand beside the frame, or it is no longer square.
+            toolbar_location=None,
+            min_border_left=0,
+            min_border_right=0,
+            min_border_top=0,
+            min_border_bottom=0,
         )
+        fig.js_on_event("doubletap", CustomJS(args={"fig": fig}, code="fig.reset.emit()"))
         fig.axis.visible = False
         fig.grid.visible = False
         fig.outline_line_alpha = 0
@@ -86,11 +89,11 @@ class PackingView:
             "y",
             radius="r",
             source=self.disks,
-            fill_color="fill",
+            fill_color=DISK,
             fill_alpha="alpha",
             line_color=EDGE,
             line_alpha="alpha",
-            line_width=0.6,
+            line_width=0.8,
         )
         fig.rect(
             "x",
@@ -110,7 +113,7 @@ class PackingView:
             source=self.links,
             line_width="width",
             line_cap="round",
-            line_color=linear_cmap("colour", [*diverging(), NEUTRAL], -1, 1 + 2 / 255),
+            line_color=linear_cmap("colour", diverging(), -1, 1, high_color=NEUTRAL),
         )
         about_grain = (
             ("grain", "@grain (@kind)"),
@@ -119,10 +122,10 @@ class PackingView:
         )
         about_contact = (
             ("contact", "@i – @j"),
-            ("f_n", "@f_n{0.000} ⟨f_n⟩"),
-            ("f_t", "@f_t{0.000} ⟨f_n⟩"),
-            ("f_t/(μ f_n)", "@mobilised{0.00}"),
-            ("f_n seen", "@low{0.000} … @high{0.000}"),
+            ("fₙ", "@f_n{0.000} ⟨fₙ⟩"),
+            ("fₜ", "@f_t{0.000} ⟨fₙ⟩"),
+            ("fₜ/(μ fₙ)", "@mobilised{0.00}"),
+            ("fₙ seen", "@low{0.000} … @high{0.000}"),
         )
         fig.add_tools(hover([disks], *about_grain), hover([links], *about_contact))
         return fig
@@ -132,8 +135,7 @@ def _disk_columns(disks):
     idle = disks.contacts == 0
     return {
         **{name: values for name, values in disks._asdict().items() if name != "image"},
-        "fill": np.where(idle, RATTLER, DISK),
-        "alpha": np.where(disks.image, 0.35, 0.75).astype(np.float32),
+        "alpha": np.where(idle, FADED, OPAQUE) * np.where(disks.image, IMAGE, 1.0),
         "kind": np.where(idle, "rattler", "backbone"),
     }
 
@@ -155,9 +157,9 @@ def _box_columns(box):
     return {"x": sides[:, 0] / 2, "y": sides[:, 1] / 2, "w": sides[:, 0], "h": sides[:, 1]}
 
 
-def _legend(mu):
+def _legend(mu, sides):
     if mu > 0:
         bar = BAR.format(stops=",".join(diverging()[::32]))
     else:
         bar = "has no meaning at μ = 0"
-    return LEGEND.format(neutral=NEUTRAL, rattler=RATTLER, edge=EDGE, bar=bar)
+    return LEGEND.format(neutral=NEUTRAL, disk=DISK, faded=FADED, edge=EDGE, bar=bar, sides=sides)

@@ -1,10 +1,10 @@
 // Replays a random walk in the page. The frames come once; per frame a few numeric columns of the
 // plots are rewritten in place. `source.change.emit()` paints them without telling the server.
 
-const WIDTH = 0.3 // of a chain that carries the mean normal force, in largest radii
+const WIDTH = 0.23 // of a chain that carries the mean normal force, in largest radii
 const LEAST = 0.35 // px, of the thinnest chain that is drawn
-const CARRYING = 1e-6 // in ⟨f_n⟩; less is not drawn
-const NEUTRAL = 1.005 // beyond the scale of mobilisation: the last colour, for μ = 0
+const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
+const NEUTRAL = 2 // beyond the scale of mobilisation: the neutral colour, for μ = 0
 
 const ICONS = {
   restart: "M6 5h2v14H6zM20 5v14L9 12z",
@@ -138,7 +138,7 @@ function controls() {
     <div class="read">
       <span>state <b class="state"></b></span>
       <span>η3 seen <b class="eta3"></b></span>
-      <span>from the centre <b class="distance"></b> ⟨f<sub>n</sub>⟩</span>
+      <span>from the centre <b class="distance"></b> ⟨fₙ⟩</span>
       <span>residual <b class="residual"></b></span>
     </div>`
   const part = (name) => root.querySelector(`.${name}`)

@@ -5,9 +5,9 @@ import panel as pn
 TILE = '<div class="tile" title="{title}"><div class="name">{name}</div><div>{value}</div></div>'
 STYLE = """
 .tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(78px, 1fr)); gap: 6px; }
-.tile { padding: 5px 8px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
-  font-variant-numeric: tabular-nums; font-size: 15px; }
-.tile .name { font-size: 11px; opacity: 0.75; }
+.tile { padding: 4px 8px 3px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
+  font-variant-numeric: tabular-nums; font-size: 15px; line-height: 19px; }
+.tile .name { font-size: 11px; line-height: 13px; opacity: 0.75; }
 .rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
 """
 
@@ -38,8 +38,8 @@ def left_out(summary):
     counts = (
         f"{summary['rattlers']} rattlers",
         f"{summary['unloaded_contacts']} unloaded contacts",
-        f"{summary['tangential_unknowns']} tangential unknowns (μ = 0)",
-        f"{summary['skipped']} states without relaxation (h = 0)",
+        f"{summary['tangential_unknowns']} tangential unknowns",
+        f"{summary['skipped']} states without relaxation",
     )
     kept = ""
     if summary["kept"] < summary["states"]:
