@@ -6,7 +6,9 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from granforce.cli import main
@@ -40,7 +42,19 @@ def test_help_needs_no_heavy_import():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize("command", ["pack", "walk", "measure", "sweep", "cache"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "pack",
+        "walk",
+        "measure",
+        "sweep",
+        "intervals",
+        "limit-loads",
+        "import",
+        "cache",
+    ],
+)
 def test_every_command_has_help_with_an_example(run, command):
     code, out, _ = run(command, "--help")
     assert code == 0
@@ -85,6 +99,62 @@ def test_sweep_table_and_resume(run, tmp_path):
     assert rows[0]["skipped"] == 4
 
 
+def test_intervals_hold_the_walk(run, tmp_path):
+    exact, seen = tmp_path / "exact.csv", tmp_path / "seen.csv"
+    words = SMALL[:4]
+    report = json.loads(run("intervals", *words, "--csv", exact, "--json")[1])
+    assert report["largest_duality_gap"] <= 1e-8
+    assert report["exact_eta3"] > json.loads(run("measure", *SMALL, "--json")[1])["eta3"]
+    run("measure", *SMALL, "--contacts", seen)
+    bounds = np.genfromtxt(exact, delimiter=",", names=True)
+    walked = np.genfromtxt(seen, delimiter=",", names=True)
+    assert np.array_equal(bounds["contact"], walked["contact"])
+    for name in ("f_n", "f_n_min", "f_n_max"):
+        assert np.all(walked[name] >= bounds["f_n_min"] - 1e-7)
+        assert np.all(walked[name] <= bounds["f_n_max"] + 1e-7)
+    assert json.loads(run("intervals", *words, "--json")[1])["cached"] is True
+    # A subset gives the same bounds for what was asked.
+    part = tmp_path / "part.csv"
+    run("intervals", *words, "--contacts", f"{bounds['contact'][3]:.0f}", "--csv", part)
+    one = np.genfromtxt(part, delimiter=",", names=True)
+    assert one["f_n_max"] == pytest.approx(bounds["f_n_max"][3], rel=1e-7)
+
+
+def test_a_frozen_frame_determines_more(run):
+    words = ["intervals", "-n", "60", "--mu", "0.3", "--json"]
+    free = json.loads(run(*words)[1])
+    held = json.loads(run(*words, "--slice", "0.1,0.9,0.1,0.9")[1])
+    assert held["contacts"] < free["contacts"]
+    assert held["dimension"] < free["dimension"]
+    assert free["undetermined_clusters"] == 1
+
+
+def test_limit_loads_of_chosen_contacts(run, tmp_path):
+    bounds = tmp_path / "loads.csv"
+    words = ["limit-loads", *SMALL[:4], "--json", "--csv", bounds]
+    report = json.loads(run(*words)[1])
+    assert report["least_limit_load"] >= 0
+    assert report["largest_duality_gap"] <= 1e-8
+    assert bounds.read_text().startswith("contact,limit_load\n")
+
+
+def test_import_keeps_what_was_read(run, tmp_path):
+    folder = Path(__file__).parent / "lammps"
+    dumps = [folder / f"lammps_n400_mu0.3.{kind}.dump" for kind in ("particles", "contacts")]
+    file = tmp_path / "p.npz"
+    code, out, _ = run("import", "lammps", *dumps, "--mu", 0.3, "--out", file, "--json")
+    report = json.loads(out)
+    assert code == 0
+    assert report["grains"] == 400
+    assert report["residual"] < 1e-9
+    assert report["violation"] < 1e-9
+    words = ["intervals", "--packing", file, "--contacts", "0,1,2", "--json"]
+    found = json.loads(run(*words)[1])
+    assert found["contacts"] == 3
+    # The elastic network is one point of S: inside every exact interval.
+    assert sum(found["position_of_f_n_in_tenths"]) == 3
+
+
 def test_cache_commands(run):
     run("walk", *SMALL)
     entries = json.loads(run("cache", "list", "--json")[1])
@@ -106,6 +176,13 @@ def test_cache_commands(run):
         (["pack", "--mu", "0.1", "--radii", "uniform:2,1"], "radii"),
         (["pack", "-n", "40", "--mu", "0.3", "--max-steps", "100"], "not jammed"),
         (["walk", "--packing", "no-such-file.npz"], "no-such-file.npz"),
+        (["intervals", "-n", "20", "--mu", "0.3", "--contacts", "0,999"], "contact 999"),
+        (["intervals", "-n", "20", "--mu", "0.3", "--contacts", "a"], "--contacts"),
+        (["intervals", "-n", "20", "--mu", "0.3", "--slice", "0.5,0.2,0,1"], "slice"),
+        (["limit-loads", "-n", "20", "--mu", "0.3", "--slice", "0,1"], "four numbers"),
+        (["import", "lammps", "no-such.dump", "nor-this.dump", "--mu", "0.3"], "no-such.dump"),
+        (["import", "lammps", "one.dump", "--mu", "0.3"], "two dumps"),
+        (["import", "table", "no-such.csv", "--mu", "-1"], ""),
         (["walk", "--mu", "0.1", "--states", "0"], "states"),
         (["sweep", "--mu", "0.1;1"], "--mu"),
         (["sweep", "--mu", "0.1", "--seeds", "0"], "--seeds"),

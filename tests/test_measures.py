@@ -67,3 +67,22 @@ def test_distances_from_the_centre(states):
     centre = measures.mean_network(states)
     expected = [np.linalg.norm((s - centre).ravel()) for s in states]
     assert measures.distances(states, centre) == pytest.approx(expected)
+
+
+def test_clusters_are_connected_through_grains():
+    # Contacts 0–1 and 1–2 share grain 1; 3–4 stands apart; 2–3 is determined.
+    i, j = np.array([0, 1, 3, 2]), np.array([1, 2, 4, 3])
+    extent = np.array([[1.0, 0.0], [0.0, 0.5], [0.2, 0.0], [1e-9, 1e-9]])
+    label, sizes = measures.undetermined_clusters(i, j, extent, 1e-6)
+    assert label.tolist() == [0, 0, 1, -1]
+    assert sizes.tolist() == [2, 1]
+    label, sizes = measures.undetermined_clusters(i, j, 0 * extent, 1e-6)
+    assert label.tolist() == [-1] * 4
+    assert len(sizes) == 0
+
+
+def test_position_in_the_interval():
+    low, high = np.array([[1.0, 0], [0, 0], [2, 0]]), np.array([[3.0, 0], [1, 0], [2, 0]])
+    position = measures.position_in_interval(np.array([1.5, 1.0, 2.0]), low, high)
+    assert position[:2].tolist() == [0.25, 1.0]
+    assert np.isnan(position[2])
