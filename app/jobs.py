@@ -24,11 +24,12 @@ class Job:
         self.library, self.params = library, params
         self.stage = "waiting for a free processor"
         self.fraction = None  # done, 0 … 1; None where unknown
-        self.seconds_left = None
+        self.seconds_left = None  # of this stage
         self.error = ""
         self.cell = None  # the result
         self.ended = False
         self._begun = time.perf_counter()
+        self._steps = None  # of the compaction, as expected
         self._cancelled = threading.Event()
         self._future = _pool.submit(self._run)
 
@@ -77,15 +78,19 @@ class Job:
 
     def _begin(self, stage):
         self.stage, self._begun = stage, time.perf_counter()
+        self.seconds_left = None
 
     def _packing_told(self, step, message):
         self.stage = f"compaction, step {step}: {message}"
         if self._steps:
-            part = min(NEARLY, step / self._steps)
-            self.fraction = PACKING_SHARE * part
+            self.fraction = PACKING_SHARE * min(NEARLY, step / self._steps)
+            self._tell_time_left(step, self._steps)
 
     def _walk_told(self, done, total):
         self.stage = f"random walk, {done} of {total} states"
-        spent = time.perf_counter() - self._begun
-        self.seconds_left = spent / done * (total - done)
         self.fraction = PACKING_SHARE + (1 - PACKING_SHARE) * done / total
+        self._tell_time_left(done, total)
+
+    def _tell_time_left(self, done, total):
+        spent = time.perf_counter() - self._begun
+        self.seconds_left = spent / done * (total - done) if 0 < done <= total else None

@@ -1,4 +1,8 @@
-"""The page: `panel serve app` from the repository's root."""
+"""The page: `panel serve app` from the repository's root.
+
+It opens on the finished results in data/start.zarr, or in the folder that the environment variable
+GRANFORCE_DATA names, and on the user's own cache (GRANFORCE_CACHE).
+"""
 
 import panel as pn
 import panel_material_ui as pmui

@@ -7,13 +7,15 @@ from granforce.records import InputError
 
 from .jobs import Job
 
+OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
+
 
 class AppState(param.Parameterized):
     """The walk selected, the catalogue to select from, and the computation under way."""
 
     catalogue = param.List(doc="all cells, by series and μ")
-    series = param.Selector(objects=[None], doc="everything but μ")
-    mu = param.Selector(objects=[None], doc="friction coefficient μ of the ensemble")
+    series = param.String(doc="of the walk on screen: everything but μ, in words")
+    mu = param.Number(default=None, allow_None=True, doc="of the walk on screen")
     replay = param.Parameter(doc="the Replay on screen, or None")
     source = param.String(doc="where the states on screen come from, in words")
     message = param.String(doc="one line about what went wrong, or empty")
@@ -32,40 +34,34 @@ class AppState(param.Parameterized):
         """The cells of the selected series, by μ."""
         return [cell for cell in self.catalogue if cell.series == self.series]
 
-    def refresh(self, select=None):
+    def refresh(self, show=None):
         """Read the catalogue anew and show a cell: the given one, or what fits best."""
         self.catalogue = self.library.cells()
-        series = list(dict.fromkeys(cell.series for cell in self.catalogue)) or [None]
-        self.param.series.objects = series
-        wanted = select.series if select is not None else self.series
-        self.series = wanted if wanted in series else self._fullest(series)
-        self._offer(select.mu if select is not None else self.mu)
+        if show is not None:
+            self.show(show)
+        elif self.catalogue:
+            self.choose(series=self.series or self._fullest())
 
-    def _fullest(self, series):
+    def series_offered(self):
+        """The names of all series."""
+        return list(dict.fromkeys(cell.series for cell in self.catalogue))
+
+    def _fullest(self):
         """The series with the most values of μ: the one most worth opening with."""
-        number = [sum(cell.series == name for cell in self.catalogue) for name in series]
-        return series[number.index(max(number))]
+        names = [cell.series for cell in self.catalogue]
+        return max(self.series_offered(), key=names.count)
 
-    @param.depends("series", watch=True)
-    def _series_changed(self):
-        self._offer(self.mu)
+    def choose(self, series=None, mu=None):
+        """Show the cell of this series with this μ or the nearest; by default those on screen."""
+        series = self.series if series is None else series
+        mu = self.mu if mu is None else mu
+        near = OPENING_MU if mu is None else mu
+        cells = [cell for cell in self.catalogue if cell.series == series]
+        if cells:
+            self.show(min(cells, key=lambda cell: abs(cell.mu - near)))
 
-    def _offer(self, mu):
-        """Offer the series' values of μ and select one: the given if there, else nearest 0.1."""
-        values = [cell.mu for cell in self.cells()] or [None]
-        if mu not in values:
-            mu = min(values, key=lambda value: abs((value or 0) - 0.1))
-        with param.parameterized.discard_events(self):
-            self.param.mu.objects = values
-            self.mu = mu
-        self.param.trigger("mu")
-
-    @param.depends("mu", watch=True)
-    def _mu_changed(self):
-        cell = next((cell for cell in self.cells() if cell.mu == self.mu), None)
-        if cell is None:
-            self.replay = None
-            return
+    def show(self, cell):
+        """Load a cell and put it on screen; what cannot be read leaves a message."""
         try:
             replay = self.library.replay(cell)
         except InputError as error:
@@ -73,8 +69,8 @@ class AppState(param.Parameterized):
             return
         shipped = cell.store is self.library.shipped
         where = "finished results" if shipped else "your cache"
-        self.source = f"μ = {cell.mu:g}, {cell.series} (from {where})"
-        self.replay = replay
+        source = f"μ = {cell.mu:g}, {cell.series} (from {where})"
+        self.param.update(series=cell.series, mu=cell.mu, source=source, replay=replay)
 
     def compute(self, n, mu, seed, states, relax):
         """Show the walk of these parameters: from a store, or computed in the background."""
@@ -108,7 +104,7 @@ class AppState(param.Parameterized):
         self.job, self.running = None, False
         self.message = job.error
         if job.cell is not None:
-            self.refresh(select=job.cell)
+            self.refresh(show=job.cell)
 
     def cancel(self):
         """End the computation, if there is one; nothing of it is kept but a finished packing."""

@@ -17,12 +17,8 @@ class Controls:
     def __init__(self, state):
         self.state = state
         wide = {"sizing_mode": "stretch_width"}
-        self.series = pmui.Select.from_param(
-            state.param.series, name="Series", description=None, **wide
-        )
-        self.mu = pmui.Select.from_param(
-            state.param.mu, name="Friction coefficient μ", description=None, **wide
-        )
+        self.series = pmui.Select(name="Series", **wide)
+        self.mu = pmui.Select(name="Friction coefficient μ", **wide)
         self.new_mu = pmui.TextInput(name="μ", value="0.3", **wide)
         self.n = pmui.IntInput(name="Disks N", value=400, start=3, end=4000, step=100, **wide)
         self.seed = pmui.IntInput(name="Seed", value=1, start=0, **wide)
@@ -33,8 +29,12 @@ class Controls:
         self.go = pmui.Button(name="Show or compute", color="primary", **wide)
         self.cancel = pmui.Button(name="Cancel", variant="outlined", visible=False, **wide)
         self.bar = pmui.LinearProgress(visible=False, **wide)
-        self.stage = pn.pane.Markdown("", visible=False, **wide)
+        self.stage = pmui.Typography("", variant="caption", visible=False, **wide)
         self.error = pmui.Alert(severity="error", visible=False, **wide)
+        self._offer()
+        self.series.param.watch(lambda event: self._choose(series=event.new), "value")
+        self.mu.param.watch(lambda event: self._choose(mu=event.new), "value")
+        state.param.watch(self._offer, ["catalogue", "series", "mu"])
         self.go.on_click(self._compute)
         self.new_mu.param.watch(self._compute, "enter_pressed")
         self.cancel.on_click(lambda event: state.cancel())
@@ -60,6 +60,19 @@ class Controls:
             pmui.Typography(HELP, variant="caption"),
         ]
 
+    def _offer(self, *events):
+        """Options and selection as the state has them."""
+        state = self.state
+        values = {f"{cell.mu:g}": cell.mu for cell in state.cells()}
+        self._following = True
+        self.series.param.update(options=state.series_offered(), value=state.series)
+        self.mu.param.update(options=values, value=state.mu)
+        self._following = False
+
+    def _choose(self, **wanted):
+        if not self._following:
+            self.state.choose(**wanted)
+
     def _compute(self, event):
         self.state.compute(
             n=self.n.value,
@@ -80,7 +93,9 @@ class Controls:
             value=round(100 * state.fraction) if known else -1,
         )
         left = state.seconds_left
-        self.stage.object = state.stage + (f" — {left:.0f} s left" if left is not None else "")
+        self.stage.object = state.stage + (
+            f" — about {left:.0f} s more" if left is not None else ""
+        )
 
     def _tell(self, *events):
         self.error.param.update(title=self.state.message, visible=bool(self.state.message))

@@ -54,7 +54,7 @@ class CurveView:
 
     def _tapped(self, name, old, new):
         if new:
-            self.state.mu = float(self.source.data["mu"][new[0]])
+            self.state.choose(mu=float(self.source.data["mu"][new[0]]))
             self.source.selected.indices = []
 
     def _figure(self):

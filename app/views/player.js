@@ -153,7 +153,7 @@ function plain(walk) {
 export function render({ model, view }) {
   const { root, part } = controls()
   const stage = new Stage(view.model.document)
-  let walk = null, seen = null, frame = 0, playing = false, due = 0, before = 0, painted = 0
+  let loaded = null, walk = null, seen = null, frame = 0, playing = false, due = 0, before = 0
 
   const speed = () => 2 ** Number(part("speed").value) // states per second
   const last = () => walk.number.length - 1
@@ -162,7 +162,6 @@ export function render({ model, view }) {
     frame = Math.max(0, Math.min(last(), to))
     seen.until(frame)
     stage.show(walk, seen, frame)
-    painted += 1
     part("scrub").value = frame
     const residual = walk.residual[frame]
     part("state").textContent = frame ? `${walk.number[frame]} of ${walk.states}` : "original"
@@ -194,18 +193,15 @@ export function render({ model, view }) {
     else requestAnimationFrame(tick)
   }
 
-  function load(tries = 50) {
-    const given = plain(model.walk)
-    if (!given.contacts || !stage.figure) return
-    // Plots and frames come in separate messages; the frames of one walk on the contacts of
-    // another would be nonsense.
-    if (!stage.fits(given)) {
-      if (tries > 0) setTimeout(() => load(tries - 1), 50)
-      return
-    }
+  // Plots and frames come in separate messages, and the frames of one walk on the contacts of
+  // another would be nonsense: begin when both are there.
+  function load() {
+    const given = model.walk, asked = plain(given)
+    if (given === loaded || !asked.contacts || !stage.fits(asked)) return
+    loaded = given
     const wasPlaying = playing
     playing = false
-    walk = given
+    walk = asked
     seen = new Seen(walk)
     part("scrub").max = last()
     show(0)
@@ -234,8 +230,8 @@ export function render({ model, view }) {
   stage.figure.x_range.change.connect(rescale)
   stage.figure.properties.inner_width.change.connect(rescale)
 
-  model.on("walk", () => load())
+  model.on("walk", load)
+  for (const source of [stage.bars, stage.growth]) source.properties.data.change.connect(load)
   load()
-  root.painted = () => painted // for measuring
   return root
 }

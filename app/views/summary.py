@@ -26,9 +26,11 @@ TILES = (
 def numbers(summary):
     """The tiles and the line below them, as HTML."""
     values = summary | {"scaled_eta3": 0.15 * summary["eta3"]}
+    texts = {key: format(values[key], form) for _, key, form, _ in TILES}
+    if summary["skipped"]:
+        texts["acceptance"] = "–"  # nothing was tried
     tiles = "".join(
-        TILE.format(name=name, value=format(values[key], form), title=title)
-        for name, key, form, title in TILES
+        TILE.format(name=name, value=texts[key], title=title) for name, key, _, title in TILES
     )
     return f'<div class="tiles">{tiles}</div><div class="rest">{left_out(summary)}</div>'
 
