@@ -17,7 +17,12 @@ from granforce.store import open_store
 SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 
-SOLVERS = {"nearest": "nearest admissible state", "gauss_seidel": "paper's Gauss–Seidel"}
+# Names on screen of study.RELAXATIONS; the first is what a new walk takes unless told otherwise.
+SOLVERS = {
+    "nearest": "nearest admissible state",
+    "gauss_seidel": "Gauss–Seidel, finished exactly",
+    "gauss_seidel_only": "paper's plain Gauss–Seidel",
+}
 
 # Width of the strip around the periodic box in which images are drawn, in largest radii.
 MARGIN = 1.0
@@ -170,7 +175,7 @@ def series_name(params):
     if params["mu"] != packing["mu"]:
         words.append(f"packed at μ = {packing['mu']:g}")
     words.append(f"{params['states']} states")
-    if params["seed"] != packing.get("seed"):
+    if params["seed"] != 0:
         words.append(f"walk seed {params['seed']}")
     if params["chains"] > 1:
         words.append(f"{params['chains']} chains")

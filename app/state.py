@@ -81,7 +81,7 @@ class AppState(param.Parameterized):
             packing = study.packing_parameters(n, mu, seed)
             if packing["n"] < 3:
                 raise InputError(f"a packing needs at least 3 disks, got {n}")
-            params = study.walk_parameters(packing, states, seed, relax=relax)
+            params = study.walk_parameters(packing, states, relax=relax)
         except (InputError, TypeError, ValueError) as error:
             self.message = str(error) if isinstance(error, InputError) else "fill in every field"
             return

@@ -92,7 +92,7 @@ class IntervalsView:
 
     def _growth_figure(self):
         fig = plot(
-            "Indeterminacy η3 seen so far (dashed: all states)",
+            "η3 of the states shown so far (dashed: of all states)",
             "states of the walk",
             "η3",
             x_range=Range1d(0, 1),

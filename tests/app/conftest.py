@@ -18,7 +18,7 @@ DISKS, STATES, KEPT = 30, 30, 12
 def cell_parameters(mu, **options):
     """Walk parameters of the small store's cells."""
     packing = study.packing_parameters(DISKS, mu, 1)
-    return study.walk_parameters(packing, STATES, 1, relax="nearest", keep=KEPT, **options)
+    return study.walk_parameters(packing, STATES, 0, relax="nearest", keep=KEPT, **options)
 
 
 @pytest.fixture(scope="session")

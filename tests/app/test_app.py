@@ -194,3 +194,9 @@ def test_left_out_work_is_counted(library):
     text = left_out(replay_at(library, 0).summary)
     assert "rattlers" in text and f"{STATES} states without relaxation" in text
     assert f"Shown: {KEPT}" in text
+
+
+def test_every_relaxation_has_a_name_on_screen():
+    from app.data import SOLVERS
+
+    assert set(SOLVERS) == set(study.RELAXATIONS)
