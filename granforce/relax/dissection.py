@@ -12,10 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from scipy import sparse
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
 # Parts of at most this many grains are eliminated whole: smaller fronts cost more in overhead
 # than their sparsity saves (measured flat between 6 and 16 at N = 400 and 6400).
-LARGEST_PART = 10
+LARGEST_PART = 8
+# Parts of more grains than this are worth a choice among several cuts.
+SEVERAL_CUTS = 40
 # Pivots whose rows of U are kept in cache while they are subtracted from all rows below.
 PANEL = 48
 # A pivot that rounding has driven to zero or below belongs to a direction without weight.
@@ -88,29 +92,11 @@ def _dissect(x, start, other):
 
     def eliminate(part):
         if len(part) <= LARGEST_PART:
-            return _add(part, [])
-        axis = np.argmax(np.ptp(x[part], axis=0))
-        sorted_part = part[np.argsort(x[part, axis], kind="stable")]
-        halves = sorted_part[: len(part) // 2], sorted_part[len(part) // 2 :]
-        for mark, half in enumerate(halves, 1):
-            side[half] = mark
-        # Of the two banks of the cut the one with fewer grains separates the halves.
-        banks = [half[_touches(half, side, 3 - mark)] for mark, half in enumerate(halves, 1)]
-        side[part] = 0
-        thinner = int(len(banks[1]) < len(banks[0]))
-        separator = banks[thinner]
-        parts = list(halves)
-        parts[thinner] = np.setdiff1d(halves[thinner], separator, assume_unique=True)
-        return _add(separator, [eliminate(rest) for rest in parts if len(rest)])
+            return add(part, [])
+        separator, *halves = _best_cut(part, x, start, other, side)
+        return add(separator, [eliminate(half) for half in halves if len(half)])
 
-    def _touches(half, side, mark):
-        degree = start[half + 1] - start[half]
-        ends = np.concatenate([[0], np.cumsum(degree)])
-        flat = np.repeat(start[half] - ends[:-1], degree) + np.arange(ends[-1])
-        hits = np.concatenate([[0], np.cumsum(side[other[flat]] == mark)])
-        return hits[ends[1:]] > hits[ends[:-1]]
-
-    def _add(pivots, children):
+    def add(pivots, children):
         fronts.append(pivots)
         parent.append(-1)
         for child in children:
@@ -121,8 +107,56 @@ def _dissect(x, start, other):
     return fronts, np.array(parent)
 
 
+def _best_cut(part, x, start, other, side):
+    """Separator and two halves: of several straight cuts the one with the thinnest separator."""
+    extent = np.ptp(x[part], axis=0)
+    several = len(part) > SEVERAL_CUTS
+    best = None
+    for axis in np.flatnonzero(extent >= (0.7 if several else 1.0) * extent.max()):
+        ranked = part[np.argsort(x[part, axis], kind="stable")]
+        for fraction in (0.42, 0.46, 0.5, 0.54, 0.58) if several else (0.5,):
+            middle = int(fraction * len(part))
+            halves = ranked[:middle], ranked[middle:]
+            separator = _separator(*halves, start, other, side)
+            if best is None or len(separator) < len(best[0]):
+                best = (separator, *halves)
+    separator, *halves = best
+    return separator, *(np.setdiff1d(half, separator, assume_unique=True) for half in halves)
+
+
+def _separator(left, right, start, other, side):
+    """Fewest grains that meet every contact between two sets (König: from a largest matching)."""
+    side[right] = 1
+    degree = start[left + 1] - start[left]
+    ends = np.cumsum(degree)
+    flat = np.repeat(start[left] - ends + degree, degree) + np.arange(degree.sum())
+    across = side[other[flat]] == 1
+    side[right] = 0
+    a, from_left = np.unique(np.repeat(left, degree)[across], return_inverse=True)
+    b, to_right = np.unique(other[flat][across], return_inverse=True)
+    links = [[] for _ in a]
+    for m, k in zip(from_left.tolist(), to_right.tolist(), strict=True):
+        links[m].append(k)
+    graph = sparse.csr_matrix((np.ones(len(from_left)), (from_left, to_right)), (len(a), len(b)))
+    partner = maximum_bipartite_matching(graph, perm_type="row").tolist()
+    # Alternating paths from the unmatched on the left: what they reach on the right, and what
+    # they do not reach on the left, meets every link.
+    matched = set(partner)
+    reached = [m for m in range(len(a)) if m not in matched]
+    seen, met = set(reached), set()
+    while reached:
+        for k in links[reached.pop()]:
+            if k not in met:
+                met.add(k)
+                if partner[k] not in seen:
+                    seen.add(partner[k])
+                    reached.append(partner[k])
+    unseen = [m for m in range(len(a)) if m not in seen]
+    return np.concatenate([a[unseen], b[sorted(met)]])
+
+
 def _later_grains(fronts, parent, front_of, i, j):
-    """Grains of later fronts that each front's pivots meet, directly or by fill, sorted by front."""
+    """Grains of later fronts that each front meets, directly or by fill, in elimination order."""
     position = np.empty(len(front_of), dtype=np.int64)
     position[np.concatenate(fronts)] = np.arange(len(front_of))
     met = [[] for _ in fronts]
@@ -230,12 +264,9 @@ def _add_child(front, plan, child, stack):
     into = plan.into_parent[first : first + rest]
     for a in range(rest):
         row = into[a]
+        # Rows keep their order from front to front: the upper half stays the upper half.
         for b in range(a, rest):
-            column = into[b]
-            if column >= row:
-                front[row, column] += update[a, b]
-            else:
-                front[column, row] += update[a, b]
+            front[row, into[b]] += update[a, b]
     before = child - 1
     for _ in range(plan.children[child]):
         before = _skip(plan, before)
@@ -329,9 +360,18 @@ def solve(plan, panels, x, work):
         for p in range(pivots - 1, -1, -1):
             row = panel[p]
             value = local[p]
-            for b in range(p + 1, size):
-                value -= row[b] * local[b]
-            local[p] = value * row[p]
+            # Four sums side by side, because one would wait for each addition.
+            s0 = s1 = s2 = s3 = 0.0
+            b = p + 1
+            while b + 4 <= size:
+                s0 += row[b] * local[b]
+                s1 += row[b + 1] * local[b + 1]
+                s2 += row[b + 2] * local[b + 2]
+                s3 += row[b + 3] * local[b + 3]
+                b += 4
+            for d in range(b, size):
+                s0 += row[d] * local[d]
+            local[p] = (value - ((s0 + s1) + (s2 + s3))) * row[p]
         for a in range(pivots):
             x[plan.rows[first + a]] = local[a]
 
