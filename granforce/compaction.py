@@ -1,9 +1,10 @@
 """From a dilute gas of disks to a jammed packing, at constant pressure (arXiv:0803.3566).
 
 The dynamics runs until a certificate of jamming is found: an admissible force network on the
-present contacts, close to the dynamic forces. Then the geometry is finished: at μ > 0 the grains
-move by the least amount that closes every contact exactly; at μ = 0, where contact dynamics alone
-does not reach isostaticity, linear programs shrink the box under linearised non-overlap.
+present contacts, close to the dynamic forces. Then the grains move by the least amount that closes
+every contact exactly. At μ = 0 contact dynamics alone does not reach isostaticity, and below 1e-4
+it takes ever longer to come to rest: there linear programs shrink the box under linearised
+non-overlap.
 """
 
 import highspy
@@ -33,6 +34,9 @@ INITIAL_FRACTION = 0.5
 # A certificate is looked for every so many steps, once grains and box are nearly at rest.
 CHECK_EVERY = 100
 NEARLY_BALANCED = 0.3
+# Up to this μ a packing is finished like a frictionless one, from which its geometry differs by
+# order μ: contact dynamics takes ever longer to reach rest there.
+NEARLY_FRICTIONLESS = 1e-4
 # Strain of the box per step below which frictionless grains are handed to the linear programs.
 BOX_AT_REST = 1e-6
 # Skin of the neighbour list and reach of the finishing programs, in largest radii.
@@ -247,10 +251,10 @@ def _fraction(motion):
 
 def _finish(motion, mu, settings, unbalance, work, cancel):
     """The finished packing in natural units, or None while it is not jammed."""
-    if mu == 0:
+    if mu <= NEARLY_FRICTIONLESS:
         if abs(motion.dilation[0]) * settings["dt"] > BOX_AT_REST:
             return None
-        return _shrink_to_isostatic(motion, work, cancel)
+        return _shrink_to_isostatic(motion, mu, work, cancel)
     if unbalance > NEARLY_BALANCED:
         return None
     work["certificates_tried"] += 1
@@ -288,7 +292,7 @@ def _near_forces(packing):
     found = nearest(S, S.original)
     forces = S.expand(found.forces)
     far = np.linalg.norm(forces - packing.forces) / np.linalg.norm(packing.forces)
-    return forces if found.converged and far <= JAMMED_DISTANCE else None
+    return forces if S.admits(found.forces) and far <= JAMMED_DISTANCE else None
 
 
 def _packing_of(motion, x, box, touching, force, mu):
@@ -377,7 +381,7 @@ def _least_motion(R, gap, exact, force):
     return move * scale, opened
 
 
-def _shrink_to_isostatic(motion, work, cancel):
+def _shrink_to_isostatic(motion, mu, work, cancel):
     """Frictionless finish: linear programs that shrink the box until no grain can make room.
 
     minimise ε subject to gap_c + n_c·(u_j − u_i) + ε ℓ_c ≥ 0, |u| ≤ TRUST. Distances are convex
@@ -401,10 +405,10 @@ def _shrink_to_isostatic(motion, work, cancel):
     i, j, shift = find_pairs(x, motion.r, box, TOUCHING)
     at_rest = motion._replace(i=i, j=j, shift=shift)
     touching = np.ones(len(i), bool)
-    packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), 0.0)
+    packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), mu)
     S = ensemble(packing)
     found = nearest(S, S.original)
-    return packing._replace(forces=S.expand(found.forces)) if found.converged else None
+    return packing._replace(forces=S.expand(found.forces)) if S.admits(found.forces) else None
 
 
 def _without_overlap(x, box, motion):
@@ -421,7 +425,8 @@ def _shrink_program(i, j, normal, length, gap, n):
     lp = highspy.HighsLp()
     columns = 2 * n + 1
     lp.num_col_, lp.num_row_ = columns, len(gap)
-    lp.col_cost_ = np.append(np.zeros(2 * n), 1.0)
+    # The duals are the contact forces: this cost makes their mean about 1, the tolerances' scale.
+    lp.col_cost_ = np.append(np.zeros(2 * n), 4.0 * n)
     # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the pairs' reach.
     lp.col_lower_ = np.append(np.full(2 * n, -TRUST), -TRUST / 2)
     lp.col_upper_ = np.append(np.full(2 * n, TRUST), 0.0)

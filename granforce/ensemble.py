@@ -75,6 +75,17 @@ class Ensemble:
             T = sparse.kron(sparse.identity(len(self.index)), block, format="csc")
         return sparse.csc_matrix(self.A @ T), T
 
+    @cached_property
+    def scaled_form(self):
+        """(A, b, T) of S = {x = ⟨f_n⟩ T y : A y = b, y ≥ 0}, each row's largest entry 1.
+
+        Torque rows are as small (or large) as μ otherwise, which costs solvers their last digits.
+        """
+        A, T = self.cone_form
+        largest = abs(A).max(axis=1).toarray().ravel()
+        scale = 1 / np.where(largest > 0, largest, 1.0)
+        return sparse.csc_matrix(sparse.diags(scale) @ A), scale * self.b / self.force_scale, T
+
     def to_vector(self, forces):
         """Forces (…, N_c, 2) as vectors x (…, unknowns)."""
         forces = np.asarray(forces, dtype=np.float64)
@@ -270,8 +281,8 @@ def _carrying(full):
     idle = np.ones(len(full.index), bool) if known is None else known <= CARRYING * full.force_scale
     if not idle.any():
         return ~idle
-    A, T = full.cone_form
-    model = programs.standard_form(A, full.b / full.force_scale)
+    A, b, T = full.scaled_form
+    model = programs.standard_form(A, b)
     normal_rows = sparse.csr_matrix(T)[:: full.per_contact]
     while idle.any():
         programs.set_cost(model, -(normal_rows.T @ idle.astype(float)))

@@ -17,14 +17,14 @@ def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
     of ⟨f_n⟩. Returns a Relaxation; ``converged`` is False where S is empty.
     """
     begin = time.perf_counter()
-    A, T = ensemble.cone_form
+    A, b, T = ensemble.scaled_form
     target = ensemble.to_vector(start) / ensemble.force_scale
     solver = _solver(max_iterations)
     solver.setup(
         sparse.csc_matrix(T.T @ T),
         -(T.T @ target),
         A,
-        ensemble.b / ensemble.force_scale,
+        b,
         x_l=np.zeros(A.shape[1]),
     )
     status = solver.solve()
@@ -67,4 +67,6 @@ def _solver(max_iterations):
     solver.settings.max_iter = max_iterations
     solver.settings.eps_abs = 1e-12
     solver.settings.eps_rel = 1e-13
+    # Near isostaticity (small μ) the default regularisation leaves the dual short of its target.
+    solver.settings.reg_lower_limit = 1e-14
     return solver
