@@ -39,7 +39,7 @@ STEP = 0.999
 # The second phase is tried when the mean of f · multiplier (in ⟨f_n⟩²) has fallen to this, and
 # each time it has fallen by LOWER since; it may take so many steps, and is given up where the
 # unbalance (in ⟨f_n⟩) exceeds LOST.
-ATTEMPT, LOWER, FINAL_STEPS, LOST = 1e-5, 1e-2, 4, 100.0
+ATTEMPT, LOWER, FINAL_STEPS, LOST = 1e-6, 1e-2, 3, 1.0
 # Added to the Laplacian, whose translations cost nothing; it slows no step, only bounds them.
 SHIFT = 1e-11
 # Steps shorter than this, so many in a row, mean that S is empty.
@@ -172,10 +172,11 @@ def _gather(start, index, value, rows, columns, component, per_contact):
 def project(normal, tangential, mu):
     """The point (f_n, f_t) of the cone |f_t| ≤ μ f_n nearest to (normal, tangential)."""
     size = abs(tangential)
-    if size <= mu * normal:
-        return normal, tangential
+    # The tip comes first: at μ = 0 a pull without tangential part would pass as inside.
     if mu * size <= -normal:
         return 0.0, 0.0
+    if size <= mu * normal:
+        return normal, tangential
     f_n = (normal + mu * size) / (1.0 + mu * mu)
     return f_n, np.copysign(mu * f_n, tangential)
 
@@ -284,10 +285,10 @@ def _finish(geometry, target, at, tolerance, most):
 def _projected(normal, tangential, mu, weight):
     """Derivative of the projection onto the cone, as nn, nt, tt."""
     size = abs(tangential)
-    if size <= mu * normal:
-        weight[0], weight[1], weight[2] = 1.0, 0.0, 1.0
-    elif mu * size <= -normal:
+    if mu * size <= -normal:
         weight[:] = 0.0
+    elif size <= mu * normal:
+        weight[0], weight[1], weight[2] = 1.0, 0.0, 1.0
     else:
         weight[0] = 1.0 / (1.0 + mu * mu)
         weight[1] = np.copysign(mu * weight[0], tangential)

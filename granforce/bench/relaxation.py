@@ -1,0 +1,200 @@
+"""Relaxation solvers side by side: the same starts, time and what was reached, and how it scales."""
+
+import importlib.util
+import time
+
+import numpy as np
+
+from granforce.bench.report import note
+from granforce.compaction import pack
+from granforce.ensemble import ensemble
+from granforce.records import make_contacts, make_packing
+from granforce.relax.accelerated import accelerated
+from granforce.relax.gauss_seidel import gauss_seidel
+from granforce.relax.nearest import nearest
+
+BASELINE = "Gauss–Seidel alone"
+# Residual (in ⟨f_n⟩) all solvers are asked for.
+GOAL = 1e-9
+# Sweeps after which Gauss–Seidel alone is cut short: 3 to 5 s at N = 400.
+LONGEST = 300_000
+FRICTIONS = (0.01, 0.1, 0.3, 1.0, 10.0)
+
+
+def solvers(sweeps=LONGEST):
+    """Name → (solver, options) of all that are compared."""
+    return {
+        BASELINE: (gauss_seidel, {"rest": None, "tolerance": GOAL, "max_iterations": sweeps}),
+        "Gauss–Seidel, exact finish": (
+            gauss_seidel,
+            {"tolerance": GOAL, "max_iterations": sweeps},
+        ),
+        "nearest (PIQP)": (nearest, {"tolerance": GOAL}),
+        "accelerated": (accelerated, {"tolerance": GOAL}),
+    }
+
+
+def relaxation(quick=True, *, n=None, frictions=FRICTIONS, repeats=None, sweeps=None):
+    """Rows (dicts): median time of one relaxation, residual and ratio to BASELINE, per μ and solver.
+
+    All solvers get the same starts, the packing's own network kicked as in the random walk. Where
+    the baseline did not reach GOAL within its sweeps the ratio is a lower bound, and says so.
+    """
+    n = n or (100 if quick else 400)
+    repeats = repeats or (3 if quick else 9)
+    sweeps = sweeps or (LONGEST // 3 if quick else LONGEST)
+    rows = []
+    for mu in frictions:
+        note(f"relaxation: N = {n}, μ = {mu:g}")
+        S = ensemble(pack(n, mu, 1))
+        starts = kicked(S, repeats, 0)
+        runs = {name: _run(S, starts, *solver) for name, solver in solvers(sweeps).items()}
+        baseline = runs[BASELINE]
+        for name, run in runs.items():
+            rows.append(
+                {"n": n, "mu": mu, "contacts": len(S.index), "solver": name, **_summary(run)}
+                | _ratio(baseline, run)
+            )
+    return rows
+
+
+def kicked(S, count, seed):
+    """Starts of the random walk from the original network, a list of (N_c, 2)."""
+    rng = np.random.default_rng(seed)
+    amplitude = np.mean(S.original[:, 0])
+    kicks = rng.uniform(-amplitude, amplitude, (count, *S.original.shape))
+    if S.mu == 0:
+        kicks[..., 1] = 0.0
+    return list(S.original + kicks)
+
+
+def _run(S, starts, solver, options):
+    solver(S, starts[0], **{**options, "max_iterations": 2})  # compiles, makes plans
+    return [solver(S, start, **options) for start in starts]
+
+
+def _summary(run):
+    reached = [r.residual <= GOAL for r in run]
+    return {
+        "seconds": float(np.median([r.seconds for r in run])),
+        "fastest": float(min(r.seconds for r in run)),
+        "slowest": float(max(r.seconds for r in run)),
+        "iterations": float(np.median([r.iterations for r in run])),
+        "worst_residual": float(max(r.residual for r in run)),
+        "runs": len(run),
+        "reached": sum(reached),
+        "no_equilibrium": sum(r.converged and not ok for r, ok in zip(run, reached, strict=True)),
+        "note": _verdict(run, reached),
+    }
+
+
+def _verdict(run, reached):
+    short = [r for r, ok in zip(run, reached, strict=True) if not ok and not r.converged]
+    moving = [r for r, ok in zip(run, reached, strict=True) if not ok and r.converged]
+    parts = []
+    if short:
+        longest = max(r.seconds for r in short)
+        parts.append(f"{len(short)} not converged after {longest:.2g} s")
+    if moving:
+        parts.append(f"{len(moving)} ended in motion")
+    return "; ".join(parts)
+
+
+def _ratio(baseline, run):
+    ratio = np.median([r.seconds for r in baseline]) / np.median([r.seconds for r in run])
+    bound = any(r.residual > GOAL for r in baseline) and all(r.residual <= GOAL for r in run)
+    return {"ratio": float(ratio), "ratio_is_lower_bound": bool(bound)}
+
+
+def contact_updates(quick=True, *, n=None, mu=0.1, sweeps=2000):
+    """Rows: nanoseconds per contact update of our sweep, and of Siconos where it is installed."""
+    n = n or (100 if quick else 400)
+    S = ensemble(pack(n, mu, 1))
+    options = {"rest": None, "tolerance": 0.0, "max_iterations": sweeps}
+    runs = _run(S, kicked(S, 5, 0), gauss_seidel, options)
+    each = [1e9 * r.seconds / (r.iterations * len(S.index)) for r in runs]
+    row = {"n": n, "mu": mu, "solver": "granforce sweep", "ns_per_update": float(np.median(each))}
+    rows = [{**row, "note": f"{runs[0].iterations} sweeps"}]
+    # Siconos has no package on PyPI; its own build is needed to compare.
+    found = importlib.util.find_spec("siconos") is not None
+    told = "installed, not compared: time fc2d_nsgs on the same contacts" if found else "absent"
+    rows.append({**row, "solver": "Siconos NSGS", "ns_per_update": None, "note": told})
+    return rows
+
+
+def tile(S, k):
+    """The packing of an ensemble repeated k × k times: N k² disks, exactly as balanced.
+
+    Only the ensemble's contacts are kept; build the new ensemble with ``prune=False``.
+    """
+    packing, contacts = S.packing, S.contacts
+    i, j, count = contacts.i, contacts.j, len(packing.r)
+    # How many boxes away from i the image of j lies that is touched.
+    reach = packing.x[i] + contacts.length[:, None] * contacts.normal - packing.x[j]
+    image = np.rint(reach / packing.box).astype(np.int64)
+    column, row = (part.ravel() for part in np.meshgrid(np.arange(k), np.arange(k)))
+    x = packing.x[None] + np.column_stack([column, row])[:, None] * packing.box
+    to = (column[:, None] + image[:, 0]) % k + k * ((row[:, None] + image[:, 1]) % k)
+    tiles = k * k
+    r = np.tile(packing.r, tiles)
+    repeated = make_contacts(
+        (np.arange(tiles)[:, None] * count + i).ravel(),
+        (to * count + j).ravel(),
+        np.tile(contacts.normal, (tiles, 1)),
+        np.tile(contacts.length, tiles),
+        r,
+    )
+    arms = {name: np.tile(getattr(contacts, name), tiles) for name in ("gap", "arm_i", "arm_j")}
+    return make_packing(
+        x.reshape(-1, 2),
+        r,
+        k * packing.box,
+        repeated._replace(**arms),
+        np.tile(S.original, (tiles, 1)),
+        packing.mu,
+        packing.pressure,
+    )
+
+
+def scaling(quick=True, *, n=100, mu=0.1, tiles=None, repeats=3, patience=None):
+    """Rows: time per relaxation against N by tiling, and the exponent of time with N per solver.
+
+    A solver is left out at sizes above the one where it first needed `patience` seconds. The
+    exponent is the slope of log time over log N, over the sizes at which GOAL was reached.
+    """
+    tiles = tiles or ((1, 2, 4) if quick else (1, 2, 4, 8, 16))
+    patience = patience or (2.0 if quick else 60.0)
+    base = ensemble(pack(n, mu, 1))
+    rows, tired = [], set()
+    for k in tiles:
+        S = ensemble(tile(base, k), prune=False)
+        starts = kicked(S, repeats, 0)
+        for name, (solver, options) in solvers().items():
+            if name in tired:
+                continue
+            note(f"scaling: N = {n * k * k}, {name}")
+            begin = time.perf_counter()
+            solver(S, starts[0], **{**options, "max_iterations": 1})
+            setup = time.perf_counter() - begin
+            run = [solver(S, starts[0], **options)]
+            if run[0].seconds > patience:
+                tired.add(name)
+            else:
+                run += [solver(S, start, **options) for start in starts[1:]]
+            row = {"n": n * k * k, "mu": mu, "contacts": len(S.index), "solver": name}
+            rows.append(row | _summary(run) | {"first_call": setup})
+    return rows + _exponents(rows, mu)
+
+
+def _exponents(rows, mu):
+    fits = []
+    for name in solvers():
+        points = [
+            (row["n"], row["seconds"])
+            for row in rows
+            if row["solver"] == name and row["reached"] == row["runs"]
+        ]
+        slope = float(np.polyfit(*np.log(points).T, 1)[0]) if len(points) > 1 else None
+        sizes = f"N = {points[0][0]} … {points[-1][0]}" if points else "goal never reached"
+        fits.append({"n": "fit", "mu": mu, "solver": name, "exponent": slope, "note": sizes})
+    return fits

@@ -1,0 +1,189 @@
+"""The fast nearest network: same optimum as the quadratic program, exact cones, honest ends."""
+
+import gc
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from conftest import lattice, packed, reference, two_disks
+from hypothesis import given
+from hypothesis import strategies as st
+
+from granforce.bench.relaxation import tile
+from granforce.ensemble import ensemble
+from granforce.records import Relaxation
+from granforce.relax import accelerated as module
+from granforce.relax.accelerated import accelerated, project
+from granforce.relax.nearest import nearest
+from granforce.tolerances import ADMISSIBLE, BALANCED
+from granforce.walk import walk
+
+
+def kicked(S, seed, size=1.0):
+    rng = np.random.default_rng(seed)
+    kick = size * S.force_scale * rng.uniform(-1, 1, S.original.shape)
+    if S.mu == 0:
+        kick[:, 1] = 0
+    return S.original + kick
+
+
+def assert_nearest(S, start):
+    ours, theirs = accelerated(S, start), nearest(S, start)
+    assert ours.converged and theirs.converged
+    assert S.admits(ours.forces, BALANCED, ADMISSIBLE)
+    assert ours.residual == S.residual(ours.forces)
+    assert ours.violation == S.violation(ours.forces)
+    assert np.abs(ours.forces - theirs.forces).max() < 1e-6 * S.force_scale
+    # Two optima of one strictly convex program: neither is nearer by more than rounding.
+    ours, theirs = (np.linalg.norm(r.forces - start) for r in (ours, theirs))
+    assert ours <= theirs * (1 + 1e-8) + 1e-8 * S.force_scale
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.01, 0.1, 0.3, 1.0, 10.0])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 30.0])
+def test_agrees_with_the_quadratic_program(mu, size):
+    S = ensemble(packed(40, mu))
+    for seed in range(3):
+        assert_nearest(S, kicked(S, seed, size))
+
+
+@pytest.mark.parametrize("name", ["n100_mu0.1_s11", "n100_mu1_s12", "n400_mu0.1_s13"])
+def test_agrees_on_the_reference_packings(name):
+    S = ensemble(reference(name))
+    assert_nearest(S, kicked(S, 5))
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.5])
+def test_agrees_where_packing_and_ensemble_differ_in_friction(mu):
+    S = ensemble(packed(40, 0.0), mu=mu)
+    assert_nearest(S, kicked(S, 2))
+
+
+@pytest.mark.parametrize("triangular", [False, True])
+def test_agrees_on_crystals_with_redundant_rows(triangular):
+    S = ensemble(lattice(6, 6, 0.4, triangular))
+    assert_nearest(S, kicked(S, 1) + S.force_scale)
+    assert_nearest(S, np.zeros(S.original.shape))
+
+
+def test_agrees_on_two_disks_that_touch_twice():
+    S = ensemble(two_disks())
+    assert_nearest(S, np.array([[3.0, 1.0], [0.5, -2.0]]))
+
+
+def test_agrees_with_frozen_contacts_and_no_pressure_row():
+    packing = packed(40, 0.3)
+    S = ensemble(packing, frozen=np.arange(0, len(packing.contacts.i), 9))
+    assert not S.has_pressure_row
+    assert_nearest(S, kicked(S, 3))
+
+
+def test_contacts_that_carry_nothing_may_stay():
+    S = ensemble(packed(40, 0.3), prune=False)
+    assert_nearest(S, kicked(S, 3))
+
+
+def test_an_admissible_start_stays():
+    S = ensemble(packed(40, 0.3))
+    found = accelerated(S, S.original)
+    assert np.abs(found.forces - S.original).max() < 1e-9 * S.force_scale
+
+
+@pytest.mark.parametrize("pressure", [1e-9, 1e7])
+def test_scales_with_the_pressure(pressure):
+    packing = packed(40, 0.3)
+    scaled = packing._replace(pressure=pressure, forces=packing.forces * pressure)
+    S, T = ensemble(packing), ensemble(scaled)
+    start = kicked(S, 4)
+    one, two = accelerated(S, start), accelerated(T, start * pressure)
+    assert np.abs(two.forces / pressure - one.forces).max() < 1e-9 * S.force_scale
+    assert two.converged
+
+
+def test_same_start_same_forces_whatever_was_solved_before_and_in_any_thread():
+    S = ensemble(packed(40, 0.3))
+    starts = [kicked(S, seed) for seed in range(4)]
+    once = [accelerated(S, start).forces for start in starts]
+    with ThreadPoolExecutor(4) as pool:
+        again = list(pool.map(lambda k: accelerated(S, starts[k % 4]).forces, range(15, -1, -1)))
+    for k, forces in zip(range(15, -1, -1), again, strict=True):
+        assert np.array_equal(forces, once[k % 4])
+    fresh = ensemble(packed(40, 0.3))
+    assert np.array_equal(accelerated(fresh, starts[2]).forces, once[2])
+
+
+def test_the_plan_goes_with_its_ensemble():
+    S = ensemble(packed(40, 0.3))
+    accelerated(S, S.original)
+    known, gone = len(module._known), weakref.ref(S)
+    del S
+    gc.collect()
+    assert gone() is None
+    assert len(module._known) < known
+
+
+def test_too_few_steps_are_told():
+    S = ensemble(packed(40, 0.1))
+    found = accelerated(S, kicked(S, 0), max_iterations=2)
+    assert isinstance(found, Relaxation)
+    assert not found.converged
+    assert found.iterations == 2
+    assert found.residual == S.residual(found.forces) > BALANCED
+    assert found.violation == 0
+
+
+def test_an_empty_s_is_told():
+    packing = packed(40, 0.3)
+    # Without friction the same contacts cannot balance.
+    S = ensemble(packing, mu=1e-6, prune=False)
+    found = accelerated(S, S.original)
+    assert not found.converged
+    assert found.residual > 1e-6
+    assert np.all(np.isfinite(found.forces))
+
+
+def test_a_walk_by_it_stays_in_s_and_visits_what_the_quadratic_program_does():
+    S = ensemble(packed(40, 0.3))
+    ours = walk(S, 5, 3, relax=accelerated)
+    theirs = walk(S, 5, 3, relax=nearest)
+    assert ours.residual.max() < BALANCED
+    assert np.abs(ours.states - theirs.states).max() < 1e-5 * S.force_scale
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_tiled_packing_balances_and_its_nearest_network_is_tiled(mu):
+    one = ensemble(packed(40, mu))
+    packing = tile(one, 3)
+    many = ensemble(packing, prune=False)
+    assert len(many.index) == 9 * len(one.index)
+    assert many.force_scale == pytest.approx(one.force_scale)
+    assert many.residual(many.original) < BALANCED
+    start = kicked(one, 1)
+    small = accelerated(one, start).forces
+    large = accelerated(many, np.tile(start, (9, 1))).forces
+    assert np.abs(large - np.tile(small, (9, 1))).max() < 1e-6 * one.force_scale
+
+
+force = st.floats(-1e3, 1e3)
+friction = st.one_of(st.just(0.0), st.floats(1e-6, 1e3))
+
+
+@given(force, force, friction, force, force)
+def test_projection_is_the_nearest_point_of_the_cone(normal, tangential, mu, f_n, f_t):
+    p, t = project(normal, tangential, mu)
+    size = 1 + abs(normal) + abs(tangential)
+    assert p >= 0 and abs(t) <= mu * p * (1 + 1e-12)
+    # A point of the cone is the nearest one where no other of the cone lies ahead of it.
+    f_n = abs(f_n)
+    f_t = np.clip(f_t, -mu * f_n, mu * f_n)
+    ahead = (normal - p) * (f_n - p) + (tangential - t) * (f_t - t)
+    assert ahead <= 1e-9 * size * (size + abs(f_n) + abs(f_t))
+
+
+@given(force, force, friction)
+def test_projection_twice_is_projection_once(normal, tangential, mu):
+    once = project(normal, tangential, mu)
+    assert project(*once, mu) == pytest.approx(once, rel=1e-12, abs=1e-12)
+    inside = abs(tangential) <= mu * normal
+    assert not inside or once == (normal, tangential)
