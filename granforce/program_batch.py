@@ -114,7 +114,8 @@ def _pin_dependent_rows(layout, columns, b):
         block_cholesky.factor(work.L, layout.start, layout.target)
         inverse = work.L.reshape(-1, 9, LANES)[columns.diagonal, ::4, 0]
         # A pivot above the diagonal is not one: rounding had made it negative.
-        pivot = inverse**-2 / before
+        with np.errstate(divide="ignore"):
+            pivot = inverse**-2 / before
         dependent = ((pivot <= _DEPENDENT) | (pivot > 2.0)) & (columns.pinned == 0)
         if not dependent.any():
             return
