@@ -86,11 +86,11 @@ def pack(
     unit = r.max()
     motion = _dilute_gas(r / unit, rng)
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
-    counters = np.zeros(4, dtype=np.int64)
+    counters = np.zeros(3, dtype=np.int64)
     work = {"list_rebuilds": 0, "certificates_tried": 0, "linear_programs": 0}
     tell = progress or (lambda step, message: None)
     while True:
-        motion, unbalance = _advance(motion, mu, settings, counters, work)
+        motion, overlap, unbalance = _advance(motion, mu, settings, counters, work)
         step = int(counters[dynamics.STEPS])
         tell(step, f"φ = {_fraction(motion):.4f}, unbalance {unbalance:.1e} ⟨f_n⟩")
         if cancel is not None and cancel():
@@ -111,6 +111,7 @@ def pack(
         "steps": step,
         "sweeps_done": int(counters[dynamics.SWEEPS]),
         "contact_updates": int(counters[dynamics.UPDATES]),
+        "mean_overlap_of_dynamics": overlap,
         **work,
     }
     return _in_users_units(finished, unit, pressure, info)
@@ -224,10 +225,10 @@ def _carry_over(old_i, old_j, old_shift, old_force, i, j, shift):
 
 
 def _advance(motion, mu, settings, counters, work):
-    """CHECK_EVERY time steps; returns the motion (a new record after a list rebuild), unbalance."""
+    """CHECK_EVERY time steps; returns the motion, mean overlap and unbalance."""
     goal = counters[dynamics.STEPS] + CHECK_EVERY
     while counters[dynamics.STEPS] < goal:
-        _, unbalance = dynamics.advance(
+        overlap, unbalance = dynamics.advance(
             motion,
             mu,
             1.0,
@@ -242,7 +243,7 @@ def _advance(motion, mu, settings, counters, work):
         if motion.drift[0] > 0.5 * SKIN:
             motion = _with_new_list(motion)
             work["list_rebuilds"] += 1
-    return motion, unbalance
+    return motion, overlap, unbalance
 
 
 def _fraction(motion):

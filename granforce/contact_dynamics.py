@@ -124,7 +124,7 @@ class Motion(NamedTuple):
 
 
 # What advance() tells: index of each number in its counters.
-STEPS, SWEEPS, UPDATES, SLEPT = range(4)
+STEPS, SWEEPS, UPDATES = range(3)
 
 
 @njit(cache=True, nogil=True)
