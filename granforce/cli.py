@@ -43,6 +43,7 @@ def _parser():
     _add_intervals(commands)
     _add_limit_loads(commands)
     _add_import(commands)
+    _add_bench(commands)
     _add_cache(commands)
     return parser
 
@@ -224,6 +225,18 @@ def _add_import(commands):
     command.add_argument("--forces", action="store_true", help="table: fn, ft must be given")
     command.add_argument("--pressure", type=float, default=1.0, help="table without forces: P0")
     command.add_argument("--out", metavar="FILE.npz", help="save the packing to this file")
+
+
+def _add_bench(commands):
+    command = _command(
+        commands,
+        "bench",
+        "bench",
+        "measure run time against error of every solver on this machine",
+        "granforce bench --quick --out bench",
+    )
+    command.add_argument("--quick", action="store_true", help="small sizes, under 3 minutes")
+    command.add_argument("--out", metavar="FOLDER", help="write the rows as JSON to this folder")
 
 
 def _add_cache(commands):

@@ -301,6 +301,13 @@ def _report_sweep(rows, failed, as_json):
     )
 
 
+def bench(arguments):
+    """The benchmark's report."""
+    from granforce.bench import main  # its imports are of no use to other commands
+
+    main(arguments.out, arguments.quick, arguments.json)
+
+
 def cache(arguments):
     """List, measure, clear or verify a store. Returns 1 if an entry is damaged."""
     store = open_store(arguments.cache)
