@@ -1,0 +1,81 @@
+"""The benchmark: run time against error of every solver, on the machine at hand.
+
+`main` is the command `granforce bench`; each part can be called on its own and returns rows
+(dicts of plain numbers and strings).
+"""
+
+import json
+import time
+from pathlib import Path
+
+from granforce.bench.packings import compaction
+from granforce.bench.report import environment, note, table
+from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
+from granforce.bench.states import interval_methods, intervals, walks
+
+__all__ = [
+    "PARTS",
+    "compaction",
+    "contact_updates",
+    "environment",
+    "interval_methods",
+    "intervals",
+    "main",
+    "relaxation",
+    "run",
+    "scaling",
+    "tile",
+    "walks",
+]
+
+# Part → what it measures, and its heading.
+PARTS = {
+    "contact_updates": (contact_updates, "One contact update of Gauss–Seidel"),
+    "relaxation": (relaxation, "One relaxation to 1e-9 ⟨f_n⟩, from the same kicked starts"),
+    "scaling": (scaling, "One relaxation against the number of disks"),
+    "compaction": (compaction, "Compaction: time step and sweeps"),
+    "walks": (walks, "Random walks by solver"),
+    "intervals": (intervals, "Intervals seen by walks against exact ones"),
+    "interval_methods": (interval_methods, "Exact intervals against other tools"),
+}
+
+
+def run(folder=None, quick=True, *, parts=None, show=print):
+    """Measure all parts (or those named) and return {"environment": …, part: rows}.
+
+    folder: where bench.json is written, after every part so that nothing is lost; None: nowhere.
+    show: what is called with each finished table.
+    """
+    results = {"environment": environment(), "quick": bool(quick), "seconds": {}}
+    for name in parts or PARTS:
+        measure, heading = PARTS[name]
+        begin = time.perf_counter()
+        results[name] = measure(quick)
+        results["seconds"][name] = time.perf_counter() - begin
+        note(f"{name}: {results['seconds'][name]:.1f} s")
+        show(table(heading, results[name]))
+        if folder is not None:
+            _write(Path(folder), results)
+    return results
+
+
+def _write(folder, results):
+    folder.mkdir(parents=True, exist_ok=True)
+    fresh = folder / "bench.json.part"
+    fresh.write_text(json.dumps(results, indent=1, ensure_ascii=False))
+    fresh.replace(folder / "bench.json")
+
+
+def main(out=None, quick=False, as_json=False):
+    """The command `granforce bench`: tables or JSON on stdout, progress on stderr; returns 0."""
+    results = run(out, quick, show=(lambda text: None) if as_json else print)
+    if as_json:
+        print(json.dumps(results, indent=1, ensure_ascii=False))
+    else:
+        print(table("Environment", [{**results["environment"], **_versions(results)}]))
+    return 0
+
+
+def _versions(results):
+    libraries = results["environment"]["libraries"]
+    return {"libraries": " ".join(f"{name} {v}" for name, v in libraries.items() if v)}

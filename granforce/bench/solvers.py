@@ -1,4 +1,4 @@
-"""Relaxation solvers side by side: the same starts, time and what was reached, and how it scales."""
+"""Relaxation solvers side by side: same starts, time and what was reached, and how it scales."""
 
 import importlib.util
 import time
@@ -35,7 +35,7 @@ def solvers(sweeps=LONGEST):
 
 
 def relaxation(quick=True, *, n=None, frictions=FRICTIONS, repeats=None, sweeps=None):
-    """Rows (dicts): median time of one relaxation, residual and ratio to BASELINE, per μ and solver.
+    """Rows (dicts) per μ and solver: median time of one relaxation, residual, ratio to BASELINE.
 
     All solvers get the same starts, the packing's own network kicked as in the random walk. Where
     the baseline did not reach GOAL within its sweeps the ratio is a lower bound, and says so.

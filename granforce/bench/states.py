@@ -1,0 +1,178 @@
+"""What the choice of solver does to the random walk, and walks against exact intervals."""
+
+import contextlib
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from granforce import measures
+from granforce.bench.report import note
+from granforce.compaction import pack
+from granforce.ensemble import ensemble
+from granforce.intervals import intervals as exact_intervals
+from granforce.records import NotJammedError
+from granforce.relax.accelerated import accelerated
+from granforce.relax.gauss_seidel import gauss_seidel
+from granforce.relax.nearest import nearest
+from granforce.tolerances import EQUILIBRIUM
+from granforce.walk import walk
+
+WALKS = {
+    "Gauss–Seidel alone": {
+        "relax": gauss_seidel,
+        "rest": None,
+        "tolerance": EQUILIBRIUM,
+        "max_iterations": 20_000,
+    },
+    "Gauss–Seidel, exact finish": {"relax": gauss_seidel},
+    "nearest (PIQP)": {"relax": nearest},
+    "accelerated": {"relax": accelerated},
+}
+FRICTIONS = (0.01, 0.1, 1.0)
+# Packings of the exact intervals for `granforce.bench_intervals`, where the sources are at hand.
+REFERENCES = Path("tests/reference")
+
+
+def walks(quick=True, *, n=None, packings=None, states=None, frictions=FRICTIONS):
+    """Rows: η1, η2, η3 and distance from the centre, mean ± standard error over packings.
+
+    Every solver walks on the same packings with the same seeds. The distance is
+    ⟨|F − C|⟩/|C|, C the mean over the solvers of their mean networks; `original` is that of the
+    packing's own network. A walk that found too few equilibria is left out and counted in `failed`.
+    """
+    n = n or (100 if quick else 400)
+    packings = packings or (3 if quick else 10)
+    states = states or (50 if quick else 300)
+    rows = []
+    for mu in frictions:
+        found = {name: [] for name in WALKS}
+        for seed in range(1, packings + 1):
+            note(f"walks: N = {n}, μ = {mu:g}, packing {seed} of {packings}")
+            S = ensemble(pack(n, mu, seed))
+            for name, values in _walked(S, states, seed).items():
+                found[name].append(values)
+        for name, values in found.items():
+            row = {"n": n, "mu": mu, "solver": name, "packings": packings, "states": states}
+            rows.append(row | _over_packings(values))
+    return rows
+
+
+def _walked(S, states, seed):
+    """Measures by solver on one packing; an empty dict for a walk that failed."""
+    done, seconds = {}, {}
+    for name, options in WALKS.items():
+        begin = time.perf_counter()
+        with contextlib.suppress(NotJammedError):
+            done[name] = walk(S, states, seed, **options)
+        seconds[name] = time.perf_counter() - begin
+    if not done:
+        return {name: {} for name in WALKS}
+    centre = np.mean([measures.mean_network(w.states) for w in done.values()], axis=0)
+    size = np.linalg.norm(centre)
+    found = {name: {} for name in WALKS}
+    for name, one in done.items():
+        found[name] = {
+            "eta1": measures.eta1(one.states),
+            "eta2": measures.eta2(one.states),
+            "eta3": measures.eta3(*measures.intervals_seen(one.states)),
+            "distance": float(measures.distances(one.states, centre).mean() / size),
+            "original": float(np.linalg.norm(S.original - centre) / size),
+            "acceptance": one.acceptance,
+            "seconds": seconds[name],
+        }
+    return found
+
+
+def _over_packings(values):
+    kept = [one for one in values if one]
+    row = {"failed": len(values) - len(kept)}
+    for key in kept[0] if kept else ():
+        numbers = np.array([one[key] for one in kept])
+        row[key] = float(numbers.mean())
+        if key.startswith(("eta", "distance")) and len(numbers) > 1:
+            row[f"{key}_error"] = float(numbers.std(ddof=1) / np.sqrt(len(numbers)))
+    return row
+
+
+def intervals(quick=True, *, n=None, frictions=None, states=None):
+    """Rows: η3 and mean ΔF_n seen by walks of growing length against the exact intervals.
+
+    Exact bounds come with their own run time, so that the cost of either can be compared.
+    """
+    n = n or (100 if quick else 400)
+    frictions = frictions or ((0.1,) if quick else (0.1, 1.0))
+    states = states or ((30, 100) if quick else (100, 300, 1000))
+    rows = []
+    for mu in frictions:
+        S = ensemble(pack(n, mu, 1))
+        note(f"intervals: N = {n}, μ = {mu:g}, exact")
+        begin = time.perf_counter()
+        exact = exact_intervals(S, workers=2)
+        seconds = time.perf_counter() - begin
+        row = {"n": n, "mu": mu}
+        eta3, extent = _extents(S, exact.lower, exact.upper)
+        told = {"eta3": eta3, "mean_extent": extent, "eta3_part": 1.0, "extent_part": 1.0}
+        rows.append({**row, "method": "exact", "states": 0, "seconds": seconds, **told})
+        for name in ("Gauss–Seidel, exact finish", "nearest (PIQP)"):
+            note(f"intervals: N = {n}, μ = {mu:g}, {name}")
+            rows += [
+                {**row, "method": name, **seen} for seen in _growing(S, name, states, eta3, extent)
+            ]
+    return rows
+
+
+def _extents(S, lower, upper):
+    """η3 and the mean length of the intervals of f_n, in ⟨f_n⟩."""
+    extent = measures.normal_extent(lower, upper).mean() / S.force_scale
+    return measures.eta3(lower, upper), float(extent)
+
+
+def _growing(S, name, counts, eta3, extent):
+    times, begin = [], time.perf_counter()
+    done = walk(
+        S,
+        max(counts),
+        1,
+        **WALKS[name],
+        progress=lambda count, total: times.append(time.perf_counter() - begin),
+    )
+    for count in counts:
+        low, high = measures.intervals_seen(done.states[:count])
+        seen_eta3, seen_extent = _extents(S, low, high)
+        yield {
+            "states": count,
+            "seconds": times[min(count, len(times)) - 1] if times else 0.0,
+            "eta3": seen_eta3,
+            "mean_extent": seen_extent,
+            "eta3_part": seen_eta3 / eta3 if eta3 else None,
+            "extent_part": seen_extent / extent if extent else None,
+        }
+
+
+def interval_methods(quick=True, *, folder=REFERENCES):
+    """Exact intervals against other tools, by `granforce.bench_intervals` (needs its packings).
+
+    Rows with time, ratio to a plain loop over programs, and error against the reference bounds
+    in ⟨f_n⟩; one row that says so where the reference files are not at hand.
+    """
+    if not any(Path(folder).glob("*.npz")):
+        return [{"packing": None, "note": f"reference packings not found in {folder}"}]
+    from granforce import bench_intervals
+
+    note("intervals against other tools")
+    # Its own table would mix with ours on stdout.
+    with contextlib.redirect_stdout(sys.stderr):
+        found = bench_intervals.run(quick, folder)
+    return [
+        {
+            "packing": packing,
+            "method": method,
+            "seconds": row["seconds"],
+            "ratio": rows["plain loop"]["seconds"] / row["seconds"],
+            "error": row["error"],
+        }
+        for packing, rows in found.items()
+        for method, row in rows.items()
+    ]
