@@ -48,6 +48,16 @@ def test_agrees_with_the_quadratic_program(mu, size):
         assert_nearest(S, kicked(S, seed, size))
 
 
+def test_comes_back_from_far_outside():
+    S = ensemble(packed(40, 0.3))
+    start = kicked(S, 1, 1e4)
+    found = accelerated(S, start)
+    assert found.converged and S.admits(found.forces)
+    # No state of S on the way to the nearest by the quadratic program is nearer.
+    ahead = ((start - found.forces) * (nearest(S, start).forces - found.forces)).sum()
+    assert ahead <= 1e-9 * (start**2).sum()
+
+
 @pytest.mark.parametrize("name", ["n100_mu0.1_s11", "n100_mu1_s12", "n400_mu0.1_s13"])
 def test_agrees_on_the_reference_packings(name):
     S = ensemble(reference(name))
@@ -131,6 +141,12 @@ def test_too_few_steps_are_told():
     assert found.iterations == 2
     assert found.residual == S.residual(found.forces) > BALANCED
     assert found.violation == 0
+
+
+def test_starts_that_are_no_numbers_are_told():
+    S = ensemble(packed(40, 0.3))
+    found = accelerated(S, np.full(S.original.shape, np.nan))
+    assert not found.converged and np.isnan(found.residual)
 
 
 def test_an_empty_s_is_told():

@@ -40,7 +40,8 @@ def walks(quick=True, *, n=None, packings=None, states=None, frictions=FRICTIONS
 
     Every solver walks on the same packings with the same seeds. The distance is
     ⟨|F − C|⟩/|C|, C the mean over the solvers of their mean networks; `original` is that of the
-    packing's own network. A walk that found too few equilibria is left out and counted in `failed`.
+    packing's own network. A walk that found too few equilibria is left out and counted in
+    `failed`: such a row is a mean over fewer packings, and not to be compared with the others.
     """
     n = n or (100 if quick else 400)
     packings = packings or (3 if quick else 10)

@@ -29,10 +29,11 @@ from granforce.relax import dissection
 from granforce.relax.dissection import factor, solve
 from granforce.tolerances import BALANCED
 
-# Distance to the nearest network itself (in ⟨f_n⟩, over all components) that ends the steps.
+# Distance to the nearest network itself (over all components) that ends the steps. This and INSIDE
+# are in ⟨f_n⟩, or in rms forces of the start where those are larger.
 NEAREST = 1e-6
-# First forces and multipliers lie at least this far (in ⟨f_n⟩) inside their cones: with 0.3 and
-# less steps are short (three times as many at 0.1).
+# First forces and multipliers lie at least this far inside their cones: with 0.3 and less steps
+# are short (three times as many at 0.1).
 INSIDE = 1.0
 # Part of the way to the nearest cone boundary that a step may go.
 STEP = 0.999
@@ -43,7 +44,7 @@ ATTEMPT, LOWER, FINAL_STEPS, LOST = 1e-6, 1e-2, 3, 1.0
 # Added to the Laplacian, whose translations cost nothing; it slows no step, only bounds them.
 SHIFT = 1e-11
 # Steps shorter than this, so many in a row, mean that S is empty.
-SHORT, SHORT_IN_A_ROW = 1e-3, 5
+SHORT, SHORT_IN_A_ROW = 1e-4, 8
 
 
 class Geometry(NamedTuple):
@@ -83,8 +84,9 @@ def accelerated(ensemble, start, *, tolerance=BALANCED, max_iterations=100):
     """The point of S with the least Σ |F_c − F_start,c|², as by `nearest` but faster.
 
     start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
-    distance to the optimum below NEAREST ⟨f_n⟩; ``converged`` is False where that was not reached
-    (S is empty, or max_iterations were too few): forces are the last iterate, inside the cones.
+    distance to the optimum below NEAREST; ``converged`` is False where that was not reached (S is
+    empty, or max_iterations were too few): forces are the last iterate, inside the cones. At
+    N = 400, μ = 0.01 … 10, it takes 0.5 to 0.8 of the time of `nearest`, at N = 25,600 half.
     """
     begin = time.perf_counter()
     geometry = _geometry(ensemble)
@@ -187,7 +189,10 @@ def _relax(geometry, target, at, tolerance, max_iterations):
     count = max(1, target.shape[0])
     attempt = ATTEMPT
     steps = short = 0
-    _begin(target, geometry.mu, at.y, at.z)
+    # Starts far outside need room in proportion: a third of the steps from 10⁴ ⟨f_n⟩ away.
+    size = max(1.0, np.sqrt(np.sum(target**2) / count))
+    near = NEAREST * size
+    _begin(target, geometry.mu, INSIDE * size, at.y, at.z)
     while True:
         product, dual = _look(geometry, target, at)
         if product <= attempt * count:
@@ -197,7 +202,7 @@ def _relax(geometry, target, at, tolerance, max_iterations):
             if ended:
                 return steps, True
             _look(geometry, target, at)
-        if _largest(at.unbalance) <= tolerance and product <= NEAREST**2 and dual <= NEAREST:
+        if _largest(at.unbalance) <= tolerance and product <= near**2 and dual <= near:
             return steps, True
         if steps >= max_iterations or short >= SHORT_IN_A_ROW or not product < 1e200:
             return steps, False
@@ -207,16 +212,16 @@ def _relax(geometry, target, at, tolerance, max_iterations):
 
 
 @njit(cache=True, nogil=True)
-def _begin(target, mu, y, z):
+def _begin(target, mu, inside, y, z):
     """y and z of each contact's own projection, moved inside."""
     for c in range(target.shape[0]):
         normal, tangential = project(target[c, 0], target[c, 1], mu)
         ratio = tangential / mu if mu > 0 else 0.0
         slope_n, slope_t = normal - target[c, 0], mu * (tangential - target[c, 1])
-        y[c, 0] = max(normal + ratio, 0.0) + INSIDE
-        y[c, 1] = max(normal - ratio, 0.0) + INSIDE
-        z[c, 0] = max(0.5 * (slope_n + slope_t), 0.0) + INSIDE
-        z[c, 1] = max(0.5 * (slope_n - slope_t), 0.0) + INSIDE
+        y[c, 0] = max(normal + ratio, 0.0) + inside
+        y[c, 1] = max(normal - ratio, 0.0) + inside
+        z[c, 0] = max(0.5 * (slope_n + slope_t), 0.0) + inside
+        z[c, 1] = max(0.5 * (slope_n - slope_t), 0.0) + inside
 
 
 @njit(cache=True, nogil=True)
