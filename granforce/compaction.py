@@ -281,19 +281,25 @@ def _certified(motion, mu):
         # Overlap had jammed more contacts than rigid disks can have: go on from where they fit.
         motion.x[:], motion.box[:] = x, box
         return None
-    return packing._replace(forces=found)
+    return _on_backbone(packing._replace(forces=found))
 
 
 def _near_forces(packing):
     """The balanced network nearest to the packing's forces, or None if it is not close to them."""
+    S = ensemble(packing, prune=False)
+    forces = nearest(S, S.original).forces
+    far = np.linalg.norm(forces - packing.forces) / np.linalg.norm(packing.forces)
+    return forces if S.admits(forces) and far <= JAMMED_DISTANCE else None
+
+
+def _on_backbone(packing):
+    """The packing with forces on its backbone alone, balanced to the last digits; None if not."""
     try:
         S = ensemble(packing)
     except NotJammedError:
         return None
-    found = nearest(S, S.original)
-    forces = S.expand(found.forces)
-    far = np.linalg.norm(forces - packing.forces) / np.linalg.norm(packing.forces)
-    return forces if S.admits(found.forces) and far <= JAMMED_DISTANCE else None
+    forces = nearest(S, S.original).forces
+    return packing._replace(forces=S.expand(forces)) if S.admits(forces) else None
 
 
 def _packing_of(motion, x, box, touching, force, mu):
@@ -407,9 +413,7 @@ def _shrink_to_isostatic(motion, mu, work, cancel):
     at_rest = motion._replace(i=i, j=j, shift=shift)
     touching = np.ones(len(i), bool)
     packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), mu)
-    S = ensemble(packing)
-    found = nearest(S, S.original)
-    return packing._replace(forces=S.expand(found.forces)) if S.admits(found.forces) else None
+    return _on_backbone(packing)
 
 
 def _without_overlap(x, box, motion):

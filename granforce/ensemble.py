@@ -11,7 +11,7 @@ from scipy import sparse
 
 from granforce import programs
 from granforce.records import Contacts, InputError, NotJammedError, Packing, friction
-from granforce.relax.nearest import least_unbalanced
+from granforce.relax.nearest import least_unbalanced, nearest
 from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING
 
 # Rows beyond which the dense eigenvalues that give a rank are not worth their time.
@@ -274,15 +274,22 @@ def _pressure_row(packing, contacts, held, mu):
 def _carrying(full):
     """Mask of contacts whose largest f_n over S is positive, exactly.
 
-    A state in which all of them carry is sought: contacts without force in the known state are
-    asked to carry as much as they can together; when their sum can only be 0, each is 0.
+    What carries in a known state carries: the original network, or else the one nearest to equal
+    f_n. The others are asked to carry as much as they can together; when their sum can only be 0,
+    each is 0.
     """
-    known = full.original[:, 0].copy() if full.admits(full.original) else None
-    idle = np.ones(len(full.index), bool) if known is None else known <= CARRYING * full.force_scale
+    known = full.original
+    if not full.admits(known):
+        equal = np.zeros_like(known)
+        equal[:, 0] = full.force_scale
+        known = nearest(full, equal).forces
+    trusted = full.admits(known)
+    idle = known[:, 0] <= CARRYING * full.force_scale if trusted else np.ones(len(known), bool)
     if not idle.any():
         return ~idle
     A, b, T = full.scaled_form
-    model = programs.standard_form(A, b)
+    # Interior point, then crossover to a vertex: simplex alone takes minutes for 1500 grains.
+    model = programs.standard_form(A, b, solver="ipm")
     normal_rows = sparse.csr_matrix(T)[:: full.per_contact]
     while idle.any():
         programs.set_cost(model, -(normal_rows.T @ idle.astype(float)))
@@ -294,11 +301,10 @@ def _carrying(full):
                 raise NotJammedError(
                     "the forces on this packing are not bounded: is a pressure or load set?"
                 )
-            if known is None:
+            if not trusted:
                 raise NotJammedError(_unbalanced_message(full))
             break  # feasible within BALANCED but not exactly: what is known to carry, carries
-        normal = normal_rows @ y
-        newly = idle & (normal > CARRYING)
+        newly = idle & (normal_rows @ y > CARRYING)
         if not newly.any():
             break
         idle &= ~newly
