@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import linprog
 
 from granforce import programs
-from granforce.ensemble import ensemble
-from granforce.intervals import intervals
+from granforce.bounds import intervals
+from granforce.polytope import ensemble
 from granforce.records import make_contacts, make_packing
 
 _PRIMAL_SIMPLEX = 4

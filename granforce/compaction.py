@@ -15,8 +15,8 @@ from scipy import sparse
 
 from granforce import contact_dynamics as dynamics
 from granforce import programs
-from granforce.ensemble import ensemble
 from granforce.neighbours import find_pairs, separations
+from granforce.polytope import ensemble
 from granforce.records import (
     Cancelled,
     InputError,

@@ -14,16 +14,16 @@ from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 import numpy as np
 
 from granforce import measures
+from granforce.bounds import intervals, limit_load_bounds
 from granforce.compaction import pack
-from granforce.ensemble import ensemble
-from granforce.intervals import intervals, limit_load_bounds
+from granforce.polytope import ensemble
+from granforce.random_walk import walk
 from granforce.records import Cancelled, InputError, friction
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
 from granforce.schema import dataset_packing, labelled, packing_dataset
 from granforce.store import open_store
 from granforce.tolerances import EQUILIBRIUM
-from granforce.walk import walk
 
 # Raised when an algorithm gives other numbers for the same parameters: older entries are not used.
 PACKING_VERSION = 1

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from granforce.bench import tile
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
+from granforce.random_walk import walk
 from granforce.records import Relaxation
 from granforce.relax import accelerated as module
 from granforce.relax.accelerated import accelerated, project
 from granforce.relax.nearest import nearest
 from granforce.tolerances import ADMISSIBLE, BALANCED
-from granforce.walk import walk
 
 
 def kicked(S, seed, size=1.0):

@@ -8,7 +8,7 @@ from conftest import packed
 
 from granforce import bench
 from granforce.bench import packings, report, solvers, states
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
 from granforce.records import NotJammedError
 
 SMALL = {"n": 30, "frictions": (0.3,)}

@@ -5,8 +5,8 @@ import pytest
 from conftest import packed
 
 from granforce.compaction import draw_radii, pack
-from granforce.ensemble import ensemble
 from granforce.neighbours import find_pairs, separations
+from granforce.polytope import ensemble
 from granforce.records import Cancelled, InputError, NotJammedError
 
 

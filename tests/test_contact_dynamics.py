@@ -5,7 +5,7 @@ import pytest
 from conftest import packed, reference
 
 from granforce.contact_dynamics import add_forces, set_stiffness, sweep
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
 from granforce.relax.gauss_seidel import _from_rest, gauss_seidel
 from granforce.relax.nearest import nearest
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from granforce.ensemble import ensemble
 from granforce.importers import load_packing, read_lammps, read_table, report, save_packing
+from granforce.polytope import ensemble
 from granforce.records import InputError, NotJammedError, make_contacts, make_packing
 
 HERE = Path(__file__).parent

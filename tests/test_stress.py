@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from granforce import measures
+from granforce.bounds import intervals
 from granforce.compaction import pack
-from granforce.ensemble import ensemble
-from granforce.intervals import intervals
 from granforce.neighbours import find_pairs, separations
+from granforce.polytope import ensemble
+from granforce.random_walk import walk
 from granforce.records import Contacts, NotJammedError, make_contacts, make_packing
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
-from granforce.walk import walk
 
 
 def assert_sound(packing, overlap=1e-7):

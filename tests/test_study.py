@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from granforce import measures, study
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
 from granforce.records import InputError
 from granforce.store import open_store
 
@@ -133,3 +133,14 @@ def test_a_killed_sweep_loses_only_the_cells_under_way(tmp_path):
     assert not failed
     assert sum(line["cached"] for line in rows) == done
     assert not list(path.glob(".tmp-*"))
+
+
+def test_public_names_are_what_they_say():
+    import granforce
+    import granforce.study  # loads every module, which must not hide a function's name
+
+    for name in granforce.__all__:
+        if name != "measures":
+            assert callable(getattr(granforce, name)), name
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = granforce.nothing

@@ -6,7 +6,7 @@ import numpy as np
 
 from granforce.bench.report import note
 from granforce.compaction import pack
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
 from granforce.records import NotJammedError
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from granforce.bench.report import note
 from granforce.compaction import pack
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
 from granforce.records import make_contacts, make_packing
 from granforce.relax.accelerated import accelerated
 from granforce.relax.gauss_seidel import gauss_seidel

@@ -9,15 +9,15 @@ import numpy as np
 
 from granforce import measures
 from granforce.bench.report import note
+from granforce.bounds import intervals as exact_intervals
 from granforce.compaction import pack
-from granforce.ensemble import ensemble
-from granforce.intervals import intervals as exact_intervals
+from granforce.polytope import ensemble
+from granforce.random_walk import walk
 from granforce.records import NotJammedError
 from granforce.relax.accelerated import accelerated
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
 from granforce.tolerances import EQUILIBRIUM
-from granforce.walk import walk
 
 WALKS = {
     "Gauss–Seidel alone": {

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from granforce.ensemble import ensemble
 from granforce.importers.geometry import overlapping
+from granforce.polytope import ensemble
 from granforce.records import InputError, NotJammedError
 from granforce.relax.nearest import least_unbalanced, nearest
 from granforce.tolerances import CARRYING

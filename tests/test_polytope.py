@@ -5,7 +5,7 @@ import pytest
 from conftest import REFERENCE, lattice, packed, reference, two_disks
 from scipy.optimize import linprog
 
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
 from granforce.records import Contacts, NotJammedError, make_packing
 from granforce.relax.nearest import nearest
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from granforce import block_cholesky, programs
-from granforce import intervals as module
+from granforce import bounds as module
 from granforce.bench_intervals import read_reference
-from granforce.ensemble import ensemble
-from granforce.intervals import intervals, limit_load_bounds, limit_loads
+from granforce.bounds import intervals, limit_load_bounds, limit_loads
+from granforce.polytope import ensemble
 from granforce.records import InputError, make_contacts, make_packing
 from granforce.tolerances import INTERVAL_GAP
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from conftest import packed, two_disks
 
-from granforce.ensemble import ensemble
+from granforce.polytope import ensemble
+from granforce.random_walk import init, judge, step, walk
 from granforce.records import Cancelled, InputError, NotJammedError, Relaxation
 from granforce.relax.nearest import nearest
-from granforce.walk import init, judge, step, walk
 
 
 @pytest.fixture(scope="module")
