@@ -86,7 +86,7 @@ def accelerated(ensemble, start, *, tolerance=BALANCED, max_iterations=100):
     start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
     distance to the optimum below NEAREST; ``converged`` is False where that was not reached (S is
     empty, or max_iterations were too few): forces are the last iterate, inside the cones. At
-    N = 400, μ = 0.01 … 10, it takes 0.5 to 0.8 of the time of `nearest`, at N = 25,600 half.
+    N = 400, μ = 0.01 … 10, it takes 0.5 to 0.9 of the time of `nearest`, at N = 25,600 half.
     """
     begin = time.perf_counter()
     geometry = _geometry(ensemble)
