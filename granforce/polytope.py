@@ -274,23 +274,68 @@ def _pressure_row(packing, contacts, held, mu):
 def _carrying(full):
     """Mask of contacts whose largest f_n over S is positive, exactly.
 
-    What carries in a known state carries: the original network, or else the one nearest to equal
-    f_n. The others are asked to carry as much as they can together; when their sum can only be 0,
-    each is 0.
+    What carries in a known state carries; known are the original network, or the one nearest to
+    equal f_n, and one that is pulled towards forces on the contacts without any. Contacts of grains
+    that cannot balance any force on them carry nothing. Only contacts that are neither are left to
+    a linear program over all of S.
     """
     known = full.original
     if not full.admits(known):
-        equal = np.zeros_like(known)
-        equal[:, 0] = full.force_scale
-        known = nearest(full, equal).forces
+        known = _nearest_to(full, np.zeros_like(known), np.ones(len(known), bool))
     trusted = full.admits(known)
-    idle = known[:, 0] <= CARRYING * full.force_scale if trusted else np.ones(len(known), bool)
+    idle = np.ones(len(known), bool)
+    dead = ~idle
+    if trusted:
+        idle = known[:, 0] <= CARRYING * full.force_scale
+        dead = idle & _cannot_balance(full, idle)
+        open_ones = idle & ~dead
+        if open_ones.any():
+            pulled = _nearest_to(full, known, open_ones)
+            idle &= (pulled[:, 0] <= CARRYING * full.force_scale) | (not full.admits(pulled))
+    return ~(dead | _proven_idle(full, idle & ~dead, trusted))
+
+
+def _nearest_to(full, known, pulled):
+    target = known.copy()
+    target[pulled, 0] += full.force_scale
+    return nearest(full, target).forces
+
+
+def _cannot_balance(full, idle):
+    """Mask of idle contacts that even their own grains alone cannot balance: local, exact.
+
+    Grains whose contacts are all idle must be in balance; all others may answer any force.
+    """
+    size = 1 + full.per_contact
+    c = full.contacts
+    held_up = np.zeros(len(full.packing.r), bool)
+    held_up[c.i[~idle]] = held_up[c.j[~idle]] = True
+    held_up |= np.any(full.packing.load != 0, axis=1)
+    held_up[full.packing.contacts.i[full.frozen]] = True
+    held_up[full.packing.contacts.j[full.frozen]] = True
+    rows = np.repeat(~held_up[full.grains], size)
+    columns = np.repeat(idle, full.per_contact)
+    if not rows.any():
+        return np.zeros(len(idle), bool)
+    A, T = full.cone_form
+    local = A[: len(rows)].tocsr()[rows][:, columns]
+    normal = sparse.csr_matrix(T)[:: full.per_contact][idle][:, columns]
+    model = programs.standard_form(local, np.zeros(local.shape[0]), upper=1.0)
+    programs.set_cost(model, -(normal.T @ np.ones(int(idle.sum()))))
+    status, y = programs.solve(model)
+    mask = np.zeros(len(idle), bool)
+    if status == programs.OPTIMAL:
+        mask[idle] = normal @ y <= CARRYING
+    return mask
+
+
+def _proven_idle(full, idle, trusted):
+    """Those of the idle contacts whose sum, and so each, can only be 0 over S."""
     if not idle.any():
-        return ~idle
+        return idle
     A, b, T = full.scaled_form
-    # Interior point: simplex takes minutes for 1500 grains. No vertex is wanted.
     model = programs.standard_form(A, b, solver="ipm")
-    model.setOptionValue("run_crossover", "off")
+    model.setOptionValue("run_crossover", "off")  # no vertex is wanted
     normal_rows = sparse.csr_matrix(T)[:: full.per_contact]
     while idle.any():
         programs.set_cost(model, -(normal_rows.T @ idle.astype(float)))
@@ -304,12 +349,12 @@ def _carrying(full):
                 )
             if not trusted:
                 raise NotJammedError(_unbalanced_message(full))
-            break  # feasible within BALANCED but not exactly: what is known to carry, carries
+            return idle  # feasible within BALANCED but not exactly: no more is known to carry
         newly = idle & (normal_rows @ y > CARRYING)
         if not newly.any():
-            break
-        idle &= ~newly
-    return ~idle
+            return idle
+        idle = idle & ~newly
+    return idle
 
 
 def _unbalanced_message(full):

@@ -10,15 +10,15 @@ OPTIMAL = highspy.HighsModelStatus.kOptimal
 INFEASIBLE = highspy.HighsModelStatus.kInfeasible
 
 
-def standard_form(A, b, *, solver="choose", threads=1):
-    """A silent HiGHS model of {y ≥ 0, A y = b} with zero cost; A sparse (m, n), b (m,)."""
+def standard_form(A, b, *, upper=np.inf, solver="choose", threads=1):
+    """A silent HiGHS model of {0 ≤ y ≤ upper, A y = b}, zero cost; A sparse (m, n), b (m,)."""
     A = sparse.csc_matrix(A)
     rows, columns = A.shape
     lp = highspy.HighsLp()
     lp.num_col_, lp.num_row_ = columns, rows
     lp.col_cost_ = np.zeros(columns)
     lp.col_lower_ = np.zeros(columns)
-    lp.col_upper_ = np.full(columns, highspy.kHighsInf)
+    lp.col_upper_ = np.full(columns, upper)
     lp.row_lower_ = lp.row_upper_ = np.asarray(b, dtype=np.float64)
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     lp.a_matrix_.start_ = A.indptr.astype(np.int32)
