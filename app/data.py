@@ -22,6 +22,7 @@ SOLVERS = {
     "nearest": "nearest admissible state",
     "gauss_seidel": "Gauss–Seidel, finished exactly",
     "gauss_seidel_only": "paper's plain Gauss–Seidel",
+    "accelerated": "nearest admissible state, own solver",
 }
 
 # Width of the strip around the periodic box in which images are drawn, in largest radii.

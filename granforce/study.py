@@ -19,6 +19,7 @@ from granforce.compaction import pack
 from granforce.polytope import ensemble
 from granforce.random_walk import walk
 from granforce.records import Cancelled, InputError, friction
+from granforce.relax.accelerated import accelerated
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
 from granforce.schema import dataset_packing, labelled, packing_dataset
@@ -38,6 +39,7 @@ RELAXATIONS = {
     "gauss_seidel": {"relax": gauss_seidel},
     "gauss_seidel_only": {"relax": gauss_seidel, "rest": None, "tolerance": EQUILIBRIUM},
     "nearest": {"relax": nearest},
+    "accelerated": {"relax": accelerated},
 }
 
 
