@@ -43,7 +43,8 @@ PARTS = {
 def run(folder=None, quick=True, *, parts=None, show=print):
     """Measure all parts (or those named) and return {"environment": …, part: rows}.
 
-    folder: where bench.json is written, after every part so that nothing is lost; None: nowhere.
+    folder: where bench.json is written, after every part so that nothing is lost, and a figure of
+    the intervals; None: nowhere.
     show: what is called with each finished table.
     """
     results = {"environment": environment(), "quick": bool(quick), "seconds": {}}
@@ -56,6 +57,11 @@ def run(folder=None, quick=True, *, parts=None, show=print):
         show(table(heading, results[name]))
         if folder is not None:
             _write(Path(folder), results)
+    if folder is not None and "intervals" in results:
+        from granforce import figures  # HoloViews takes seconds to load
+
+        figure = figures.walk_against_exact(results["intervals"])
+        figures.save(figure, Path(folder) / "walk_against_exact.html")
     return results
 
 

@@ -1,0 +1,39 @@
+"""Figures as HoloViews objects, one function each."""
+
+import holoviews as hv
+
+
+def walk_against_exact(rows):
+    """Part of the exact mean ΔF_n that walks saw, against their run time; exact bounds beside.
+
+    rows: those of `granforce.bench.intervals`. One panel per μ.
+    """
+    hv.extension("bokeh")
+    panels = []
+    for mu in sorted({row["mu"] for row in rows}):
+        chosen = [row for row in rows if row["mu"] == mu]
+        panels.append(hv.Overlay([*_curves(chosen)]).opts(title=f"μ = {mu:g}", **_FRAME))
+    return hv.Layout(panels).cols(2)
+
+
+_FRAME = {
+    "logx": True,
+    "ylim": (0, 1.1),
+    "xlabel": "run time / s",
+    "ylabel": "seen part of exact ⟨ΔF_n⟩",
+    "legend_position": "bottom_right",
+    "frame_width": 380,
+    "frame_height": 280,
+}
+
+
+def _curves(rows):
+    for method in dict.fromkeys(row["method"] for row in rows):
+        points = [(r["seconds"], r["extent_part"]) for r in rows if r["method"] == method]
+        line = hv.Curve(points, label=method)
+        yield line * hv.Scatter(points, label=method).opts(size=8)
+
+
+def save(figure, path):
+    """Write a figure as a page of its own that needs no network."""
+    hv.save(figure, path, backend="bokeh", resources="inline")
