@@ -1,64 +1,7 @@
-"""Packings that many tests share: made once a session, small enough to be made at all."""
-
-import functools
-from pathlib import Path
+"""Fixtures of all tests."""
 
 import numpy as np
 import pytest
-
-from granforce.compaction import pack
-from granforce.importers import load_packing
-from granforce.records import make_contacts, make_packing
-
-REFERENCE = Path(__file__).parent / "reference"
-
-
-@functools.cache
-def packed(n, mu, seed=1):
-    """A packing of n disks, made once."""
-    return pack(n, mu, seed)
-
-
-@functools.cache
-def reference(name):
-    """A reference packing by its file's stem."""
-    return load_packing(REFERENCE / f"{name}.npz")
-
-
-def two_disks(pressure=1.0, height=3.0):
-    """Two disks of radius 1/2 in a row across a periodic box 2 wide: they touch on both sides."""
-    x = [[0.25, 1.0], [1.25, 1.0]]
-    r = np.full(2, 0.5)
-    contacts = make_contacts([0, 0], [1, 1], [[1.0, 0.0], [-1.0, 0.0]], [1.0, 1.0], r)
-    return make_packing(x, r, [2.0, height], contacts, np.zeros((2, 2)), 0.5, pressure)
-
-
-def lattice(columns, rows, mu, triangular=False):
-    """A crystal of touching disks of radius 1/2 in a periodic box, without forces."""
-    across = np.arange(columns * rows) % columns
-    up = np.arange(columns * rows) // columns
-    directions = [(1, 0), (0, 1)]
-    height = 1.0
-    if triangular:
-        height = np.sqrt(3) / 2
-        directions.append((-1, 1))
-    box = np.array([columns, rows * height])
-    x = np.column_stack([across + 0.5 * triangular * up, up * height])
-    i, j, normal = [], [], []
-    for a, b in directions:
-        i.append(np.arange(columns * rows))
-        shifted = (across + a + _slip(up + b, rows, triangular)) % columns
-        j.append(shifted + columns * ((up + b) % rows))
-        normal.append(np.tile([a + 0.5 * triangular * b, b * height], (columns * rows, 1)))
-    r = np.full(columns * rows, 0.5)
-    i, j, normal = np.concatenate(i), np.concatenate(j), np.concatenate(normal)
-    contacts = make_contacts(i, j, normal, np.ones(len(i)), r)
-    return make_packing(x % box, r, box, contacts, np.zeros((len(i), 2)), mu, 1.0)
-
-
-def _slip(up, rows, triangular):
-    # A triangular lattice leans by half a disk a row: crossing the top shifts by rows/2 columns.
-    return np.where(up >= rows, rows // 2, 0) * triangular
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from conftest import lattice, packed, reference, two_disks
 from hypothesis import given
 from hypothesis import strategies as st
+from packings import lattice, packed, reference, two_disks
 
 from granforce.bench import tile
 from granforce.polytope import ensemble

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import packed
+from packings import packed
 
 from granforce import bench
 from granforce.bench import packings, report, solvers, states

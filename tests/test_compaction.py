@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import packed
+from packings import packed
 
 from granforce.compaction import draw_radii, pack
 from granforce.neighbours import find_pairs, separations

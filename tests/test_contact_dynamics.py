@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import packed, reference
+from packings import packed, reference
 
 from granforce.contact_dynamics import add_forces, set_stiffness, sweep
 from granforce.polytope import ensemble

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import REFERENCE, lattice, packed, reference, two_disks
+from packings import REFERENCE, lattice, packed, reference, two_disks
 from scipy.optimize import linprog
 
 from granforce.polytope import ensemble

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import packed, two_disks
+from packings import packed, two_disks
 
 from granforce.polytope import ensemble
 from granforce.random_walk import init, judge, step, walk

@@ -5,9 +5,9 @@ The quick cases run always, the long ones with -m stress.
 
 import numpy as np
 import pytest
-from conftest import lattice, packed, reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from packings import lattice, packed, reference
 
 from granforce import measures
 from granforce.bounds import intervals
