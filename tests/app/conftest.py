@@ -1,24 +1,10 @@
-"""The app is a folder beside the package: make it importable, and give it a small store."""
-
-import sys
-from pathlib import Path
+"""A small store for the app's tests."""
 
 import pytest
+from small_store import cell_parameters
 
 from granforce import study
 from granforce.store import open_store
-
-ROOT = Path(__file__).resolve().parents[2]
-if str(ROOT) not in sys.path:
-    sys.path.insert(0, str(ROOT))
-
-DISKS, STATES, KEPT = 30, 30, 12
-
-
-def cell_parameters(mu, **options):
-    """Walk parameters of the small store's cells."""
-    packing = study.packing_parameters(DISKS, mu, 1)
-    return study.walk_parameters(packing, STATES, 0, relax="nearest", keep=KEPT, **options)
 
 
 @pytest.fixture(scope="session")

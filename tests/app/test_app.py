@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import DISKS, KEPT, STATES, cell_parameters
+from small_store import DISKS, KEPT, STATES, cell_parameters
 
 from granforce import measures, study
 
