@@ -13,17 +13,18 @@ def walk_against_exact(rows):
     for mu in sorted({row["mu"] for row in rows}):
         chosen = [row for row in rows if row["mu"] == mu]
         panels.append(hv.Overlay([*_curves(chosen)]).opts(title=f"μ = {mu:g}", **_FRAME))
-    return hv.Layout(panels).cols(2)
+    return hv.Layout(panels).cols(2).opts(toolbar=None)
 
 
 _FRAME = {
     "logx": True,
+    "padding": 0.1,
     "ylim": (0, 1.1),
     "xlabel": "run time / s",
     "ylabel": "seen part of exact ⟨ΔF_n⟩",
-    "legend_position": "bottom_right",
-    "frame_width": 380,
-    "frame_height": 280,
+    "legend_position": "right",
+    "frame_width": 300,
+    "frame_height": 260,
 }
 
 
