@@ -1,5 +1,7 @@
 """Figures hold what they were given."""
 
+import re
+
 from granforce import figures
 
 
