@@ -15,7 +15,7 @@ OVERLAP = 1e-9
 RIGID_OVERLAP = 1e-5
 
 # Residual at which Gauss–Seidel sweeps end and the nearest admissible network takes over. Against
-# sweeping on to 1e-6 it moved the state by at most 2 % (mostly 0.1–0.9 %), of steps that are 5–20 %,
+# sweeping on to 1e-6 it moved the state by at most 2 % (mostly below 0.9 %), of steps of 5–20 %,
 # and saved four fifths of the sweeps or more.
 AT_REST = 1e-3
 
