@@ -9,22 +9,15 @@ from scipy.optimize import linprog
 
 from granforce import programs
 from granforce.bounds import intervals
+from granforce.importers import load_packing
 from granforce.polytope import ensemble
-from granforce.records import make_contacts, make_packing
 
 _PRIMAL_SIMPLEX = 4
 
 
 def read_reference(path):
     """The Ensemble of a reference file (NPZ) and its arrays."""
-    data = np.load(path)
-    r = data["r"]
-    normal = np.c_[data["nx"], data["ny"]]
-    contacts = make_contacts(data["i"], data["j"], normal, data["branch"], r)
-    forces = np.c_[data["fn"], data["ft"]]
-    box = [float(data["L"])] * 2
-    mu, pressure = float(data["mu"]), float(data["P"])
-    return ensemble(make_packing(data["x"], r, box, contacts, forces, mu, pressure)), data
+    return ensemble(load_packing(path)), np.load(path)
 
 
 def plain_loop(ensemble):

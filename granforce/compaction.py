@@ -7,7 +7,6 @@ it takes ever longer to come to rest: there linear programs shrink the box under
 non-overlap.
 """
 
-import highspy
 import numpy as np
 import piqp
 from numba import njit
@@ -426,22 +425,13 @@ def _without_overlap(x, box, motion):
 def _shrink_program(i, j, normal, length, gap, n):
     """Displacements (n, 2) and strain of the box of the linear program, by HiGHS."""
     R = sparse.hstack([_approach(i, j, normal, n), sparse.csc_matrix(length[:, None])])
-    R = sparse.csc_matrix(R)
-    lp = highspy.HighsLp()
-    columns = 2 * n + 1
-    lp.num_col_, lp.num_row_ = columns, len(gap)
-    # The duals are the contact forces: this cost makes their mean about 1, the tolerances' scale.
-    lp.col_cost_ = np.append(np.zeros(2 * n), 4.0 * n)
     # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the pairs' reach.
-    lp.col_lower_ = np.append(np.full(2 * n, -TRUST), -TRUST / 2)
-    lp.col_upper_ = np.append(np.full(2 * n, TRUST), 0.0)
-    lp.row_lower_ = -gap
-    lp.row_upper_ = np.full(len(gap), highspy.kHighsInf)
-    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    lp.a_matrix_.start_, lp.a_matrix_.index_ = R.indptr, R.indices
-    lp.a_matrix_.value_ = R.data
-    model = programs.silent_model()
-    model.passModel(lp)
+    lower = np.append(np.full(2 * n, -TRUST), -TRUST / 2)
+    upper = np.append(np.full(2 * n, TRUST), 0.0)
+    # The duals are the contact forces: this cost makes their mean about 1, the tolerances' scale.
+    cost = np.append(np.zeros(2 * n), 4.0 * n)
+    rows = -gap, np.full(len(gap), np.inf)
+    model = programs.bounded(R, rows, (lower, upper), cost)
     status, u = programs.solve(model)
     if status != programs.OPTIMAL:
         raise NotJammedError("the last step of the frictionless compaction did not converge")

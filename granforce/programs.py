@@ -10,36 +10,38 @@ OPTIMAL = highspy.HighsModelStatus.kOptimal
 INFEASIBLE = highspy.HighsModelStatus.kInfeasible
 
 
-def standard_form(A, b, *, upper=np.inf, solver="choose", threads=1):
+def standard_form(A, b, *, upper=np.inf, solver="choose"):
     """A silent HiGHS model of {0 ≤ y ≤ upper, A y = b}, zero cost; A sparse (m, n), b (m,)."""
+    columns = np.zeros(A.shape[1]), np.full(A.shape[1], upper)
+    return bounded(A, (b, b), columns, np.zeros(A.shape[1]), solver=solver)
+
+
+def bounded(A, rows, columns, cost, *, solver="choose"):
+    """A silent HiGHS model: minimise cost·y with A y and y between bounds.
+
+    A sparse (m, n); rows: lower and upper bounds (m,) of A y; columns: those (n,) of y; cost (n,).
+    granforce's tolerances, one thread.
+    """
     A = sparse.csc_matrix(A)
-    rows, columns = A.shape
     lp = highspy.HighsLp()
-    lp.num_col_, lp.num_row_ = columns, rows
-    lp.col_cost_ = np.zeros(columns)
-    lp.col_lower_ = np.zeros(columns)
-    lp.col_upper_ = np.full(columns, upper)
-    lp.row_lower_ = lp.row_upper_ = np.asarray(b, dtype=np.float64)
+    lp.num_row_, lp.num_col_ = A.shape
+    lp.col_cost_ = np.asarray(cost, dtype=np.float64)
+    lp.col_lower_, lp.col_upper_ = columns
+    lp.row_lower_, lp.row_upper_ = (np.asarray(bound, dtype=np.float64) for bound in rows)
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     lp.a_matrix_.start_ = A.indptr.astype(np.int32)
     lp.a_matrix_.index_ = A.indices.astype(np.int32)
     lp.a_matrix_.value_ = A.data
-    model = silent_model(solver=solver, threads=threads)
-    model.passModel(lp)
-    return model
-
-
-def silent_model(*, solver="choose", threads=1):
-    """An empty HiGHS model with granforce's tolerances and no output."""
     model = highspy.Highs()
     for name, value in {
         "output_flag": False,
-        "threads": threads,
+        "threads": 1,
         "solver": solver,
         "primal_feasibility_tolerance": PROGRAM,
         "dual_feasibility_tolerance": PROGRAM,
     }.items():
         model.setOptionValue(name, value)
+    model.passModel(lp)
     return model
 
 

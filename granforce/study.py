@@ -68,7 +68,7 @@ def walk_parameters(packing, states, seed=0, *, mu=None, relax="gauss_seidel", c
     """
     if relax not in RELAXATIONS:
         raise InputError(f"unknown relaxation {relax!r}: take one of {', '.join(RELAXATIONS)}")
-    if int(states) < 1 or not 1 <= int(chains) <= int(states) or (keep or 1) < 1 or keep == 0:
+    if not 1 <= int(chains) <= int(states) or (keep is not None and keep < 1):
         raise InputError("states, keep and chains must be at least 1, and chains ≤ states")
     return {
         "packing": packing,
