@@ -96,9 +96,9 @@ def _add_walk_options(command):
     group.add_argument(
         "--relax",
         choices=["gauss_seidel", "gauss_seidel_only", "nearest", "accelerated"],
-        default="gauss_seidel",
-        help="the paper's contact dynamics with an exact finish or (slower, to 1e-6) without, or "
-        "the nearest admissible network (by PIQP, or faster by our own solver)",
+        default="accelerated",
+        help="the nearest admissible network, by our own solver (default) or by PIQP, or the "
+        "paper's contact dynamics with an exact finish or (slower, to 1e-6) without",
     )
     group.add_argument("--chains", type=int, default=1, help="independent chains (default 1)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")

@@ -60,7 +60,7 @@ def imported_parameters(packing):
     return {"imported": digest.hexdigest(), "mu": packing.mu}
 
 
-def walk_parameters(packing, states, seed=0, *, mu=None, relax="gauss_seidel", chains=1, keep=None):
+def walk_parameters(packing, states, seed=0, *, mu=None, relax="accelerated", chains=1, keep=None):
     """The parameters that name a walk: those of its packing, and how it goes.
 
     mu: friction coefficient of the ensemble, by default the packing's. keep: number of evenly

@@ -7,6 +7,8 @@ from packings import packed, two_disks
 from granforce.polytope import ensemble
 from granforce.random_walk import init, judge, step, walk
 from granforce.records import Cancelled, InputError, NotJammedError, Relaxation
+from granforce.relax.accelerated import accelerated
+from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
 
 
@@ -32,9 +34,9 @@ def test_the_walk_moves(S):
     assert np.all(moved > 1e-3 * S.force_scale)
 
 
-@pytest.mark.parametrize("relax", ["gauss_seidel", nearest])
+@pytest.mark.parametrize("relax", [gauss_seidel, nearest, accelerated])
 def test_same_seed_same_states_for_any_number_of_workers(S, relax):
-    options = {} if relax == "gauss_seidel" else {"relax": relax}
+    options = {"relax": relax}
     one = walk(S, 9, 5, chains=3, workers=1, **options)
     two = walk(S, 9, 5, chains=3, workers=3, **options)
     other = walk(S, 9, 6, chains=3, workers=1, **options)
