@@ -486,7 +486,16 @@ def _is_alive(pid):
         return False
     except OSError:
         pass  # it exists and belongs to someone else
-    return True
+    return not _is_zombie(pid)
+
+
+def _is_zombie(pid):
+    """Whether the process has ended but was not yet collected by its parent (Linux)."""
+    try:
+        told = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return told.rpartition(")")[2].split()[:1] == ["Z"]
 
 
 def _remove(path):

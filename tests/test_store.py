@@ -528,9 +528,12 @@ def test_folder_that_cannot_be_written_can_be_read(nobody):
 def test_temporaries_of_dead_writers_are_cleaned(store):
     ended = subprocess.Popen(["true"])
     ended.wait()
+    zombie = subprocess.Popen(["true"])  # ended, but not waited for
+    os.waitid(os.P_PID, zombie.pid, os.WEXITED | os.WNOWAIT)
     host = store_module._host()
     ages = {
         f".tmp-{host}-{ended.pid}-aa": 0,  # dead
+        f".tmp-{host}-{zombie.pid}-ff": 0,  # dead too
         f".tmp-{host}-{os.getpid()}-bb": 0,  # alive
         f".tmp-{host}-{os.getpid()}-cc": 4000,  # too old for any writer
         f".tmp-far_away-{ended.pid}-dd": 0,  # nobody here can tell
@@ -540,7 +543,8 @@ def test_temporaries_of_dead_writers_are_cleaned(store):
         (store.path / name).mkdir()
         (store.path / name / "zarr.json").write_text("{}")
         os.utime(store.path / name, (time.time() - age, time.time() - age))
-    assert store.clean() == 3
+    assert store.clean() == 4
+    zombie.wait()
     kept = {item.name[-2:] for item in store.path.glob(".tmp-*")}
     assert kept == {"bb", "dd"}
     os.utime(store.path / f".tmp-far_away-{ended.pid}-dd", (0, 0))
