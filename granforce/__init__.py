@@ -20,6 +20,7 @@ _HOME = {
     "walk": "random_walk",
     "intervals": "bounds",
     "limit_loads": "bounds",
+    "outline": "projection",
     "load_packing": "importers",
     "save_packing": "importers",
     "read_lammps": "importers",

@@ -82,7 +82,7 @@ def intervals(
     tangential = [] if frictionless else [(int(c), 1, side) for c in contacts for side in (0, 1)]
     lower = [(int(c), 0, 0) for c in contacts]
     total = len(upper) + len(tangential) + len(lower)
-    solver = _Solver(ensemble, workers, total, progress, cancel)
+    solver = Solver(ensemble, workers, total, progress, cancel)
     solver.see(states)
     bounds = solver.solve(
         upper + tangential, [_bound(solver.system, *key) for key in upper + tangential]
@@ -130,7 +130,7 @@ def limit_load_bounds(ensemble, contacts=None, *, workers=1, progress=None, canc
     Options and errors as in `intervals`.
     """
     contacts = _positions(ensemble, contacts)
-    solver = _Solver(ensemble, workers, len(contacts), progress, cancel)
+    solver = Solver(ensemble, workers, len(contacts), progress, cancel)
     keys = [int(c) for c in contacts]
     bounds = solver.solve(keys, [Program([], [], key) for key in keys])
     load, gap = np.full(len(keys), np.nan), np.full(len(keys), np.nan)
@@ -166,15 +166,17 @@ def _bound(system, contact, component, side):
     return Program(unknown.indices.tolist(), (sign * unknown.data).tolist(), -1)
 
 
-class _Solver:
+class Solver:
     """Solves and certifies programs over one S; keeps count of what it did."""
 
-    def __init__(self, ensemble, workers, total, progress, cancel):
+    def __init__(self, ensemble, workers, total, progress, cancel, *, points=None):
+        """points: a dict to fill with the y (n,) at which each key's value is attained."""
         self.ensemble, self.workers = ensemble, workers
         self.total, self.done = total, 0
         self.progress, self.cancel = progress, cancel or (lambda: False)
         self.system = _system(ensemble)
         self.least = np.full(len(ensemble.index), np.inf)  # smallest f_n seen, ⟨f_n⟩
+        self.points = points
         self.counts = {"programs": 0, "again": 0, "iterations": 0}
         self.lock = threading.Lock()
 
@@ -199,6 +201,8 @@ class _Solver:
             with self.lock:
                 for k, outcome in enumerate(outcomes):
                     bounds[keys[outcome.number]] = (attained[k], bound[k])
+                    if self.points is not None:
+                        self.points[keys[outcome.number]] = outcome.y
                     self.counts["iterations"] += outcome.steps
                     if outcome.loaded < 0 and np.isfinite(attained[k]):
                         normal = outcome.y.reshape(len(self.least), -1).mean(axis=1)
@@ -219,14 +223,16 @@ class _Solver:
                 if key not in bounds:
                     self.counts["programs"] += 1
                     self._report(1)
-                bounds[key] = self._again(number, tasks, attained, bound)
+                bounds[key] = self._again(key, number, tasks, attained, bound)
         return bounds
 
-    def _again(self, number, tasks, attained, bound):
+    def _again(self, key, number, tasks, attained, bound):
         """Solve one program from scratch by HiGHS; keep the better of either side."""
         outcome = from_scratch(self.system, number, tasks[number])
         again = certify(self.system, [outcome], tasks)
         self.counts["again"] += 1
+        if self.points is not None and again[0][0] < attained:
+            self.points[key] = outcome.y
         return min(attained, again[0][0]), max(bound, again[1][0])
 
     def _report(self, count):

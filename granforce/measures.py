@@ -72,6 +72,23 @@ def distances(states, centre):
     return np.sqrt(((states - centre) ** 2).sum(axis=(1, 2)))
 
 
+def principal_axes(states, count=2):
+    """Directions along which states vary most: axes (count, N_c, 2), and their share of variance.
+
+    Axes have length 1 and a positive largest component; those along which nothing varies are zero.
+    """
+    flat = (states - mean_network(states)).reshape(len(states), -1)
+    # States are fewer than components as a rule: their Gram matrix is the smaller one.
+    value, left = np.linalg.eigh(flat @ flat.T)
+    axes, share = np.zeros((count, flat.shape[1])), np.zeros(count)
+    varies = value > 1e-12 * max(value[-1], np.finfo(float).tiny) * len(value)
+    for k in range(min(count, int(varies.sum()))):
+        axis = left[:, -1 - k] @ flat
+        axis *= np.sign(axis[np.abs(axis).argmax()]) / np.linalg.norm(axis)
+        axes[k], share[k] = axis, value[-1 - k] / value[varies].sum()
+    return axes.reshape(count, *states.shape[1:]), share
+
+
 def growing_eta3(states):
     """η3 from the first 1, 2, … S states, shape (S,)."""
     low = np.minimum.accumulate(states, axis=0)

@@ -131,7 +131,7 @@ def test_threads_and_company_do_not_change_a_bit(first):
 
 def test_certificates_see_a_wrong_optimum(first):
     system, _ = first
-    solver = module._Solver(system, 1, 1, None, None)
+    solver = module.Solver(system, 1, 1, None, None)
     task = module._bound(solver.system, 0, 0, 1)
     outcome = module.from_scratch(solver.system, 0, task)
     attained, bound = module.certify(solver.system, [outcome], [task])
