@@ -7,7 +7,7 @@ import pytest
 from packings import packed
 
 from granforce import bench
-from granforce.bench import packings, report, solvers, states
+from granforce.bench import packings, report, siconos, solvers, states
 from granforce.polytope import ensemble
 from granforce.records import NotJammedError
 
@@ -59,8 +59,17 @@ def test_ending_in_motion_is_not_called_converged():
 
 def test_contact_updates_tell_whether_siconos_is_there():
     rows = bench.contact_updates(True, n=30, mu=0.3, sweeps=40)
-    assert named(rows, "solver", "granforce sweep")["ns_per_update"] > 0
-    assert named(rows, "solver", "Siconos NSGS")["note"]
+    assert rows[0]["solver"] == "granforce sweep" and rows[0]["ns_per_update"] > 0
+    assert rows[-1]["solver"] == "Siconos NSGS"
+    assert ("absent" in rows[-1]["note"]) == (siconos.interpreter() is None)
+
+
+@pytest.mark.skipif(siconos.interpreter() is None, reason=siconos.ABSENT)
+def test_a_sweep_is_that_of_siconos():
+    S = ensemble(packed(30, 0.3))
+    found = siconos.against_siconos(S, solvers.kicked(S, 1, 0)[0], 1e-4)
+    assert found["sweeps"] > 10
+    assert found["difference"] < 1e-10
 
 
 def test_scaling_gives_an_exponent_per_solver():
@@ -102,8 +111,23 @@ def test_compaction_rows(monkeypatch):
     assert rows[0]["z"] == pytest.approx(S.coordination)
     assert rows[0]["h"] == S.dimension
     assert rows[0]["phi"] == pytest.approx(S.packing.packing_fraction)
-    assert {"seconds", "steps", "contact_updates", "ns_per_update"} <= rows[0].keys()
+    assert {"seconds", "steps", "contact_updates", "overlap"} <= rows[0].keys()
     assert "phi" not in rows[1]
+
+
+def test_compaction_at_each_friction_and_size():
+    rows = bench.compaction_frictions(True, n=30, frictions=(0.3, 1.0), seeds=2)
+    assert [row["mu"] for row in rows] == [0.3, 1.0]
+    assert all(0 < row["seconds"] <= row["slowest"] for row in rows)
+    rows = bench.compaction_growth(True, mu=0.3, sizes=(20, 30), seeds=1)
+    assert [row["n"] for row in rows] == [20, 30, "fit"]
+    assert np.isfinite(rows[-1]["exponent"])
+
+
+def test_chains_on_two_threads():
+    (row,) = bench.batches(True, states=6, **SMALL)
+    assert min(row["per_second"], row["per_second_2"], row["ceiling"]) > 0
+    assert row["ratio"] == pytest.approx(row["per_second_2"] / row["per_second"])
 
 
 def test_walks_of_one_optimum_agree_and_others_need_not():

@@ -8,14 +8,17 @@ import json
 import time
 from pathlib import Path
 
-from granforce.bench.packings import compaction
+from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
 from granforce.bench.report import environment, note, table
 from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
-from granforce.bench.states import interval_methods, intervals, walks
+from granforce.bench.states import batches, interval_methods, intervals, walks
 
 __all__ = [
     "PARTS",
+    "batches",
     "compaction",
+    "compaction_frictions",
+    "compaction_growth",
     "contact_updates",
     "environment",
     "interval_methods",
@@ -33,7 +36,10 @@ PARTS = {
     "contact_updates": (contact_updates, "One contact update of Gauss–Seidel"),
     "relaxation": (relaxation, "One relaxation to 1e-9 ⟨f_n⟩, from the same kicked starts"),
     "scaling": (scaling, "One relaxation against the number of disks"),
-    "compaction": (compaction, "Compaction: time step and sweeps"),
+    "batches": (batches, "Chains of one packing on one and two threads"),
+    "compaction": (compaction, "Compaction: run time and overlap by time step and sweeps"),
+    "compaction_frictions": (compaction_frictions, "Compaction at each μ"),
+    "compaction_growth": (compaction_growth, "Compaction against the number of disks"),
     "walks": (walks, "Random walks by solver"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),

@@ -1,53 +1,78 @@
-"""Compaction: what a shorter time step and more sweeps cost, and what packing they give."""
+"""Compaction: run time against the overlap of the dynamics, against μ, and against N."""
 
 import time
 
 import numpy as np
 
-from granforce.bench.report import note
+from granforce.bench.report import exponent, note
 from granforce.compaction import pack
 from granforce.polytope import ensemble
 from granforce.records import NotJammedError
 
+FRICTIONS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+
 
 def compaction(quick=True, *, n=None, mu=0.1, steps=None, sweeps=None, seeds=None):
-    """Rows: time, steps and contact updates until jammed, and φ, z, h of what came out.
+    """Rows: run time and mean overlap of the dynamics, and φ, z, h of the packing it gave.
 
-    One row per time step Δt and number of sweeps per step; means over seeds. Every packing is
-    finished exactly, so the error that a coarse Δt leaves shows only in where it jams; runs that
-    did not jam are left out of the means and counted in `failed`.
+    One row per time step Δt and number of sweeps per step; means over seeds. Mean overlap against
+    run time is the figure of merit of arXiv:0803.3566 (its Fig. 7). Every packing is then
+    finished exactly, so that of this error only the place where it jams is left; runs that did
+    not jam are left out of the means and counted in `failed`.
     """
     n = n or (100 if quick else 400)
     steps = steps or ((0.01, 0.02) if quick else (0.005, 0.01, 0.02, 0.05))
     sweeps = sweeps or ((25, 100) if quick else (25, 100, 400))
     seeds = seeds or (2 if quick else 3)
-    rows = []
-    for dt in steps:
-        for count in sweeps:
-            note(f"compaction: N = {n}, μ = {mu:g}, Δt = {dt:g}, {count} sweeps")
-            made = [_packed(n, mu, seed, dt, count) for seed in range(1, seeds + 1)]
-            kept = [one for one in made if one]
-            row = {"n": n, "mu": mu, "dt": dt, "sweeps": count, "seeds": seeds}
-            row["failed"] = len(made) - len(kept)
-            for key in kept[0] if kept else ():
-                row[key] = float(np.mean([one[key] for one in kept]))
-            rows.append(row)
-    return rows
+    return [
+        _row(n, mu, seeds, dt=dt, sweeps=count) | {"dt": dt, "sweeps": count}
+        for dt in steps
+        for count in sweeps
+    ]
 
 
-def _packed(n, mu, seed, dt, sweeps):
+def compaction_frictions(quick=True, *, n=None, frictions=None, seeds=None):
+    """Rows: time to a certified packing at each μ; means, and the slowest of the seeds."""
+    n = n or (100 if quick else 400)
+    frictions = frictions or (FRICTIONS[::3] if quick else FRICTIONS)
+    return [_row(n, mu, seeds or (2 if quick else 5)) for mu in frictions]
+
+
+def compaction_growth(quick=True, *, mu=0.1, sizes=None, seeds=None):
+    """Rows: time to a certified packing at growing N, and the exponent of time with N."""
+    sizes = sizes or ((50, 100, 200) if quick else (100, 400, 1600, 6400))
+    rows = [_row(n, mu, seeds or (2 if quick else 3)) for n in sizes]
+    jammed = [(row["n"], row["seconds"]) for row in rows if "seconds" in row]
+    return [*rows, {"n": "fit", "mu": mu, "exponent": exponent(jammed)}]
+
+
+def _row(n, mu, seeds, **options):
+    told = "".join(f", {name} {value:g}" for name, value in options.items())
+    note(f"compaction: N = {n}, μ = {mu:g}{told}")
+    made = [_packed(n, mu, seed, **options) for seed in range(1, seeds + 1)]
+    kept = [one for one in made if one]
+    row = {"n": n, "mu": mu, "seeds": seeds, "failed": len(made) - len(kept)}
+    for key in kept[0] if kept else ():
+        row[key] = float(np.mean([one[key] for one in kept]))
+    if kept:
+        row["slowest"] = max(one["seconds"] for one in kept)
+    return row
+
+
+def _packed(n, mu, seed, **options):
     begin = time.perf_counter()
     try:
-        packing = pack(n, mu, seed, dt=dt, sweeps=sweeps)
-        seconds = time.perf_counter() - begin
-        S = ensemble(packing)
+        packing = pack(n, mu, seed, **options)
     except NotJammedError:
         return {}
+    seconds = time.perf_counter() - begin
+    S = ensemble(packing)
     return {
         "seconds": seconds,
         "steps": packing.info["steps"],
         "contact_updates": packing.info["contact_updates"],
-        "ns_per_update": 1e9 * seconds / max(1, packing.info["contact_updates"]),
+        "certificates": packing.info["certificates_tried"],
+        "overlap": packing.info["mean_overlap_of_dynamics"],
         "phi": packing.packing_fraction,
         "z": S.coordination,
         "h": S.dimension,

@@ -6,6 +6,8 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+import numpy as np
+
 LIBRARIES = ("granforce", "numpy", "scipy", "numba", "highspy", "piqp", "siconos")
 
 
@@ -39,6 +41,13 @@ def _version(name):
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return None
+
+
+def exponent(points):
+    """Slope of log y over log x of points (x, y), or None for fewer than two."""
+    if len(points) < 2:
+        return None
+    return float(np.polyfit(*np.log(points).T, 1)[0])
 
 
 def table(title, rows):

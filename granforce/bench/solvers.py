@@ -1,11 +1,11 @@
 """Relaxation solvers side by side: same starts, time and what was reached, and how it scales."""
 
-import importlib.util
 import time
 
 import numpy as np
 
-from granforce.bench.report import note
+from granforce.bench.report import exponent, note
+from granforce.bench.siconos import ABSENT, TOLERANCES, against_siconos
 from granforce.compaction import pack
 from granforce.polytope import ensemble
 from granforce.records import make_contacts, make_packing
@@ -107,18 +107,28 @@ def _ratio(baseline, run):
 
 
 def contact_updates(quick=True, *, n=None, mu=0.1, sweeps=2000):
-    """Rows: nanoseconds per contact update of our sweep, and of Siconos where it is installed."""
+    """Rows: nanoseconds per contact update of our sweep, alone and against Siconos.
+
+    Both start from the same forces in a box of fixed size and do the same number of sweeps.
+    """
     n = n or (100 if quick else 400)
     S = ensemble(pack(n, mu, 1))
     options = {"rest": None, "tolerance": 0.0, "max_iterations": sweeps}
     runs = _run(S, kicked(S, 5, 0), gauss_seidel, options)
-    each = [1e9 * r.seconds / (r.iterations * len(S.index)) for r in runs]
-    row = {"n": n, "mu": mu, "solver": "granforce sweep", "ns_per_update": float(np.median(each))}
-    rows = [{**row, "note": f"{runs[0].iterations} sweeps"}]
-    # Siconos has no package on PyPI; its own build is needed to compare.
-    found = importlib.util.find_spec("siconos") is not None
-    told = "installed, not compared: time fc2d_nsgs on the same contacts" if found else "absent"
-    rows.append({**row, "solver": "Siconos NSGS", "ns_per_update": None, "note": told})
+    each = float(np.median([1e9 * r.seconds / (r.iterations * len(S.index)) for r in runs]))
+    row = {"n": n, "mu": mu}
+    told = f"{runs[0].iterations} sweeps, box free to dilate"
+    rows = [{**row, "solver": "granforce sweep", "ns_per_update": each, "note": told}]
+    for tolerance in TOLERANCES:
+        found = against_siconos(S, kicked(S, 1, 0)[0], tolerance)
+        if found is None:
+            return [*rows, {**row, "solver": "Siconos NSGS", "note": ABSENT}]
+        told = f"{found['sweeps']} sweeps, forces differ by {found['difference']:.0e} ⟨f_n⟩"
+        both = {"granforce sweep": found["ns"], "Siconos NSGS": found["siconos_ns"]}
+        for name, each in both.items():
+            ratio = found["siconos_ns"] / each
+            measured = {"solver": name, "ns_per_update": each, "ratio": ratio}
+            rows.append({**row, **measured, "note": told})
     return rows
 
 
@@ -196,7 +206,7 @@ def _exponents(rows, mu):
             for row in rows
             if row["solver"] == name and row["reached"] == row["runs"]
         ]
-        slope = float(np.polyfit(*np.log(points).T, 1)[0]) if len(points) > 1 else None
+        slope = exponent(points)
         sizes = f"N = {points[0][0]} … {points[-1][0]}" if points else "goal never reached"
         fits.append({"n": "fit", "mu": mu, "solver": name, "exponent": slope, "note": sizes})
     return fits

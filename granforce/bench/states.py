@@ -1,8 +1,10 @@
 """What the choice of solver does to the random walk, and walks against exact intervals."""
 
 import contextlib
+import multiprocessing
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +50,7 @@ def walks(quick=True, *, n=None, packings=None, states=None, frictions=FRICTIONS
     """
     n = n or (100 if quick else 400)
     packings = packings or (3 if quick else 10)
-    states = states or (50 if quick else 300)
+    states = states or (50 if quick else 200)
     rows = []
     for mu in frictions:
         found = {name: [] for name in WALKS}
@@ -98,6 +100,51 @@ def _over_packings(values):
         if key.startswith(("eta", "distance")) and len(numbers) > 1:
             row[f"{key}_error"] = float(numbers.std(ddof=1) / np.sqrt(len(numbers)))
     return row
+
+
+def batches(quick=True, *, n=None, states=None, frictions=FRICTIONS):
+    """Rows: states per second of two chains on one thread and on two, by default relaxation.
+
+    Chains share what depends on the geometry alone (matrices, the plan of the factorisation);
+    `setup` is the time it takes once. Medians of three runs, in turn. `ceiling` is the ratio that
+    two processes reach which share nothing but the machine.
+    """
+    n = n or (100 if quick else 400)
+    states = states or (100 if quick else 400)
+    rows = []
+    for mu in frictions:
+        note(f"batches: N = {n}, μ = {mu:g}")
+        S = ensemble(pack(n, mu, 1))
+        begin = time.perf_counter()
+        walk(S, 1, 0)
+        setup = time.perf_counter() - begin
+        seconds = {1: [], 2: []}
+        for _ in range(3):
+            for workers, times in seconds.items():
+                begin = time.perf_counter()
+                walk(S, states, 0, chains=2, workers=workers)
+                times.append(time.perf_counter() - begin)
+        one, two = (states / np.median(times) for times in seconds.values())
+        row = {"n": n, "mu": mu, "states": states, "setup": setup, "per_second": one}
+        ceiling = _ceiling(S, states)
+        rows.append({**row, "per_second_2": two, "ratio": two / one, "ceiling": ceiling})
+    return rows
+
+
+def _ceiling(S, states):
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        alone = pool.submit(_speed, S.packing, states).result()
+        together = [pool.submit(_speed, S.packing, states) for _ in range(2)]
+        return sum(one.result() for one in together) / alone
+
+
+def _speed(packing, states):
+    """States per second of one chain in this process."""
+    S = ensemble(packing)
+    walk(S, 2, 0)
+    begin = time.perf_counter()
+    walk(S, states, 0)
+    return states / (time.perf_counter() - begin)
 
 
 def intervals(quick=True, *, n=None, frictions=None, states=None):

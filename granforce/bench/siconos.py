@@ -1,0 +1,100 @@
+"""Our Gauss–Seidel sweep against Siconos's, sweep by sweep on one problem."""
+
+import functools
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+
+from granforce.bench.report import note
+from granforce.contact_dynamics import add_forces, set_stiffness, sweep
+from granforce.relax.gauss_seidel import _from_rest
+
+# Environment variable naming a Python that can import Siconos, which has no package on PyPI.
+INTERPRETER = "GRANFORCE_SICONOS_PYTHON"
+PROGRAM = Path(__file__).with_name("siconos_nsgs.py")
+ABSENT = f"absent (Debian: python3-siconos, python3-scipy; or name a Python in ${INTERPRETER})"
+# Siconos's own error at which it stops.
+TOLERANCES = (1e-4, 1e-6)
+REPEATS = 3
+
+
+@functools.cache
+def interpreter():
+    """The first Python that can import Siconos, or None."""
+    for python in (os.environ.get(INTERPRETER), sys.executable, "/usr/bin/python3"):
+        if python and _imports(python):
+            return python
+    return None
+
+
+def _imports(python):
+    test = [python, "-I", "-c", "import siconos.numerics, scipy.sparse"]
+    try:
+        return subprocess.run(test, capture_output=True, timeout=60).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+
+
+def against_siconos(S, start, tolerance):
+    """Time per contact update of both on a box of fixed size, and how far their forces differ.
+
+    Siconos sweeps from the given forces until its error is below the tolerance; ours then does as
+    many sweeps. Medians over REPEATS. None where Siconos is absent.
+    """
+    python = interpreter()
+    if python is None:
+        return None
+    note(f"Siconos to {tolerance:g}")
+    start = start / S.force_scale
+    theirs = [_siconos(python, S, start, tolerance) for _ in range(REPEATS)]
+    sweeps = int(theirs[0]["sweeps"])
+    ours = [_ours(S, start, sweeps) for _ in range(REPEATS)]
+    updates = sweeps * len(S.index)
+    seconds = [float(np.median([float(one["seconds"]) for one in theirs]))]
+    seconds.append(float(np.median([one[1] for one in ours])))
+    return {
+        "sweeps": sweeps,
+        "siconos_ns": 1e9 * seconds[0] / updates,
+        "ns": 1e9 * seconds[1] / updates,
+        "ratio": seconds[0] / seconds[1],
+        "difference": float(np.abs(theirs[0]["forces"] - ours[0][0]).max()),
+    }
+
+
+def _siconos(python, S, start, tolerance):
+    r = S.packing.r[S.grains]
+    mass = np.pi * r**2
+    # Rows of A are forces and torque/r of a grain: what they change velocities by in unit time.
+    inverse = np.column_stack([1 / mass, 1 / mass, 2 / mass]).ravel()
+    H = S.A[: len(inverse)]
+    W = sparse.csc_matrix(H.T @ sparse.diags(inverse) @ H)
+    with tempfile.TemporaryDirectory() as folder:
+        problem, result = Path(folder) / "problem.npz", Path(folder) / "result.npz"
+        indices, indptr = W.indices.astype(np.int64), W.indptr.astype(np.int64)
+        arrays = {"data": W.data, "indices": indices, "indptr": indptr, "start": start.ravel()}
+        np.savez(problem, mu=S.mu, **arrays)
+        # Isolated: this folder must not shadow the modules that the program imports.
+        command = [python, "-I", str(PROGRAM), str(problem), str(result), str(tolerance)]
+        subprocess.run(command, check=True, capture_output=True)
+        with np.load(result) as found:
+            return dict(found)
+
+
+def _ours(S, start, sweeps):
+    problem, velocity, _, _ = _from_rest(S)
+    problem = problem._replace(box_compliance=0.0)
+    velocity[:] = 0.0
+    force = start.copy()
+    order = np.arange(len(force))
+    begin = time.perf_counter()
+    set_stiffness(problem)
+    add_forces(problem, force, velocity, 0.0)
+    for _ in range(sweeps):
+        sweep(problem, order, S.mu, force, velocity, 0.0)
+    return force, time.perf_counter() - begin
