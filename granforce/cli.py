@@ -166,6 +166,16 @@ def _add_sweep(commands):
     _add_store(command)
     command.add_argument("--keep", type=int, help="store only so many states, evenly spaced")
     command.add_argument("--float32", action="store_true", help="store states in single precision")
+    _add_scheduler(command)
+
+
+def _add_scheduler(command):
+    command.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="run on the workers of this dask scheduler, such as tcp://head:8786, which see the "
+        "same store, in place of processes on this machine",
+    )
 
 
 def _add_exact(command):

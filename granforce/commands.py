@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from granforce import importers, study
+from granforce import sweep as sweeps
 from granforce.records import InputError
 from granforce.store import open_store
 from granforce.terminal import Bar, Steps, print_list, report, table
@@ -267,11 +268,12 @@ def sweep(arguments):
         for seed in range(1, arguments.seeds + 1)
     ]
     store = open_store(arguments.out or arguments.cache)
-    with Bar("sweep", "state") as progress:
-        rows, failed = study.sweep(
+    with Bar("sweep", "cell") as progress:
+        rows, failed = sweeps.sweep(
             store.path,
             cells,
             workers=arguments.workers,
+            scheduler=arguments.scheduler,
             dtypes={"states": "float32"} if arguments.float32 else None,
             progress=progress,
         )

@@ -1,15 +1,12 @@
-"""Cells of a study: one packing and one walk each, found in the store or computed and kept.
+"""Cells of a study: one dataset each, found in the store or computed and kept.
 
-A cell is named by plain parameters. Cells are independent and seeded, so a sweep over processes
-gives the same result for any number of workers, and one that was cut short goes on where it was.
+A cell is named by plain parameters. Cells are independent and seeded, so that they may be computed
+anywhere and in any order (see `granforce.sweep`).
 """
 
 import hashlib
 import json
-import multiprocessing
-import signal
 import time
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 
 import numpy as np
 
@@ -17,13 +14,13 @@ from granforce import measures
 from granforce.bounds import intervals, limit_load_bounds
 from granforce.compaction import pack
 from granforce.polytope import ensemble
+from granforce.projection import outline
 from granforce.random_walk import walk
 from granforce.records import Cancelled, InputError, friction
 from granforce.relax.accelerated import accelerated
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
 from granforce.schema import dataset_packing, labelled, packing_dataset
-from granforce.store import open_store
 from granforce.tolerances import EQUILIBRIUM
 
 # Raised when an algorithm gives other numbers for the same parameters: older entries are not used.
@@ -31,6 +28,7 @@ PACKING_VERSION = 1
 WALK_VERSION = 1
 INTERVALS_VERSION = 1
 LIMIT_LOADS_VERSION = 1
+OUTLINE_VERSION = 1
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
 UNDETERMINED = 1e-6
@@ -103,25 +101,37 @@ def get_walk(store, parameters, *, workers=1, dtypes=None, progress=None, cancel
 
     progress(done, total) counts states; dtypes as for Store.save.
     """
-    found = store.load("walk", parameters, version=WALK_VERSION)
+
+    def compute():
+        packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
+        S = ensemble(packing, parameters["mu"])
+        begin = time.perf_counter()
+        done = walk(
+            S,
+            parameters["states"],
+            parameters["seed"],
+            chains=parameters["chains"],
+            workers=workers,
+            **RELAXATIONS[parameters["relax"]],
+            progress=progress,
+            cancel=cancel,
+        )
+        seconds = time.perf_counter() - begin
+        return walk_dataset(S, done, keep=parameters["keep"], seconds=seconds)
+
+    return found_or_kept(store, "walk", parameters, compute, WALK_VERSION, dtypes)
+
+
+def found_or_kept(store, kind, parameters, compute, version, dtypes=None):
+    """The entry's dataset and True where the store has it, else what compute() gives and False.
+
+    The result is saved before it is returned; dtypes as for Store.save.
+    """
+    found = store.load(kind, parameters, version=version)
     if found is not None:
         return found, True
-    packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
-    S = ensemble(packing, parameters["mu"])
-    begin = time.perf_counter()
-    done = walk(
-        S,
-        parameters["states"],
-        parameters["seed"],
-        chains=parameters["chains"],
-        workers=workers,
-        **RELAXATIONS[parameters["relax"]],
-        progress=progress,
-        cancel=cancel,
-    )
-    seconds = time.perf_counter() - begin
-    dataset = walk_dataset(S, done, keep=parameters["keep"], seconds=seconds)
-    store.save("walk", parameters, dataset, version=WALK_VERSION, dtypes=dtypes)
+    dataset = compute()
+    store.save(kind, parameters, dataset, version=version, dtypes=dtypes)
     return dataset, False
 
 
@@ -203,21 +213,27 @@ def exact_ensemble(store, parameters, *, cancel=None):
 
 def get_intervals(store, parameters, *, workers=2, progress=None, cancel=None):
     """Dataset of exact bounds and η3, clusters of undetermined contacts; and if it was kept."""
-    found = store.load("intervals", parameters, version=INTERVALS_VERSION)
-    if found is not None:
-        return found, True
-    S, contacts = exact_ensemble(store, parameters, cancel=cancel)
-    begin = time.perf_counter()
-    bounds = intervals(S, contacts, workers=workers, progress=progress, cancel=cancel)
-    seconds = time.perf_counter() - begin
-    _complete(bounds, "exact bounds", cancel)
+
+    def compute():
+        S, contacts = exact_ensemble(store, parameters, cancel=cancel)
+        begin = time.perf_counter()
+        bounds = intervals(S, contacts, workers=workers, progress=progress, cancel=cancel)
+        seconds = time.perf_counter() - begin
+        _complete(bounds, "exact bounds", cancel)
+        return intervals_dataset(S, contacts, bounds, seconds=seconds)
+
+    return found_or_kept(store, "intervals", parameters, compute, INTERVALS_VERSION)
+
+
+def intervals_dataset(S, contacts, bounds, *, seconds=0.0):
+    """Exact bounds of contacts (positions in S) with their measures and clusters as a dataset."""
     low, high = bounds.lower, bounds.upper
     original = S.original[contacts]
     i, j = S.contacts.i[contacts], S.contacts.j[contacts]
     tolerance = UNDETERMINED * S.force_scale
     cluster, _ = measures.undetermined_clusters(i, j, high - low, tolerance)
     extent = measures.normal_extent(low, high)
-    dataset = labelled(
+    return labelled(
         {
             "backbone": S.index[contacts],
             "original": original,
@@ -237,34 +253,98 @@ def get_intervals(store, parameters, *, workers=2, progress=None, cancel=None):
         },
         {"counts": json.dumps(bounds.counts)},
     )
-    store.save("intervals", parameters, dataset, version=INTERVALS_VERSION)
-    return dataset, False
 
 
 def get_limit_loads(store, parameters, *, workers=2, progress=None, cancel=None):
     """Dataset of the limit loads of contacts, and whether it came from the store."""
-    found = store.load("limit_loads", parameters, version=LIMIT_LOADS_VERSION)
-    if found is not None:
-        return found, True
-    S, contacts = exact_ensemble(store, parameters, cancel=cancel)
-    begin = time.perf_counter()
-    loads = limit_load_bounds(S, contacts, workers=workers, progress=progress, cancel=cancel)
-    seconds = time.perf_counter() - begin
-    _complete(loads, "limit loads", cancel)
-    dataset = labelled(
-        {
-            "backbone": S.index[contacts],
-            "original": S.original[contacts],
-            "limit_load": loads.load,
-            "load_gap": loads.gap,
-            "max_gap": loads.max_gap,
-            "force_scale": S.force_scale,
-            "seconds": seconds,
-        },
-        {"counts": json.dumps(loads.counts)},
-    )
-    store.save("limit_loads", parameters, dataset, version=LIMIT_LOADS_VERSION)
-    return dataset, False
+
+    def compute():
+        S, contacts = exact_ensemble(store, parameters, cancel=cancel)
+        begin = time.perf_counter()
+        loads = limit_load_bounds(S, contacts, workers=workers, progress=progress, cancel=cancel)
+        seconds = time.perf_counter() - begin
+        _complete(loads, "limit loads", cancel)
+        return labelled(
+            {
+                "backbone": S.index[contacts],
+                "original": S.original[contacts],
+                "limit_load": loads.load,
+                "load_gap": loads.gap,
+                "max_gap": loads.max_gap,
+                "force_scale": S.force_scale,
+                "seconds": seconds,
+            },
+            {"counts": json.dumps(loads.counts)},
+        )
+
+    return found_or_kept(store, "limit_loads", parameters, compute, LIMIT_LOADS_VERSION)
+
+
+def outline_parameters(packing, *, mu=None, components=None, states=None, tolerance=1e-3):
+    """The parameters that name the outline of S in a plane.
+
+    mu: friction coefficient of the ensemble, by default the packing's. components: two pairs
+    (contact as a position in the packing's list, 0 for f_n or 1 for f_t); or states: parameters of
+    the walk or sample whose principal axes span the plane. tolerance as for `outline`.
+    """
+    if (components is None) == (states is None):
+        raise InputError("the plane of an outline is given by two components, or by states")
+    mu = packing["mu"] if mu is None else friction(mu)
+    chosen = None if components is None else [[int(c), int(part)] for c, part in components]
+    named = {"packing": packing, "mu": mu, "tolerance": float(tolerance)}
+    return named | {"components": chosen, "states": states}
+
+
+def get_outline(store, parameters, axes=None, *, workers=2, progress=None, cancel=None):
+    """Dataset of the outline of S in a plane, and whether it came from the store.
+
+    axes (2, N_c, 2): principal axes of the states that the parameters name; not used for
+    components.
+    """
+
+    def compute():
+        packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
+        S = ensemble(packing, parameters["mu"])
+        plane = _component_axes(S, parameters["components"]) if axes is None else axes
+        begin = time.perf_counter()
+        found = outline(
+            S,
+            plane,
+            tolerance=parameters["tolerance"],
+            workers=workers,
+            progress=progress,
+            cancel=cancel,
+        )
+        if cancel is not None and cancel():
+            raise Cancelled("outline cancelled")
+        if not found.converged:
+            raise InputError(f"outline not closed: a gap of {found.gap:.1e} ⟨f_n⟩ is left")
+        return labelled(
+            {
+                "backbone": S.index,
+                "axes": plane,
+                "inner": found.inner,
+                "outer": found.outer,
+                "outline_gap": found.gap,
+                "programs": found.counts["programs"],
+                "force_scale": S.force_scale,
+                "seconds": time.perf_counter() - begin,
+            },
+            {"counts": json.dumps(found.counts)},
+        )
+
+    return found_or_kept(store, "outline", parameters, compute, OUTLINE_VERSION)
+
+
+def _component_axes(S, components):
+    """Axes (2, N_c, 2) along two components (contact in the packing, 0 or 1)."""
+    axes = np.zeros((2, len(S.index), 2))
+    for k, (contact, part) in enumerate(components or ()):
+        place = np.searchsorted(S.index, contact)
+        if place == len(S.index) or S.index[place] != contact or part not in (0, 1):
+            raise InputError(f"contact {contact} carries no load in this packing")
+        axes[k, place, part] = 1.0
+    return axes
 
 
 def _complete(result, what, cancel):
@@ -310,90 +390,3 @@ def row(parameters, dataset, cached):
         "residual": float(dataset["residual"].max()),
         "cached": cached,
     }
-
-
-def sweep(path, cells, *, workers=2, dtypes=None, progress=None, on_row=None):
-    """Run cells (lists of walk parameters) over processes, keeping each in the store at path.
-
-    Finished cells are found, not computed. progress(states done, states in all); on_row(row) after
-    each cell. Returns the rows in the order of the cells and a list of (cell, error message).
-    Interrupted, it loses the cells under way only.
-    """
-    store = open_store(path)
-    store.clean()
-    rows, failed, todo = {}, [], []
-    for k, cell in enumerate(cells):
-        found = store.load("walk", cell, version=WALK_VERSION)
-        if found is None:
-            todo.append(k)
-        else:
-            rows[k] = row(cell, found, True)
-            _tell(on_row, rows[k])
-    if todo:
-        warm_up()
-        _run(path, cells, todo, workers, dtypes, progress, on_row, rows, failed)
-    return [rows[k] for k in sorted(rows)], failed
-
-
-def _run(path, cells, todo, workers, dtypes, progress, on_row, rows, failed):
-    context = multiprocessing.get_context("spawn")
-    counter = context.Value("q", 0)
-    total = sum(cells[k]["states"] for k in todo)
-    pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
-    try:
-        waiting = {pool.submit(run_cell, path, cells[k], dtypes): k for k in todo}
-        while waiting:
-            ended, _ = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
-            if progress is not None:
-                progress(counter.value, total)
-            for future in ended:
-                k = waiting.pop(future)
-                try:
-                    rows[k] = future.result()
-                    _tell(on_row, rows[k])
-                except InputError as error:
-                    failed.append((cells[k], str(error)))
-    except BaseException:
-        # Workers would go on with the cell under way: what they hold is lost either way.
-        for process in list(pool._processes.values()):
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _tell(on_row, line):
-    if on_row is not None:
-        on_row(line)
-
-
-_counter = None
-
-
-def _share(counter):
-    global _counter
-    _counter = counter
-    # Ctrl-C goes to the whole process group: the parent ends the workers, each without a word.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def run_cell(path, cell, dtypes=None):
-    """Compute one cell into the store at path; returns its row. Runs in a worker process."""
-    seen = 0
-
-    def count(done, total):
-        nonlocal seen
-        if _counter is not None:
-            with _counter.get_lock():
-                _counter.value += done - seen
-        seen = done
-
-    dataset, cached = get_walk(open_store(path), cell, dtypes=dtypes, progress=count)
-    count(cell["states"], cell["states"])
-    return row(cell, dataset, cached)
-
-
-def warm_up():
-    """Compile (or load from numba's cache) every kernel once, before workers do it each."""
-    packing = pack(12, 0.5, 0)
-    walk(ensemble(packing), 2, 0)

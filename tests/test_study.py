@@ -1,10 +1,4 @@
-"""Cells, the store behind them, sweeps over processes, and what a kill costs."""
-
-import os
-import signal
-import subprocess
-import sys
-import time
+"""Cells and the store behind them."""
 
 import numpy as np
 import pytest
@@ -82,57 +76,6 @@ def test_bad_walks_are_refused(bad):
     options = {"states": 4} | bad
     with pytest.raises(InputError):
         study.walk_parameters(study.packing_parameters(20, 0.3, 1), **options)
-
-
-def test_a_sweep_gives_the_same_for_any_number_of_workers(tmp_path):
-    cells = [cell(mu, seed) for mu in (0, 0.3) for seed in (1, 2)]
-    seen = []
-    one, failed = study.sweep(tmp_path / "one", cells, workers=1, on_row=seen.append)
-    two, _ = study.sweep(tmp_path / "two", cells, workers=2)
-    assert not failed
-    assert one == two
-    assert sorted(map(str, seen)) == sorted(map(str, one))
-    stores = [open_store(tmp_path / name) for name in ("one", "two")]
-    for name in stores[0]:
-        a, b = (store[name].drop_vars("seconds", errors="ignore") for store in stores)
-        assert a.equals(b)
-    found, _ = study.sweep(tmp_path / "one", cells, workers=2)
-    assert [line["cached"] for line in found] == [True] * 4
-
-
-def test_a_failed_cell_leaves_the_others(tmp_path):
-    # Three disks do not always jam: whatever happens to them, the other cell is there.
-    hopeless = cell()
-    hopeless["packing"] = {**hopeless["packing"], "radii": [1.0] * 3}
-    rows, failed = study.sweep(tmp_path / "s", [hopeless, cell()], workers=2)
-    assert len(rows) == 1
-    assert "radii" in failed[0][1]
-
-
-def test_a_killed_sweep_loses_only_the_cells_under_way(tmp_path):
-    path = tmp_path / "s"
-    cells = [cell(seed=seed, states=60) for seed in range(1, 9)]
-    code = (
-        "from granforce import study; import sys\n"
-        "if __name__ == '__main__':\n"
-        f"    study.sweep({str(path)!r}, {cells!r}, workers=2)\n"
-    )
-    script = tmp_path / "run.py"
-    script.write_text(code)
-    running = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
-    deadline = time.time() + 120
-    while len(list(path.glob("walk-*"))) < 2 and time.time() < deadline:
-        time.sleep(0.02)
-    os.killpg(running.pid, signal.SIGKILL)
-    running.wait()
-    store = open_store(path)
-    done = len(store.find("walk"))
-    assert 2 <= done
-    assert all(verdict.ok for verdict in store.verify())
-    rows, failed = study.sweep(path, cells, workers=2)
-    assert not failed
-    assert sum(line["cached"] for line in rows) == done
-    assert not list(path.glob(".tmp-*"))
 
 
 def test_public_names_are_what_they_say():

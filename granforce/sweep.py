@@ -1,0 +1,234 @@
+"""Sweeps: many cells computed over processes or over a dask cluster, each kept as it ends.
+
+Cells are independent and seeded, so a sweep gives the same result for any number of workers, and
+one that was cut short, or lost a worker, goes on where it was.
+"""
+
+import multiprocessing
+import os
+import signal
+import socket
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from granforce import study
+from granforce.compaction import pack
+from granforce.polytope import ensemble
+from granforce.random_walk import walk
+from granforce.records import InputError
+from granforce.store import open_store
+
+TRIES = 3  # a cell under way when a worker died is begun anew so often: it may have been its fault
+
+_SINGLE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Cell(NamedTuple):
+    """One dataset of a sweep."""
+
+    kind: str  # "packing", "walk", "intervals", …: a key of COMPUTE
+    parameters: dict  # that name it in the store
+
+
+class Kind(NamedTuple):
+    """How cells of one kind are computed."""
+
+    compute: Callable  # get_…(store, parameters, …) of `granforce.study`
+    version: int  # of the algorithm
+    keeps_states: bool = False  # whether it takes dtypes to keep them in
+
+
+COMPUTE = {
+    "packing": Kind(study.get_packing, study.PACKING_VERSION),
+    "walk": Kind(study.get_walk, study.WALK_VERSION, keeps_states=True),
+    "intervals": Kind(study.get_intervals, study.INTERVALS_VERSION),
+    "limit_loads": Kind(study.get_limit_loads, study.LIMIT_LOADS_VERSION),
+}
+
+
+def load(store, cell):
+    """The dataset of a cell, or None where the store has none."""
+    return store.load(cell.kind, cell.parameters, version=COMPUTE[cell.kind].version)
+
+
+def sweep(path, cells, *, on_row=None, **options):
+    """Run walks (their parameters); see `run` for the options.
+
+    on_row(row) after each walk. Returns the rows in the order of the cells and a list of (walk
+    parameters, error message).
+    """
+    store, rows = open_store(path), {}
+    named = [Cell("walk", parameters) for parameters in cells]
+
+    def done(k, cached):
+        rows[k] = study.row(cells[k], load(store, named[k]), cached)
+        if on_row is not None:
+            on_row(rows[k])
+
+    failed = run(path, named, on_done=done, **options)
+    return [rows[k] for k in sorted(rows)], [(cell.parameters, text) for cell, text in failed]
+
+
+def run(path, cells, *, workers=2, scheduler=None, dtypes=None, progress=None, on_done=None):
+    """Compute cells into the store at path, on one processor each; finished ones are found.
+
+    workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
+    the same folder, in place of processes. dtypes: as for Store.save, for the states.
+    progress(cells done, cells in all) counts quarters of cells; on_done(position in cells,
+    whether it was found) after each. Returns a list of (cell, error message). Interrupted, it
+    loses the cells under way only. Raises InputError where the scheduler cannot be reached.
+    """
+    store = open_store(path)
+    todo = []
+    for k, cell in enumerate(cells):
+        if load(store, cell) is None:
+            todo.append(k)
+        elif on_done is not None:
+            on_done(k, True)
+    failed = {}
+    ended = 0
+
+    def finished(k, get_result):
+        nonlocal ended
+        try:
+            cached = get_result()
+        except InputError as error:
+            failed[k] = str(error)
+        else:
+            if on_done is not None:
+                on_done(k, cached)
+        ended += 1
+        if progress is not None:
+            progress(ended, len(todo))
+
+    def advanced(parts):
+        if progress is not None:  # in quarters, which add up exactly
+            progress(max(ended, min(int(4 * parts) / 4, len(todo))), len(todo))
+
+    if todo:
+        tasks = {k: (str(store.path), cells[k], dtypes) for k in todo}
+        if scheduler is None:
+            _over_processes(tasks, workers, finished, advanced)
+        else:
+            _over_dask(tasks, scheduler, finished)
+    return [(cells[k], failed[k]) for k in sorted(failed)]
+
+
+def _over_processes(tasks, workers, finished, advanced):
+    warm_up()
+    for _ in range(TRIES):
+        tasks = _one_pool(tasks, workers, finished, advanced)
+        if not tasks:
+            return
+    for k in tasks:
+        finished(k, _lost)
+
+
+def _lost():
+    raise InputError(f"worker processes died {TRIES} times at it, or at cells beside it")
+
+
+def _one_pool(tasks, workers, finished, advanced):
+    """Run tasks over processes; those left over where a worker died are returned."""
+    context = multiprocessing.get_context("spawn")
+    counter = context.Value("d", 0.0)
+    left = dict(tasks)
+    pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
+    try:
+        with _single_threaded():
+            waiting = {pool.submit(run_cell, *task): k for k, task in tasks.items()}
+        while waiting:
+            ended, _ = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
+            for future in ended:
+                k = waiting.pop(future)
+                if not isinstance(future.exception(), BrokenProcessPool):
+                    finished(k, future.result)
+                    del left[k]
+            advanced(counter.value)
+    except BaseException:
+        # Workers would go on with the cell under way: what they hold is lost either way.
+        for process in list(pool._processes.values()):
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+    return left
+
+
+@contextmanager
+def _single_threaded():
+    """Processes started meanwhile use one thread in linear algebra: cells, not rows, are shared."""
+    before = {name: os.environ.get(name) for name in _SINGLE}
+    os.environ.update(dict.fromkeys(_SINGLE, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+_counter = None
+
+
+def _share(counter):
+    global _counter
+    _counter = counter
+    # Ctrl-C goes to the whole process group: the parent ends the workers, each without a word.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def run_cell(path, cell, dtypes=None):
+    """Compute one cell into the store at path; whether it was there. Runs in a worker process."""
+    if not Path(path, "zarr.json").exists():
+        raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
+    kind, seen = COMPUTE[cell.kind], 0.0
+
+    def count(done, total):
+        nonlocal seen
+        if _counter is not None and total:
+            part = min(done / total, 1.0)
+            with _counter.get_lock():
+                _counter.value += part - seen
+            seen = part
+
+    # The steps of a compaction are not known beforehand, nor can workers share them.
+    options = {} if cell.kind == "packing" else {"workers": 1, "progress": count}
+    if kind.keeps_states:
+        options["dtypes"] = dtypes
+    _, cached = kind.compute(open_store(path), cell.parameters, **options)
+    count(1, 1)
+    return cached
+
+
+def _over_dask(tasks, scheduler, finished):
+    """Run tasks over the workers of a dask scheduler, which begins those of lost workers anew."""
+    try:
+        from dask.distributed import Client, KilledWorker, as_completed
+    except ImportError:
+        raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
+    try:
+        client = Client(scheduler, timeout=10)
+    except (OSError, ValueError) as error:
+        raise InputError(f"no dask scheduler at {scheduler}: {error}") from None
+    with client:
+        waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
+        try:
+            for future in as_completed(list(waiting)):
+                dead = isinstance(future.exception(), KilledWorker)
+                finished(waiting[future], _lost if dead else future.result)
+        except BaseException:
+            client.cancel(list(waiting))
+            raise
+
+
+def warm_up():
+    """Compile (or load from numba's cache) every kernel once, before workers do it each."""
+    packing = pack(12, 0.5, 0)
+    walk(ensemble(packing), 2, 0)
