@@ -81,6 +81,20 @@ VARIABLES: dict[str, Variable] = {
     "load_gap": Variable(
         ("contact",), "float64", "mean normal force", "duality gap of the limit loads"
     ),
+    # the outline of S in a plane of force space
+    "axes": Variable(
+        ("plane_axis", "contact", "component"), "float64", "1", f"axes of the plane, {_COMPONENT}"
+    ),
+    "inner": Variable(
+        ("inner_corner", "plane_axis"), "float64", "mean normal force", "polygon inside the outline"
+    ),
+    "outer": Variable(
+        ("outer_corner", "plane_axis"), "float64", "mean normal force", "polygon around the outline"
+    ),
+    "outline_gap": Variable(
+        (), "float64", "mean normal force", "largest distance of the polygons of the outline"
+    ),
+    "programs": Variable((), "int64", "1", "linear programs solved"),
     "max_gap": Variable((), "float64", "mean normal force", "largest duality gap"),
     "packing_fraction": Variable((), "float64", "1", "packing fraction φ, rattlers included"),
     "coordination": Variable((), "float64", "1", "mean coordination number z of the backbone"),

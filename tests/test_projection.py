@@ -5,12 +5,13 @@ import pytest
 from packings import packed, reference
 from scipy.optimize import linprog
 
-from granforce import measures
+from granforce import measures, study
 from granforce.bounds import intervals
 from granforce.polytope import ensemble
 from granforce.projection import outline
 from granforce.random_walk import walk
 from granforce.records import InputError
+from granforce.store import open_store
 
 NAME = "n100_mu0.1_s11"
 
@@ -174,3 +175,32 @@ def test_principal_axes_of_states_on_a_line_or_in_a_point(states):
     assert share == pytest.approx([1, 0]) and not axes[1].any()
     axes, share = measures.principal_axes(states[:1])
     assert not axes.any() and not share.any()
+
+
+def test_the_study_keeps_the_outline_of_states_and_of_components(tmp_path):
+    store = open_store(tmp_path / "store")
+    made = study.packing_parameters(30, 0.3, 1)
+    taken = study.walk_parameters(made, 10, 0)
+    states, _ = study.get_walk(store, taken)
+    axes, _ = measures.principal_axes(states["states"].values)
+    named = study.outline_parameters(made, states=taken)
+    dataset, cached = study.get_outline(store, named, axes)
+    assert not cached and study.get_outline(store, named)[1]
+    centre = states["states"].values.mean(axis=0) / states["force_scale"].item()
+    inside = np.tensordot(axes, centre, ((1, 2), (0, 1)))
+    assert beyond(dataset["outer"].values, inside[None]) < 0
+    assert dataset["programs"] >= 16 and dataset["outline_gap"] < 0.1
+    contact = int(states["backbone"][2])
+    named = study.outline_parameters(made, components=[(contact, 0), (contact, 1)])
+    cone, _ = study.get_outline(store, named)
+    normal, tangential = cone["inner"].values.T
+    assert np.all(np.abs(tangential) <= 0.3 * normal + 1e-9)
+
+
+def test_wrong_planes_of_an_outline_are_refused(tmp_path):
+    made = study.packing_parameters(30, 0.3, 1)
+    with pytest.raises(InputError, match="two components, or by states"):
+        study.outline_parameters(made)
+    named = study.outline_parameters(made, components=[(10**6, 0), (0, 1)])
+    with pytest.raises(InputError, match="contact 1000000 carries no load"):
+        study.get_outline(open_store(tmp_path / "store"), named)
