@@ -42,6 +42,7 @@ def _parser():
     _add_sweep(commands)
     _add_intervals(commands)
     _add_limit_loads(commands)
+    _add_study(commands)
     _add_import(commands)
     _add_bench(commands)
     _add_cache(commands)
@@ -166,6 +167,29 @@ def _add_sweep(commands):
     _add_store(command)
     command.add_argument("--keep", type=int, help="store only so many states, evenly spaced")
     command.add_argument("--float32", action="store_true", help="store states in single precision")
+    _add_scheduler(command)
+
+
+def _add_study(commands):
+    command = _command(
+        commands,
+        "study",
+        "study_",
+        "compute the paper's study, draw its figures and judge its claims, resumable",
+        "granforce study --out study\n  granforce study --quick --out quick",
+    )
+    command.add_argument("--quick", action="store_true", help="a small version, in minutes")
+    command.add_argument("--out", metavar="FOLDER", default="study", help="(default study)")
+    command.add_argument("--parts", help="compute only these parts, names separated by commas")
+    group = command.add_argument_group("size")
+    group.add_argument("-n", type=int, help="number of disks (default 400)")
+    group.add_argument("--mu", help="friction coefficients, separated by commas")
+    group.add_argument("--packings", type=int, help="packings at each μ (default 10)")
+    group.add_argument("--states", type=int, help="states of a walk (default 1000)")
+    group.add_argument("--gauss-seidel-packings", type=int, help="walks as in the paper (3)")
+    group.add_argument("--exact-packings", type=int, help="with exact intervals (default 3)")
+    group.add_argument("--sizes", help="other numbers of disks (default 100,200,800,1600)")
+    command.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     _add_scheduler(command)
 
 

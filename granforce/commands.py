@@ -303,6 +303,13 @@ def _report_sweep(rows, failed, as_json):
     )
 
 
+def study_(arguments):
+    """The study of the paper. Returns 1 if a cell failed."""
+    from granforce.paper.main import main  # its imports are of no use to other commands
+
+    return main(arguments)
+
+
 def bench(arguments):
     """The benchmark's report."""
     from granforce.bench import main  # its imports are of no use to other commands
