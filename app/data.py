@@ -1,9 +1,11 @@
 """What the app shows, as plain arrays: no widgets, no plots.
 
-The only module of the app, with `jobs`, that knows stores and studies.
+The only module of the app, with those that compute for single tabs, that knows stores and studies.
 """
 
 import os
+import threading
+from collections import OrderedDict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,72 +15,75 @@ from granforce import study
 from granforce.records import InputError
 from granforce.store import open_store
 
+from . import geometry
+from .selection import Selection, selected, series
+
 # Environment variable naming a store of finished results to open instead of data/start.zarr.
 SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 
-# Names on screen of study.RELAXATIONS; the first is what a new walk takes unless told otherwise.
-SOLVERS = {
-    "nearest": "nearest admissible state",
-    "gauss_seidel": "Gauss–Seidel, finished exactly",
-    "gauss_seidel_only": "paper's plain Gauss–Seidel",
-    "accelerated": "nearest admissible state, own solver",
-}
+# Kinds of entries that hold states: (version, function that finds or computes).
+SOURCES = {"walk": (study.WALK_VERSION, study.get_walk)}
 
-# Width of the strip around the periodic box in which images are drawn, in largest radii.
-MARGIN = 1.0
+OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
+FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
+SHOWN_KEPT = 8  # cells in memory, for all visitors
 
 
 class Cell(NamedTuple):
-    """One walk that a store holds: what it is called on screen, and how to get it."""
+    """States that a store holds: what they are, what they are called, where they are."""
 
+    selection: Selection
     series: str  # everything but μ, in words; cells of one series form one η(μ)
-    mu: float  # friction coefficient of the ensemble
-    params: dict  # walk parameters, as for study.get_walk
-    store: object  # the store that holds it
+    params: dict  # as for study.get_walk or study.get_uniform
+    store: object  # the store that holds them
+    name: str  # of the entry
 
+    @property
+    def mu(self):
+        """Friction coefficient of the ensemble."""
+        return self.selection.mu
 
-class Disks(NamedTuple):
-    """Disks and their periodic images that are seen, k rows."""
-
-    x: np.ndarray  # (k,) length
-    y: np.ndarray
-    r: np.ndarray
-    grain: np.ndarray  # (k,) number of the grain
-    contacts: np.ndarray  # (k,) its number of force-bearing contacts
-    image: np.ndarray  # (k,) bool, whether the centre lies outside the box
-
-
-class Links(NamedTuple):
-    """Contacts of the backbone and their periodic images as segments, k rows."""
-
-    x0: np.ndarray  # (k,) centre of grain i, length
-    y0: np.ndarray
-    x1: np.ndarray  # (k,) that centre + ℓ n
-    y1: np.ndarray
-    contact: np.ndarray  # (k,) position among the backbone's contacts
-    i: np.ndarray  # (k,) numbers of the two grains
-    j: np.ndarray
+    @property
+    def kind(self):
+        """Kind of the entry: walk or uniform."""
+        return self.selection.kind
 
 
 class Replay(NamedTuple):
-    """A walk to look at: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
+    """States to look at: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
 
-    disks: Disks
-    links: Links
+    disks: geometry.Disks
+    links: geometry.Links
     box: np.ndarray  # (2,) sides; inf where open
     window: tuple  # x_low, x_high, y_low, y_high of the view, a square
+    backbone: np.ndarray  # (N_c,) positions of the contacts in the packing
+    force_scale: float  # ⟨f_n⟩, force
     normal: np.ndarray  # (F, N_c) float32 f_n: the original network, then the states kept
     tangential: np.ndarray  # (F, N_c) float32 f_t
     number: np.ndarray  # (F,) number of the state, 0 for the original
     distance: np.ndarray  # (F,) from the centre of the states
     residual: np.ndarray  # (F,) NaN for the original
+    attempts: np.ndarray  # (F,) spent on each state; NaN for the original and where none are made
+    low: np.ndarray  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
+    high: np.ndarray  # (N_c, 2) float32 largest
     order: np.ndarray  # (N_c,) contacts by original f_n, ascending
-    summary: dict  # plain numbers of the walk, by their names in the schema
+    summary: dict  # plain numbers of the states, by their names in the schema
+
+
+class Shown(NamedTuple):
+    """All that the page needs of one cell."""
+
+    cell: Cell
+    replay: Replay
+    exact: object  # Dataset of exact intervals, or None where no store has them
 
 
 class Library:
-    """The stores side by side: finished results, read-only, and the user's own cache."""
+    """The stores side by side: finished results, read-only, and the user's own cache.
+
+    Shared by all visitors; its methods may be called from any thread.
+    """
 
     def __init__(self, shipped=None, cache=None):
         """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache."""
@@ -86,7 +91,11 @@ class Library:
         shipped = shipped or os.environ.get(SHIPPED_VARIABLE) or SHIPPED
         self.shipped = self._open(shipped, readonly=True)
         self.cache = self._open(cache, readonly=False)
+        self.catalogue = []  # as last read
+        self._known = {}  # (path, entry's name) → Cell or None; entries never change
         self._rows = {}
+        self._shown = OrderedDict()
+        self._lock = threading.Lock()
 
     def _open(self, path, readonly):
         try:
@@ -101,49 +110,87 @@ class Library:
         return [store for store in (self.shipped, self.cache) if store is not None]
 
     def cells(self):
-        """All walks of the current algorithms, by series and μ."""
+        """All states of the current algorithms, by series and μ; also kept as `catalogue`."""
         found = {}
         for store in self.stores:
-            for entry in store.find(kind="walk"):
-                if entry.version == study.WALK_VERSION:
-                    found.setdefault(entry.name, _cell(entry.params, store))
-        return sorted(found.values(), key=lambda cell: (cell.series, cell.mu))
+            for name in store:
+                key = store.path, name
+                if key not in self._known:
+                    self._known[key] = _cell(store, name)
+                if self._known[key] is not None:
+                    found.setdefault(name, self._known[key])
+        self.catalogue = sorted(found.values(), key=lambda cell: (cell.series, cell.mu))
+        return self.catalogue
 
-    def find(self, params):
-        """The cell of these walk parameters, or None."""
+    def find(self, kind, params):
+        """The cell of these parameters, or None."""
+        version, _ = SOURCES[kind]
         for store in self.stores:
-            name = store.name("walk", params, version=study.WALK_VERSION)
+            name = store.name(kind, params, version=version)
             if name in store:
-                return _cell(params, store)
+                return _cell(store, name)
         return None
 
-    def replay(self, cell):
-        """The Replay of one cell. InputError if its packing is not in the same store."""
-        dataset, _ = study.get_walk(cell.store, cell.params)
-        packing, _ = study.get_packing(cell.store, cell.params["packing"])
-        return make_replay(packing, dataset, cell.mu)
+    def dataset(self, cell):
+        """The dataset of one cell."""
+        return SOURCES[cell.kind][1](cell.store, cell.params)[0]
+
+    def shown(self, cell):
+        """Shown of one cell; the last few are kept. InputError if its packing is nowhere."""
+        found = self.shown_in_memory(cell)
+        if found is None:
+            packing = self.packing(cell.params["packing"])
+            replay = make_replay(packing, self.dataset(cell), cell.mu)
+            found = Shown(cell, replay, self.exact(cell.selection))
+            self.keep_in_memory(found)
+        return found
+
+    def shown_in_memory(self, cell):
+        """Shown of one cell if it is one of the last, or None: takes no time."""
+        with self._lock:
+            if cell.name in self._shown:
+                self._shown.move_to_end(cell.name)
+            return self._shown.get(cell.name)
+
+    def keep_in_memory(self, shown):
+        """Make this the newest of those kept."""
+        with self._lock:
+            self._shown[shown.cell.name] = shown
+            while len(self._shown) > SHOWN_KEPT:
+                self._shown.popitem(last=False)
+
+    def packing(self, params):
+        """The packing of these parameters from the first store that has it. InputError if none."""
+        for store in self.stores:
+            if store.name("packing", params, version=study.PACKING_VERSION) in store:
+                return study.get_packing(store, params)[0]
+        raise InputError("the packing of these states is in no store that is open here")
 
     def table(self, cells):
-        """One row of measures for each cell, as study.row; `cell` is its position."""
-        rows = []
+        """One row of measures for each cell, as study.row with the ensemble's μ."""
         for cell in cells:
-            key = cell.store.name("walk", cell.params, version=study.WALK_VERSION)
-            if key not in self._rows:
-                dataset, _ = study.get_walk(cell.store, cell.params)
-                self._rows[key] = study.row(cell.params, dataset, True) | {"mu": cell.mu}
-            rows.append(self._rows[key])
-        return rows
+            if cell.name not in self._rows:
+                row = study.row(cell.params, self.dataset(cell), True)
+                self._rows[cell.name] = row | {"mu": cell.mu}
+        return [self._rows[cell.name] for cell in cells]
+
+    def exact(self, selection):
+        """The exact intervals of a selection's packing at its μ as a dataset, or None."""
+        params = study.exact_parameters(selection.packing, mu=selection.mu)
+        for store in self.stores:
+            found = store.load("intervals", params, version=study.INTERVALS_VERSION)
+            if found is not None:
+                return found
+        return None
 
     def lend_packing(self, params):
         """Copy a packing that only the shipped store has to the cache: it need not be made anew."""
-        if (
-            self.shipped is None
-            or self.shipped.name("packing", params, version=study.PACKING_VERSION)
-            not in self.shipped
+        if self.cache is None:
+            raise InputError("no cache folder can be written, so nothing can be computed")
+        if self.shipped is not None and (
+            self.shipped.name("packing", params, version=study.PACKING_VERSION) in self.shipped
         ):
-            return
-        packing, _ = study.get_packing(self.shipped, params)
-        study.keep_packing(self.cache, params, packing)
+            study.keep_packing(self.cache, params, study.get_packing(self.shipped, params)[0])
 
     def expected_steps(self, n, mu):
         """Compaction steps of the stored packing of n grains with the nearest μ, or None."""
@@ -159,120 +206,87 @@ class Library:
         return study.dataset_packing(store[name]).info.get("steps")
 
 
-def _cell(params, store):
-    return Cell(series_name(params), float(params["mu"]), params, store)
+def _cell(store, name):
+    """The Cell of a store's entry; None where it holds no states of the current algorithms."""
+    entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
+    if entry is None or entry.version != SOURCES[entry.kind][0]:
+        return None
+    selection = selected(entry.kind, entry.params)
+    words = series(selection, entry.params.get("chains", 1) if entry.kind == "walk" else 1)
+    return Cell(selection, words, entry.params, store, name)
 
 
-def series_name(params):
-    """Everything but μ that names a walk, in words."""
-    packing = params["packing"]
-    if "imported" in packing:
-        words = [f"imported {packing['imported'][:8]}"]
-    else:
-        words = [f"N = {packing['n']}", f"seed {packing['seed']}"]
-        usual = study.packing_parameters(packing["n"], packing["mu"], packing["seed"])
-        more = {name: value for name, value in packing.items() if usual.get(name) != value}
-        words += [f"{name} {value}" for name, value in sorted(more.items())]
-    if params["mu"] != packing["mu"]:
-        words.append(f"packed at μ = {packing['mu']:g}")
-    words.append(f"{params['states']} states")
-    if params["seed"] != 0:
-        words.append(f"walk seed {params['seed']}")
-    if params["chains"] > 1:
-        words.append(f"{params['chains']} chains")
-    words.append(SOLVERS.get(params["relax"], params["relax"]))
-    return ", ".join(words)
+def nearest_cell(cells, mu):
+    """Of these cells the one whose μ is nearest, on the logarithmic scale of the slider."""
+    return min(cells, key=lambda cell: abs(place(cell.mu) - place(mu)))
+
+
+def best_cell(cells, wanted=None):
+    """The cell of the wanted Selection, or the one most worth opening with; None without cells."""
+    for cell in cells:
+        if wanted is not None and cell.selection.names(wanted):
+            return cell
+    if not cells:
+        return None
+    names = [cell.series for cell in cells]
+    fullest = max(dict.fromkeys(names), key=names.count)
+    return nearest_cell([cell for cell in cells if cell.series == fullest], OPENING_MU)
+
+
+LEAST_PLACE = -3.5  # stands for μ = 0
+
+
+def place(mu):
+    """log10 μ, and LEAST_PLACE for what is below."""
+    return max(LEAST_PLACE, np.log10(mu)) if mu > 0 else LEAST_PLACE
 
 
 def make_replay(packing, dataset, mu):
-    """The Replay of a walk dataset on its packing; μ is that of the ensemble."""
+    """The Replay of a dataset of states on its packing; μ is that of the ensemble."""
     backbone = dataset["backbone"].values
     scale = float(dataset["force_scale"])
-    frames = np.concatenate([dataset["original"].values[None], dataset["states"].values]) / scale
-    frames = frames.astype(np.float32)
-    x = _into_box(packing)
-    window = _window(x, packing)
     summary = {name: array.item() for name, array in dataset.items() if array.ndim == 0}
+    kept = dataset.sizes["state"]
+    states = int(summary.get("accepted", kept) + summary.get("skipped", 0))
+    pick = _shown(kept, len(backbone))
+    frames = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
+    frames = (frames / scale).astype(np.float32)
+    number = np.linspace(0, states - 1, kept).astype(int)[pick] + 1
     summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
-    kept, states = dataset.sizes["state"], _states(summary)
-    number = np.linspace(0, states - 1, kept).astype(int) + 1
-    summary |= {"kept": kept, "states": states}
+    summary |= {"kept": len(pick), "states": states}
+    x = geometry.into_box(packing)
+    window = geometry.square(x, packing)
+
+    def column(name):
+        if name not in dataset:
+            return np.full(len(pick) + 1, np.nan)
+        return np.append(np.nan, dataset[name].values[pick])
+
+    distance = column("distance_to_centre")
+    distance[0] = summary["original_distance"]
     return Replay(
-        disks=_disks(packing, x, window, backbone),
-        links=_links(packing, x, window, backbone),
+        disks=geometry.disks(packing, x, window, backbone),
+        links=geometry.links(packing, x, window, backbone),
         box=packing.box,
         window=window,
+        backbone=backbone,
+        force_scale=scale,
         normal=np.ascontiguousarray(frames[..., 0]),
         tangential=np.ascontiguousarray(frames[..., 1]),
         number=np.append(0, number),
-        distance=np.append(summary["original_distance"], dataset["distance_to_centre"].values),
-        residual=np.append(np.nan, dataset["residual"].values),
+        distance=distance,
+        residual=column("residual"),
+        attempts=column("attempts"),
+        low=(dataset["low"].values / scale).astype(np.float32),
+        high=(dataset["high"].values / scale).astype(np.float32),
         order=np.argsort(frames[0, :, 0], kind="stable"),
         summary=summary,
     )
 
 
-def _states(summary):
-    """States that the walk accepted, or would have where S is one point."""
-    return int(summary["accepted"] + summary["skipped"])
-
-
-def _into_box(packing):
-    """Centres moved into [0, L) along each periodic axis."""
-    periodic = np.isfinite(packing.box)
-    return np.where(periodic, packing.x % np.where(periodic, packing.box, 1.0), packing.x)
-
-
-def _window(x, packing):
-    """A square that holds the box (or, where open, the grains) and a margin."""
-    margin = MARGIN * packing.r.max()
-    periodic = np.isfinite(packing.box)
-    low = np.where(periodic, 0.0, (x - packing.r[:, None]).min(axis=0))
-    high = np.where(periodic, packing.box, (x + packing.r[:, None]).max(axis=0))
-    middle, half = (low + high) / 2, (high - low).max() / 2 + margin
-    corners = np.stack([middle - half, middle + half], axis=1)
-    return tuple(float(value) for value in corners.ravel())
-
-
-def _shifts(packing):
-    """Shifts by −1, 0, 1 boxes along each periodic axis, (k, 2)."""
-    steps = [(-1, 0, 1) if np.isfinite(side) else (0,) for side in packing.box]
-    sides = np.where(np.isfinite(packing.box), packing.box, 0.0)
-    return np.array([(a, b) for a in steps[0] for b in steps[1]]) * sides
-
-
-def _seen(low, high, packing, window):
-    """Rows whose extent (k, 2) reaches into the drawn strip around the box."""
-    margin = MARGIN * packing.r.max()
-    open_low, open_high = np.array(window[::2]), np.array(window[1::2])
-    edge_low = np.where(np.isfinite(packing.box), -margin, open_low)
-    edge_high = np.where(np.isfinite(packing.box), packing.box + margin, open_high)
-    return np.all((high > edge_low) & (low < edge_high), axis=1)
-
-
-def _disks(packing, x, window, backbone):
-    i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
-    number = np.bincount(i, minlength=len(x)) + np.bincount(j, minlength=len(x))
-    parts = []
-    for shift in _shifts(packing):
-        r = packing.r[:, None]
-        grain = np.flatnonzero(_seen(x + shift - r, x + shift + r, packing, window))
-        at = x[grain] + shift
-        image = np.full(len(grain), bool(np.any(shift)))
-        parts.append((at[:, 0], at[:, 1], packing.r[grain], grain, number[grain], image))
-    return Disks(*(np.concatenate(field) for field in zip(*parts, strict=True)))
-
-
-def _links(packing, x, window, backbone):
-    i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
-    reach = packing.contacts.length[backbone, None] * packing.contacts.normal[backbone]
-    parts = []
-    # From a centre inside the box a contact may reach out of it, so its image may come in.
-    for shift in _shifts(packing):
-        begin = x[i] + shift
-        end = begin + reach
-        low, high = np.minimum(begin, end), np.maximum(begin, end)
-        contact = np.flatnonzero(_seen(low, high, packing, window))
-        ends = (*begin[contact].T, *end[contact].T)
-        parts.append((*ends, contact, i[contact], j[contact]))
-    return Links(*(np.concatenate(field) for field in zip(*parts, strict=True)))
+def _shown(kept, contacts):
+    """Which of the states kept fit in FRAME_BYTES, evenly spaced."""
+    most = max(2, int(FRAME_BYTES / (8 * max(1, contacts))))
+    if kept <= most:
+        return np.arange(kept)
+    return np.linspace(0, kept - 1, most).astype(int)

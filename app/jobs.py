@@ -1,4 +1,4 @@
-"""Walks computed in the background: threads run them, the page asks now and then how far they are.
+"""Work off the event loop: threads run it, the page asks now and then how far it is.
 
 The kernels release the interpreter lock, so a thread keeps neither the page nor others waiting.
 """
@@ -7,50 +7,68 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
-from granforce import study
+import param
+
 from granforce.records import Cancelled, InputError
 
-# All users together: more would only slow each other down.
-_pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix="granforce")
+from .limits import LIMITS
 
-# A part of the bar for the compaction; it is never told to be full before it ends.
-PACKING_SHARE, NEARLY = 0.5, 0.95
+# All users together: more would only slow each other down.
+computing = ThreadPoolExecutor(LIMITS.computations, thread_name_prefix="granforce-compute")
+# What only reads stores must not wait for a computation to end.
+reading = ThreadPoolExecutor(2, thread_name_prefix="granforce-read")
 
 
 class Job:
-    """One walk under way. Fields are written by its thread and read by the page."""
+    """One piece of work under way. Fields are written by its thread and read by the page.
 
-    def __init__(self, library, params):
-        self.library, self.params = library, params
+    work(job) returns the result. It may give `job.tell` as progress callback, `job.cancelled` as
+    cancel callable, and set `job.stage` to say what it is doing.
+    """
+
+    def __init__(self, work, pool=computing, on_end=None):
+        """on_end(): called from another thread when the job has ended."""
         self.stage = "waiting for a free processor"
         self.fraction = None  # done, 0 … 1; None where unknown
         self.seconds_left = None  # of this stage
         self.error = ""
-        self.cell = None  # the result
+        self.result = None
         self.ended = False
+        self._work, self._on_end = work, on_end
         self._begun = time.perf_counter()
-        self._steps = None  # of the compaction, as expected
-        self._cancelled = threading.Event()
-        self._future = _pool.submit(self._run)
+        self._cancel = threading.Event()
+        self._future = pool.submit(self._run)
+
+    def begin(self, stage):
+        """Enter a stage; its time left is counted from here."""
+        self.stage, self._begun = stage, time.perf_counter()
+        self.seconds_left = None
+
+    def tell(self, done, total, *, part=(0.0, 1.0)):
+        """Progress of the stage; part: where on the whole bar the stage begins and ends."""
+        begin, end = part
+        self.fraction = begin + (end - begin) * min(1.0, done / total)
+        spent = time.perf_counter() - self._begun
+        self.seconds_left = spent / done * (total - done) if 0 < done <= total else None
 
     def cancel(self):
         """Ask it to end; it does so within about a second."""
-        self._cancelled.set()
+        self._cancel.set()
         if self._future.cancel():
-            self.ended = True
+            self._finish()
 
-    @property
     def cancelled(self):
         """Whether it was asked to end."""
-        return self._cancelled.is_set()
+        return self._cancel.is_set()
 
     def wait(self, timeout=None):
         """Until it ends; for tests and scripts."""
         self._future.result(timeout)
 
     def _run(self):
+        self.begin("starting")
         try:
-            self.cell = self._compute()
+            self.result = self._work(self)
         except Cancelled:
             pass
         except InputError as error:
@@ -58,39 +76,60 @@ class Job:
         except Exception as error:  # told on the page, or nobody would see it
             self.error = f"the computation failed: {type(error).__name__}: {error}"
         finally:
-            self.ended = True
+            self._finish()
 
-    def _compute(self):
-        cell = self.library.find(self.params)
-        if cell is not None:
-            return cell
-        if self.library.cache is None:
-            raise InputError("no cache folder can be written, so nothing can be computed")
-        packing = self.params["packing"]
-        self.library.lend_packing(packing)
-        self._steps = self.library.expected_steps(packing["n"], packing["mu"])
-        self._begin("compaction")
-        options = {"cancel": self._cancelled.is_set}
-        study.get_packing(self.library.cache, packing, progress=self._packing_told, **options)
-        self._begin("random walk")
-        study.get_walk(self.library.cache, self.params, progress=self._walk_told, **options)
-        return self.library.find(self.params)
+    def _finish(self):
+        self.ended = True
+        self._work = None  # what it refers to may be large
+        if self._on_end is not None:
+            self._on_end()
 
-    def _begin(self, stage):
-        self.stage, self._begun = stage, time.perf_counter()
-        self.seconds_left = None
 
-    def _packing_told(self, step, message):
-        self.stage = f"compaction, step {step}: {message}"
-        if self._steps:
-            self.fraction = PACKING_SHARE * min(NEARLY, step / self._steps)
-            self._tell_time_left(step, self._steps)
+class Task(param.Parameterized):
+    """One kind of work as a view sees it: at most one job at a time, a later one replaces it.
 
-    def _walk_told(self, done, total):
-        self.stage = f"random walk, {done} of {total} states"
-        self.fraction = PACKING_SHARE + (1 - PACKING_SHARE) * done / total
-        self._tell_time_left(done, total)
+    Jobs run in threads, but the parameters change only within `poll`, on the page's own thread.
+    """
 
-    def _tell_time_left(self, done, total):
-        spent = time.perf_counter() - self._begun
-        self.seconds_left = spent / done * (total - done) if 0 < done <= total else None
+    running = param.Boolean()
+    stage = param.String(doc="what the job is doing")
+    fraction = param.Number(default=None, allow_None=True, doc="part done, None if unknown")
+    seconds_left = param.Number(default=None, allow_None=True)
+    message = param.String(doc="one line about what went wrong, or empty")
+
+    def __init__(self, pool=computing, wake=None, **params):
+        """wake(function): call a function soon on the page's thread; without it, poll yourself."""
+        super().__init__(**params)
+        self._pool, self._wake = pool, wake
+        self._job = self._done = None
+
+    def start(self, work, done=None):
+        """Begin work(job), as for Job; done(result) follows within `poll` unless it failed."""
+        self.cancel()
+        on_end = None if self._wake is None else lambda: self._wake(self.poll)
+        self._job, self._done = Job(work, self._pool, on_end), done
+        self.param.update(
+            running=True, stage=self._job.stage, fraction=None, seconds_left=None, message=""
+        )
+
+    def poll(self):
+        """Take over how far the job is; when it has ended, its result."""
+        job = self._job
+        if job is None:
+            return
+        if not job.ended:
+            self.param.update(
+                stage="cancelling …" if job.cancelled() else job.stage,
+                fraction=job.fraction,
+                seconds_left=job.seconds_left,
+            )
+            return
+        done, self._job, self._done = self._done, None, None
+        self.param.update(running=False, message=job.error)
+        if done is not None and not job.error and not job.cancelled():
+            done(job.result)
+
+    def cancel(self):
+        """Ask the job to end; its result is dropped."""
+        if self._job is not None:
+            self._job.cancel()

@@ -1,70 +1,114 @@
 """The page: `panel serve app` from the repository's root.
 
 It opens on the finished results in data/start.zarr, or in the folder that the environment variable
-GRANFORCE_DATA names, and on the user's own cache (GRANFORCE_CACHE).
+GRANFORCE_DATA names, and on the user's own cache (GRANFORCE_CACHE); GRANFORCE_LIMITS says how much
+a visitor may ask for, see app/limits.py.
 """
+
+import importlib
+import importlib.util
 
 import panel as pn
 import panel_material_ui as pmui
 
 from .data import Library
-from .state import AppState
+from .state import VIEW, AppState
 from .views.controls import Controls
-from .views.curve import CurveView
-from .views.intervals import IntervalsView
 from .views.packing import PackingView
-from .views.player import Player
 from .views.summary import SummaryView
 
-POLL_MS = 200  # how often the page asks a running computation how far it is
+POLL_MS = 200  # how often the page asks running work how far it is
+
+# The tabs: name in links → title, module of app.views whose `View(state)` fills it when first seen.
+TABS = {
+    "intervals": "Intervals",
+    "statistics": "Statistics",
+    "projection": "Force space",
+    "perturb": "Perturb",
+    "upload": "Your packing",
+    "export": "Export",
+}
 
 pn.extension()
 
 
 def page():
-    """One user's page."""
-    state = AppState(pn.state.as_cached("library", Library))
+    """One visitor's page."""
+    document = pn.state.curdoc
+
+    def wake(function):
+        document.add_next_tick_callback(function)
+
+    query = pn.state.location.search if pn.state.location else ""
+    state = AppState(pn.state.as_cached("library", Library), wake, query)
     state.message = state.message or " ".join(state.library.notes)
-    player = Player(sizing_mode="stretch_width")
-    packing, intervals = PackingView(state), IntervalsView(state)
-    summary, curve, controls = SummaryView(state), CurveView(state), Controls(state)
-    player.show(state.replay)
-
-    def show(event):
-        # One batch; the player comes last, since it writes into the plots of the others.
-        with pn.io.hold():
-            for view in (packing, intervals, summary, player):
-                view.show(event.new)
-
-    state.param.watch(show, "replay")
-    _poll_while_running(state)
+    packing, tabs = PackingView(state), Tabs(state)
+    packing.player.on_digit = tabs.choose
     source = pmui.Typography(state.param.source, variant="subtitle2", margin=(8, 10, 0, 10))
-    left = pn.Column(source, player, packing.panel(), sizing_mode="stretch_width")
-    right = pn.Column(
-        summary.panel(),
-        intervals.panel(),
-        intervals.growth_panel(),
-        curve.panel(),
-        sizing_mode="stretch_width",
-    )
+    left = pn.Column(source, packing.panel(), sizing_mode="stretch_width")
+    right = pn.Column(SummaryView(state).panel(), tabs.tabs, sizing_mode="stretch_width")
     grid = pmui.Grid(
-        pmui.Grid(left, size={"xs": 12, "md": 7}),
-        pmui.Grid(right, size={"xs": 12, "md": 5}),
+        pmui.Grid(left, size={"xs": 12, "md": 6}),
+        pmui.Grid(right, size={"xs": 12, "md": 6}),
         container=True,
         spacing=1,
         sizing_mode="stretch_width",
     )
-    return pmui.Page(
+    whole = pmui.Page(
         title="granforce — how undetermined are contact forces?",
-        sidebar=controls.panel(),
+        sidebar=Controls(state).panel(),
         sidebar_width=290,
         main=[grid],
+        dark_theme=state.dark,
     )
+    whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
+    _poll_while_running(state)
+    _tell_address(state)
+    pn.state.on_session_destroyed(lambda context: state.close())
+    return whole
+
+
+class Tabs:
+    """Views beside the packing; each is made when it is first seen, and told when it is hidden."""
+
+    def __init__(self, state):
+        self.state = state
+        self.names = [name for name in TABS if _module(name) is not None]
+        self.pages = {name: pn.Column(sizing_mode="stretch_width") for name in self.names}
+        if state.tab not in self.names:
+            state.tab = self.names[0]
+        self._fill(state.tab)
+        self.tabs = pmui.Tabs(
+            *((TABS[name], self.pages[name]) for name in self.names),
+            active=self.names.index(state.tab),
+            sizing_mode="stretch_width",
+        )
+        self.tabs.param.watch(lambda event: self._show(self.names[event.new]), "active")
+        state.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
+
+    def choose(self, number):
+        """Show tab 1, 2, …; other numbers do nothing."""
+        if 1 <= number <= len(self.names):
+            self.tabs.active = number - 1
+
+    def _show(self, name):
+        self._fill(name)  # first, so that those who follow the state find it in the page
+        self.state.tab = name
+
+    def _fill(self, name):
+        if not self.pages[name].objects:
+            self.pages[name].append(_module(name).View(self.state).panel())
+
+
+def _module(name):
+    if importlib.util.find_spec(f"app.views.{name}") is None:
+        return None
+    return importlib.import_module(f"app.views.{name}")
 
 
 def _poll_while_running(state):
-    """Take over the progress of a computation; end it when its page is closed."""
-    callback = pn.state.add_periodic_callback(state.poll, POLL_MS, start=False)
+    """Take over the progress of tasks while there are any."""
+    callback = pn.state.add_periodic_callback(state.poll, POLL_MS, start=state.busy)
 
     def switch(event):
         if event.new:
@@ -72,8 +116,18 @@ def _poll_while_running(state):
         else:
             callback.stop()
 
-    state.param.watch(switch, "running")
-    pn.state.on_session_destroyed(lambda context: state.cancel())
+    state.param.watch(switch, "busy")
+
+
+def _tell_address(state):
+    """Keep the address such that a copy of it reopens the view."""
+
+    def tell(*events):
+        if pn.state.location is not None and state.cell is not None:
+            pn.state.location.search = f"?{state.link()}"
+
+    state.param.watch(tell, ["selection", *VIEW])
+    tell()
 
 
 page().servable()

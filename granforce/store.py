@@ -242,18 +242,26 @@ class Store(Mapping):
                 self._publish(name, variables, attrs)
         return name
 
+    def entry(self, name):
+        """The `Entry` of this name, or None if there is none that can be read; reads no arrays."""
+        attrs = self._attrs(name) if _ENTRY.fullmatch(name) else None
+        if attrs is None:
+            return None
+        params = json.loads(attrs["parameters"])
+        size = _folder_bytes(self.path / name)
+        return Entry(
+            name, attrs["kind"], params, attrs["algorithm_version"], size, attrs["created"]
+        )
+
     def entries(self):
         """A list of `Entry`, one for each readable entry; arrays are not read."""
         found = []
         for name in self._names():
-            attrs = self._attrs(name)
-            if attrs is None:
+            entry = self.entry(name)
+            if entry is None:
                 self._warn(name, "its metadata cannot be read")
-                continue
-            params = json.loads(attrs["parameters"])
-            size = _folder_bytes(self.path / name)
-            version, created = attrs["algorithm_version"], attrs["created"]
-            found.append(Entry(name, attrs["kind"], params, version, size, created))
+            else:
+                found.append(entry)
         return found
 
     def find(self, kind=None, **params):

@@ -1,101 +1,172 @@
-"""The sidebar: what to see, and what to compute."""
+"""The sidebar: which states to see, how to see them, and how to take them along."""
 
 import panel as pn
 import panel_material_ui as pmui
 
-from ..data import SOLVERS
+from granforce.records import InputError, friction
 
-HELP = (
-    "Computed in the background and kept in your cache: a packing takes some 5–20 s at N = 400, "
-    "200 states by the nearest admissible state a few seconds, by Gauss–Seidel a minute or more."
-)
+from ..data import SOURCES
+from ..limits import LIMITS
+from ..selection import KINDS, SOLVERS, command, select
+from ..state import COLOURS, WIDTHS
+from .copying import CopyButton
+from .friction import FrictionSlider
+from .progress import Progress
+
+WIDE = {"sizing_mode": "stretch_width"}
+SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
+HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
+HELP = "Computed in the background and kept in your cache."
+SAME = "as S"  # a packing made with the friction of the ensemble
+
+
+def _swap(labels):
+    return {label: name for name, label in labels.items()}
 
 
 class Controls:
-    """Widgets for the state's selection and for a walk that no store holds yet."""
+    """Widgets for the state's selection and view; they follow what is on screen."""
 
     def __init__(self, state):
         self.state = state
-        wide = {"sizing_mode": "stretch_width"}
-        self.series = pmui.Select(name="Series", **wide)
-        self.mu = pmui.Select(name="Friction coefficient μ", **wide)
-        self.new_mu = pmui.TextInput(name="μ", value="0.3", **wide)
-        self.n = pmui.IntInput(name="Disks N", value=400, start=3, end=4000, step=100, **wide)
-        self.seed = pmui.IntInput(name="Seed", value=1, start=0, **wide)
-        self.states = pmui.IntInput(name="States", value=200, start=1, end=5000, step=100, **wide)
-        self.relax = pmui.Select(
-            name="Relaxation", options={label: name for name, label in SOLVERS.items()}, **wide
+        self._following = False
+        self.mu = FrictionSlider(self._typed, **WIDE)
+        self.n = pmui.IntInput(name="Disks N", start=3, end=LIMITS.n, step=100, **SMALL)
+        self.seed = pmui.IntInput(name="Seed", start=0, **SMALL)
+        self.packed = pmui.TextInput(name="Packed at μ", placeholder=SAME, **SMALL)
+        self.states = pmui.IntInput(name="States", start=1, end=LIMITS.states, step=100, **SMALL)
+        kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
+        self.kind = pmui.Select(name="States from", options=_swap(kinds), **SMALL)
+        self.relax = pmui.Select(name="Relaxation", options=_swap(SOLVERS), **SMALL)
+        self.series = pmui.Select(name="In the store", options=[], **SMALL)
+        self.go = pmui.Button(name="Compute", color="primary", visible=False, **WIDE)
+        self.colour = pmui.Select(name="Colour", options=_swap(COLOURS), **SMALL)
+        self.thickness = pmui.Select(name="Width", options=_swap(WIDTHS), **SMALL)
+        self.overlay = pmui.Switch(
+            label="Strong and undetermined contacts", value=state.overlay, margin=(2, 10)
         )
-        self.go = pmui.Button(name="Show or compute", color="primary", **wide)
-        self.cancel = pmui.Button(name="Cancel", variant="outlined", visible=False, **wide)
-        self.bar = pmui.LinearProgress(visible=False, **wide)
-        self.stage = pmui.Typography("", variant="caption", visible=False, **wide)
-        self.error = pmui.Alert(severity="error", visible=False, **wide)
-        self._offer()
-        self.series.param.watch(lambda event: self._choose(series=event.new), "value")
-        self.mu.param.watch(lambda event: self._choose(mu=event.new), "value")
-        state.param.watch(self._offer, ["catalogue", "series", "mu"])
-        self.go.on_click(self._compute)
-        self.new_mu.param.watch(self._compute, "enter_pressed")
-        self.cancel.on_click(lambda event: state.cancel())
-        state.param.watch(self._progress, ["running", "stage", "fraction", "seconds_left"])
-        state.param.watch(self._tell, "message")
+        self.error = pmui.Alert(severity="error", visible=False, **WIDE)
+        self.link = CopyButton(label="Copy link", margin=(4, 10), **WIDE)
+        self.command = CopyButton(label="Copy CLI command", margin=(4, 10), **WIDE)
+        self.progress = Progress(state.computation)
+        self._connect()
+        self._follow()
+        self._look()
 
     def panel(self):
         """The widgets in order."""
-        heading = {"variant": "subtitle1", "margin": (10, 10, 0, 10)}
         return [
-            pmui.Typography("Show", **heading),
-            self.series,
             self.mu,
-            pmui.Typography("Another walk", **heading),
-            pn.Row(self.new_mu, self.n, sizing_mode="stretch_width"),
-            pn.Row(self.seed, self.states, sizing_mode="stretch_width"),
+            pn.Row(self.n, self.seed, **WIDE),
+            pn.Row(self.states, self.packed, **WIDE),
+            self.kind,
             self.relax,
             self.go,
-            self.cancel,
-            self.bar,
-            self.stage,
+            self.progress.panel(),
             self.error,
-            pmui.Typography(HELP, variant="caption"),
+            self.series,
+            pmui.Typography("Force chains", **HEADING),
+            self.colour,
+            self.thickness,
+            self.overlay,
+            pmui.Typography("Take along", **HEADING),
+            pn.Row(self.link, self.command, **WIDE),
         ]
 
-    def _offer(self, *events):
-        """Options and selection as the state has them."""
+    def _connect(self):
         state = self.state
-        values = {f"{cell.mu:g}": cell.mu for cell in state.cells()}
-        self._following = True
-        self.series.param.update(options=state.series_offered(), value=state.series)
-        self.mu.param.update(options=values, value=state.mu)
-        self._following = False
+        self.mu.param.watch(lambda event: self._ask(), "mu")
+        for widget in (self.n, self.seed, self.packed, self.states, self.kind, self.relax):
+            widget.param.watch(lambda event: self._ask(), "value")
+        self.series.param.watch(self._choose, "value")
+        self.go.on_click(lambda event: state.compute())
+        for name in ("colour", "thickness", "overlay"):
+            widget = getattr(self, name)
+            widget.param.watch(
+                lambda event, name=name: state.param.update({name: event.new}), "value"
+            )
+        state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
+        state.param.watch(self._look, ["colour", "thickness", "overlay"])
+        state.param.watch(self._tell, "message")
+        state.computation.param.watch(self._rest, "running")
+        self._tell()
 
-    def _choose(self, **wanted):
+    # From the widgets
+
+    def _set(self, name, event):
+        setattr(self.state, name, event.new)
+
+    def _typed(self, text):
+        try:
+            self.mu.mu = friction(text)
+        except InputError as error:
+            self.state.message = str(error)
+
+    def _ask(self):
+        """Select what the widgets say."""
+        state = self.state
+        if self._following or state.selection is None:
+            return
+        try:
+            state.ask(self._selection())
+        except InputError as error:
+            state.message = str(error)
+
+    def _selection(self):
+        now, packing = self.state.selection, self.state.selection.packing
+        if None in (self.n.value, self.seed.value, self.states.value):
+            raise InputError("fill in every field")
+        own = self.packed.value.strip()
+        packed_mu = friction(own) if own else None
+        details = {
+            "kind": self.kind.value,
+            "relax": self.relax.value,
+            "states": self.states.value,
+            "seed": now.seed,
+        }
+        if now.imported:
+            return now._replace(mu=friction(self.mu.mu), **details)
+        made = select(self.n.value, self.mu.mu, self.seed.value, packed_mu, **details)
+        same = {name: packing[name] for name in packing if name not in ("n", "mu", "seed", "radii")}
+        return made._replace(packing=made.packing | same)
+
+    def _choose(self, event):
         if not self._following:
-            self.state.choose(**wanted)
+            self.state.choose(series=event.new)
 
-    def _compute(self, event):
-        self.state.compute(
-            n=self.n.value,
-            mu=self.new_mu.value_input or self.new_mu.value,
-            seed=self.seed.value,
-            states=self.states.value,
-            relax=self.relax.value,
-        )
+    # From the state
 
-    def _progress(self, *events):
+    def _follow(self, *events):
+        """Widgets as the state has them."""
         state = self.state
-        self.go.disabled = state.running
-        for widget in (self.cancel, self.bar, self.stage):
-            widget.visible = state.running
-        known = state.fraction is not None
-        self.bar.param.update(
-            variant="determinate" if known else "indeterminate",
-            value=round(100 * state.fraction) if known else -1,
-        )
-        left = state.seconds_left
-        self.stage.object = state.stage + (
-            f" — about {left:.0f} s more" if left is not None else ""
-        )
+        if state.selection is None:
+            return
+        asked, packing = state.selection, state.selection.packing
+        self._following = True
+        self.mu.param.update(stored=[cell.mu for cell in state.cells()], mu=asked.mu)
+        if not asked.imported:
+            self.n.value, self.seed.value = packing["n"], packing["seed"]
+        for widget in (self.n, self.seed, self.packed):
+            widget.disabled = asked.imported
+        self.packed.value = "" if asked.same_mu else f"{packing['mu']:g}"
+        self.states.value = asked.states
+        self.kind.value, self.relax.value = asked.kind, asked.relax
+        self.relax.visible = asked.kind == "walk"
+        offered = list(dict.fromkeys(cell.series for cell in state.catalogue))
+        self.series.param.update(options=offered, value=state.cell.series if state.cell else None)
+        self.command.text = command(asked)
+        self._following = False
+        self._rest()
+
+    def _rest(self, *events):
+        state = self.state
+        self.go.visible = state.missing and not state.computation.running
+        if state.missing:
+            self.go.name = f"Compute μ = {state.selection.mu:g}"
+
+    def _look(self, *events):
+        for name in ("colour", "thickness", "overlay"):
+            getattr(self, name).value = getattr(self.state, name)
 
     def _tell(self, *events):
         self.error.param.update(title=self.state.message, visible=bool(self.state.message))

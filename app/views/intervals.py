@@ -1,75 +1,173 @@
-"""Intervals of each contact's normal force seen so far (Fig. 3 of PRE 79, 052302), and η3."""
+"""Intervals of each contact's normal force (Fig. 3 of PRE 79, 052302); η1, η2, η3 as they grow."""
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, Range1d, Span
+import panel_material_ui as pmui
+from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 
-from .style import DOT, ORIGINAL, PALE, SERIES, hover, plot, quiet_legend
+from ..state import SCALES, SORTS
+from .packing import exact_intervals
+from .progress import Progress
+from .style import DARK, DOT, ORIGINAL, PALE, SERIES, hover, plot, quiet_legend
 
-BARS, GROWTH = "bars", "growth"  # names under which the player finds the sources
+MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
+BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
+ETAS = ("eta1", "eta2", "eta3")
+SMALL = {"size": "small", "width": 190, "margin": (2, 8)}
 
 
-class IntervalsView:
-    """One bar a contact, growing as the walk goes; the player rewrites low, high and now."""
+class View:
+    """One bar a contact, growing as the states go by; the player rewrites low, high and now."""
+
+    name, title = "intervals", "Intervals"
 
     def __init__(self, state):
-        self.bars = ColumnDataSource(name=BARS)
-        self.growth = ColumnDataSource(name=GROWTH)
-        self.final = Span(dimension="width", line_dash="dashed", line_color=SERIES[1])
-        self.figure = self._bars_figure()
-        self.growth_figure = self._growth_figure()
-        self.show(state.replay)
+        self.state = state
+        self.bars = _source("bars", BARS)
+        self.growth = _source("growth", ("state", *ETAS))
+        self.chosen = _source("chosen", ("rank", "low", "high"))
+        self.finals = [
+            Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
+        ]
+        self.figure, self.growth_figure = self._bars_figure(), self._growth_figure()
+        self.sort = _select("Sorted by", SORTS, state.sort)
+        self.scale = _select("Scale", SCALES, state.scale)
+        self.exact = pmui.Button(
+            name="Compute exact intervals", variant="outlined", size="small", margin=(8, 8)
+        )
+        self.left_out = pn.pane.HTML(margin=(0, 10), styles={"font-size": "12px", "opacity": "0.8"})
+        self.progress = Progress(state.computation)
+        self._connect()
+        self._show()
 
     def panel(self):
-        """The bars."""
-        return pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0)
+        """Choices, bars and growth."""
+        wide = {"sizing_mode": "stretch_width", "margin": 0}
+        choices = pn.FlexBox(self.sort, self.scale, self.exact, sizing_mode="stretch_width")
+        return pn.Column(
+            choices,
+            self.progress.panel(),
+            pn.pane.Bokeh(self.figure, **wide),
+            self.left_out,
+            pn.pane.Bokeh(self.growth_figure, **wide),
+            sizing_mode="stretch_width",
+        )
 
-    def growth_panel(self):
-        """η3 against the number of states."""
-        return pn.pane.Bokeh(self.growth_figure, sizing_mode="stretch_width", margin=0)
+    def _connect(self):
+        state = self.state
+        self.sort.param.watch(lambda event: state.param.update(sort=event.new), "value")
+        self.scale.param.watch(lambda event: state.param.update(scale=event.new), "value")
+        self.exact.on_click(lambda event: state.compute_exact())
+        self.bars.selected.on_change("indices", self._tapped)
+        state.param.watch(self._show, ["replay", "exact", "sort", "scale"])
+        state.param.watch(self._mark, "contact")
+        state.param.watch(self._catch_up, "tab")
+        self._stale = False
 
-    def show(self, replay):
-        """Take over contacts and their original forces."""
-        if replay is None:
+    # Contents
+
+    def _catch_up(self, event):
+        if event.new == self.name and self._stale:
+            self._show()
+
+    def _show(self, *events):
+        """Take over contacts, exact intervals and the walk's length."""
+        state, replay = self.state, self.state.replay
+        self._stale = state.tab != self.name
+        if replay is None or self._stale:
             return
-        order = replay.order
-        original = replay.normal[0, order]
-        columns = {name: original.copy() for name in ("low", "high", "now", "original")}
-        count = len(order)
-        self.bars.data = columns | {
-            "rank": np.arange(1, count + 1, dtype=np.float32),
-            "contact": order.astype(np.int32),
+        self.sort.value, self.scale.value = state.sort, state.scale
+        exact = exact_intervals(state.exact, replay)
+        self.exact.visible = not exact
+        order = sorted_contacts(replay, exact, state.sort)
+        step = -(-len(order) // MOST_BARS)
+        ranks = np.arange(0, len(order), step)
+        self.contacts = order[ranks]
+        self._show_bars(replay, exact, ranks)
+        self.left_out.object = (
+            f"Every {step}th of {len(order)} contacts is drawn." if step > 1 else ""
+        )
+        if not events or any(event.name == "replay" for event in events):
+            self._show_growth(replay)
+        self._mark()
+
+    def _show_bars(self, replay, exact, ranks):
+        contacts = self.contacts
+        original = replay.normal[0, contacts]
+        unit = original if self.state.scale == "own" else np.ones_like(original)
+        none = np.full_like(original, np.nan)
+        low, high = (exact[name][contacts] if exact else none for name in ("low", "high"))
+        self.bars.data = {
+            "rank": (ranks + 1).astype(np.float32),
+            "at": contacts.astype(np.int32),
+            "contact": replay.backbone[contacts].astype(np.int32),
+            "original": original / unit,
+            "exact_low": low / unit,
+            "exact_high": high / unit,
+            **{name: original / unit for name in ("low", "high", "now")},
         }
-        _set_range(self.figure.x_range, 0, count + 1)
-        _set_range(self.figure.y_range, 0, 1.04 * float(replay.normal.max(initial=1)))
+        self.width = len(replay.order)
+        _set_range(self.figure.x_range, 0, self.width + 1)
+        top = 3.0 if self.state.scale == "own" else _top(replay, exact)
+        _set_range(self.figure.y_range, 0, top)
+        self.figure.xaxis.axis_label = f"contacts, sorted by {SORTS[self.state.sort]}"
+        self.figure.yaxis.axis_label = SCALES[self.state.scale]
+
+    def _show_growth(self, replay):
         unseen = np.full(len(replay.number), np.nan, dtype=np.float32)
-        self.growth.data = {"state": replay.number.astype(np.int32), "eta3": unseen}
-        eta3 = replay.summary["eta3"]
-        self.final.location = eta3
+        self.growth.data = {"state": replay.number.astype(np.int32)} | {
+            name: unseen.copy() for name in ETAS
+        }
+        finals = [replay.summary[name] * (0.15 if name == "eta3" else 1) for name in ETAS]
+        for span, value in zip(self.finals, finals, strict=True):
+            span.location = value
         _set_range(self.growth_figure.x_range, 0, max(1, int(replay.number[-1])))
-        _set_range(self.growth_figure.y_range, 0, 1.15 * eta3 if eta3 > 1e-9 else 1)
+        _set_range(self.growth_figure.y_range, 0, 1.25 * max(finals) if max(finals) > 1e-9 else 1)
+
+    # Selection, linked with the packing
+
+    def _tapped(self, name, old, new):
+        if new:
+            self.state.contact = int(self.contacts[new[0]])
+            self.bars.selected.indices = []
+
+    def _mark(self, *events):
+        """Show where the selected contact stands."""
+        state = self.state
+        marks = {"rank": [], "low": [], "high": []}
+        if state.contact is not None and state.replay is not None and state.tab == self.name:
+            at = np.flatnonzero(self.contacts == state.contact)
+            if len(at):
+                column = self.bars.data
+                low, high = self.figure.y_range.start, self.figure.y_range.end
+                marks = {"rank": [float(column["rank"][at[0]])], "low": [low], "high": [high]}
+        self.chosen.data = marks
+
+    # Figures
 
     def _bars_figure(self):
         fig = plot(
-            "Interval of each contact's normal force seen so far",
-            "contacts, sorted by original fₙ",
+            None,
+            "contacts",
             "fₙ / ⟨fₙ⟩",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1),
-            height=280,
+            height=330,
         )
-        bars = fig.vbar(
-            x="rank",
-            bottom="low",
-            top="high",
+        bar = {"x": "rank", "source": self.bars, "line_color": None}
+        exact = fig.vbar(
+            bottom="exact_low",
+            top="exact_high",
             width=1,
-            source=self.bars,
             fill_color=PALE,
-            fill_alpha=0.75,
-            line_color=None,
-            legend_label="seen",
+            legend_label="exact",
+            **bar,
         )
-        fig.scatter("rank", "now", source=self.bars, size=2.2, color=DOT, legend_label="now")
+        seen = fig.vbar(
+            bottom="low", top="high", width=0.8, fill_color=DARK, legend_label="seen so far", **bar
+        )
+        for glyph in (exact, seen):
+            glyph.nonselection_glyph = None
         fig.line(
             "rank",
             "original",
@@ -78,30 +176,76 @@ class IntervalsView:
             line_width=1.5,
             legend_label="original",
         )
+        dots = fig.scatter(
+            "rank",
+            "now",
+            source=self.bars,
+            size=2.4,
+            color=DOT,
+            legend_label="now",
+            nonselection_alpha=1,
+        )
+        fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         quiet_legend(fig, "top_left")
         fig.add_tools(
             hover(
-                [bars],
+                [seen, exact],
                 ("contact", "@contact"),
-                ("fₙ now", "@now{0.000} ⟨fₙ⟩"),
-                ("original", "@original{0.000} ⟨fₙ⟩"),
+                ("now", "@now{0.000}"),
+                ("original", "@original{0.000}"),
                 ("seen", "@low{0.000} … @high{0.000}"),
-            )
+                ("exact", "@exact_low{0.000} … @exact_high{0.000}"),
+            ),
+            TapTool(renderers=[exact, seen, dots]),
         )
         return fig
 
     def _growth_figure(self):
         fig = plot(
-            "η3 of the states shown so far (dashed: of all states)",
-            "states of the walk",
-            "η3",
+            "η of the states shown so far (dashed: of all states)",
+            "states",
+            "η",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1),
-            height=170,
+            height=200,
         )
-        fig.line("state", "eta3", source=self.growth, line_width=2, color=SERIES[0])
-        fig.add_layout(self.final)
+        labels = ("eta1", "η1"), ("eta2", "η2"), ("eta3", "0.15 η3")
+        for (name, label), colour in zip(labels, SERIES, strict=True):
+            fig.line(
+                "state", name, source=self.growth, line_width=2, color=colour, legend_label=label
+            )
+        for span in self.finals:
+            fig.add_layout(span)
+        quiet_legend(fig, "bottom_right")
         return fig
+
+
+def sorted_contacts(replay, exact, by):
+    """Positions of the contacts (N_c,), ascending in what `by`, one of state.SORTS, names."""
+    if by == "original" or (by in ("exact", "position") and not exact):
+        return replay.order
+    if by == "extent":
+        value = replay.high[:, 0] - replay.low[:, 0]
+    else:
+        value = exact["high"] - exact["low"]
+        if by == "position":
+            with np.errstate(invalid="ignore", divide="ignore"):
+                value = (replay.normal[0] - exact["low"]) / value
+    return np.argsort(value, kind="stable")
+
+
+def _top(replay, exact):
+    seen = float(replay.high[:, 0].max(initial=1))
+    return 1.04 * max(seen, float(np.quantile(exact["high"], 0.995)) if exact else 0)
+
+
+def _source(name, columns):
+    return ColumnDataSource({column: [] for column in columns}, name=name)
+
+
+def _select(name, labels, value):
+    options = {label: key for key, label in labels.items()}
+    return pmui.Select(name=name, options=options, value=value, **SMALL)
 
 
 def _set_range(axis, low, high):

@@ -1,165 +1,127 @@
-"""The packing: disks to scale, periodic images, and force chains."""
+"""The packing: the player, what it shares with the state, and the legend."""
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, CustomJS, Range1d
-from bokeh.transform import linear_cmap
 
-from .style import DISK, EDGE, FADED, IMAGE, NEUTRAL, OPAQUE, diverging, hover, plot
+from ..state import COLOURS, WIDTHS
+from .player import Player, frames
+from .style import BLUE, EXTENT, GREY, ORANGE, palettes
 
-# The names under which the player finds these in the page.
-FIGURE, LINKS = "packing", "links"
-
-# Columns of the links that the player rewrites with every frame.
-LIVE = ("width", "colour", "f_n", "f_t", "mobilised", "low", "high")
+SHARED = ("contact", "frame", "reference")  # both ways
+FOLLOWED = ("tab", "colour", "thickness", "overlay", "scale")  # from the state only
 
 LEGEND = """
-<div style="display:flex;flex-wrap:wrap;gap:4px 22px;align-items:center;font-size:12px">
- <span>width: normal force fₙ
-  <svg width="64" height="12" style="vertical-align:middle"><polygon points="0,5.5 64,0 64,12 0,6.5"
-   fill="{neutral}"/></svg></span>
- <span>colour: mobilisation fₜ/(μ fₙ) {bar}</span>
- <span><svg width="12" height="12" style="vertical-align:middle"><circle cx="6" cy="6" r="5"
-  fill="{disk}" fill-opacity="{faded}" stroke="{edge}"/></svg> rattler</span>
- <span>box {sides} largest radii, dashed; outside it images</span>
+<div style="display:flex;flex-wrap:wrap;gap:3px 20px;align-items:center;font-size:12px">
+ <span>width: {width}
+  <svg width="56" height="12" style="vertical-align:middle"><polygon points="0,5.5 56,0 56,12 0,6.5"
+   fill="currentColor" fill-opacity="0.65"/></svg></span>
+ <span>colour: {colour} {bar}</span>
+ {marks}
+ <span>pale disks: rattlers; dashed: the box{sides}, outside it images</span>
 </div>
 """
-BAR = """−1 <span style="display:inline-block;width:110px;height:10px;vertical-align:middle;
- border-radius:2px;background:linear-gradient(90deg,{stops})"></span> 1"""
+BAR = """{low} <span style="display:inline-block;width:96px;height:10px;vertical-align:middle;
+ border-radius:2px;background:linear-gradient(90deg,{stops})"></span> {high}"""
+DOT = """<svg width="12" height="12" style="vertical-align:middle;margin-left:8px">
+ <circle cx="6" cy="6" r="4" fill="{fill}" stroke="{line}" stroke-width="1.5"/></svg> {text}"""
 
 
 class PackingView:
-    """Disks and chains of the replay on screen; the player animates the chains."""
+    """Disks, chains and the player's buttons."""
 
     def __init__(self, state):
         self.state = state
-        self.disks = ColumnDataSource(name="disks")
-        self.links = ColumnDataSource(name=LINKS)
-        self.box = ColumnDataSource(name="box")
-        self.figure = self._figure()
-        self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
-        self.show(state.replay)
+        self.player = Player(
+            sizing_mode="stretch_width",
+            palettes=palettes(state.dark),
+            **{name: getattr(state, name) for name in (*SHARED, *FOLLOWED)},
+        )
+        self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(2, 10))
+        for name in SHARED:
+            self.player.param.watch(lambda event: state.param.update({event.name: event.new}), name)
+        self.player.param.watch(self._swing, "between")
+        state.param.watch(self._follow, [*SHARED, *FOLLOWED])
+        state.param.watch(self._show, ["replay", "exact", "between"])
+        state.param.watch(self._displace, "displacement")
+        state.param.watch(self._dress, ["dark"])
+        shown = ["colour", "thickness", "overlay", "exact", "dark", "replay"]
+        state.param.watch(self._explain, shown)
+        self._show()
+        self._explain()
 
     def panel(self):
-        """The plot and its legend."""
-        return pn.Column(
-            pn.pane.Bokeh(self.figure, sizing_mode="scale_width", aspect_ratio=1, margin=0),
-            self.legend,
-            sizing_mode="stretch_width",
-        )
+        """Player and legend."""
+        return pn.Column(self.player, self.legend, sizing_mode="stretch_width")
 
-    def show(self, replay):
-        """Take over geometry; the forces come with the frames."""
-        if replay is None:
+    def _swing(self, event):
+        self.state.between = None if event.new is None else tuple(event.new)
+
+    def _follow(self, *events):
+        self.player.param.update({event.name: event.new for event in events})
+
+    def _show(self, *events):
+        """What belongs together comes in one message."""
+        state = self.state
+        if state.replay is None:
             return
-        self.disks.data = _disk_columns(replay.disks)
-        self.links.data = _link_columns(replay.links)
-        self.box.data = _box_columns(replay.box)
-        x_low, x_high, y_low, y_high = replay.window
-        for axis, low, high in (("x_range", x_low, x_high), ("y_range", y_low, y_high)):
-            getattr(self.figure, axis).update(start=low, end=high, reset_start=low, reset_end=high)
-        sides = " × ".join(f"{side:.2f}" for side in replay.box)
-        self.legend.object = _legend(replay.summary["mu"], sides)
+        changes = {
+            "exact": exact_intervals(state.exact, state.replay),
+            "between": None if state.between is None else list(state.between),
+        }
+        if not events or any(event.name == "replay" for event in events):
+            changes["walk"] = frames(state.replay)
+        self.player.param.update(changes)
 
-    def _figure(self):
-        fig = plot(
-            None,
-            None,
-            None,
-            name=FIGURE,
-            # Equal ranges on a frame kept square: every other way lets the scale drift.
-            x_range=Range1d(0, 1),
-            y_range=Range1d(0, 1),
-            aspect_ratio=1,
-            sizing_mode="scale_width",
-            # Nothing may stand beside the frame, or it is no longer square.
-            toolbar_location=None,
-            min_border_left=0,
-            min_border_right=0,
-            min_border_top=0,
-            min_border_bottom=0,
-        )
-        fig.js_on_event("doubletap", CustomJS(args={"fig": fig}, code="fig.reset.emit()"))
-        fig.axis.visible = False
-        fig.grid.visible = False
-        fig.outline_line_alpha = 0
-        fig.toolbar.active_scroll = fig.toolbar.tools[1]
-        disks = fig.circle(
-            "x",
-            "y",
-            radius="r",
-            source=self.disks,
-            fill_color=DISK,
-            fill_alpha="alpha",
-            line_color=EDGE,
-            line_alpha="alpha",
-            line_width=0.8,
-        )
-        fig.rect(
-            "x",
-            "y",
-            "w",
-            "h",
-            source=self.box,
-            fill_alpha=0,
-            line_color=EDGE,
-            line_dash="dashed",
-        )
-        links = fig.segment(
-            "x0",
-            "y0",
-            "x1",
-            "y1",
-            source=self.links,
-            line_width="width",
-            line_cap="round",
-            line_color=linear_cmap("colour", diverging(), -1, 1, high_color=NEUTRAL),
-        )
-        about_grain = (
-            ("grain", "@grain (@kind)"),
-            ("radius", "@r{0.000}"),
-            ("contacts", "@contacts"),
-        )
-        about_contact = (
-            ("contact", "@i – @j"),
-            ("fₙ", "@f_n{0.000} ⟨fₙ⟩"),
-            ("fₜ", "@f_t{0.000} ⟨fₙ⟩"),
-            ("fₜ/(μ fₙ)", "@mobilised{0.00}"),
-            ("fₙ seen", "@low{0.000} … @high{0.000}"),
-        )
-        fig.add_tools(hover([disks], *about_grain), hover([links], *about_contact))
-        return fig
+    def _displace(self, event):
+        field = event.new
+        flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
+        self.player.displacement = flat
+
+    def _dress(self, event):
+        self.player.palettes = palettes(event.new)
+
+    def _explain(self, *events):
+        self.legend.object = legend(self.state)
 
 
-def _disk_columns(disks):
-    idle = disks.contacts == 0
+def exact_intervals(dataset, replay):
+    """Exact intervals of f_n in ⟨f_n⟩, for the contacts on screen."""
+    if dataset is None or not np.array_equal(dataset["backbone"].values, replay.backbone):
+        return {}
     return {
-        **{name: values for name, values in disks._asdict().items() if name != "image"},
-        "alpha": np.where(idle, FADED, OPAQUE) * np.where(disks.image, IMAGE, 1.0),
-        "kind": np.where(idle, "rattler", "backbone"),
+        name: (dataset[name].values[:, 0] / replay.force_scale).astype(np.float32)
+        for name in ("low", "high")
     }
 
 
-def _link_columns(links):
-    count = len(links.contact)
-    live = {name: np.zeros(count, dtype=np.float32) for name in LIVE}
-    whole = {"contact", "i", "j"}
-    geometry = {
-        name: values.astype(np.int32) if name in whole else values
-        for name, values in links._asdict().items()
+def legend(state):
+    """What width and colour mean just now, as HTML."""
+    if state.replay is None:
+        return ""
+    diverging = f"{BLUE},{GREY},{ORANGE}"
+    known = "exact" if state.exact is not None else "of all states"
+    bars = {
+        "mobilised": ("−1", diverging, "1"),
+        "extent": ("0", ",".join(EXTENT), f"98 % of all ({known})"),
+        "change": ("−⟨fₙ⟩", diverging, "+⟨fₙ⟩"),
+        "sign": ("less", f"{BLUE} 50%,{ORANGE} 50%", "more"),
     }
-    return geometry | live
+    low, stops, high = bars[state.colour]
+    bar = BAR.format(low=low, stops=stops, high=high)
+    if state.colour == "mobilised" and state.replay.summary["mu"] == 0:
+        bar = "(none at μ = 0)"
+    sides = [f"{side:.2f}" for side in state.replay.box if np.isfinite(side)]
+    return LEGEND.format(
+        width=WIDTHS[state.thickness],
+        colour=COLOURS[state.colour],
+        bar=bar,
+        marks=_marks(state.dark) if state.overlay else "",
+        sides=f" of {' × '.join(sides)} largest radii" if sides else "",
+    )
 
 
-def _box_columns(box):
-    """One rectangle; none where the box is open."""
-    sides = box[None] if np.all(np.isfinite(box)) else np.zeros((0, 2))
-    return {"x": sides[:, 0] / 2, "y": sides[:, 1] / 2, "w": sides[:, 0], "h": sides[:, 1]}
-
-
-def _legend(mu, sides):
-    if mu > 0:
-        bar = BAR.format(stops=",".join(diverging()[::32]))
-    else:
-        bar = "has no meaning at μ = 0"
-    return LEGEND.format(neutral=NEUTRAL, disk=DISK, faded=FADED, edge=EDGE, bar=bar, sides=sides)
+def _marks(dark):
+    colours = palettes(dark)["scene"]
+    strong = DOT.format(fill=colours["strong"], line="none", text="fₙ &gt; 2⟨fₙ⟩")
+    loose = DOT.format(fill="none", line=colours["loose"], text="ΔFₙ &gt; ⟨ΔFₙ⟩")
+    return f"<span>{strong}{loose}</span>"

@@ -1,10 +1,13 @@
-// Replays a random walk in the page. The frames come once; per frame a few numeric columns of the
-// plots are rewritten in place. `source.change.emit()` paints them without telling the server.
+// Replays states in the page. The frames come once; per painted frame the chains are drawn anew and a
+// few numeric columns of the plots beside are rewritten in place, without telling the server.
+// Between two states the straight line is shown: S is convex, so every point of it is admissible too.
 
 const WIDTH = 0.23 // of a chain that carries the mean normal force, in largest radii
-const LEAST = 0.35 // px, of the thinnest chain that is drawn
 const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
-const NEUTRAL = 2 // beyond the scale of mobilisation: the neutral colour, for μ = 0
+const STRONG = 2 // in ⟨fₙ⟩: contacts that Fig. 5 of the paper marks
+const PLOTS_MS = 66 // the plots beside are repainted no more often than this while playing
+const DIM = 0.35 // chains under the marks of Fig. 5
+const SWING = 2.2 // s, for the displacement field to go to and fro
 
 const ICONS = {
   restart: "M6 5h2v14H6zM20 5v14L9 12z",
@@ -12,212 +15,359 @@ const ICONS = {
   play: "M7 4v16l13-8z",
   pause: "M6 5h4v14H6zM14 5h4v14h-4z",
   step: "M6 5v14l10-7zM17 5h2v14h-2z",
+  pin: "M12 2a7 7 0 0 1 7 7c0 5-7 13-7 13S5 14 5 9a7 7 0 0 1 7-7zm0 4a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",
+  between: "M4 12l5-5v3h6V7l5 5-5 5v-3H9v3z",
 }
 
-/** What the walk has shown up to a frame: the range of every component, and η3. */
-class Seen {
-  constructor(walk) {
-    this.walk = walk
-    this.eta3 = new Float32Array(walk.number.length)
-    this.restart()
+/** The plots beside, found in the page by name. */
+class Plots {
+  constructor(document, onData) {
+    this.document = document
+    this.onData = onData
+    this.heard = new Set()
   }
 
-  restart() {
-    const size = this.walk.contacts
-    const filled = (value) => new Float32Array(size).fill(value)
-    this.last = 0 // the original network (frame 0) is no state of the walk
-    this.low = [filled(Infinity), filled(Infinity)]
-    this.high = [filled(-Infinity), filled(-Infinity)]
-    this.eta3[0] = 0
+  /** A source by name; new contents of it are heard from now on. */
+  find(name) {
+    const source = this.document.get_model_by_name(name)
+    if (source && !this.heard.has(source)) {
+      this.heard.add(source)
+      source.properties.data.change.connect(this.onData)
+    }
+    return source
   }
 
-  /** Going on costs one frame; going back begins anew. */
-  until(frame) {
-    if (frame < this.last) this.restart()
-    while (this.last < frame) this.add(++this.last)
-  }
-
-  add(frame) {
-    const { contacts, normal, tangential } = this.walk
-    let extent = 0, middle = 0
-    for (const [k, values] of [normal, tangential].entries()) {
-      const low = this.low[k], high = this.high[k], begin = frame * contacts
-      for (let c = 0; c < contacts; c++) {
-        const value = values[begin + c]
-        if (value < low[c]) low[c] = value
-        if (value > high[c]) high[c] = value
-        extent += high[c] - low[c]
-        middle += (high[c] + low[c]) / 2
+  show(walk, seen, frame, mixed, scale) {
+    const bars = this.find("bars"), growth = this.find("growth")
+    if (bars?.get_column("at")) this.showBars(bars, walk, seen, frame, mixed, scale)
+    if (growth?.get_column("state")?.length !== walk.number.length) return
+    for (const name of ["eta1", "eta2", "eta3"]) {
+      const column = growth.get_column(name), factor = name === "eta3" ? 0.15 : 1
+      for (let k = 0; k < column.length; k++) {
+        column[k] = k > 0 && k <= frame ? factor * seen[name][k] : NaN
       }
     }
-    this.eta3[frame] = extent / middle
+    growth.change.emit()
+  }
+
+  showBars(bars, walk, seen, frame, mixed, scale) {
+    const column = (name) => bars.get_column(name)
+    const at = column("at"), low = column("low"), high = column("high"), now = column("now")
+    for (let k = 0; k < now.length; k++) {
+      const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
+      now[k] = mixed.normal[c] / unit
+      low[k] = frame ? seen.low[0][c] / unit : now[k]
+      high[k] = frame ? seen.high[0][c] / unit : now[k]
+    }
+    bars.change.emit()
+  }
+
+  /** Points that go along a path: sources with the tags "follows", name of the path, name of tab. */
+  follow(tab, position, track) {
+    for (const model of this.document._all_models.values()) {
+      const [word, name, on] = model.tags ?? []
+      if (word !== "follows" || on !== tab) continue
+      const path = this.find(name)
+      if (!path) continue
+      const [a, b, part] = spot(track, position)
+      for (const column of Object.keys(model.data)) {
+        const along = path.get_column(column)
+        if (along) model.get_column(column)[0] = (1 - part) * along[a] + part * along[b]
+      }
+      model.change.emit()
+    }
   }
 }
 
-/** Writes one frame into the columns of the plots. */
-class Stage {
-  constructor(document) {
-    this.figure = document.get_model_by_name("packing")
-    this.links = document.get_model_by_name("links")
-    this.bars = document.get_model_by_name("bars")
-    this.growth = document.get_model_by_name("growth")
-  }
-
-  /** Whether the plots hold the geometry of this walk already. */
-  fits(walk) {
-    const rank = this.bars.get_column("rank"), state = this.growth.get_column("state")
-    return rank?.length === walk.contacts && state?.length === walk.number.length
-  }
-
-  show(walk, seen, frame) {
-    this.showChains(walk, seen, frame)
-    this.showBars(walk, seen, frame)
-    const eta3 = this.growth.get_column("eta3")
-    for (let k = 0; k < eta3.length; k++) eta3[k] = k <= frame ? seen.eta3[k] : NaN
-    this.growth.change.emit()
-  }
-
-  /** px per largest radius: chains keep their width on the grains when zoomed. */
-  scale() {
-    const { start, end } = this.figure.x_range
-    return this.figure.inner_width / (end - start)
-  }
-
-  showChains(walk, seen, frame) {
-    const column = (name) => this.links.get_column(name)
-    const contact = column("contact"), width = column("width"), colour = column("colour")
-    const f_n = column("f_n"), f_t = column("f_t"), mobilised = column("mobilised")
-    const low = column("low"), high = column("high")
-    const begin = frame * walk.contacts, unit = WIDTH * this.scale()
-    for (let k = 0; k < contact.length; k++) {
-      const c = contact[k], n = walk.normal[begin + c], t = walk.tangential[begin + c]
-      const carries = n > CARRYING
-      const part = carries && walk.mu > 0 ? Math.max(-1, Math.min(1, t / (walk.mu * n))) : 0
-      f_n[k] = n
-      f_t[k] = t
-      mobilised[k] = part
-      colour[k] = walk.mu > 0 ? part : NEUTRAL
-      width[k] = carries ? Math.max(LEAST, unit * n) : 0
-      low[k] = frame ? seen.low[0][c] : n
-      high[k] = frame ? seen.high[0][c] : n
-    }
-    this.links.change.emit()
-  }
-
-  showBars(walk, seen, frame) {
-    const low = this.bars.get_column("low"), high = this.bars.get_column("high")
-    const now = this.bars.get_column("now"), begin = frame * walk.contacts
-    for (let k = 0; k < now.length; k++) {
-      const c = walk.order[k]
-      now[k] = walk.normal[begin + c]
-      low[k] = frame ? seen.low[0][c] : now[k]
-      high[k] = frame ? seen.high[0][c] : now[k]
-    }
-    this.bars.change.emit()
-  }
+/** Frames before and after a position on the track, and the part of the way. */
+function spot(track, position) {
+  const k = Math.min(Math.floor(position), track.length - 2)
+  return track.length < 2 ? [track[0], track[0], 0] : [track[k], track[k + 1], position - k]
 }
 
 function icon(name) {
   return `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
 }
 
-function controls() {
+function layout(scene) {
   const root = document.createElement("div")
   const button = (name, title) =>
-    `<button class="${name}" title="${title}" aria-label="${title}">${icon(name)}</button>`
+    `<button type="button" class="${name}" title="${title}" aria-label="${title}">${icon(name)}</button>`
+  root.className = "player"
   root.innerHTML = `
     <div class="bar">
-      ${button("restart", "restart at the original network")}
-      ${button("back", "one state back")}
-      ${button("play", "play")}
-      ${button("step", "one state on")}
+      ${button("restart", "restart at the original network (Home)")}
+      ${button("back", "one state back (←)")}
+      ${button("play", "play (space)")}
+      ${button("step", "one state on (→)")}
       <input class="scrub" type="range" min="0" value="0" step="1" aria-label="state">
-      <label><input class="speed" type="range" min="0" max="6" step="0.25" value="3"
+      ${button("pin", "pin this state, to compare others with it")}
+      ${button("between", "to and fro between the pinned state and this one")}
+      <label title="speed"><input class="speed" type="range" min="0" max="6" step="0.25" value="3"
         aria-label="speed"><span class="rate"></span></label>
     </div>
     <div class="read">
       <span>state <b class="state"></b></span>
-      <span>η3 seen <b class="eta3"></b></span>
-      <span>from the centre <b class="distance"></b> ⟨fₙ⟩</span>
-      <span>residual <b class="residual"></b></span>
+      <span>η1 <b class="eta1"></b></span>
+      <span>η2 <b class="eta2"></b></span>
+      <span>η3 <b class="eta3"></b></span>
+      <span title="accepted states per attempt">accepted <b class="acceptance"></b></span>
+      <span title="distance from the centre of the states, in ⟨fₙ⟩">from centre <b class="distance"></b></span>
+      <span title="largest unbalance, in ⟨fₙ⟩">residual <b class="residual"></b></span>
     </div>`
+  root.append(scene.root)
+  const skips = root.appendChild(document.createElement("div"))
+  skips.className = "skips"
   const part = (name) => root.querySelector(`.${name}`)
   return { root, part }
 }
 
 /** Takes what the server sent, a Map or a plain object, as a plain object. */
-function plain(walk) {
-  return walk instanceof Map ? Object.fromEntries(walk) : walk
+function plain(given) {
+  return given instanceof Map ? Object.fromEntries(given) : given
+}
+
+function colourBins(name, walk, mixed, pinned, extent, bins, out) {
+  const last = bins - 1, { normal, tangential } = mixed
+  for (let c = 0; c < out.length; c++) {
+    let part = 0.5
+    if (name === "mobilised") part = normal[c] > CARRYING ? 0.5 + tangential[c] / (2 * walk.mu * normal[c]) : 0.5
+    else if (name === "extent") part = extent.most > 0 ? extent.normal[c] / extent.most : 0
+    else if (name === "change") part = 0.5 + (normal[c] - walk.normal[c]) / 2
+    else part = 0.5 + 0.5 * Math.sign(normal[c] - walk.normal[pinned + c])
+    out[c] = Math.round(last * Math.max(0, Math.min(1, part)))
+  }
 }
 
 export function render({ model, view }) {
-  const { root, part } = controls()
-  const stage = new Stage(view.model.document)
-  let loaded = null, walk = null, seen = null, frame = 0, playing = false, due = 0, before = 0
+  const scene = new Scene((contact) => { model.contact = contact })
+  const { root, part } = layout(scene)
+  const plots = new Plots(view.model.document, () => again())
+  let loaded = null, walk = null, seen = null, extent = null, mixed = null, style = null
+  let track = [0], position = 0, playing = false, direction = 1, before = 0, toldPlots = 0
 
   const speed = () => 2 ** Number(part("speed").value) // states per second
-  const last = () => walk.number.length - 1
+  const last = () => track.length - 1
+  const swinging = () => model.between !== null && model.between !== undefined
+  const frame = () => track[Math.floor(position + 1e-9)]
 
-  function show(to) {
-    frame = Math.max(0, Math.min(last(), to))
-    seen.until(frame)
-    stage.show(walk, seen, frame)
-    part("scrub").value = frame
-    const residual = walk.residual[frame]
-    part("state").textContent = frame ? `${walk.number[frame]} of ${walk.states}` : "original"
-    part("eta3").textContent = seen.eta3[frame].toFixed(3)
-    part("distance").textContent = walk.distance[frame].toFixed(2)
-    part("residual").textContent = Number.isFinite(residual) ? residual.toExponential(0) : "–"
+  // What is drawn
+
+  function mix() {
+    const [a, b, portion] = spot(track, position), size = walk.contacts
+    for (const name of ["normal", "tangential"]) {
+      const from = a * size, to = b * size, values = walk[name], out = mixed[name]
+      for (let c = 0; c < size; c++) {
+        out[c] = portion ? (1 - portion) * values[from + c] + portion * values[to + c] : values[from + c]
+      }
+    }
   }
+
+  function restyle() {
+    const size = walk.contacts, pinned = model.reference * size
+    for (let c = 0; c < size; c++) {
+      let value = mixed.normal[c]
+      if (model.thickness === "extent") value = extent.normal[c]
+      else if (model.thickness === "difference") value = Math.abs(value - walk.normal[pinned + c])
+      style.width[c] = value > CARRYING ? WIDTH * value : 0
+    }
+    const known = model.colour !== "mobilised" || walk.mu > 0
+    style.colours = known ? model.palettes[model.colour] : [model.palettes.neutral]
+    if (known) colourBins(model.colour, walk, mixed, pinned, extent, style.colours.length, style.bin)
+    else style.bin.fill(0)
+    style.alpha = model.overlay ? DIM : 1
+    style.strong = model.overlay ? walk.strong : null
+    style.loose = model.overlay ? extent.loose : null
+  }
+
+  function paint() {
+    mix()
+    restyle()
+    scene.drawChains(style)
+  }
+
+  function paintPlots(now = performance.now()) {
+    toldPlots = now
+    if (model.tab === "intervals") plots.show(walk, seen, seen.last, mixed, model.scale)
+    plots.follow(model.tab, position, track)
+  }
+
+  function read() {
+    const k = frame(), measured = seen.last
+    const form = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–")
+    const [a, b, portion] = spot(track, position)
+    const here = portion > 0.5 ? b : a
+    part("state").textContent = swinging()
+      ? `${Math.round(100 * portion)} % of the way from ${name(a)} to ${name(b)}`
+      : k ? `${walk.number[k]} of ${walk.states}` : "original"
+    for (const eta of ["eta1", "eta2", "eta3"]) part(eta).textContent = form(measured ? seen[eta][measured] : NaN, 3)
+    const accepted = seen.acceptance[measured]
+    part("acceptance").textContent = measured && accepted <= 1 ? `${Math.round(100 * accepted)} %` : "–"
+    part("distance").textContent = form(distance(a, b, portion), 2)
+    const residual = walk.residual[here]
+    part("residual").textContent = Number.isFinite(residual) ? residual.toExponential(0) : "–"
+    part("scrub").value = position
+    const { drawn, segments, outside, thin } = scene.counts ?? {}
+    if (segments) {
+      root.querySelector(".skips").textContent = `Drawn: ${drawn} of ${segments} segments ` +
+        `(${outside} out of view, ${thin} thinner than ${LEAST} px).`
+    }
+  }
+
+  const name = (k) => (k ? `state ${walk.number[k]}` : "the original")
+
+  /** From the centre: |(1−t) a + t b|² = (1−t) a² + t b² − t (1−t) |a − b|². */
+  function distance(a, b, t) {
+    const size = walk.contacts
+    let square = (1 - t) * walk.distance[a] ** 2 + t * walk.distance[b] ** 2
+    if (t > 0) {
+      let apart = 0
+      for (const values of [walk.normal, walk.tangential]) {
+        for (let c = 0; c < size; c++) apart += (values[a * size + c] - values[b * size + c]) ** 2
+      }
+      square -= t * (1 - t) * apart
+    }
+    return Math.sqrt(Math.max(0, square))
+  }
+
+  /** Go to a position on the track and paint it; tell: the server, too. */
+  function show(to, tell = true) {
+    position = Math.max(0, Math.min(last(), to))
+    if (!swinging()) seen.until(frame())
+    paint()
+    paintPlots()
+    read()
+    if (tell) model.frame = frame()
+  }
+
+  // Playing
 
   function play(on) {
     playing = on && walk !== null
     part("play").innerHTML = icon(playing ? "pause" : "play")
-    part("play").title = playing ? "pause" : "play"
-    part("play").setAttribute("aria-label", part("play").title)
-    if (!playing) return
-    if (frame === last()) show(0)
-    due = 0
+    part("play").title = `${playing ? "pause" : "play"} (space)`
+    part("play").setAttribute("aria-label", playing ? "pause" : "play")
+    root.classList.toggle("playing", playing)
+    if (!playing) return walk && (model.frame = frame())
+    if (position >= last() && !swinging()) show(0, false)
+    direction = 1
     before = performance.now()
     requestAnimationFrame(tick)
   }
 
   function tick(now) {
     if (!playing || !root.isConnected) return
-    due += (Math.max(0, now - before) / 1000) * speed()
+    position += (direction * Math.max(0, now - before) * speed()) / (swinging() ? 8000 : 1000)
     before = now
-    const steps = Math.floor(due)
-    due -= steps
-    if (steps > 0) show(frame + steps)
-    if (frame === last()) play(false)
-    else requestAnimationFrame(tick)
+    if (swinging() && (position >= last() || position <= 0)) direction = position <= 0 ? 1 : -1
+    position = Math.max(0, Math.min(last(), position))
+    if (!swinging()) seen.until(frame())
+    paint()
+    if (now - toldPlots > PLOTS_MS) {
+      paintPlots(now)
+      read()
+    }
+    if (!swinging() && position >= last()) {
+      play(false)
+      show(last())
+    } else requestAnimationFrame(tick)
   }
 
-  // Plots and frames come in separate messages, and the frames of one walk on the contacts of
-  // another would be nonsense: begin when both are there.
+  // What the server tells
+
   function load() {
-    const given = model.walk, asked = plain(given)
-    if (given === loaded || !asked.contacts || !stage.fits(asked)) return
+    const given = model.walk
+    if (given === loaded || !plain(given).contacts) return
     loaded = given
     const wasPlaying = playing
     playing = false
-    walk = asked
+    walk = plain(given)
+    const size = walk.contacts
     seen = new Seen(walk)
-    part("scrub").max = last()
-    show(0)
+    mixed = { normal: new Float32Array(size), tangential: new Float32Array(size) }
+    style = { width: new Float32Array(size), bin: new Int16Array(size) }
+    walk.strong = walk.normal.subarray(0, size).map((value) => value > STRONG)
+    scene.palette = plain(model.palettes).scene
+    scene.selected = model.contact ?? null
+    loadExact()
+    retrack()
+    scene.show(walk)
+    scene.resize()
+    scene.repaint()
+    show(swinging() ? 0 : model.frame, false)
     if (wasPlaying) requestAnimationFrame(() => play(true))
   }
+
+  /** Lengths of the intervals of f_n: exact ones where known, else those of all states. */
+  function loadExact() {
+    const exact = plain(model.exact ?? {}), size = walk.contacts
+    const { low, high } = exact.low?.length === size ? exact : walk
+    const normal = new Float32Array(size)
+    for (let c = 0; c < size; c++) normal[c] = high[c] - low[c]
+    const mean = normal.reduce((sum, value) => sum + value, 0) / size
+    const most = Float32Array.from(normal).sort()[Math.floor(0.98 * (size - 1))]
+    extent = { normal, most, low, high, loose: normal.map((value) => value > mean), exact: low === exact.low }
+  }
+
+  function retrack() {
+    track = swinging() ? [...model.between] : Array.from(walk.number.keys())
+    position = 0
+    const scrub = part("scrub")
+    scrub.max = last()
+    scrub.step = swinging() ? 0.01 : 1
+    part("between").classList.toggle("on", swinging())
+    part("between").disabled = !swinging() && walk.number.length < 2
+  }
+
+  const tooltip = {
+    contact(k) {
+      const c = walk.contact[k], n = mixed.normal[c], t = mixed.tangential[c]
+      const mobilised = walk.mu > 0 && n > CARRYING ? (t / (walk.mu * n)).toFixed(2) : "–"
+      const told = (low, high) => `${low.toFixed(3)} … ${high.toFixed(3)}`
+      const rows = [
+        ["contact", `${walk.backbone[c]} (grains ${walk.i[k]} – ${walk.j[k]})`],
+        ["fₙ / ⟨fₙ⟩", n.toFixed(3)],
+        ["fₜ / ⟨fₙ⟩", t.toFixed(3)],
+        ["fₜ/(μ fₙ)", mobilised],
+        ["original fₙ", walk.normal[c].toFixed(3)],
+      ]
+      if (seen.last) rows.push(["fₙ seen", told(seen.low[0][c], seen.high[0][c])])
+      if (extent.exact) rows.push(["fₙ exact", told(extent.low[c], extent.high[c])])
+      return rows
+    },
+    grain(k) {
+      return [
+        ["grain", `${walk.grain[k]}${walk.kind[k] % 2 ? " (rattler)" : ""}`],
+        ["radius", walk.r[k].toFixed(3)],
+        ["contacts", walk.touching[k]],
+      ]
+    },
+  }
+  scene.describe = tooltip
+
+  // Widgets and keys
 
   function tellRate() {
     const rate = speed()
     part("rate").textContent = `${rate < 10 ? rate.toFixed(1) : rate.toFixed(0)} states/s`
   }
 
-  const onClick = (name, action) => part(name).addEventListener("click", () => walk && action())
-  onClick("play", () => play(!playing))
-  onClick("step", () => { play(false); show(frame + 1) })
-  onClick("back", () => { play(false); show(frame - 1) })
-  onClick("restart", () => { play(false); show(0) })
+  const halt = (action) => () => { if (walk) { play(false); action() } }
+  const actions = {
+    play: () => walk && play(!playing),
+    step: halt(() => show(Math.floor(position + 1e-9) + (swinging() ? 0.05 : 1))),
+    back: halt(() => show(Math.ceil(position - 1e-9) - (swinging() ? 0.05 : 1))),
+    restart: halt(() => show(0)),
+    pin: () => walk && (model.reference = frame()),
+    between: () => {
+      if (!walk) return
+      if (swinging()) return (model.between = null)
+      const here = frame() || last()
+      model.between = [model.reference === here ? 0 : model.reference, here]
+      play(true)
+    },
+  }
+  for (const [button, action] of Object.entries(actions)) part(button).addEventListener("click", action)
   part("scrub").addEventListener("input", (event) => {
     play(false)
     if (walk) show(Number(event.target.value))
@@ -225,13 +375,51 @@ export function render({ model, view }) {
   part("speed").addEventListener("input", tellRate)
   tellRate()
 
-  // Chains keep their width relative to the grains when the plot is zoomed or resized.
-  const rescale = () => walk && !playing && stage.fits(walk) && show(frame)
-  stage.figure.x_range.change.connect(rescale)
-  stage.figure.properties.inner_width.change.connect(rescale)
+  function key(event) {
+    if (!root.isConnected) return window.removeEventListener("keydown", key)
+    const at = event.composedPath()[0]
+    const typing = at.isContentEditable || /^(TEXTAREA|SELECT)$/.test(at.tagName) ||
+      (at.tagName === "INPUT" && at.type !== "range" && at.type !== "checkbox")
+    if (typing || event.ctrlKey || event.metaKey || event.altKey) return
+    const pressing = at.tagName === "BUTTON" || at.role === "combobox" || at.role === "tab"
+    const keys = { ArrowRight: "step", ArrowLeft: "back", Home: "restart" }
+    if (event.key === " " && !pressing) actions.play()
+    else if (keys[event.key] && at.type !== "range" && at.role !== "tab") actions[keys[event.key]]()
+    else if (/^[1-9]$/.test(event.key)) model.send_msg({ tab: Number(event.key) })
+    else return
+    event.preventDefault()
+  }
+  window.addEventListener("keydown", key)
 
+  // A displacement field goes to and fro; the largest displacement is half a largest radius.
+  function swing(now) {
+    if (!scene.offset || !root.isConnected) return
+    scene.offset.amplitude = scene.offset.most * Math.sin((2 * Math.PI * now) / (1000 * SWING))
+    scene.repaint()
+    requestAnimationFrame(swing)
+  }
+  function displace() {
+    const field = model.displacement, was = scene.offset
+    let most = 0
+    for (let g = 0; g < (field?.length ?? 0); g += 2) most = Math.max(most, Math.hypot(field[g], field[g + 1]))
+    scene.offset = most > 0 ? { field, most: 0.5 / most, amplitude: 0 } : null
+    if (scene.offset && !was) requestAnimationFrame(swing)
+    if (!scene.offset && walk) scene.changed()
+  }
+
+  const again = () => { if (walk && !playing) show(position, false) }
   model.on("walk", load)
-  for (const source of [stage.bars, stage.growth]) source.properties.data.change.connect(load)
+  model.on("exact", () => { if (walk) { loadExact(); again() } })
+  model.on("between", () => { if (walk) { const k = frame(); retrack(); show(swinging() ? 0 : k) } })
+  model.on("frame", () => { if (walk && !playing && !swinging() && model.frame !== frame()) show(model.frame, false) })
+  model.on("palettes", () => { scene.palette = plain(model.palettes).scene; scene.changed(); again() })
+  model.on("contact", () => { scene.selected = model.contact ?? null; if (style) scene.drawMarks(style) })
+  model.on("displacement", displace)
+  for (const name of ["colour", "thickness", "overlay", "reference", "scale", "tab"]) model.on(name, again)
+  const observer = new ResizeObserver(() => scene.resize())
+  observer.observe(scene.root)
+  model.on("remove", () => { observer.disconnect(); window.removeEventListener("keydown", key) })
   load()
+  displace()
   return root
 }

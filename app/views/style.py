@@ -5,27 +5,59 @@ from bokeh.plotting import figure
 
 # Blue and orange are told apart with every common colour blindness; the middle is grey, not white,
 # so that contacts without friction are seen on pale disks, by day and by night.
-BLUE, GREY, ORANGE = (20, 100, 200), (116, 120, 128), (232, 113, 10)
-NEUTRAL = "#4a5563"  # of force chains at μ = 0, where mobilisation means nothing
-# One half-transparent colour is pale by day and dark by night; rattlers have the same, thinner.
-DISK, EDGE = "#8ba0bb", "#8fa1b5"
-OPAQUE, FADED, IMAGE = 0.45, 0.14, 0.4  # backbone, rattlers; factor for images
+BLUE, GREY, ORANGE = "#1464c8", "#747880", "#e8710a"
+NEUTRAL = (
+    "#4a5563",
+    "#aab4c2",
+)  # by day, by night: chains at μ = 0, where mobilisation means nothing
+# Cividis, which reads the same with every common colour blindness; its two ends would be lost on a
+# dark and on a pale ground.
+EXTENT = ("#16407a", "#3c5a80", "#5f6f7d", "#7f8478", "#a39a6c", "#c6b159", "#e3c53f")
+EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
-PALE, DOT, ORIGINAL = "#7fb2e5", "#b5236b", "#e69f00"
+PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
 
-COLOURS = 255
-
-
-def diverging():
-    """The palette of mobilisation −1 … 1: blue, grey, orange, straight lines in between."""
-    half = COLOURS // 2
-    down = [_mix(BLUE, GREY, k / half) for k in range(half)]
-    up = [_mix(GREY, ORANGE, k / half) for k in range(half + 1)]
-    return down + up
+COLOURS = 33
 
 
-def _mix(a, b, part):
-    return "#" + "".join(f"{round(p + (q - p) * part):02x}" for p, q in zip(a, b, strict=True))
+def ramp(*stops, count=COLOURS):
+    """Colours "#rrggbb" along the stops, straight lines in between."""
+    pieces = len(stops) - 1
+    return [_mix(stops, k * pieces / (count - 1)) for k in range(count)]
+
+
+def _mix(stops, at):
+    k = min(int(at), len(stops) - 2)
+    pairs = zip(bytes.fromhex(stops[k][1:]), bytes.fromhex(stops[k + 1][1:]), strict=True)
+    return "#" + "".join(f"{round(a + (b - a) * (at - k)):02x}" for a, b in pairs)
+
+
+def palettes(dark):
+    """Colours of the packing: of the chains by what they show, and of everything else in it."""
+    diverging = ramp(BLUE, GREY, ORANGE)
+    body, line = ((150, 172, 200), 0.5) if dark else ((139, 160, 187), 0.75)
+    fills = (0.34, 0.12, 0.16, 0.06) if dark else (0.42, 0.14, 0.2, 0.07)
+    disks = [
+        {"fill": _faded(body, part), "line": _faded(body, line * part / 0.42)} for part in fills
+    ]
+    return {
+        "mobilised": diverging,
+        "extent": ramp(*EXTENT),
+        "change": diverging,
+        "sign": [BLUE, GREY, ORANGE],
+        "neutral": NEUTRAL[dark],
+        "scene": {
+            "disks": disks,
+            "edge": EDGE,
+            "strong": "#ffffff" if dark else "#101720",
+            "loose": "#ff5ca8" if dark else DOT,
+            "selected": "#ff5ca8" if dark else DOT,
+        },
+    }
+
+
+def _faded(colour, part):
+    return f"rgba({', '.join(map(str, colour))}, {min(1.0, part):.3f})"
 
 
 def plot(title, x, y, **options):

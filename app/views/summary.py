@@ -26,43 +26,51 @@ TILES = (
 def numbers(summary):
     """The tiles and the line below them, as HTML."""
     values = summary | {"scaled_eta3": 0.15 * summary["eta3"]}
-    texts = {key: format(values[key], form) for _, key, form, _ in TILES}
-    if summary["skipped"]:
-        texts["acceptance"] = "–"  # nothing was tried
+    if summary.get("skipped"):
+        values["acceptance"] = None  # nothing was tried
+    texts = {key: _text(values.get(key), form) for _, key, form, _ in TILES}
     tiles = "".join(
         TILE.format(name=name, value=texts[key], title=title) for name, key, _, title in TILES
     )
     return f'<div class="tiles">{tiles}</div><div class="rest">{left_out(summary)}</div>'
 
 
+def _text(value, form):
+    return "–" if value is None else format(value, form)
+
+
+LEFT_OUT = {
+    "rattlers": "rattlers",
+    "unloaded_contacts": "unloaded contacts",
+    "tangential_unknowns": "tangential unknowns",
+    "skipped": "states without relaxation",
+}
+
+
 def left_out(summary):
     """One line on work that was skipped and attempts that failed."""
-    counts = (
-        f"{summary['rattlers']} rattlers",
-        f"{summary['unloaded_contacts']} unloaded contacts",
-        f"{summary['tangential_unknowns']} tangential unknowns",
-        f"{summary['skipped']} states without relaxation",
-    )
-    kept = ""
+    counts = [f"{summary[key]} {words}" for key, words in LEFT_OUT.items() if summary.get(key)]
+    line = f"Left out: {', '.join(counts) or 'nothing'}."
+    if summary.get("rejected") or summary.get("unconverged"):
+        line += f" Failed: {summary['rejected']} rejected, {summary['unconverged']} unconverged."
     if summary["kept"] < summary["states"]:
-        kept = f" Shown: {summary['kept']} evenly spaced of {summary['states']} states."
-    return (
-        f"Left out: {', '.join(counts)}. Failed: {summary['rejected']} rejected, "
-        f"{summary['unconverged']} unconverged.{kept}"
-    )
+        line += f" Shown: {summary['kept']} evenly spaced of {summary['states']} states."
+    return line
 
 
 class SummaryView:
     """The numbers of the replay on screen."""
 
     def __init__(self, state):
+        self.state = state
         self.pane = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
-        self.show(state.replay)
+        state.param.watch(self._show, "replay")
+        self._show()
 
     def panel(self):
         """The tiles."""
         return self.pane
 
-    def show(self, replay):
-        """Take over the numbers."""
+    def _show(self, *events):
+        replay = self.state.replay
         self.pane.object = numbers(replay.summary) if replay is not None else ""

@@ -1,0 +1,190 @@
+"""What is asked for, and its three spellings: words on screen, a link, a command line."""
+
+import shlex
+from typing import NamedTuple
+from urllib.parse import parse_qsl, urlencode
+
+from granforce import study
+from granforce.records import InputError, friction
+
+# Names on screen of study.RELAXATIONS; the first is what a new walk takes unless told otherwise.
+SOLVERS = {
+    "accelerated": "nearest admissible state",
+    "nearest": "nearest admissible state, by PIQP",
+    "gauss_seidel": "Gauss–Seidel, finished exactly",
+    "gauss_seidel_only": "paper's plain Gauss–Seidel",
+}
+KINDS = {"walk": "the paper's random walk", "uniform": "uniform in S"}
+# Command-line options of a packing, apart from N, μ and seed.
+OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps")
+# Stored states take at most about this much; measures are those of all states anyway.
+KEPT_BYTES = 64e6
+
+
+class Selection(NamedTuple):
+    """States asked for: of which packing, at which friction, from which source."""
+
+    packing: dict  # parameters of the packing, as for study.get_packing
+    mu: float  # friction coefficient of the ensemble
+    kind: str = "walk"  # one of KINDS
+    relax: str = "accelerated"  # of the walk
+    states: int = 200
+    seed: int = 0  # of the walk or sample
+
+    @property
+    def imported(self):
+        """Whether the packing comes from elsewhere, so that none can be made like it."""
+        return "imported" in self.packing
+
+    @property
+    def same_mu(self):
+        """Whether packing and ensemble have the same friction."""
+        return self.packing["mu"] == self.mu
+
+    def at(self, mu):
+        """The same at another μ; the packing's friction goes along if it was the same."""
+        mu = friction(mu)
+        if self.imported or not self.same_mu:
+            return self._replace(mu=mu)
+        return self._replace(mu=mu, packing=self.packing | {"mu": mu})
+
+    def parameters(self):
+        """Parameters of the walk or sample, as for study.get_walk or study.get_uniform."""
+        grains = self.packing.get("n", 0)
+        keep = None if not grains else max(1, int(KEPT_BYTES / (16 * 2 * grains)))
+        common = {"mu": self.mu, "keep": keep}
+        if self.kind == "uniform":
+            return study.uniform_parameters(self.packing, self.states, self.seed, **common)
+        return study.walk_parameters(
+            self.packing, self.states, self.seed, relax=self.relax, **common
+        )
+
+    def names(self, other):
+        """Whether other is the same but for details that this kind of states does not have."""
+        return _plain(self) == _plain(other)
+
+
+def _plain(selection):
+    return selection if selection.kind == "walk" else selection._replace(relax="")
+
+
+def selected(kind, parameters):
+    """The Selection that these parameters of a walk or sample belong to."""
+    packing, mu = parameters["packing"], float(parameters["mu"])
+    relax = parameters.get("relax", "accelerated")
+    return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"])
+
+
+def select(n=400, mu=0.1, packing_seed=1, packed_mu=None, **others):
+    """A Selection of a packing made here; InputError for what cannot be.
+
+    packed_mu: friction during compaction, by default that of the ensemble. others: fields of
+    Selection.
+    """
+    mu = friction(mu)
+    packing = study.packing_parameters(n, mu if packed_mu is None else packed_mu, packing_seed)
+    if packing["n"] < 3:
+        raise InputError(f"a packing needs at least 3 disks, got {n}")
+    return Selection(packing, mu, **others)
+
+
+def _unusual(packing):
+    usual = study.packing_parameters(packing["n"], packing["mu"], packing["seed"])
+    return {name: packing[name] for name in OPTIONS if packing[name] != usual[name]}
+
+
+def series(selection, chains=1):
+    """Everything but μ, in words: selections of one series form one η(μ)."""
+    packing = selection.packing
+    if selection.imported:
+        words = [f"imported {packing['imported'][:8]}"]
+    else:
+        words = [f"N = {packing['n']}", f"seed {packing['seed']}"]
+        words += [f"{name} {value}" for name, value in _unusual(packing).items()]
+        if not selection.same_mu:
+            words.append(f"packed at μ = {packing['mu']:g}")
+    words.append(f"{selection.states} states")
+    if selection.seed != 0:
+        words.append(f"walk seed {selection.seed}")
+    if chains > 1:
+        words.append(f"{chains} chains")
+    words.append(SOLVERS[selection.relax] if selection.kind == "walk" else KINDS[selection.kind])
+    return ", ".join(words)
+
+
+def command(selection):
+    """The command that makes the same states in a terminal."""
+    words = ["granforce", selection.kind]
+    packing = selection.packing
+    if selection.imported:
+        words += ["--packing", "PACKING.npz"]
+    else:
+        words += ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
+        for name, value in _unusual(packing).items():
+            words += [f"--{name.replace('_', '-')}", value]
+    if not selection.same_mu:
+        words += ["--ensemble-mu", f"{selection.mu:.9g}"]
+    words += ["--states", selection.states]
+    if selection.kind == "walk":
+        words += ["--walk-seed", selection.seed, "--relax", selection.relax]
+    elif selection.seed:
+        words += ["--walk-seed", selection.seed]
+    return shlex.join(str(word) for word in words)
+
+
+def link(selection, view):
+    """The query of an address that reopens this selection, seen as `view` {name: plain value}."""
+    packing = selection.packing
+    if selection.imported:
+        given = {"packing": packing["imported"]}
+    else:
+        given = {"n": packing["n"], "seed": packing["seed"], **_unusual(packing)}
+    given["mu"] = f"{selection.mu:.9g}"
+    if not selection.same_mu:
+        given["packed"] = f"{packing['mu']:.9g}"
+    given |= {"source": selection.kind, "states": selection.states}
+    if selection.kind == "walk":
+        given["relax"] = selection.relax
+    if selection.seed:
+        given["walkseed"] = selection.seed
+    return urlencode(given | view)
+
+
+def read_link(query):
+    """(Selection or None, {name: text} of everything else) of a link's query.
+
+    InputError for a selection that cannot be; a link without "mu" selects nothing.
+    """
+    given = dict(parse_qsl(query.lstrip("?")))
+    if "mu" not in given:
+        return None, given
+    try:
+        return _read_selection(given), given
+    except (ValueError, TypeError) as error:
+        raise InputError(f"this link cannot be read: {error}") from None
+
+
+def _read_selection(given):
+    kind, relax = given.pop("source", "walk"), given.pop("relax", "accelerated")
+    if kind not in KINDS or relax not in SOLVERS:
+        raise InputError("this link names an unknown source of states")
+    mu = friction(given.pop("mu"))
+    packed = friction(given.pop("packed", mu))
+    rest = {"states": int(given.pop("states", 200)), "seed": int(given.pop("walkseed", 0))}
+    if "packing" in given:
+        packing = {"imported": given.pop("packing"), "mu": packed}
+        return Selection(packing, mu, kind, relax, **rest)
+    made = select(
+        int(given.pop("n", 400)),
+        mu,
+        int(given.pop("seed", 1)),
+        packed,
+        kind=kind,
+        relax=relax,
+        **rest,
+    )
+    casts = {"radii": str, "sweeps": int}
+    options = {name: casts.get(name, float)(given.pop(name)) for name in OPTIONS if name in given}
+    if ":" not in options.get("radii", ":"):
+        raise InputError("radii in a link are named distributions")
+    return made._replace(packing=made.packing | options)

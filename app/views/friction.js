@@ -1,0 +1,76 @@
+// Slider for μ on a logarithmic scale, with a place for 0 and a tick for every stored value.
+
+const SNAP = 0.07 // decades within which the thumb jumps to a stored value
+
+const place = (mu, least) => (mu > 0 ? Math.max(least, Math.log10(mu)) : least)
+const rounded = (mu) => Number(mu.toPrecision(2))
+
+export function render({ model }) {
+  const root = document.createElement("div")
+  root.className = "friction"
+  root.innerHTML = `
+    <div class="head"><label for="mu">Friction coefficient μ</label>
+      <input id="mu" class="typed" inputmode="decimal" aria-label="μ"></div>
+    <div class="rail"><div class="ticks"></div>
+      <input type="range" step="0.01" aria-label="logarithm of μ"></div>
+    <div class="scale"></div>`
+  const part = (name) => root.querySelector(`.${name}`)
+  const range = root.querySelector("[type=range]"), typed = part("typed")
+
+  const along = (at) => `calc(8px + (100% - 16px) * ${(at - model.least) / (model.most - model.least)})`
+  const value = (at) => (at <= model.least + SNAP ? 0 : rounded(10 ** at))
+
+  function snapped(at) {
+    let best = null
+    for (const mu of model.stored) {
+      const away = Math.abs(place(mu, model.least) - at)
+      if (away < SNAP && (best === null || away < Math.abs(place(best, model.least) - at))) best = mu
+    }
+    return best
+  }
+
+  function draw() {
+    range.min = model.least
+    range.max = model.most
+    part("ticks").innerHTML = model.stored
+      .map((mu) => `<i style="left:${along(place(mu, model.least))}"></i>`).join("")
+    let marks = `<span style="left:${along(model.least)}">0</span>`
+    for (let k = Math.ceil(model.least + 0.4); k <= model.most; k++) {
+      marks += `<span style="left:${along(k)}">${Number((10 ** k).toPrecision(1))}</span>`
+    }
+    part("scale").innerHTML = marks
+    follow()
+  }
+
+  function follow() {
+    range.value = place(model.mu, model.least)
+    typed.value = String(Number(model.mu.toPrecision(4)))
+  }
+
+  // A stored value is shown while the thumb still moves; others are asked for when it is let go.
+  range.addEventListener("input", () => {
+    const at = Number(range.value), stored = snapped(at)
+    typed.value = String(stored ?? value(at))
+    if (stored !== null && stored !== model.mu) model.mu = stored
+  })
+  range.addEventListener("change", () => {
+    const at = Number(range.value)
+    model.mu = snapped(at) ?? value(at)
+    follow()
+  })
+  range.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key]
+    if (!step || !model.stored.length) return
+    const sorted = [...model.stored].sort((a, b) => a - b)
+    const next = step > 0 ? sorted.find((mu) => mu > model.mu) : sorted.findLast((mu) => mu < model.mu)
+    if (next !== undefined) model.mu = next
+    event.preventDefault()
+    event.stopPropagation()
+  })
+  typed.addEventListener("change", () => { model.send_msg({ typed: typed.value }) })
+
+  for (const name of ["least", "most", "stored"]) model.on(name, draw)
+  model.on("mu", follow)
+  draw()
+  return root
+}

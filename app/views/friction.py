@@ -1,0 +1,32 @@
+"""Slider for the friction coefficient."""
+
+from pathlib import Path
+from typing import ClassVar
+
+import param
+from panel.custom import JSComponent
+
+from ..data import LEAST_PLACE
+
+MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
+
+
+class FrictionSlider(JSComponent):
+    """μ on a logarithmic scale; jumps to values in `stored`; see friction.js."""
+
+    mu = param.Number(default=0.1)
+    stored = param.List(default=[], doc="values of μ that need no computing")
+    least = param.Number(default=LEAST_PLACE, constant=True, doc="stands for μ = 0")
+    most = param.Number(default=MOST_PLACE, constant=True)
+
+    _esm = Path(__file__).with_name("friction.js")
+    _stylesheets: ClassVar = [Path(__file__).with_name("friction.css")]
+
+    def __init__(self, on_typed=None, **params):
+        """on_typed(text): what to do with a value that was typed, sensible or not."""
+        super().__init__(**params)
+        self._on_typed = on_typed
+
+    def _handle_msg(self, message):
+        if self._on_typed is not None:
+            self._on_typed(str(message.get("typed", "")))

@@ -1,0 +1,362 @@
+// The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
+// chains only. One unit of length is the same number of pixels in x and y by construction.
+
+const LEAST = 0.1 // px; thinner chains are not drawn
+const FEW = 2500 // chains drawn one by one, with round ends; more are gathered by colour
+const GRAB = 6 // px from a chain that still mean it
+const ZOOM = [0.02, 4] // least and largest part of the whole view
+
+class Scene {
+  constructor(onSelect) {
+    this.root = document.createElement("div")
+    this.root.className = "scene"
+    this.root.tabIndex = 0
+    this.root.setAttribute("role", "img")
+    this.root.setAttribute("aria-label", "packing with its force chains")
+    const layer = () => this.root.appendChild(document.createElement("canvas")).getContext("2d")
+    this.disks = layer()
+    this.chains = layer()
+    this.marks = layer()
+    this.tip = this.root.appendChild(document.createElement("div"))
+    this.tip.className = "tip"
+    this.root.scene = this
+    this.onSelect = onSelect
+    this.size = 0
+    this.painted = 0
+    this.selected = null
+    this.offset = null
+    this.listen()
+  }
+
+  // Geometry and view
+
+  show(geometry) {
+    const moved = !this.geometry || `${geometry.window}` !== `${this.geometry.window}`
+    this.geometry = geometry
+    const { x0 } = geometry
+    this.width = new Float32Array(x0.length)
+    this.bin = new Int16Array(x0.length)
+    if (moved) this.reset(false)
+  }
+
+  reset(paint = true) {
+    const [left, right, bottom, top] = this.geometry.window
+    this.view = { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
+    if (paint) this.changed()
+  }
+
+  /** px of the layout per unit of length, along x and y alike. */
+  get scale() { return this.size / (2 * this.view.half) }
+
+  toPixel(x, y) {
+    const { scale, view, size } = this
+    return [size / 2 + (x - view.x) * scale, size / 2 - (y - view.y) * scale]
+  }
+
+  toPlace(px, py) {
+    const { scale, view, size } = this
+    return [view.x + (px - size / 2) / scale, view.y - (py - size / 2) / scale]
+  }
+
+  resize() {
+    const size = this.root.clientWidth, ratio = window.devicePixelRatio || 1
+    if (!size || (size === this.size && ratio === this.ratio)) return
+    this.size = size
+    this.ratio = ratio
+    for (const { canvas } of [this.disks, this.chains, this.marks]) {
+      canvas.width = canvas.height = Math.round(size * ratio)
+    }
+    if (this.geometry) this.changed()
+  }
+
+  /** After pan, zoom, resize or a new theme: everything, once per painted frame. */
+  changed() {
+    this.stale = true
+    if (this.asked) return
+    this.asked = requestAnimationFrame(() => {
+      this.asked = 0
+      if (this.geometry && this.size) this.repaint()
+    })
+  }
+
+  repaint() {
+    this.drawDisks()
+    this.stale = false
+    if (this.style) this.drawChains(this.style)
+  }
+
+  // Painting
+
+  begin(context) {
+    const { ratio, scale, view, size } = this
+    context.setTransform(1, 0, 0, 1, 0, 0)
+    context.clearRect(0, 0, context.canvas.width, context.canvas.height)
+    const s = ratio * scale
+    const middle = (ratio * size) / 2
+    context.setTransform(s, 0, 0, -s, middle - s * view.x, middle + s * view.y)
+  }
+
+  drawDisks() {
+    const { x, y, r, kind, grain } = this.geometry, { disks, view, scale } = this
+    this.begin(disks)
+    this.drawBox(disks)
+    const near = view.half
+    for (const [number, { fill, line }] of this.palette.disks.entries()) {
+      disks.beginPath()
+      for (let k = 0; k < x.length; k++) {
+        if (kind[k] !== number) continue
+        const reach = near + r[k]
+        const px = x[k] + this.shift(grain[k], 0), py = y[k] + this.shift(grain[k], 1)
+        if (Math.abs(px - view.x) > reach || Math.abs(py - view.y) > reach) continue
+        disks.moveTo(px + r[k], py)
+        disks.arc(px, py, r[k], 0, 2 * Math.PI)
+      }
+      disks.fillStyle = fill
+      disks.fill()
+      if (scale < 3) continue // outlines of disks of a few pixels would be all that is seen
+      disks.lineWidth = 0.8 / scale
+      disks.strokeStyle = line
+      disks.stroke()
+    }
+  }
+
+  drawBox(context) {
+    const [width, height] = this.geometry.box
+    if (width < 0 || height < 0) return // open
+    context.setLineDash([4 / this.scale, 4 / this.scale])
+    context.lineWidth = 1 / this.scale
+    context.strokeStyle = this.palette.edge
+    context.strokeRect(0, 0, width, height)
+    context.setLineDash([])
+  }
+
+  /** How far a grain is displaced at this moment of an animated displacement field. */
+  shift(grain, axis) {
+    return this.offset ? this.offset.amplitude * this.offset.field[2 * grain + axis] : 0
+  }
+
+  /** style: per contact `width` (units) and `bin` of `colours`; marks to set; alpha. */
+  drawChains(style) {
+    this.style = style
+    if (!this.size || this.stale) return this.stale && this.changed()
+    const { x0, y0, x1, y1, contact, i, j } = this.geometry
+    const { chains, view, scale, width, bin } = this
+    const least = LEAST / scale, order = this.order ??= []
+    let drawn = 0, outside = 0, thin = 0
+    for (let k = 0; k < contact.length; k++) {
+      const w = style.width[contact[k]]
+      width[k] = 0
+      if (w < least) { thin++; continue }
+      const left = view.x - view.half - w, right = view.x + view.half + w
+      const low = view.y - view.half - w, high = view.y + view.half + w
+      if ((x0[k] < left && x1[k] < left) || (x0[k] > right && x1[k] > right) ||
+          (y0[k] < low && y1[k] < low) || (y0[k] > high && y1[k] > high)) { outside++; continue }
+      width[k] = w
+      bin[k] = style.bin[contact[k]]
+      order[drawn++] = k
+    }
+    this.counts = { segments: contact.length, drawn, outside, thin }
+    this.begin(chains)
+    chains.globalAlpha = style.alpha
+    if (drawn <= FEW) this.strokeEach(order, drawn, style.colours)
+    else this.fillByColour(order, drawn, style.colours)
+    chains.globalAlpha = 1
+    this.drawMarks(style)
+    this.painted++
+  }
+
+  ends(k) {
+    const { x0, y0, x1, y1, i, j } = this.geometry
+    return [
+      x0[k] + this.shift(i[k], 0), y0[k] + this.shift(i[k], 1),
+      x1[k] + this.shift(j[k], 0), y1[k] + this.shift(j[k], 1),
+    ]
+  }
+
+  strokeEach(order, count, colours) {
+    const { chains, width, bin } = this
+    chains.lineCap = "round"
+    for (let n = 0; n < count; n++) {
+      const k = order[n], [xa, ya, xb, yb] = this.ends(k)
+      chains.strokeStyle = colours[bin[k]]
+      chains.lineWidth = width[k]
+      chains.beginPath()
+      chains.moveTo(xa, ya)
+      chains.lineTo(xb, yb)
+      chains.stroke()
+    }
+  }
+
+  fillByColour(order, count, colours) {
+    const { chains, width, bin } = this
+    const first = new Int32Array(colours.length + 1), sorted = new Int32Array(count)
+    for (let n = 0; n < count; n++) first[bin[order[n]] + 1]++
+    for (let b = 0; b < colours.length; b++) first[b + 1] += first[b]
+    const place = first.slice()
+    for (let n = 0; n < count; n++) sorted[place[bin[order[n]]]++] = order[n]
+    for (let b = 0; b < colours.length; b++) {
+      if (first[b] === first[b + 1]) continue
+      chains.beginPath()
+      for (let n = first[b]; n < first[b + 1]; n++) {
+        const k = sorted[n], [xa, ya, xb, yb] = this.ends(k)
+        const dx = xb - xa, dy = yb - ya, half = width[k] / (2 * Math.hypot(dx, dy))
+        const ox = -dy * half, oy = dx * half
+        chains.moveTo(xa + ox, ya + oy)
+        chains.lineTo(xb + ox, yb + oy)
+        chains.lineTo(xb - ox, yb - oy)
+        chains.lineTo(xa - ox, ya - oy)
+      }
+      chains.fillStyle = colours[b]
+      chains.fill()
+    }
+  }
+
+  /** Fig. 5 of the paper: strong contacts filled, undetermined ones open; and the selected one. */
+  drawMarks(style) {
+    const { marks, scale, palette, geometry } = this
+    this.begin(marks)
+    const { contact } = geometry
+    const radius = Math.max(0.24, 2 / scale)
+    if (style.strong) {
+      for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
+        marks.beginPath()
+        for (let k = 0; k < contact.length; k++) {
+          if (!chosen[contact[k]]) continue
+          const [xa, ya, xb, yb] = this.ends(k), x = (xa + xb) / 2, y = (ya + yb) / 2
+          marks.moveTo(x + radius * size, y)
+          marks.arc(x, y, radius * size, 0, 2 * Math.PI)
+        }
+        marks.fillStyle = palette.strong
+        marks.strokeStyle = palette.loose
+        marks.lineWidth = Math.max(0.09, 1.2 / scale)
+        if (filled) marks.fill()
+        else marks.stroke()
+      }
+    }
+    if (this.selected !== null) this.drawSelected()
+  }
+
+  drawSelected() {
+    const { marks, scale, palette, geometry, selected } = this
+    marks.strokeStyle = palette.selected
+    marks.lineCap = "round"
+    for (let k = 0; k < geometry.contact.length; k++) {
+      if (geometry.contact[k] !== selected) continue
+      const [xa, ya, xb, yb] = this.ends(k)
+      marks.lineWidth = 2 / scale
+      for (const [x, y, grain] of [[xa, ya, geometry.i[k]], [xb, yb, geometry.j[k]]]) {
+        marks.beginPath()
+        marks.arc(x, y, geometry.radius[grain], 0, 2 * Math.PI)
+        marks.stroke()
+      }
+      marks.lineWidth = Math.max(0.12, 3 / scale)
+      marks.beginPath()
+      marks.moveTo(xa, ya)
+      marks.lineTo(xb, yb)
+      marks.stroke()
+    }
+  }
+
+  // Pointer
+
+  /** Segment under a point of the layout, or −1. */
+  linkAt(px, py) {
+    const [x, y] = this.toPlace(px, py), { x0, y0, x1, y1, contact } = this.geometry
+    let best = -1, least = Infinity
+    for (let k = 0; k < contact.length; k++) {
+      const dx = x1[k] - x0[k], dy = y1[k] - y0[k]
+      const along = ((x - x0[k]) * dx + (y - y0[k]) * dy) / (dx * dx + dy * dy)
+      if (along < 0.05 || along > 0.95) continue // at a centre many chains meet
+      const away = Math.hypot(x - x0[k] - along * dx, y - y0[k] - along * dy)
+      if (away - this.width[k] / 2 < least) { least = away - this.width[k] / 2; best = k }
+    }
+    return least * this.scale <= GRAB ? best : -1
+  }
+
+  diskAt(px, py) {
+    const [a, b] = this.toPlace(px, py), { x, y, r } = this.geometry
+    for (let k = 0; k < x.length; k++) {
+      if ((a - x[k]) ** 2 + (b - y[k]) ** 2 < r[k] ** 2) return k
+    }
+    return -1
+  }
+
+  place(event) {
+    const box = this.root.getBoundingClientRect()
+    return [event.clientX - box.left, event.clientY - box.top]
+  }
+
+  listen() {
+    const { root } = this, fingers = new Map()
+    let moved = 0
+    root.addEventListener("wheel", (event) => {
+      event.preventDefault()
+      this.zoom(Math.exp(event.deltaY * 0.0015), ...this.place(event))
+    }, { passive: false })
+    root.addEventListener("dblclick", () => this.reset())
+    root.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return
+      fingers.set(event.pointerId, this.place(event))
+      root.setPointerCapture(event.pointerId)
+      moved = 0
+    })
+    root.addEventListener("pointermove", (event) => {
+      const before = fingers.get(event.pointerId), now = this.place(event)
+      if (!before) return this.hover(...now)
+      const step = [now[0] - before[0], now[1] - before[1]]
+      moved += Math.hypot(...step)
+      if (moved > 3) this.drag(fingers, event.pointerId, now, step)
+      fingers.set(event.pointerId, now)
+    })
+    const end = (event) => {
+      if (!fingers.delete(event.pointerId)) return
+      if (event.type === "pointerup" && moved <= 3) this.pick(...this.place(event))
+    }
+    root.addEventListener("pointerup", end)
+    root.addEventListener("pointercancel", end)
+    root.addEventListener("pointerleave", () => this.tip.classList.remove("on"))
+  }
+
+  drag(fingers, id, now, [dx, dy]) {
+    this.tip.classList.remove("on")
+    const other = [...fingers].find(([key]) => key !== id)?.[1]
+    if (other) {
+      const before = fingers.get(id), apart = (p) => Math.hypot(p[0] - other[0], p[1] - other[1])
+      this.zoom(apart(before) / Math.max(1, apart(now)), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2)
+    }
+    const part = other ? 0.5 : 1
+    this.view.x -= (part * dx) / this.scale
+    this.view.y += (part * dy) / this.scale
+    this.changed()
+  }
+
+  zoom(factor, px, py) {
+    if (!this.geometry) return
+    const [left, right] = this.geometry.window, whole = (right - left) / 2
+    const before = this.toPlace(px, py)
+    this.view.half = Math.min(ZOOM[1] * whole, Math.max(ZOOM[0] * whole, this.view.half * factor))
+    const after = this.toPlace(px, py)
+    this.view.x += before[0] - after[0]
+    this.view.y += before[1] - after[1]
+    this.changed()
+  }
+
+  pick(px, py) {
+    if (!this.geometry) return
+    const k = this.linkAt(px, py), contact = k < 0 ? null : this.geometry.contact[k]
+    this.onSelect(contact === this.selected ? null : contact)
+  }
+
+  hover(px, py) {
+    if (!this.geometry || !this.describe) return
+    const k = this.linkAt(px, py), disk = k < 0 ? this.diskAt(px, py) : -1
+    const rows = k >= 0 ? this.describe.contact(k) : disk >= 0 ? this.describe.grain(disk) : null
+    this.tip.classList.toggle("on", rows !== null)
+    this.root.style.cursor = k >= 0 ? "pointer" : "grab"
+    if (!rows) return
+    this.tip.innerHTML = rows.map(([name, value]) => `<i>${name}</i><b>${value}</b>`).join("")
+    const right = px > this.size / 2, low = py > this.size / 2
+    this.tip.style.inset = `${low ? "auto" : `${py + 14}px`} ${right ? `${this.size - px + 14}px` : "auto"} ` +
+      `${low ? `${this.size - py + 14}px` : "auto"} ${right ? "auto" : `${px + 14}px`}`
+  }
+}
