@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from granforce import measures, study
 from granforce.records import InputError
-
-COMPONENTS = ("f_n", "f_t")
 
 
 class Plane(NamedTuple):
@@ -78,6 +77,20 @@ def labels(replay, plane):
         f"{word} principal axis ({part:.0%} of the variance) / ⟨fₙ⟩"
         for word, part in zip(ordinals, plane.share, strict=True)
     )
+
+
+def hull(points):
+    """Corners of the convex hull of points (n, 2); all points where they lie on a line."""
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError:
+        return points
+
+
+def area(polygon):
+    """Area of a convex polygon (k, 2); 0 for fewer than three corners."""
+    x, y = np.asarray(polygon, dtype=np.float64).T
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
 def outline(library, cell, replay, plane, workers=2):
