@@ -38,11 +38,13 @@ NEARLY_BALANCED = 0.3
 NEARLY_FRICTIONLESS = 1e-4
 # Strain of the box per step below which frictionless grains are handed to the linear programs.
 BOX_AT_REST = 1e-6
-# Steps of the quadratic program that certifies: where a network exists it was found in 9 to 21 (N up
-# to 10,000), where none exists the program would go on to its limit.
+# Steps of the quadratic program that certifies: where a network exists it was found in 9 to 21
+# (N = 400), where none exists the program would go on to its limit.
 CERTIFICATE_ITERATIONS = 60
-# Skin of the neighbour list and reach of the finishing programs, in largest radii.
+# Skin of the neighbour list and reach of the finishing programs, in largest radii; the list is made
+# anew once two grains may have approached by MOVED.
 SKIN = 0.2
+MOVED = 0.5 * SKIN
 # Largest displacement of a grain that the finishing of a frictional packing may need.
 LARGEST_CORRECTION = 1e-2
 # Largest move of a grain in one of the linear programs, along each axis.
@@ -204,6 +206,9 @@ def _with_new_list(motion):
             "the box shrank to the largest disk's diameter without jamming: too few disks"
         )
     i, j, shift = find_pairs(motion.x, motion.r, motion.box, SKIN)
+    # In an order of their own, pairs are swept in the same order however often the list is made.
+    order = np.lexsort((shift[:, 1], shift[:, 0], j, i))
+    i, j, shift = i[order], j[order], shift[order]
     force = _carry_over(motion.i, motion.j, motion.shift, motion.force, i, j, shift)
     return motion._replace(i=i, j=j, shift=shift, force=force, drift=np.zeros(1))
 
@@ -238,11 +243,11 @@ def _advance(motion, mu, settings, counters, work):
             settings["dt"],
             settings["sweeps"],
             settings["accuracy"],
-            SKIN,
+            MOVED,
             int(goal - counters[dynamics.STEPS]),
             counters,
         )
-        if motion.drift[0] > 0.5 * SKIN:
+        if motion.drift[0] > MOVED:
             motion = _with_new_list(motion)
             work["list_rebuilds"] += 1
     return motion, overlap, unbalance

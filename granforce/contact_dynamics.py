@@ -128,8 +128,9 @@ STEPS, SWEEPS, UPDATES = range(3)
 
 
 @njit(cache=True, nogil=True)
-def advance(motion, mu, pressure, box_mass, dt, sweeps, accuracy, skin, steps, counters):
-    """Do up to `steps` time steps; stop early when the neighbour list (skin) must be rebuilt.
+def advance(motion, mu, pressure, box_mass, dt, sweeps, accuracy, moved, steps, counters):
+    """Do up to `steps` time steps; stop early once two grains may have moved closer by `moved`,
+    when the neighbour list must be made anew.
 
     Returns the last step's mean overlap (in largest radii) and unbalance: the largest change of
     momentum of a grain per step, in units of the mean contact force.
@@ -137,7 +138,7 @@ def advance(motion, mu, pressure, box_mass, dt, sweeps, accuracy, skin, steps, c
     overlap = 0.0
     unbalance = np.inf
     for _ in range(steps):
-        if motion.drift[0] > 0.5 * skin:
+        if motion.drift[0] > moved:
             break
         overlap, unbalance = _step(motion, mu, pressure, box_mass, dt, sweeps, accuracy, counters)
         counters[STEPS] += 1

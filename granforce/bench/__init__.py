@@ -10,6 +10,7 @@ from pathlib import Path
 
 from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
 from granforce.bench.report import environment, note, table
+from granforce.bench.skips import skips
 from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
 from granforce.bench.states import batches, interval_methods, intervals, walks
 
@@ -27,6 +28,7 @@ __all__ = [
     "relaxation",
     "run",
     "scaling",
+    "skips",
     "tile",
     "walks",
 ]
@@ -40,6 +42,7 @@ PARTS = {
     "compaction": (compaction, "Compaction: run time and overlap by time step and sweeps"),
     "compaction_frictions": (compaction_frictions, "Compaction at each μ"),
     "compaction_growth": (compaction_growth, "Compaction against the number of disks"),
+    "skips": (skips, "What skipping is worth"),
     "walks": (walks, "Random walks by solver"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),

@@ -1,0 +1,119 @@
+"""What leaving out the unnecessary is worth: each skip switched off, on the same packing."""
+
+import tempfile
+import time
+
+import numpy as np
+
+from granforce import compaction, study
+from granforce.bench.report import note
+from granforce.bench.solvers import kicked
+from granforce.bounds import intervals
+from granforce.compaction import pack
+from granforce.polytope import ensemble
+from granforce.relax.accelerated import accelerated
+from granforce.relax.gauss_seidel import gauss_seidel
+from granforce.store import open_store
+
+
+def skips(quick=True, *, n=None, mu=0.1):
+    """Rows: what is skipped, how often, seconds with the skip and without, and their ratio."""
+    n = n or (100 if quick else 400)
+    note(f"skips: N = {n}, μ = {mu:g}")
+    packing = pack(n, mu, 1)
+    S = ensemble(packing)
+    rows = [
+        _rattlers(packing, S),
+        _tangential(pack(n, 0.0, 1)),
+        _finish(S),
+        _neighbour_lists(n, mu),
+        _programs(S),
+        _cells(n, mu),
+    ]
+    return [{"n": n, "mu": mu, **row} for row in rows]
+
+
+def _row(what, count, seconds, without):
+    ratio = without / seconds
+    return {
+        "skipped": what,
+        "count": count,
+        "seconds": seconds,
+        "without": without,
+        "ratio": ratio,
+    }
+
+
+def _seconds(action, repeats=5):
+    """Median run time of an action, done once before."""
+    action()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - begin)
+    return float(np.median(times))
+
+
+def _rattlers(packing, S):
+    """A relaxation of all contacts of all grains, as in an import that has not been looked at."""
+    whole = ensemble(packing, prune=False)
+    start = kicked(whole, 1, 0)[0]
+    few = _seconds(lambda: accelerated(S, start[S.index]))
+    every = _seconds(lambda: accelerated(whole, start))
+    count = S.skipped["rattlers"] + S.skipped["unloaded_contacts"]
+    return _row("rattlers and unloaded contacts, one relaxation", count, few, every)
+
+
+def _tangential(packing):
+    """The balance of a frictionless packing with the unknowns f_t kept (at μ = 1e-6) or not."""
+    without = ensemble(packing, mu=1e-6)
+    S = ensemble(packing)
+    few = _seconds(lambda: intervals(S, [0, 1]))
+    every = _seconds(lambda: intervals(without, [0, 1]))
+    told = "tangential unknowns and torque rows at μ = 0, four bounds"
+    return _row(told, S.skipped["tangential_unknowns"], few, every)
+
+
+def _finish(S):
+    """Sweeps that the exact finish of Gauss–Seidel saves, to the same tolerance 1e-6."""
+    start = kicked(S, 1, 0)[0]
+    short = gauss_seidel(S, start, tolerance=1e-6)
+    long = gauss_seidel(S, start, tolerance=1e-6, rest=None)
+    few = _seconds(lambda: gauss_seidel(S, start, tolerance=1e-6), 3)
+    every = _seconds(lambda: gauss_seidel(S, start, tolerance=1e-6, rest=None), 3)
+    told = "Gauss–Seidel sweeps after 1e-3, one relaxation"
+    return _row(told, long.iterations - short.iterations, few, every)
+
+
+def _neighbour_lists(n, mu):
+    """Compaction with its neighbour list, and with one made anew in every step."""
+    with_skip, kept = _seconds(lambda: pack(n, mu, 1), 1), compaction.MOVED
+    try:
+        compaction.MOVED = 0.0
+        begin = time.perf_counter()
+        every = pack(n, mu, 1)
+        without = time.perf_counter() - begin
+    finally:
+        compaction.MOVED = kept
+    count = every.info["list_rebuilds"] - pack(n, mu, 1).info["list_rebuilds"]
+    return _row("new neighbour lists, one compaction", count, with_skip, without)
+
+
+def _programs(S):
+    found = intervals(S)
+    few = _seconds(lambda: intervals(S), 1)
+    every = _seconds(lambda: intervals(S, skip=False), 1)
+    count = found.counts["f_n = 0 seen in a known state"]
+    return _row("programs for a least f_n seen to be 0", count, few, every)
+
+
+def _cells(n, mu):
+    with tempfile.TemporaryDirectory() as folder:
+        store = open_store(folder)
+        named = study.walk_parameters(study.packing_parameters(n, mu, 1), 50)
+        begin = time.perf_counter()
+        study.get_walk(store, named)
+        every = time.perf_counter() - begin
+        few = _seconds(lambda: study.get_walk(store, named))
+    return _row("a finished cell (packing, 50 states)", 1, few, every)
