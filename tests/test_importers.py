@@ -184,10 +184,19 @@ def test_damaged_archives_are_refused_with_a_reason(changes, message):
         load_packing(archive(**changes))
 
 
-def test_archives_that_announce_more_than_memory_are_refused(monkeypatch):
-    monkeypatch.setattr("granforce.importers.npz._UNPACKED", 10_000)
-    with pytest.raises(InputError, match="1 GiB"):
-        load_packing(SMALL)
+def test_archives_that_announce_more_than_allowed_are_refused():
+    with pytest.raises(InputError, match=r"more than 0\.01 MB unpacked"):
+        load_packing(SMALL, unpacked=10_000)
+
+
+def test_a_packing_goes_through_an_open_file_as_through_a_path(tmp_path):
+    packing = load_packing(SMALL)
+    file = io.BytesIO()
+    save_packing(packing, file)
+    save_packing(packing, tmp_path / "packing.npz")
+    for source in (io.BytesIO(file.getvalue()), tmp_path / "packing.npz"):
+        again = load_packing(source)
+        assert np.array_equal(again.forces, packing.forces) and again.info == packing.info
 
 
 # LAMMPS

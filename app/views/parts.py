@@ -1,4 +1,4 @@
-"""What the tabs share: they take over what changed only while they are seen, and plots can be saved."""
+"""What the tabs share: they compute only while they are seen, and their plots can be saved."""
 
 import panel as pn
 import panel_material_ui as pmui

@@ -35,7 +35,7 @@ class View(Seen):
         self.figure = self._figure()
         self.planes = choice(PLANES, "principal")
         self.other = pmui.IntInput(
-            name="second contact", value=0, start=0, size="small", width=130, margin=(2, 8)
+            label="second contact", value=0, start=0, size="small", width=130, margin=(2, 8)
         )
         self.task = state.task()
         self.told = note()
@@ -120,11 +120,11 @@ class View(Seen):
         part = np.ptp(found.plane.path[1:], axis=0) / np.ptp(found.outer, axis=0)
         area = projections.area(projections.hull(found.plane.path[1:]))
         area /= projections.area(found.outer)
+        states = len(found.plane.path) - 1
         self.told.object = (
             f"Shaded: the exact outline of S in this plane ({found.programs} linear programs, "
-            f"{found.seconds:.1f} s, known to {found.gap:.1g} ⟨fₙ⟩). The {len(found.plane.path) - 1}"
-            f" states shown span {part[0]:.0%} of it across, {part[1]:.0%} upwards and "
-            f"{area:.1%} of its area."
+            f"{found.seconds:.1f} s, known to {found.gap:.1g} ⟨fₙ⟩). The {states} states shown span "
+            f"{part[0]:.0%} of it across, {part[1]:.0%} upwards and {area:.1%} of its area."
         )
 
     def _cone(self, plane, reach):

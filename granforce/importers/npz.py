@@ -13,17 +13,18 @@ _GRAINS = ("x", "r", "P", "mu")
 _CONTACTS = ("i", "j", "nx", "ny", "branch", "fn", "ft")
 
 # Bytes of the unpacked arrays: a small archive may announce far more than memory holds.
-_UNPACKED = 1 << 30
+_UNPACKED = 10**9
 
 
-def load_packing(source):
+def load_packing(source, *, unpacked=_UNPACKED):
     """The Packing in an NPZ file (a path or an open binary file), its contacts as they are.
 
     Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if none), mu, i, j, nx, ny, branch, fn, ft;
-    seed, load, arm_i, arm_j and info (JSON) if there. Raises InputError naming what is wrong.
+    seed, load, arm_i, arm_j and info (JSON) if there. unpacked: most bytes of all arrays together.
+    Raises InputError naming what is wrong.
     """
     name = str(getattr(source, "name", "the given file") if hasattr(source, "read") else source)
-    arrays = _arrays(source, name)
+    arrays = _arrays(source, name, unpacked)
     missing = [key for key in (*_GRAINS, *_CONTACTS) if key not in arrays]
     if missing or not ("L" in arrays or {"Lx", "Ly"} <= set(arrays)):
         missing = ", ".join([*missing, *([] if "L" in arrays else ["L (or Lx, Ly)"])])
@@ -34,8 +35,10 @@ def load_packing(source):
         raise InputError(f"{name}: {error}") from None
 
 
-def save_packing(packing, path):
-    """Write a packing as NPZ to be read by load_packing, exactly; aside first, then renamed.
+def save_packing(packing, target):
+    """Write a packing as NPZ to be read by load_packing, exactly, to a path or an open binary file.
+
+    A path gets the whole file or none: it is written aside first, then renamed.
 
     Raises InputError where info is not plain numbers and strings.
     """
@@ -64,7 +67,10 @@ def save_packing(packing, path):
         "info": np.array(info),
         **({"seed": packing.info["seed"]} if "seed" in packing.info else {}),
     }
-    _write_aside(path, arrays)
+    if hasattr(target, "write"):
+        np.savez_compressed(target, allow_pickle=False, **arrays)
+    else:
+        _write_aside(target, arrays)
 
 
 def _write_aside(path, arrays):
@@ -79,13 +85,15 @@ def _write_aside(path, arrays):
         raise
 
 
-def _arrays(source, name):
+def _arrays(source, name, unpacked):
     """The archive's arrays but those that loading ignores, {name: array}."""
     ignored = {"lo", "hi", "fcrit", "gap"}
     try:
         with np.load(source, allow_pickle=False) as archive:
-            if sum(member.file_size for member in archive.zip.infolist()) > _UNPACKED:
-                raise InputError(f"{name}: more than 1 GiB unpacked; too large for a packing")
+            if sum(member.file_size for member in archive.zip.infolist()) > unpacked:
+                raise InputError(
+                    f"{name}: more than {unpacked / 1e6:g} MB unpacked; too large for a packing"
+                )
             return {key: archive[key] for key in archive.files if key not in ignored}
     except InputError:
         raise

@@ -1,0 +1,154 @@
+"""Packings that a visitor brings, read in memory: no name or path of theirs reaches the disk."""
+
+import io
+from typing import NamedTuple
+
+from granforce import importers, study
+from granforce.records import InputError
+
+from .limits import LIMITS
+
+# What files together make a packing; those in brackets may be missing.
+FAMILIES = {
+    "npz": ("NPZ of granforce", ("npz",), ()),
+    "lammps": ("LAMMPS dumps", ("particles", "contacts"), ()),
+    "table": ("tables", ("grains",), ("joined",)),
+}
+WORDS = {
+    "npz": "packing",
+    "particles": "dump of the particles",
+    "contacts": "dump of the contacts",
+    "grains": "table of grains",
+    "joined": "table of contacts",
+}
+# An archive may unpack to this many times the bytes that may be sent.
+UNPACKED = 8
+
+
+class Brought(NamedTuple):
+    """A packing that was read and kept, and what it is."""
+
+    params: dict  # that name it, as for study.get_packing
+    report: dict  # of granforce.report
+    source: str  # which files it came from, in words
+
+
+def role(name, content):
+    """What a file is, one of WORDS, told by its content; InputError for anything else."""
+    if content[:4] == b"PK\x03\x04":
+        return "npz"
+    if content.lstrip()[:5] == b"ITEM:":
+        if b"ITEM: ATOMS" in content:
+            return "particles"
+        if b"ITEM: ENTRIES" in content:
+            return "contacts"
+        raise InputError(f"{name}: a LAMMPS dump without ATOMS or ENTRIES")
+    head = content.lstrip(b"\xef\xbb\xbf \t\r\n").split(b"\n", 1)[0][:2000]
+    words = head.decode("utf-8", "replace").lower().replace(";", ",").replace("\t", ",")
+    columns = {word.strip().strip('"') for word in words.split(",")}
+    if {"x", "y", "r"} <= columns:
+        return "grains"
+    if {"i", "j"} <= columns:
+        return "joined"
+    raise InputError(
+        f"{name}: neither an NPZ of granforce, nor a LAMMPS dump, nor a table with columns x, y, r "
+        "(grains) or i, j (contacts)"
+    )
+
+
+def family(roles):
+    """The one of FAMILIES that these roles belong to."""
+    return next(k for k, (_, needed, more) in FAMILIES.items() if set(roles) & {*needed, *more})
+
+
+def added(files, new):
+    """{role: (name, content)} of the files given before and new ones [(name, content), …].
+
+    A new file replaces the one with its role, and all that belong to another family.
+    Raises InputError for one that is none of WORDS, or where all together are too large.
+    """
+    for name, content in new:
+        found = role(name, content)
+        files = {k: v for k, v in files.items() if family([k]) == family([found])}
+        files[found] = (name, content)
+    size = sum(len(content) for _, content in files.values())
+    if size > LIMITS.upload * 1e6:
+        raise InputError(f"the files have {size / 1e6:.1f} MB; at most {LIMITS.upload} MB are read")
+    return files
+
+
+def missing(files):
+    """Roles that are needed besides those of the files."""
+    needed = FAMILIES[family(files)][1] if files else ()
+    return [part for part in needed if part not in files]
+
+
+def read(files, *, mu=None, box=None, pressure=1.0):
+    """The Packing in files {role: (name, content)}.
+
+    mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, pressure: of a
+    table. Raises InputError, naming file and line, for what cannot be used, and beyond LIMITS.
+    """
+    opened = {part: _opened(*given) for part, given in files.items()}
+    if "npz" in files:
+        packing = importers.load_packing(opened["npz"], unpacked=UNPACKED * LIMITS.upload * 10**6)
+    elif "particles" in files:
+        packing = importers.read_lammps(opened["particles"], opened["contacts"], mu)
+    else:
+        contacts = opened.get("joined")
+        packing = importers.read_table(
+            opened["grains"], contacts, mu=mu, box=box, pressure=pressure
+        )
+    LIMITS.check(n=len(packing.r))
+    return packing
+
+
+def _opened(name, content):
+    file = io.BytesIO(content)
+    file.name = name  # for messages only
+    return file
+
+
+def bring(library, files, **options):
+    """Work, for jobs.Task, that reads a packing, reports on it and keeps it in the cache."""
+
+    def work(job):
+        job.begin("reading")
+        packing = read(files, **options)
+        job.begin("looking for its backbone")
+        report = importers.report(packing)
+        if library.cache is None:
+            raise InputError("no cache folder can be written, so nothing can be taken in")
+        params = study.imported_parameters(packing)
+        study.keep_packing(library.cache, params, packing)
+        names = " and ".join(name for name, _ in files.values())
+        return Brought(params, report, f"{FAMILIES[family(files)][0]}: {names}")
+
+    return work
+
+
+def told(report):
+    """The report as rows (name, value) of texts for the page."""
+    rows = []
+    for label, name, form, unit in _ROWS:
+        value = report[name]
+        if value is not None:
+            rows.append((label, f"{value:{form}}{unit}"))
+    return rows
+
+
+_ROWS = (
+    ("grains", "grains", ",d", ""),
+    ("rattlers", "rattlers", ",d", ""),
+    ("contacts listed", "contacts", ",d", ""),
+    ("contacts that can carry", "backbone_contacts", ",d", ""),
+    ("coordination z", "coordination", ".3f", ""),
+    ("dimension h of S", "dimension", ",d", ""),
+    ("friction μ", "friction", "g", ""),
+    ("packing fraction φ", "packing_fraction", ".4f", ""),
+    ("pressure", "pressure", ".4g", ""),
+    ("mean normal force", "mean_normal_force", ".4g", ""),
+    ("unbalance of its forces", "residual", ".1e", " ⟨fₙ⟩"),
+    ("outside Coulomb's cones by", "violation", ".1e", " ⟨fₙ⟩"),
+    ("largest overlap", "largest_overlap", ".1e", " radii"),
+)

@@ -1,0 +1,123 @@
+"""Bring your own packing: drop its files, see what it is, and look at it like any other."""
+
+import html
+
+import panel as pn
+import panel_material_ui as pmui
+
+from granforce.records import InputError, friction, positive
+
+from .. import uploads
+from ..limits import LIMITS
+from ..selection import Selection
+from .dropper import Dropper
+from .parts import note
+from .progress import Progress
+
+STATES = 200  # of the walk that is made at once
+HELP = """
+<b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
+<b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
+contacts; <b>tables</b> (CSV): grains with columns x, y, r, and, if there are any, contacts with
+columns i, j and fn, ft. The files are read in memory; only the packing is kept, in the cache.
+"""
+REPORT = """
+<table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
+"""
+ROW = '<tr><td style="padding:2px 18px 2px 0;opacity:.75">{}</td><td><b>{}</b></td></tr>'
+SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
+
+
+class View:
+    """Drop files, see the report; the packing is then on the page."""
+
+    name, title = "upload", "Your packing"
+
+    def __init__(self, state):
+        self.state = state
+        self.files = {}
+        self.task = state.task()
+        self.dropper = Dropper(
+            self._dropped,
+            self._refuse,
+            label="Drop the files of a packing here, or click to choose them",
+            most=LIMITS.upload * 10**6,
+            sizing_mode="stretch_width",
+            margin=(8, 10),
+        )
+        self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
+        self.box = pmui.TextInput(label="Box L_x, L_y", placeholder="open", **SMALL)
+        self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
+        self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
+        self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
+        self.waiting = pmui.Alert(severity="info", visible=False, sizing_mode="stretch_width")
+        self.report = note()
+        self.read.on_click(lambda event: self._read())
+        self.task.param.watch(lambda event: self._refuse(event.new), "message")
+        self._ask()
+
+    def panel(self):
+        """Where to drop, what is asked, and what came."""
+        return pn.Column(
+            self.dropper,
+            pn.FlexBox(self.mu, self.box, self.pressure, self.read, sizing_mode="stretch_width"),
+            Progress(self.task).panel(),
+            self.error,
+            self.waiting,
+            self.report,
+            note(HELP),
+            sizing_mode="stretch_width",
+        )
+
+    def _ask(self):
+        """Show the fields that the files at hand need."""
+        kind = uploads.family(self.files) if self.files else None
+        self.mu.visible = kind in ("lammps", "table")
+        self.box.visible = self.pressure.visible = kind == "table"
+        self.read.visible = self.mu.visible and not uploads.missing(self.files)
+
+    def _dropped(self, new):
+        self._refuse("")
+        try:
+            self.files = uploads.added(self.files, new)
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        self._ask()
+        absent = [uploads.WORDS[part] for part in uploads.missing(self.files)]
+        self.waiting.param.update(
+            title=f"Now drop the {' and the '.join(absent)}." if absent else "",
+            visible=bool(absent),
+        )
+        if not absent:
+            self._read()
+
+    def _read(self):
+        self._refuse("")
+        try:
+            options = self._options()
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        self.task.start(uploads.bring(self.state.library, self.files, **options), self._show)
+
+    def _options(self):
+        kind = uploads.family(self.files)
+        options = {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
+        if kind == "table":
+            sides = (self.box.value_input or self.box.value).replace(",", " ").split()
+            if len(sides) not in (0, 2):
+                raise InputError("give two sides of the box, such as 30, 30, or none if it is open")
+            options["box"] = [positive(side, "a side of the box") for side in sides] or None
+            options["pressure"] = positive(self.pressure.value, "the pressure")
+        return options
+
+    def _show(self, brought):
+        """Report, and put the packing on the page; its walk is computed at once."""
+        rows = "".join(ROW.format(*map(html.escape, row)) for row in uploads.told(brought.report))
+        self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
+        mu = brought.params["mu"]
+        self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
+
+    def _refuse(self, line):
+        self.error.param.update(title=line, visible=bool(line))

@@ -1,0 +1,261 @@
+"""What the tabs beside the packing show, without a browser."""
+
+import io
+import time
+
+import numpy as np
+import pytest
+from packings import REFERENCE, packed
+from small_store import KEPT
+
+import granforce as gf
+from app import projections, uploads
+from granforce.records import InputError
+
+LAMMPS = REFERENCE.parent / "lammps"
+
+
+def opened(state, seconds=30):
+    """The state once its first picture is there."""
+    return settled(state, seconds, lambda: state.replay is not None)
+
+
+def settled(state, seconds=60, done=lambda: True):
+    """Poll as the page does until no task runs."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        state.poll()
+        if not any(task.running for task in state.tasks) and done():
+            return state
+        time.sleep(0.02)
+    raise AssertionError("a task did not end")
+
+
+def npz(packing):
+    file = io.BytesIO()
+    gf.save_packing(packing, file)
+    return file.getvalue()
+
+
+def table(packing, contacts=False):
+    """CSV of grains or contacts with forces, as others would write them."""
+    if contacts:
+        c = packing.contacts
+        names, columns = "i,j,nx,ny,length,fn,ft", (c.i, c.j, c.normal, c.length, packing.forces)
+    else:
+        names, columns = "x,y,r", (packing.x, packing.r)
+    file = io.StringIO()
+    np.savetxt(file, np.column_stack(columns), "%.17g", ",", header=names, comments="")
+    return file.getvalue().encode()
+
+
+def dumps():
+    return {
+        part: (f"{part}.dump", (LAMMPS / f"lammps_n400_mu0.3.{part}.dump").read_bytes())
+        for part in ("particles", "contacts")
+    }
+
+
+# Force space
+
+
+def test_the_path_is_the_projection_of_the_states(state):
+    replay = opened(state).replay
+    plane = projections.components(replay, (3, 0), (5, 1))
+    np.testing.assert_array_equal(plane.path[:, 0], replay.normal[:, 3])
+    np.testing.assert_array_equal(plane.path[:, 1], replay.tangential[:, 5])
+    plane = projections.principal(replay)
+    assert plane.path.shape == (KEPT + 1, 2)
+    np.testing.assert_allclose(plane.path[1:].mean(axis=0), 0, atol=1e-5)
+    variance = plane.path[1:].var(axis=0)
+    frames = np.stack([replay.normal, replay.tangential], axis=2)[1:]
+    np.testing.assert_allclose(variance / frames.var(axis=0).sum(), plane.share, rtol=1e-4)
+
+
+def test_the_outline_holds_the_path_and_is_kept(state):
+    from app.views.projection import View
+
+    opened(state)
+    view = View(state)
+    assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
+    state.tab = view.name
+    assert view.task.running and len(view.path.data["x"]) == KEPT + 1
+    settled(state)
+    corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
+    path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
+    merged = projections.hull(np.concatenate([corners, path]))
+    assert projections.area(merged) == pytest.approx(projections.area(corners), rel=1e-6)
+    assert "linear programs" in view.told.object
+    assert len(state.library.cache.find("outline")) == 1
+
+
+def test_one_contact_is_seen_in_its_cone(state):
+    from app.views.projection import View
+
+    opened(state)
+    state.contact = 4
+    view = View(state)
+    view.planes.value = "contact"
+    state.tab = view.name
+    settled(state)
+    normal, tangential = np.array(view.outer.data["x"]), np.array(view.outer.data["y"])
+    assert np.all(np.abs(tangential) <= state.replay.summary["mu"] * normal + 1e-3)
+    assert str(state.replay.backbone[4]) in view.figure.xaxis.axis_label
+    assert len(view.cone.data["x"]) == 3
+    before = normal
+    state.contact = 7
+    settled(state)
+    assert not np.array_equal(before, view.outer.data["x"])
+
+
+def test_a_point_has_no_outline(state):
+    from app.views.projection import View
+
+    opened(state)
+    state.choose(mu=0)
+    settled(state, done=lambda: state.cell.mu == 0)
+    state.tab = "projection"
+    view = View(state)
+    settled(state)
+    assert "one point" in view.told.object and not len(view.outer.data["x"])
+
+
+def test_planes_of_unknown_contacts_are_refused(state):
+    replay = opened(state).replay
+    with pytest.raises(InputError, match="counted from 0"):
+        projections.components(replay, (10**6, 0), (0, 0))
+    with pytest.raises(InputError, match="different"):
+        projections.components(replay, (1, 0), (1, 0))
+
+
+def test_areas():
+    square = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 1]], float)
+    assert projections.area(projections.hull(square)) == 4
+    line = np.array([[0, 0], [1, 1], [2, 2]], float)
+    assert projections.area(projections.hull(line)) == 0
+
+
+# Bring your own
+
+
+@pytest.mark.parametrize("kind", ["npz", "lammps", "table", "table with contacts"])
+def test_files_are_known_by_their_content(kind):
+    packing = packed(30, 0.3)
+    given = {
+        "npz": {"npz": ("a", npz(packing))},
+        "lammps": dumps(),
+        "table": {"grains": ("g.txt", table(packing))},
+        "table with contacts": {
+            "grains": ("g.txt", table(packing)),
+            "joined": ("c.txt", table(packing, contacts=True)),
+        },
+    }[kind]
+    files = uploads.added({}, list(given.values()))
+    assert files == given and uploads.missing(files) == []
+    options = {} if kind == "npz" else {"mu": 0.3}
+    if "table" in kind:
+        options["box"] = packing.box
+    read = uploads.read(files, **options)
+    if kind == "npz":
+        np.testing.assert_array_equal(read.forces, packing.forces)
+    elif kind == "lammps":
+        assert len(read.r) == 400
+    elif kind == "table with contacts":
+        np.testing.assert_allclose(read.forces, packing.forces, rtol=1e-9)
+    else:
+        assert len(read.contacts.i) == len(packing.contacts.i)
+
+
+def test_a_file_of_another_family_replaces_what_was_there():
+    both = dumps()
+    files = uploads.added({}, [both["particles"]])
+    assert uploads.missing(files) == ["contacts"]
+    files = uploads.added(files, [("p.npz", npz(packed(30, 0.3)))])
+    assert list(files) == ["npz"]
+
+
+@pytest.mark.parametrize(
+    "content, line",
+    [
+        (b"", "neither an NPZ"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(200), "neither an NPZ"),
+        (b"a,b,c\n1,2,3\n", "columns x, y, r"),
+        (b"ITEM: TIMESTEP\n0\n", "without ATOMS or ENTRIES"),
+    ],
+)
+def test_what_is_no_packing_is_refused(content, line):
+    with pytest.raises(InputError, match=line):
+        uploads.added({}, [("file", content)])
+
+
+def test_damaged_and_hostile_files_are_one_clear_line(state):
+    whole = npz(packed(30, 0.3))
+    hostile = {
+        "cut.npz": whole[: len(whole) // 2],
+        "zip.npz": b"PK\x03\x04" + bytes(300),
+        "../../etc/passwd": whole[:-50],
+    }
+    for name, content in hostile.items():
+        with pytest.raises(InputError, match="NPZ archive") as told:
+            uploads.read({"npz": (name, content)})
+        assert "\n" not in str(told.value)
+
+
+def test_sizes_are_limited(monkeypatch):
+    packing = packed(30, 0.3)
+    monkeypatch.setattr(uploads, "LIMITS", uploads.LIMITS._replace(n=20))
+    with pytest.raises(InputError, match="N must lie between 1 and 20"):
+        uploads.read({"npz": ("p.npz", npz(packing))})
+    monkeypatch.setattr(uploads, "LIMITS", uploads.LIMITS._replace(upload=1))
+    with pytest.raises(InputError, match="at most 1 MB"):
+        uploads.added({}, [("g.csv", b"x,y,r\n" + b"1,1,1\n" * 200_000)])
+    # Zeros pack a thousandfold: what counts is what they unpack to.
+    large = io.BytesIO()
+    np.savez_compressed(large, x=np.zeros((10**6, 2)))
+    with pytest.raises(InputError, match="MB unpacked"):
+        uploads.read({"npz": ("zeros.npz", large.getvalue())})
+
+
+def test_an_upload_is_kept_reported_and_shown(state):
+    from app.views.upload import View
+
+    opened(state)
+    view = View(state)
+    both = dumps()
+    view.dropper._handle_msg({"begin": True})
+    view.dropper._handle_msg({"name": "a", "data": both["particles"][1]})
+    view.dropper._handle_msg({"end": True})
+    assert view.waiting.visible and "dump of the contacts" in view.waiting.title
+    middle = len(both["contacts"][1]) // 2
+    view.dropper._handle_msg({"begin": True})
+    view.dropper._handle_msg({"name": "<b>c", "data": both["contacts"][1][:middle]})
+    view.dropper._handle_msg({"name": "<b>c", "data": both["contacts"][1][middle:]})
+    view.dropper._handle_msg({"end": True})
+    assert view.task.running and not view.waiting.visible
+    settled(state, 120, lambda: state.cell is not None and state.cell.selection.imported)
+    assert "604" in view.report.object and "&lt;b&gt;c" in view.report.object
+    assert state.replay.summary["contacts"] == 604 and state.message == ""
+
+
+def test_a_refused_upload_changes_nothing(state):
+    from app.views.upload import View
+
+    before = opened(state).replay
+    view = View(state)
+    view._dropped([("p.npz", npz(packed(30, 0.3))[:-80])])
+    settled(state)
+    assert view.error.visible and "NPZ archive" in view.error.title
+    assert state.replay is before and not state.library.cache.find("packing")
+
+
+def test_more_than_allowed_is_not_collected(state):
+    from app.views.upload import View
+
+    view = View(opened(state))
+    view.dropper.most = 1000
+    view.dropper._handle_msg({"begin": True})
+    for _ in range(50):
+        view.dropper._handle_msg({"name": "x", "data": bytes(100)})
+    assert not view.dropper._pieces
+    view.dropper._handle_msg({"end": True})
+    assert "nothing was read" in view.error.title and not view.files
