@@ -5,8 +5,10 @@ GRANFORCE_DATA names, and on the user's own cache (GRANFORCE_CACHE); GRANFORCE_L
 a visitor may ask for, see app/limits.py.
 """
 
+import gc
 import importlib
 import importlib.util
+from functools import partial
 
 import panel as pn
 import panel_material_ui as pmui
@@ -40,32 +42,63 @@ def page():
         document.add_next_tick_callback(function)
 
     query = pn.state.location.search if pn.state.location else ""
-    state = AppState(pn.state.as_cached("library", Library), wake, query)
+    state = AppState(pn.state.as_cached("library", _open_library), wake, query)
     state.message = state.message or " ".join(state.library.notes)
-    packing, tabs = PackingView(state), Tabs(state)
-    packing.player.on_digit = tabs.choose
+    packing = PackingView(state)
+    wide = {"sizing_mode": "stretch_width"}
     source = pmui.Typography(state.param.source, variant="subtitle2", margin=(8, 10, 0, 10))
-    left = pn.Column(source, packing.panel(), sizing_mode="stretch_width")
-    right = pn.Column(SummaryView(state).panel(), tabs.tabs, sizing_mode="stretch_width")
-    grid = pmui.Grid(
-        pmui.Grid(left, size={"xs": 12, "md": 6}),
-        pmui.Grid(right, size={"xs": 12, "md": 6}),
-        container=True,
-        spacing=1,
-        sizing_mode="stretch_width",
+    left, right, sidebar = (
+        pn.Column(source, packing.panel(), **wide),
+        pn.Column(**wide),
+        pn.Column(),
     )
     whole = pmui.Page(
         title="granforce — how undetermined are contact forces?",
-        sidebar=Controls(state).panel(),
+        sidebar=[sidebar],
         sidebar_width=290,
-        main=[grid],
+        main=[
+            pmui.Grid(
+                pmui.Grid(left, size={"xs": 12, "md": 6}),
+                pmui.Grid(right, size={"xs": 12, "md": 6}),
+                container=True,
+                spacing=1,
+                **wide,
+            )
+        ],
         dark_theme=state.dark,
     )
+
+    def parts():
+        """What follows the packing, piece by piece: others wait for one piece, not for all."""
+        widgets = Controls(state).panel()
+        yield
+        for k in range(0, len(widgets), 3):
+            sidebar.extend(widgets[k : k + 3])
+            yield
+        right.append(SummaryView(state).panel())
+        tabs = Tabs(state)
+        packing.player.on_digit = tabs.choose
+        yield
+        right.append(tabs.tabs)
+        yield
+        tabs.fill(state.tab)
+
+    def go_on(rest):
+        if next(rest, "end") != "end":
+            wake(partial(go_on, rest))
+
+    wake(partial(go_on, parts()))
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     _poll_while_running(state)
     _tell_address(state)
     pn.state.on_session_destroyed(lambda context: state.close())
     return whole
+
+
+def _open_library():
+    """The stores, once for all visitors."""
+    gc.freeze()  # else collections go through all that was imported: up to 0.2 s of the event loop
+    return Library()
 
 
 class Tabs:
@@ -77,7 +110,6 @@ class Tabs:
         self.pages = {name: pn.Column(sizing_mode="stretch_width") for name in self.names}
         if state.tab not in self.names:
             state.tab = self.names[0]
-        self._fill(state.tab)
         self.tabs = pmui.Tabs(
             *((TABS[name], self.pages[name]) for name in self.names),
             active=self.names.index(state.tab),
@@ -92,10 +124,11 @@ class Tabs:
             self.tabs.active = number - 1
 
     def _show(self, name):
-        self._fill(name)  # first, so that those who follow the state find it in the page
+        self.fill(name)  # first, so that those who follow the state find it in the page
         self.state.tab = name
 
-    def _fill(self, name):
+    def fill(self, name):
+        """Make the view of a tab, once."""
         if not self.pages[name].objects:
             self.pages[name].append(_module(name).View(self.state).panel())
 

@@ -31,17 +31,17 @@ class Controls:
         self.state = state
         self._following = False
         self.mu = FrictionSlider(self._typed, **WIDE)
-        self.n = pmui.IntInput(name="Disks N", start=3, end=LIMITS.n, step=100, **SMALL)
-        self.seed = pmui.IntInput(name="Seed", start=0, **SMALL)
-        self.packed = pmui.TextInput(name="Packed at μ", placeholder=SAME, **SMALL)
-        self.states = pmui.IntInput(name="States", start=1, end=LIMITS.states, step=100, **SMALL)
+        self.n = pmui.IntInput(label="Disks N", start=3, end=LIMITS.n, step=100, **SMALL)
+        self.seed = pmui.IntInput(label="Seed", start=0, **SMALL)
+        self.packed = pmui.TextInput(label="Packed at μ", placeholder=SAME, **SMALL)
+        self.states = pmui.IntInput(label="States", start=1, end=LIMITS.states, step=100, **SMALL)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
-        self.kind = pmui.Select(name="States from", options=_swap(kinds), **SMALL)
-        self.relax = pmui.Select(name="Relaxation", options=_swap(SOLVERS), **SMALL)
-        self.series = pmui.Select(name="In the store", options=[], **SMALL)
-        self.go = pmui.Button(name="Compute", color="primary", visible=False, **WIDE)
-        self.colour = pmui.Select(name="Colour", options=_swap(COLOURS), **SMALL)
-        self.thickness = pmui.Select(name="Width", options=_swap(WIDTHS), **SMALL)
+        self.kind = pmui.Select(label="States from", options=_swap(kinds), **SMALL)
+        self.relax = pmui.Select(label="Relaxation", options=_swap(SOLVERS), **SMALL)
+        self.series = pmui.Select(label="In the store", options=[], **SMALL)
+        self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
+        self.colour = pmui.Select(label="Colour", options=_swap(COLOURS), **SMALL)
+        self.thickness = pmui.Select(label="Width", options=_swap(WIDTHS), **SMALL)
         self.overlay = pmui.Switch(
             label="Strong and undetermined contacts", value=state.overlay, margin=(2, 10)
         )
@@ -162,7 +162,7 @@ class Controls:
         state = self.state
         self.go.visible = state.missing and not state.computation.running
         if state.missing:
-            self.go.name = f"Compute μ = {state.selection.mu:g}"
+            self.go.label = f"Compute μ = {state.selection.mu:g}"
 
     def _look(self, *events):
         for name in ("colour", "thickness", "overlay"):

@@ -13,7 +13,7 @@ from .style import DARK, DOT, ORIGINAL, PALE, SERIES, hover, plot, quiet_legend
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 ETAS = ("eta1", "eta2", "eta3")
-SMALL = {"size": "small", "width": 190, "margin": (2, 8)}
+SMALL = {"size": "small", "width": 190, "margin": (10, 8, 2, 8)}
 
 
 class View:
@@ -33,7 +33,7 @@ class View:
         self.sort = _select("Sorted by", SORTS, state.sort)
         self.scale = _select("Scale", SCALES, state.scale)
         self.exact = pmui.Button(
-            name="Compute exact intervals", variant="outlined", size="small", margin=(8, 8)
+            label="Compute exact intervals", variant="outlined", size="small", margin=(14, 8, 2, 8)
         )
         self.left_out = pn.pane.HTML(margin=(0, 10), styles={"font-size": "12px", "opacity": "0.8"})
         self.progress = Progress(state.computation)
@@ -208,6 +208,7 @@ class View:
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1),
             height=200,
+            tools="",
         )
         labels = ("eta1", "η1"), ("eta2", "η2"), ("eta3", "0.15 η3")
         for (name, label), colour in zip(labels, SERIES, strict=True):
@@ -245,7 +246,7 @@ def _source(name, columns):
 
 def _select(name, labels, value):
     options = {label: key for key, label in labels.items()}
-    return pmui.Select(name=name, options=options, value=value, **SMALL)
+    return pmui.Select(label=name, options=options, value=value, **SMALL)
 
 
 def _set_range(axis, low, high):

@@ -5,10 +5,12 @@ import panel as pn
 
 from ..state import COLOURS, WIDTHS
 from .player import Player, frames
-from .style import BLUE, EXTENT, GREY, ORANGE, palettes
+from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference")  # both ways
 FOLLOWED = ("tab", "colour", "thickness", "overlay", "scale")  # from the state only
+
+SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
 LEGEND = """
 <div style="display:flex;flex-wrap:wrap;gap:3px 20px;align-items:center;font-size:12px">
@@ -94,15 +96,24 @@ def exact_intervals(dataset, replay):
     }
 
 
+def normal_extent(replay, exact):
+    """ΔF_n (N_c,) in ⟨f_n⟩: exact where known, else of all states."""
+    if exact:
+        return exact["high"] - exact["low"]
+    return replay.high[:, 0] - replay.low[:, 0]
+
+
 def legend(state):
     """What width and colour mean just now, as HTML."""
     if state.replay is None:
         return ""
     diverging = f"{BLUE},{GREY},{ORANGE}"
-    known = "exact" if state.exact is not None else "of all states"
+    extent = normal_extent(state.replay, exact_intervals(state.exact, state.replay))
+    most = float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
+    stops = ",".join(palettes(state.dark)["extent"][::8])
     bars = {
         "mobilised": ("−1", diverging, "1"),
-        "extent": ("0", ",".join(EXTENT), f"98 % of all ({known})"),
+        "extent": ("0", stops, f"{most:.2f} ⟨fₙ⟩"),
         "change": ("−⟨fₙ⟩", diverging, "+⟨fₙ⟩"),
         "sign": ("less", f"{BLUE} 50%,{ORANGE} 50%", "more"),
     }

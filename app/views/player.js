@@ -103,7 +103,7 @@ function layout(scene) {
       <input class="scrub" type="range" min="0" value="0" step="1" aria-label="state">
       ${button("pin", "pin this state, to compare others with it")}
       ${button("between", "to and fro between the pinned state and this one")}
-      <label title="speed"><input class="speed" type="range" min="0" max="6" step="0.25" value="3"
+      <label title="speed, states per second"><input class="speed" type="range" min="0" max="6" step="0.25" value="3"
         aria-label="speed"><span class="rate"></span></label>
     </div>
     <div class="read">
@@ -207,11 +207,13 @@ export function render({ model, view }) {
     const residual = walk.residual[here]
     part("residual").textContent = Number.isFinite(residual) ? residual.toExponential(0) : "–"
     part("scrub").value = position
-    const { drawn, segments, outside, thin } = scene.counts ?? {}
-    if (segments) {
-      root.querySelector(".skips").textContent = `Drawn: ${drawn} of ${segments} segments ` +
-        `(${outside} out of view, ${thin} thinner than ${LEAST} px).`
-    }
+    count()
+  }
+
+  function count() {
+    const { drawn, segments, outside, thin } = scene.counts
+    part("skips").textContent = `Drawn: ${drawn} of ${segments} segments ` +
+      `(${outside} out of view, ${thin} thinner than ${LEAST} px).`
   }
 
   const name = (k) => (k ? `state ${walk.number[k]}` : "the original")
@@ -344,12 +346,13 @@ export function render({ model, view }) {
     },
   }
   scene.describe = tooltip
+  scene.onRepaint = count
 
   // Widgets and keys
 
   function tellRate() {
     const rate = speed()
-    part("rate").textContent = `${rate < 10 ? rate.toFixed(1) : rate.toFixed(0)} states/s`
+    part("rate").textContent = `${rate < 10 ? rate.toFixed(1) : rate.toFixed(0)} /s`
   }
 
   const halt = (action) => () => { if (walk) { play(false); action() } }

@@ -12,7 +12,7 @@ class Progress:
         self.bar = pmui.LinearProgress(sizing_mode="stretch_width")
         self.stage = pmui.Typography("", variant="caption", sizing_mode="stretch_width")
         self.cancel = pmui.Button(
-            name="Cancel", variant="outlined", size="small", on_click=lambda event: task.cancel()
+            label="Cancel", variant="outlined", size="small", on_click=lambda event: task.cancel()
         )
         self.column = pn.Column(
             self.bar, self.stage, self.cancel, sizing_mode="stretch_width", visible=task.running

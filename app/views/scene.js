@@ -23,6 +23,7 @@ class Scene {
     this.onSelect = onSelect
     this.size = 0
     this.painted = 0
+    this.counts = { segments: 0, drawn: 0, outside: 0, thin: 0 }
     this.selected = null
     this.offset = null
     this.listen()
@@ -82,7 +83,9 @@ class Scene {
   repaint() {
     this.drawDisks()
     this.stale = false
-    if (this.style) this.drawChains(this.style)
+    if (!this.style) return
+    this.drawChains(this.style)
+    this.onRepaint()
   }
 
   // Painting

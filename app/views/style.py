@@ -6,13 +6,14 @@ from bokeh.plotting import figure
 # Blue and orange are told apart with every common colour blindness; the middle is grey, not white,
 # so that contacts without friction are seen on pale disks, by day and by night.
 BLUE, GREY, ORANGE = "#1464c8", "#747880", "#e8710a"
-NEUTRAL = (
-    "#4a5563",
-    "#aab4c2",
-)  # by day, by night: chains at μ = 0, where mobilisation means nothing
-# Cividis, which reads the same with every common colour blindness; its two ends would be lost on a
-# dark and on a pale ground.
-EXTENT = ("#16407a", "#3c5a80", "#5f6f7d", "#7f8478", "#a39a6c", "#c6b159", "#e3c53f")
+# By day and by night: chains at μ = 0, where mobilisation means nothing.
+NEUTRAL = "#4a5563", "#aab4c2"
+# Cividis, which reads the same with every common colour blindness, less the end that would be lost
+# on the ground, by day and by night.
+EXTENT = (
+    ("#16407a", "#3c5a80", "#5f6f7d", "#7f8478", "#a39a6c", "#c6b159", "#e3c53f"),
+    ("#2f62a6", "#4c6a94", "#66768a", "#858a7e", "#a9a070", "#cdb85e", "#fee838"),
+)
 EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
 PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
@@ -42,7 +43,7 @@ def palettes(dark):
     ]
     return {
         "mobilised": diverging,
-        "extent": ramp(*EXTENT),
+        "extent": ramp(*EXTENT[dark]),
         "change": diverging,
         "sign": [BLUE, GREY, ORANGE],
         "neutral": NEUTRAL[dark],
@@ -63,18 +64,13 @@ def _faded(colour, part):
 def plot(title, x, y, **options):
     """A figure that fills its width, titled and labelled, with a quiet toolbar."""
     settled = {
+        "tools": "pan,wheel_zoom,box_zoom,reset",
         "toolbar_location": "above",
         "sizing_mode": "stretch_width",
         "min_border_left": 56,
         "min_border_right": 12,
     }
-    fig = figure(
-        title=title,
-        x_axis_label=x,
-        y_axis_label=y,
-        tools="pan,wheel_zoom,box_zoom,reset",
-        **settled | options,
-    )
+    fig = figure(title=title, x_axis_label=x, y_axis_label=y, **settled | options)
     fig.toolbar.logo = None
     fig.toolbar.autohide = True
     if title:

@@ -4,9 +4,9 @@ import panel as pn
 
 TILE = '<div class="tile" title="{title}"><div class="name">{name}</div><div>{value}</div></div>'
 STYLE = """
-.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(78px, 1fr)); gap: 6px; }
-.tile { padding: 4px 8px 3px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
-  font-variant-numeric: tabular-nums; font-size: 15px; line-height: 19px; }
+.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(52px, 1fr)); gap: 5px; }
+.tile { padding: 4px 6px 3px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
+  font-variant-numeric: tabular-nums; font-size: 13.5px; line-height: 18px; }
 .tile .name { font-size: 11px; line-height: 13px; opacity: 0.75; }
 .rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
 """

@@ -1,5 +1,7 @@
 """A small store for the app's tests."""
 
+import time
+
 import pytest
 from small_store import cell_parameters
 
@@ -26,6 +28,24 @@ def library(shipped, tmp_path):
 
 @pytest.fixture
 def state(library):
+    """The state of a page that has come to rest."""
     from app.state import AppState
 
-    return AppState(library)
+    state = AppState(library)
+    wait_for(state)
+    return state
+
+
+@pytest.fixture(name="wait_for")
+def wait_for_fixture():
+    """See wait_for."""
+    return wait_for
+
+
+def wait_for(state, seconds=60):
+    """Poll as the page does until no task is running any more."""
+    end = time.monotonic() + seconds
+    while state.busy and time.monotonic() < end:
+        time.sleep(0.005)
+        state.poll()
+    assert not state.busy

@@ -1,5 +1,6 @@
-"""Data and state of the app, without a browser."""
+"""Data, state, links and tasks of the app, without a browser."""
 
+import threading
 import time
 
 import numpy as np
@@ -7,37 +8,44 @@ import pytest
 from small_store import DISKS, KEPT, STATES, cell_parameters
 
 from granforce import measures, study
+from granforce.records import Cancelled, InputError
 
 
-def wait_for(state, seconds=60):
-    """Poll as the page does until nothing is computed any more."""
-    end = time.monotonic() + seconds
-    while state.running and time.monotonic() < end:
-        time.sleep(0.02)
-        state.poll()
-    assert not state.running
+def cell_at(library, mu):
+    return next(cell for cell in library.cells() if cell.mu == mu)
 
 
 def replay_at(library, mu):
-    cell = next(cell for cell in library.cells() if cell.mu == mu)
-    return library.replay(cell)
+    return library.shown(cell_at(library, mu)).replay
+
+
+def small(mu, states=8, **details):
+    """A Selection of the small store's packings."""
+    from app.selection import select
+
+    return select(DISKS, mu, 1, states=states, **details)
+
+
+# Catalogue and replays
 
 
 def test_catalogue_lists_the_shipped_walks_as_one_series(library):
     cells = library.cells()
     assert [cell.mu for cell in cells] == [0, 0.1, 1]
     assert {cell.series for cell in cells} == {
-        f"N = {DISKS}, seed 1, {STATES} states, nearest admissible state"
+        f"N = {DISKS}, seed 1, {STATES} states, nearest admissible state, by PIQP"
     }
 
 
-def test_missing_stores_leave_a_note_not_an_error(tmp_path):
+def test_missing_stores_leave_a_note_not_an_error(tmp_path, wait_for):
     from app.data import Library
     from app.state import AppState
 
     library = Library(tmp_path / "nowhere", tmp_path / "cache")
     assert "no store" in library.notes[0]
-    assert AppState(library).replay is None
+    state = AppState(library)
+    wait_for(state)
+    assert state.replay is None and state.message == ""
 
 
 @pytest.mark.parametrize("mu", [0, 0.1, 1])
@@ -82,6 +90,8 @@ def test_frames_begin_with_the_original_and_balance(library):
     assert np.all(np.abs(replay.tangential) <= 0.1 * replay.normal + 1e-6)
     assert replay.normal[0].mean() == pytest.approx(1, rel=0.2)
     assert np.all(np.diff(replay.normal[0, replay.order]) >= 0)
+    assert np.all(replay.normal[1:] >= replay.low[:, 0] - 1e-6)
+    assert np.all(replay.normal[1:] <= replay.high[:, 0] + 1e-6)
 
 
 def test_replayed_eta3_is_that_of_measures(library):
@@ -103,10 +113,25 @@ def test_open_boxes_have_no_images(library):
     from app.data import make_replay
 
     cell = library.cells()[1]
-    dataset, _ = study.get_walk(cell.store, cell.params)
-    packing, _ = study.get_packing(cell.store, cell.params["packing"])
-    replay = make_replay(packing._replace(box=np.full(2, np.inf)), dataset, cell.mu)
+    packing = library.packing(cell.params["packing"])
+    open_packing = packing._replace(box=np.full(2, np.inf))
+    replay = make_replay(open_packing, library.dataset(cell), cell.mu)
     assert len(replay.disks.x) == DISKS and len(replay.links.contact) == replay.normal.shape[1]
+
+
+def test_frames_beyond_the_budget_are_left_out_and_counted(library, monkeypatch):
+    from app import data
+    from app.views.summary import left_out
+
+    cell = cell_at(library, 0.1)
+    packing, dataset = library.packing(cell.params["packing"]), library.dataset(cell)
+    whole = data.make_replay(packing, dataset, cell.mu)
+    monkeypatch.setattr(data, "FRAME_BYTES", 8 * 5 * whole.normal.shape[1])
+    short = data.make_replay(packing, dataset, cell.mu)
+    assert len(short.number) == 6 and short.summary["kept"] == 5
+    assert "Shown: 5 evenly spaced of 30" in left_out(short.summary)
+    among = np.searchsorted(whole.number, short.number)
+    np.testing.assert_array_equal(whole.normal[among], short.normal)
 
 
 def test_table_has_a_row_for_each_mu(state):
@@ -115,41 +140,147 @@ def test_table_has_a_row_for_each_mu(state):
     assert rows[1]["eta1"] > rows[0]["eta1"]
 
 
-def test_state_opens_near_mu_0_1_and_follows_the_selection(state):
-    assert state.mu == 0.1 and state.replay.summary["mu"] == 0.1
+def test_the_last_cells_are_kept_in_memory_and_no_more(library, monkeypatch):
+    from app import data
+
+    monkeypatch.setattr(data, "SHOWN_KEPT", 2)
+    cells = library.cells()
+    for cell in cells:
+        library.shown(cell)
+    assert library.shown_in_memory(cells[0]) is None
+    assert library.shown_in_memory(cells[2]).cell == cells[2]
+
+
+def test_expected_steps_come_from_the_nearest_packing(library):
+    assert library.expected_steps(DISKS, 0.2) > 0
+    assert library.expected_steps(999, 0.2) is None
+
+
+# Links and commands
+
+
+@pytest.mark.parametrize(
+    "mu, packed, kind, extra",
+    [(0.1, None, "walk", {}), (0.3, 0.0, "walk", {"radii": "uniform:0.9,1", "sweeps": 50})],
+)
+def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
+    from app.selection import link, read_link, select
+
+    made = select(120, mu, 7, packed, kind=kind, relax="nearest", states=33, seed=4)
+    made = made._replace(packing=made.packing | extra)
+    read, view = read_link("?" + link(made, {"tab": "perturb"}))
+    assert read == made and view == {"tab": "perturb"}
+
+
+def test_links_to_imported_packings_name_their_hash():
+    from app.selection import Selection, link, read_link
+
+    made = Selection({"imported": "a1b2c3", "mu": 0.2}, 0.5, states=10)
+    assert read_link(link(made, {}))[0] == made
+
+
+@pytest.mark.parametrize(
+    "query", ["?mu=x", "?mu=-1", "?mu=0.1&n=2", "?mu=0.1&source=oracle", "?mu=.1&radii=/etc/passwd"]
+)
+def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(library, wait_for, query):
+    from app.state import AppState
+
+    state = AppState(library, query=query)
+    wait_for(state)
+    assert state.message and "\n" not in state.message
+    assert state.cell.mu == 0.1
+
+
+def test_the_view_travels_with_the_link(state, library, wait_for):
+    from app.state import AppState
+
+    state.param.update(contact=3, frame=5, between=(2, 7), colour="extent", overlay=True, dark=True)
+    again = AppState(library, query=state.link())
+    wait_for(again)
+    for name in ("contact", "frame", "between", "colour", "overlay", "dark", "selection"):
+        assert getattr(again, name) == getattr(state, name), name
+
+
+def test_views_that_make_no_sense_are_left_out(library, wait_for):
+    from app.state import AppState
+
+    query = "mu=1&n=30&states=30&relax=nearest&contact=100000&frame=-2&colour=plaid&between=5"
+    state = AppState(library, query=query)
+    wait_for(state)
+    assert state.cell.mu == 1 and state.message == ""
+    assert (state.contact, state.frame, state.colour, state.between) == (
+        None,
+        0,
+        "mobilised",
+        None,
+    )
+
+
+@pytest.mark.parametrize("packed", [None, 0.0])
+def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
+    """The command line reads the words back as the parameters of the cell."""
+    from app.selection import command, select
+    from granforce import cli, commands
+
+    wanted = select(31, 0.25, 3, packed, relax="accelerated", states=9, seed=2)
+    wanted = wanted._replace(packing=wanted.packing | {"sweeps": 60})
+    found = []
+
+    def note(store, parameters, **options):
+        found.append(parameters)
+        raise Cancelled
+
+    monkeypatch.setattr(commands.study, "get_packing", lambda *given, **options: (None, True))
+    monkeypatch.setattr(commands.study, "get_walk", note)
+    assert cli.main(command(wanted).split()[1:]) == 130
+    expected = wanted.parameters()
+    assert found[0] | {"keep": None} == expected | {"keep": None}
+
+
+# State
+
+
+def test_state_opens_near_mu_0_1_and_follows_the_selection(state, wait_for):
+    assert state.cell.mu == 0.1 and state.replay.summary["mu"] == 0.1
     state.choose(mu=1)
+    wait_for(state)
     assert state.replay.summary["mu"] == 1 and "finished results" in state.source
 
 
-def test_wrong_mu_is_told_in_one_line(state):
-    for mu in ("-1", "much", "nan", ""):
-        state.compute(n=DISKS, mu=mu, seed=1, states=5, relax="nearest")
-        assert "friction coefficient" in state.message and "\n" not in state.message
-        assert not state.running
-    state.compute(n=None, mu="0.1", seed=1, states=5, relax="nearest")
-    assert state.message and not state.running
+def test_a_cell_in_memory_is_shown_at_once(state):
+    state.library.shown(cell_at(state.library, 1))
+    state.choose(mu=1)
+    assert state.cell.mu == 1 and not state.busy
 
 
-def test_new_mu_is_computed_cached_and_shown(state):
-    state.compute(n=DISKS, mu="0.3", seed=1, states=8, relax="nearest")
-    assert state.running
+def test_stored_states_are_found_whatever_was_kept_of_them(state, wait_for):
+    state.ask(small(1, STATES, relax="nearest"))
     wait_for(state)
-    assert state.message == "" and state.mu == 0.3
+    assert state.cell.mu == 1 and not state.missing
+
+
+def test_states_in_no_store_are_missing_until_computed(state, wait_for):
+    before = state.replay
+    state.ask(small(0.3))
+    assert state.missing and state.replay is before and not state.busy
+    state.compute()
+    wait_for(state)
+    assert state.message == "" and state.cell.mu == 0.3 and not state.missing
     assert "cache" in state.source and len(state.replay.number) == 9
     assert [cell.mu for cell in state.cells()] == [0.3]
     assert len(state.catalogue) == 4
 
 
-def test_a_walk_in_the_store_is_found_not_computed(state):
-    from app.jobs import Job
+def test_a_link_to_missing_states_computes_them(library, wait_for):
+    from app.state import AppState
 
-    job = Job(state.library, cell_parameters(1))
-    job.wait(20)
-    assert job.cell.store is state.library.shipped
+    state = AppState(library, query="mu=0.2&n=30&states=5")
+    wait_for(state)
+    assert state.cell.mu == 0.2 and len(state.replay.number) == 6
 
 
-def test_a_shipped_packing_is_not_made_again(state):
-    state.compute(n=DISKS, mu=0.1, seed=1, states=5, relax="nearest")
+def test_a_shipped_packing_is_not_made_again(state, wait_for):
+    state.ask(small(0.1, 5), at_once=True)
     wait_for(state)
     packing = study.packing_parameters(DISKS, 0.1, 1)
     copied, cached = study.get_packing(state.library.cache, packing)
@@ -157,27 +288,113 @@ def test_a_shipped_packing_is_not_made_again(state):
     assert cached and np.array_equal(copied.x, shipped.x)
 
 
-def test_cancel_ends_the_computation_and_shows_what_was_there(state):
+def test_exact_intervals_hold_every_state_on_screen(state, wait_for):
+    from app.views.packing import exact_intervals
+
+    state.compute_exact()
+    wait_for(state)
+    exact = exact_intervals(state.exact, state.replay)
+    assert np.all(state.replay.normal >= exact["low"] - 1e-5)
+    assert np.all(state.replay.normal <= exact["high"] + 1e-5)
+    assert state.library.exact(state.cell.selection) is not None
+
+
+def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
+    from app.selection import select
+
     before = state.replay
-    state.compute(n=200, mu=0.05, seed=3, states=100, relax="nearest")
-    state.cancel()
+    state.ask(select(200, 0.05, 3, states=100), at_once=True)
+    state.computation.cancel()
     wait_for(state)
     assert state.replay is before and state.message == ""
     assert len(state.catalogue) == 3
 
 
-def test_progress_grows_and_estimates_the_rest(state):
+def test_closing_the_page_ends_its_computation(state):
+    from app.selection import select
+
+    state.ask(select(200, 0.05, 3, states=100), at_once=True)
+    job = state.computation._job
+    while job.fraction is None:
+        time.sleep(0.01)  # until it is under way
+    state.close()
+    job.wait(30)
+    assert job.ended and job.result is None and job.error == ""
+
+
+def test_progress_grows_and_estimates_the_rest(state, wait_for):
+    from app.selection import select
+
     fractions = []
-    state.param.watch(lambda event: fractions.append(event.new), "fraction")
-    state.compute(n=DISKS, mu=0.2, seed=2, states=100, relax="nearest")
+    state.computation.param.watch(lambda event: fractions.append(event.new), "fraction")
+    state.ask(select(DISKS, 0.2, 2, states=100), at_once=True)
     wait_for(state)
     known = [value for value in fractions if value is not None]
     assert known == sorted(known) and all(0 <= value <= 1 for value in known)
 
 
-def test_expected_steps_come_from_the_nearest_packing(library):
-    assert library.expected_steps(DISKS, 0.2) > 0
-    assert library.expected_steps(999, 0.2) is None
+def test_sizes_beyond_the_limits_are_refused(state, monkeypatch):
+    from app import state as module
+    from app.limits import Limits
+    from app.selection import select
+
+    monkeypatch.setattr(module, "LIMITS", Limits(n=50, states=10))
+    for asked, word in ((small(0.2, 11), "states"), (select(51, 0.2, 1, states=5), "N must lie")):
+        state.ask(asked, at_once=True)
+        assert not state.busy and word in state.message and "\n" not in state.message
+
+
+def test_limits_are_read_and_wrong_ones_refused():
+    from app.limits import Limits, read_limits
+
+    assert read_limits("") == Limits()
+    assert read_limits("n=500, states=20,upload=3,computations=1") == Limits(500, 20, 3, 1)
+    for text in ("n=0", "disks=4", "n=", "n=1e3"):
+        with pytest.raises(InputError, match="GRANFORCE_LIMITS"):
+            read_limits(text)
+    with pytest.raises(InputError, match="N must lie between 1 and 500"):
+        Limits(n=500).check(n=501)
+
+
+# Tasks
+
+
+def test_a_later_job_replaces_an_earlier_one(wait_for):
+    from app.jobs import Task
+
+    release, done = threading.Event(), []
+    task = Task()
+    task.start(lambda job: release.wait(10) and "first", done.append)
+    task.start(lambda job: "second", done.append)
+    release.set()
+    while task.running:
+        task.poll()
+    assert done == ["second"]
+
+
+def test_errors_of_a_job_are_told_not_raised():
+    from app.jobs import Task
+
+    def fail(job):
+        raise ZeroDivisionError("no such thing")
+
+    task, done = Task(), []
+    task.start(fail, done.append)
+    while task.running:
+        task.poll()
+    assert "ZeroDivisionError" in task.message and done == []
+
+
+def test_a_job_wakes_the_page_when_it_ends():
+    from app.jobs import Task
+
+    woken = threading.Event()
+    task = Task(wake=lambda function: woken.set())
+    task.start(lambda job: None)
+    assert woken.wait(10)
+
+
+# Views
 
 
 def test_player_gets_flat_frames(library):
@@ -186,17 +403,81 @@ def test_player_gets_flat_frames(library):
     shipped = frames(replay_at(library, 1))
     assert shipped["normal"].size == (KEPT + 1) * shipped["contacts"]
     assert shipped["normal"].dtype == np.float32
+    assert shipped["kind"].max() == 3 or not np.any(shipped["touching"] == 0)
+
+
+@pytest.mark.parametrize("by", ["original", "extent", "exact", "position"])
+def test_contacts_are_sorted_by_what_is_named(state, wait_for, by):
+    from app.views.intervals import sorted_contacts
+    from app.views.packing import exact_intervals
+
+    state.compute_exact()
+    wait_for(state)
+    replay, exact = state.replay, exact_intervals(state.exact, state.replay)
+    extent = exact["high"] - exact["low"]
+    value = {
+        "original": replay.normal[0],
+        "extent": replay.high[:, 0] - replay.low[:, 0],
+        "exact": extent,
+        "position": (replay.normal[0] - exact["low"]) / extent,
+    }[by]
+    order = sorted_contacts(replay, exact, by)
+    assert sorted(order) == list(range(len(value)))
+    assert np.all(np.diff(value[order]) >= 0)
+
+
+def test_intervals_take_nothing_over_while_hidden(state, wait_for):
+    from app.views.intervals import View
+
+    state.tab = "statistics"
+    view = View(state)
+    state.choose(mu=1)
+    wait_for(state)
+    assert len(view.bars.data["rank"]) == 0
+    state.tab = "intervals"
+    assert len(view.bars.data["rank"]) == state.replay.normal.shape[1]
+
+
+def test_many_contacts_are_drawn_in_part_and_that_is_told(state, monkeypatch):
+    from app.views import intervals
+
+    monkeypatch.setattr(intervals, "MOST_BARS", 20)
+    view = intervals.View(state)
+    assert 10 <= len(view.bars.data["rank"]) <= 20
+    assert "th of" in view.left_out.object
+
+
+def test_a_tap_on_a_bar_selects_its_contact(state):
+    from app.views.intervals import View
+
+    view = View(state)
+    view.bars.selected.indices = [4]
+    assert state.contact == state.replay.order[4]
+    assert view.chosen.data["rank"] == [5.0]
 
 
 def test_left_out_work_is_counted(library):
     from app.views.summary import left_out
 
     text = left_out(replay_at(library, 0).summary)
-    assert "rattlers" in text and f"{STATES} states without relaxation" in text
+    assert "tangential unknowns" in text and f"{STATES} states without relaxation" in text
     assert f"Shown: {KEPT}" in text
 
 
 def test_every_relaxation_has_a_name_on_screen():
-    from app.data import SOLVERS
+    from app.selection import SOLVERS
 
     assert set(SOLVERS) == set(study.RELAXATIONS)
+
+
+def test_a_walk_in_the_store_is_found_not_computed(library):
+    from app import compute
+    from app.jobs import Job
+    from app.selection import selected
+
+    chosen = selected("walk", cell_parameters(1))
+    stored = library.find("walk", cell_parameters(1))
+    job = Job(compute.states(library, chosen))
+    job.wait(60)
+    assert job.error == "" and job.result.cell.mu == 1
+    assert stored.store is library.shipped
