@@ -18,6 +18,7 @@ _HOME = {
     "nearest": "relax.nearest",
     "accelerated": "relax.accelerated",
     "walk": "random_walk",
+    "sample_uniform": "uniform",
     "intervals": "bounds",
     "limit_loads": "bounds",
     "outline": "projection",

@@ -31,6 +31,9 @@ ADMISSIBLE = 1e-9
 # A contact whose largest possible f_n (in ⟨f_n⟩) is below this carries nothing.
 CARRYING = 1e-7
 
+# A cone coordinate that stays below this (in ⟨f_n⟩) in all of S is held where it is for sampling.
+FLAT = 1e-8
+
 # The certificate of jamming: relative distance |f − f_dyn| / |f_dyn| between the dynamic forces
 # and the nearest admissible network on the same contacts.
 JAMMED_DISTANCE = 1e-2
