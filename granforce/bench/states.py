@@ -50,7 +50,7 @@ def walks(quick=True, *, n=None, packings=None, states=None, frictions=FRICTIONS
     """
     n = n or (100 if quick else 400)
     packings = packings or (3 if quick else 10)
-    states = states or (50 if quick else 200)
+    states = states or (50 if quick else 60)
     rows = []
     for mu in frictions:
         found = {name: [] for name in WALKS}
