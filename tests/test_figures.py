@@ -1,8 +1,25 @@
-"""Figures hold what they were given."""
+"""Figures hold what they were given; pages need no network, pictures no browser."""
 
 import re
 
+import holoviews as hv
+import numpy as np
+import pytest
+
 from granforce import figures
+from granforce.records import InputError
+
+
+def curves(frame):
+    """{label: (x, y)} of the lines of one frame."""
+    return {
+        e.label: (e.dimension_values(0), e.dimension_values(1))
+        for e in frame.traverse(lambda e: e, [hv.Curve])
+    }
+
+
+def frames(figure):
+    return figure.values()
 
 
 def test_walks_stand_beside_the_exact_bounds(tmp_path):
@@ -21,3 +38,70 @@ def test_walks_stand_beside_the_exact_bounds(tmp_path):
     page = path.read_text()
     # Scripts and styles are in the page: it needs no network.
     assert not re.search(r"<script[^>]+src=|<link[^>]+stylesheet", page)
+
+
+ROWS = [
+    {"mu": mu, "eta1": k * mu, "eta2": 2 * k * mu, "eta3": 20 * k * mu, "coordination": 4 - mu}
+    for mu in (0, 0.1, 1)
+    for k in (1, 3)
+]
+
+
+@pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
+def test_indeterminacy_averages_over_packings(backend):
+    exact = [{"mu": 0.1, "eta3": 9.0}]
+    figure = figures.indeterminacy(ROWS, beside={"exact": exact}, backend=backend)
+    linear, log, contacts = (curves(frame) for frame in frames(figure))
+    assert list(linear) == ["η1", "η2", "0.15 η3", "0.15 η3, exact"]
+    np.testing.assert_allclose(linear["η2"], ([0, 0.1, 1], [0, 0.4, 4]))
+    np.testing.assert_allclose(log["0.15 η3"], ([0.1, 1], [0.6, 6]))
+    np.testing.assert_allclose(linear["0.15 η3, exact"], ([0.1], [1.35]))
+    np.testing.assert_allclose(contacts["z"], ([0.1, 1], [3.9, 3]))
+    bars = frames(figure)[0].traverse(lambda e: e, [hv.ErrorBars])[0]
+    np.testing.assert_allclose(bars.dimension_values("above"), [0.1, 1])  # standard error of 1, 3
+
+
+def test_extents_are_densities_with_their_tails(rng):
+    groups = {0.1: [rng.exponential(2.0, 4000) for _ in range(2)], 1.0: [np.zeros(5)]}
+    linear, log = (curves(frame) for frame in frames(figures.extents(groups)))
+    (label,) = linear  # nothing is drawn of a packing without indeterminacy
+    b = float(label.partition("b = ")[2])
+    assert b == pytest.approx(1, abs=0.1)
+    x, height = linear[label]
+    assert np.sum(height) * (x[1] - x[0]) == pytest.approx(1 - np.exp(-4), abs=0.01)
+    np.testing.assert_allclose(height, np.exp(-x), atol=0.1)
+    assert np.all(log[label][1] > 0)
+
+
+def test_correlations_carry_the_range_over_networks():
+    rows = [
+        {"mu": mu, "correlation": c, "correlation_low": c - 0.1, "correlation_high": c + 0.3}
+        for mu in (0, 0.1, 1)
+        for c in (mu, mu + 0.2)
+    ]
+    figure = figures.correlations(rows, beside={"exact": [{"mu": 0.1, "correlation": 0.5}]})
+    drawn = curves(figure)
+    np.testing.assert_allclose(drawn["walk"], ([0.1, 1], [0.2, 1.1]))
+    np.testing.assert_allclose(drawn["exact"], ([0.1], [0.5]))
+    bars = figure.traverse(lambda e: e, [hv.ErrorBars])[0]
+    np.testing.assert_allclose(bars.dimension_values("below"), [0.1, 0.1])
+    np.testing.assert_allclose(bars.dimension_values("above"), [0.3, 0.3])
+
+
+def test_pictures_need_no_browser(tmp_path):
+    figure = figures.indeterminacy(ROWS, backend="matplotlib")
+    for name in ("a.png", "a.svg", "b.svg"):
+        figures.save(figure, tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+    with pytest.raises(InputError, match=r"not '\.gif'"):
+        figures.save(figure, tmp_path / "a.gif")
+
+
+def test_one_backend_does_not_displace_the_other():
+    figures.indeterminacy(ROWS, backend="bokeh")
+    current = hv.Store.current_backend
+    figures.indeterminacy(ROWS, backend="matplotlib")
+    assert hv.Store.current_backend == current
+    with pytest.raises(InputError, match="take bokeh or matplotlib"):
+        figures.indeterminacy(ROWS, backend="plotly")

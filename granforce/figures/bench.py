@@ -1,6 +1,8 @@
-"""Figures as HoloViews objects, one function each."""
+"""Figure of the benchmark."""
 
 import holoviews as hv
+
+from granforce.figures import style
 
 
 def walk_against_exact(rows):
@@ -8,7 +10,7 @@ def walk_against_exact(rows):
 
     rows: those of `granforce.bench.intervals`. One panel per μ.
     """
-    hv.extension("bokeh")
+    style.ready("bokeh")
     panels = []
     for mu in sorted({row["mu"] for row in rows}):
         chosen = [row for row in rows if row["mu"] == mu]
@@ -33,8 +35,3 @@ def _curves(rows):
         points = [(r["seconds"], r["extent_part"]) for r in rows if r["method"] == method]
         line = hv.Curve(points, label=method)
         yield line * hv.Scatter(points, label=method).opts(size=8)
-
-
-def save(figure, path):
-    """Write a figure as a page of its own that needs no network."""
-    hv.save(figure, path, backend="bokeh", resources="inline")
