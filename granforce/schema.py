@@ -53,6 +53,25 @@ VARIABLES: dict[str, Variable] = {
     "distance_to_centre": Variable(
         ("state",), "float64", "mean normal force", "distance from the centre of the ensemble"
     ),
+    "chain": Variable(("state",), "int64", "1", "chain that the state belongs to"),
+    # whether chains mixed: NaN where a component cannot vary
+    "r_hat": Variable(("contact", "component"), "float64", "1", f"split R̂, {_COMPONENT}"),
+    "bulk_size": Variable(
+        ("contact", "component"), "float64", "1", f"bulk effective sample size, {_COMPONENT}"
+    ),
+    "tail_size": Variable(
+        ("contact", "component"), "float64", "1", f"tail effective sample size, {_COMPONENT}"
+    ),
+    "worst_r_hat": Variable((), "float64", "1", "largest split R̂ of any component"),
+    "least_bulk_size": Variable((), "float64", "1", "smallest bulk effective sample size"),
+    "least_tail_size": Variable((), "float64", "1", "smallest tail effective sample size"),
+    "reached": Variable((), "int64", "1", "1 where chains mixed to the effective size wanted"),
+    "turns": Variable((), "int64", "1", "reflections of the billiard walk"),
+    "refused": Variable((), "int64", "1", "paths with too many reflections, not taken"),
+    "dropped": Variable((), "int64", "1", "states left out while chains warmed up"),
+    "held": Variable((), "int64", "1", "cone coordinates that are zero in all of the ensemble"),
+    "setup_seconds": Variable((), "float64", "s", "wall time until the first step"),
+    "sampling_seconds": Variable((), "float64", "s", "wall time of the steps"),
     # what a set of states says: bounds seen, measures, and what it took
     "original": Variable(
         ("contact", "component"), "float64", "force", f"the packing's own network, {_COMPONENT}"
@@ -112,6 +131,40 @@ VARIABLES: dict[str, Variable] = {
     "unloaded_contacts": Variable((), "int64", "1", "contacts that can carry nothing"),
     "tangential_unknowns": Variable((), "int64", "1", "tangential unknowns dropped at μ = 0"),
     "seconds": Variable((), "float64", "s", "wall time of the computation"),
+}
+
+# The reduced study: one row per cell, with scalars of its dataset, and samples of its contacts.
+_ROW_SCALARS = (
+    *("mu", "eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
+    *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
+    *("residual", "max_gap", "seconds"),
+)
+_FORCE = "mean normal force"
+
+VARIABLES |= {
+    **{
+        f"row_{name}": Variable(
+            ("row",), "float64", VARIABLES[name].units, VARIABLES[name].long_name
+        )
+        for name in _ROW_SCALARS
+    },
+    "row_part": Variable(("row",), "int64", "1", "part of the study, a position in attrs' parts"),
+    "row_n": Variable(("row",), "int64", "1", "number of disks"),
+    "row_seed": Variable(("row",), "int64", "1", "seed of the packing"),
+    "row_contacts": Variable(("row",), "float64", "1", "number of contacts that carry"),
+    "row_mean_extent": Variable(("row",), "float64", _FORCE, "⟨ΔF_n⟩ over contacts"),
+    "row_mean_distance": Variable(
+        ("row",), "float64", _FORCE, "mean distance of states from their centre"
+    ),
+    "row_undetermined": Variable(("row",), "float64", "1", "contacts without a unique force"),
+    "row_clusters": Variable(("row",), "float64", "1", "clusters of undetermined contacts"),
+    "row_largest_cluster": Variable(("row",), "float64", "1", "contacts of the largest cluster"),
+    "sample_row": Variable(("sample",), "int64", "1", "row that the contact belongs to"),
+    "sample_contact": Variable(("sample",), "int64", "1", "position of the contact in the packing"),
+    "sample_normal": Variable(("sample",), "float64", _FORCE, "original f_n"),
+    "sample_extent": Variable(("sample",), "float64", _FORCE, "ΔF_n"),
+    "shown_row": Variable(("shown",), "int64", "1", "row that the shown contact belongs to"),
+    "shown_normal": Variable(("shown_state", "shown"), "float64", _FORCE, "f_n in some states"),
 }
 
 
