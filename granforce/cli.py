@@ -38,6 +38,7 @@ def _parser():
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     _add_pack(commands)
     _add_walk(commands)
+    _add_uniform(commands)
     _add_measure(commands)
     _add_sweep(commands)
     _add_intervals(commands)
@@ -134,6 +135,28 @@ def _add_source(command):
     command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
     _add_packing(command)
     _add_walk_options(command)
+    _add_store(command)
+
+
+def _add_uniform(commands):
+    command = _command(
+        commands,
+        "uniform",
+        "uniform",
+        "draw force networks of a packing uniformly, and tell how well that went",
+        "granforce uniform -n 400 --mu 0.1 --seed 1 --states 1000 --effective 500",
+    )
+    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
+    _add_packing(command)
+    group = command.add_argument_group("the sample")
+    group.add_argument("--states", type=int, default=1000, help="at least so many (default 1000)")
+    group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
+    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
+    group.add_argument(
+        "--effective", type=float, help="draw on until worth so many independent states"
+    )
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     _add_store(command)
 
 

@@ -103,6 +103,47 @@ def walk(arguments):
     report(lines, arguments.json)
 
 
+UNIFORM_LINES = (
+    *("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "worst_r_hat"),
+    *("least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held", "skipped"),
+    *("rattlers", "unloaded_contacts"),
+)
+
+
+def uniform(arguments):
+    """Uniform sample, drawn or found; report it. Returns 1 if it is not worth what was wanted."""
+    size = arguments.states, arguments.sample_seed
+    options = {"chains": arguments.chains, "effective": arguments.effective}
+    options["mu"] = arguments.ensemble_mu
+    # Bad sizes are told before a packing is made.
+    study.uniform_parameters({"mu": 0.0}, *size, **options)
+    if arguments.workers < 1:
+        raise InputError("--workers must be at least 1")
+    store = open_store(arguments.cache)
+    parameters = study.uniform_parameters(_named_packing(arguments, store), *size, **options)
+    with Bar("uniform sample", "state") as progress:
+        dataset, cached = study.get_uniform(
+            store, parameters, workers=arguments.workers, progress=progress
+        )
+    reached = bool(dataset["reached"].item())
+    lines = {
+        "entry": store.name("uniform", parameters, version=study.UNIFORM_VERSION),
+        "states": dataset.sizes["state"],
+        **{name: dataset[name].item() for name in UNIFORM_LINES},
+        "reached": reached,
+        "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
+        "original_distance": dataset["original_distance"].item(),
+        "largest_residual": float(dataset["residual"].max()),
+        "largest_violation": float(dataset["violation"].max()),
+        "setup_seconds": dataset["setup_seconds"].item(),
+        "sampling_seconds": dataset["sampling_seconds"].item(),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    report(lines, arguments.json)
+    return 1 if arguments.effective and not reached else 0
+
+
 def measure(arguments):
     """Measures of a walk, made or found."""
     _, parameters, dataset, _ = _walked(arguments)

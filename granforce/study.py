@@ -16,16 +16,19 @@ from granforce.compaction import pack
 from granforce.polytope import ensemble
 from granforce.projection import outline
 from granforce.random_walk import walk
-from granforce.records import Cancelled, InputError, friction
+from granforce.records import Cancelled, InputError, friction, positive
 from granforce.relax.accelerated import accelerated
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
+from granforce.samples import uniform_dataset, walk_dataset
 from granforce.schema import dataset_packing, labelled, packing_dataset
 from granforce.tolerances import EQUILIBRIUM
+from granforce.uniform import sample_uniform
 
 # Raised when an algorithm gives other numbers for the same parameters: older entries are not used.
 PACKING_VERSION = 1
 WALK_VERSION = 1
+UNIFORM_VERSION = 1
 INTERVALS_VERSION = 1
 LIMIT_LOADS_VERSION = 1
 OUTLINE_VERSION = 1
@@ -135,45 +138,51 @@ def found_or_kept(store, kind, parameters, compute, version, dtypes=None):
     return dataset, False
 
 
-def walk_dataset(S, done, *, keep=None, seconds=0.0):
-    """A Walk with its measures as a dataset; `keep` evenly spaced states are kept, or all."""
-    states = done.states
-    centre = measures.mean_network(states)
-    low, high = measures.intervals_seen(states)
-    extent = measures.normal_extent(low, high)
-    in_error = measures.correlation_range(states, extent)
-    distance = measures.distances(states, centre) / S.force_scale
-    start = measures.distances(S.original[None], centre)[0] / S.force_scale
-    pick = slice(None) if keep is None else np.linspace(0, len(states) - 1, keep).astype(int)
-    return labelled(
-        {
-            "states": states[pick],
-            "residual": done.residual[pick],
-            "violation": done.violation[pick],
-            "sweeps": done.sweeps[pick],
-            "attempts": done.attempts[pick],
-            "distance_to_centre": distance[pick],
-            "backbone": S.index,
-            "original": S.original,
-            "low": low,
-            "high": high,
-            "eta1": measures.eta1(states),
-            "eta2": measures.eta2(states),
-            "eta3": measures.eta3(low, high),
-            "correlation": measures.correlation(S.original[:, 0], extent),
-            "correlation_low": in_error[0],
-            "correlation_high": in_error[1],
-            "packing_fraction": S.packing.packing_fraction,
-            "coordination": S.coordination,
-            "dimension": S.dimension,
-            "force_scale": S.force_scale,
-            "original_distance": start,
-            "acceptance": done.acceptance,
-            **done.counts,
-            **S.skipped,
-            "seconds": seconds,
-        }
-    )
+def uniform_parameters(packing, states, seed=0, *, mu=None, chains=4, effective=None, keep=None):
+    """The parameters that name a uniform sample: those of its packing, and how it is drawn.
+
+    mu, keep: as for `walk_parameters`; states, chains, effective: as for `sample_uniform`.
+    """
+    if min(int(states), int(chains)) < 1 or (keep is not None and keep < 1):
+        raise InputError("states, keep and chains must be at least 1")
+    return {
+        "packing": packing,
+        "mu": packing["mu"] if mu is None else friction(mu),
+        "states": int(states),
+        "seed": int(seed),
+        "chains": int(chains),
+        "effective": None if effective is None else positive(effective, "effective sample size"),
+        "keep": None if keep is None else int(keep),
+    }
+
+
+def get_uniform(store, parameters, *, workers=2, dtypes=None, progress=None, cancel=None):
+    """The dataset of this uniform sample with all its measures, and whether the store had it.
+
+    progress(done, total) counts states; dtypes as for Store.save. A sample that did not reach the
+    wanted effective size is kept too, and says so in `reached`.
+    """
+
+    def compute():
+        packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
+        S = ensemble(packing, parameters["mu"])
+        begin = time.perf_counter()
+        drawn = sample_uniform(
+            S,
+            parameters["states"],
+            parameters["chains"],
+            parameters["seed"],
+            workers=workers,
+            effective=parameters["effective"],
+            progress=progress,
+            cancel=cancel,
+        )
+        if cancel is not None and cancel():
+            raise Cancelled("uniform sample cancelled")
+        seconds = time.perf_counter() - begin
+        return uniform_dataset(S, drawn, keep=parameters["keep"], seconds=seconds)
+
+    return found_or_kept(store, "uniform", parameters, compute, UNIFORM_VERSION, dtypes)
 
 
 def exact_parameters(packing, *, mu=None, contacts=None, slice_=None):

@@ -30,8 +30,9 @@ MOVES_PER_DIMENSION = 20
 WARM_UP = 10, 20
 # Turns after which a path is not taken, per dimension; a usual path has less than one.
 MOST_TURNS = 10
-# Chains whose R̂ exceeds this have not mixed.
-MIXED = 1.05
+# Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed., 11.4);
+# the largest R̂ of 1300 components of chains that have is 1.01 for 1000 states, 1.06 for 200.
+MIXED = 1.1
 # A run that wants an effective sample size ends at this many times as many states.
 MOST_STATES = 10
 # States of each chain between two calls of progress and cancel.

@@ -4,6 +4,8 @@ Thresholds: |z| of k independent normals exceeds 5 with probability 6e-7 k, and 
 with probability 5e-5 k, so a right sampler fails here with a new seed about once in a hundred.
 """
 
+import json
+
 import numpy as np
 import pytest
 from bodies import (
@@ -18,11 +20,14 @@ from bodies import (
 from packings import lattice, packed, reference, two_disks
 from scipy import sparse
 
-from granforce import uniform
+from granforce import measures, samples, study, uniform
 from granforce.chart import chart, inner_point
+from granforce.cli import main
 from granforce.diagnostics import mixing
 from granforce.polytope import ensemble
-from granforce.records import InputError, NotJammedError
+from granforce.random_walk import walk
+from granforce.records import Cancelled, InputError, NotJammedError
+from granforce.store import open_store
 from granforce.uniform import sample_uniform
 
 BODIES = {
@@ -269,3 +274,40 @@ def test_what_cannot_be_sampled_is_told(S):
         chart(A, np.array([-1.0]))
     with pytest.raises(InputError, match="not bounded"):
         chart(sparse.csc_matrix([[1.0, -1.0]]), np.array([0.0]))
+
+
+def test_a_cell_of_uniform_states_is_kept_with_its_measures(tmp_path):
+    store = open_store(tmp_path / "s")
+    parameters = study.uniform_parameters(study.packing_parameters(40, 0.3, 1), 60, keep=12)
+    seen = []
+    dataset, cached = study.get_uniform(store, parameters, progress=lambda *a: seen.append(a))
+    again, cached_again = study.get_uniform(store, parameters)
+    assert (cached, cached_again) == (False, True) and seen[-1] == (60, 60)
+    assert np.array_equal(dataset["states"], again["states"])
+    whole = sample_uniform(ensemble(packed(40, 0.3)), 60)
+    kept = np.linspace(0, 59, 12).astype(int)
+    assert np.array_equal(dataset["states"], whole.flat[kept])
+    assert np.array_equal(dataset["chain"], whole.chain[kept])
+    assert dataset["eta2"].item() == measures.eta2(whole.flat)
+    assert dataset["least_bulk_size"].item() == whole.mixing.least_bulk
+    S = ensemble(packed(40, 0.3))
+    of_relaxation = {"sweeps", "attempts", "acceptance", "accepted", "rejected", "unconverged"}
+    assert set(samples.walk_dataset(S, walk(S, 4, 0))) - of_relaxation <= set(dataset)
+    with pytest.raises(Cancelled):
+        other = study.uniform_parameters(study.packing_parameters(40, 0.3, 1), 61)
+        study.get_uniform(store, other, cancel=lambda: True)
+    assert len(store.find("uniform")) == 1
+    with pytest.raises(InputError):
+        study.uniform_parameters(parameters["packing"], 0)
+
+
+def test_the_command_draws_reports_and_finds(tmp_path, capsys):
+    words = ["uniform", "-n", "40", "--mu", "0.3", "--states", "60", "--cache", str(tmp_path / "s")]
+    assert main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["states"] == 60 and not told["cached"] and told["largest_residual"] < 1e-10
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["cached"]
+    assert main([*words, "--chains", "0"]) == 2
+    assert main([*words, "--workers", "0"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 2
