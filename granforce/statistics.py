@@ -35,7 +35,7 @@ def by_friction(rows, name):
     return {mu: np.array(found[mu]) for mu in sorted(found)}
 
 
-def bootstrap(statistic, groups, seed=0):
+def bootstrap(statistic, groups, seed=0, resamples=RESAMPLES):
     """(value, low, high) of statistic(*groups) with a percentile interval.
 
     groups: sequences, one item per packing; each group is resampled on its own. Groups of one
@@ -43,8 +43,8 @@ def bootstrap(statistic, groups, seed=0):
     """
     rng = np.random.default_rng(seed)
     groups = [list(group) for group in groups]
-    drawn = np.empty(RESAMPLES)
-    for k in range(RESAMPLES):
+    drawn = np.empty(resamples)
+    for k in range(resamples):
         chosen = [rng.integers(len(group), size=len(group)) for group in groups]
         drawn[k] = statistic(*([g[i] for i in c] for g, c in zip(groups, chosen, strict=True)))
     if not np.isfinite(drawn).any():
