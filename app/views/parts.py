@@ -8,6 +8,8 @@ from .style import plot
 
 NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
 
+PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
+
 SVG_ICON = (
     "data:image/svg+xml;utf8,<svg xmlns='http://www.w3.org/2000/svg' width='24' height='24'>"
     "<text x='12' y='16' font-family='sans-serif' font-size='10' font-weight='bold' "
@@ -45,6 +47,11 @@ class Seen:
         if self._stale and self.visible:
             self._stale = False
             self.update()
+
+    def refresh(self, *events):
+        """Update, now or when next seen."""
+        self._stale = True
+        self.catch_up()
 
     def _changed(self, *events):
         self._stale |= any(event.name != "tab" for event in events)
@@ -85,5 +92,5 @@ def choice(labels, value):
         size="small",
         margin=(6, 8),
         # Capitals would make other symbols of fₙ and fₜ.
-        sx={"& .MuiToggleButton-root": {"textTransform": "none"}, "textTransform": "none"},
+        sx={"& .MuiToggleButton-root": PLAIN, **PLAIN},
     )

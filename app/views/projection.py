@@ -40,7 +40,7 @@ class View(Seen):
         self.task = state.task()
         self.told = note()
         for widget in (self.planes, self.other):
-            widget.param.watch(lambda event: self.update(), "value")
+            widget.param.watch(self.refresh, "value")
         self.task.param.watch(self._failed, "message")
         self.shown = None
         self.catch_up()
@@ -123,8 +123,8 @@ class View(Seen):
         states = len(found.plane.path) - 1
         self.told.object = (
             f"Shaded: the exact outline of S in this plane ({found.programs} linear programs, "
-            f"{found.seconds:.1f} s, known to {found.gap:.1g} ⟨fₙ⟩). The {states} states shown span "
-            f"{part[0]:.0%} of it across, {part[1]:.0%} upwards and {area:.1%} of its area."
+            f"{found.seconds:.1f} s, known to {found.gap:.1g} ⟨fₙ⟩). The {states} states shown span"
+            f" {part[0]:.0%} of it across, {part[1]:.0%} upwards and {area:.1%} of its area."
         )
 
     def _cone(self, plane, reach):

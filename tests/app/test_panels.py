@@ -9,7 +9,8 @@ from packings import REFERENCE, packed
 from small_store import KEPT
 
 import granforce as gf
-from app import projections, uploads
+from app import distributions, projections, uploads
+from granforce import measures, study
 from granforce.records import InputError
 
 LAMMPS = REFERENCE.parent / "lammps"
@@ -259,3 +260,100 @@ def test_more_than_allowed_is_not_collected(state):
     assert not view.dropper._pieces
     view.dropper._handle_msg({"end": True})
     assert "nothing was read" in view.error.title and not view.files
+
+
+# Statistics
+
+
+def test_rows_are_those_of_the_study_and_unlike_cells_stay_out(state):
+    opened(state)
+    cells = distributions.alike(state.catalogue, state.cell)
+    assert [cell.mu for cell in cells] == [0, 0.1, 1]
+    found = distributions.rows(cells)
+    for cell, row in zip(cells, found, strict=True):
+        dataset, _ = study.get_walk(cell.store, cell.params)
+        assert row["eta2"] == dataset["eta2"].item() and row["mu"] == cell.mu
+        extent = measures.normal_extent(dataset["low"].values, dataset["high"].values)
+        np.testing.assert_allclose(
+            row["extent"] * dataset["force_scale"].item(), extent, rtol=1e-14
+        )
+    other = cells[1]._replace(selection=cells[1].selection._replace(states=7))
+    assert distributions.alike([*cells, other], cells[0]) == cells
+    seed = cells[1].selection._replace(packing=cells[1].selection.packing | {"seed": 99})
+    assert len(distributions.alike([*cells, cells[1]._replace(selection=seed)], cells[0])) == 4
+
+
+def test_exact_rows_come_from_kept_intervals(state):
+    cell = opened(state).cell
+    assert distributions.exact_rows(state.library, [cell]) == []
+    state.compute_exact()
+    settled(state, done=lambda: state.exact is not None)
+    (row,) = distributions.exact_rows(state.library, [cell])
+    assert row["eta3"] == state.exact["eta3"].item() > distributions.rows([cell])[0]["eta3"]
+
+
+def test_groups_spread_over_mu_and_hold_the_one_on_screen():
+    found = [{"mu": mu, "extent": np.full(3, mu)} for mu in (0, 0.1, 0.2, 0.3, 0.5, 1, 2, 5, 10)]
+    chosen = distributions.groups(found, 0.3)
+    assert 0.3 in chosen and 0 not in chosen and len(chosen) == distributions.MOST_CURVES
+    assert min(chosen) == 0.1 and max(chosen) == 10
+
+
+def test_a_histogram_is_a_density():
+    values = np.random.default_rng(0).exponential(size=10_000)
+    edges, density = distributions.histogram(values)
+    assert (density * np.diff(edges)).sum() == pytest.approx(1)
+    edges, density = distributions.histogram(values, largest=1.0)
+    assert (density * np.diff(edges)).sum() == pytest.approx(1 - np.exp(-1), abs=0.02)
+
+
+@pytest.mark.parametrize("what", ["eta", "extent", "correlation", "scatter", "force"])
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_every_statistic_is_drawn_from_the_data(state, what, scale):
+    from app.views.statistics import View
+
+    opened(state)
+    view = View(state)
+    view.what.value, view.scale.value = what, scale
+    assert not view.plots.objects and not view.task.running
+    state.tab = view.name
+    settled(state)
+    figures = [pane.object for pane in view.plots.objects]
+    assert len(figures) == (2 if what == "eta" else 1)
+    columns = [r.data_source.data for fig in figures for r in fig.renderers]
+    drawn = np.concatenate([np.ravel(v).astype(float) for c in columns for v in c.values()])
+    row = distributions.rows([state.cell])[0]
+    wanted = {
+        "eta": row["eta2"],
+        "correlation": row["correlation"],
+        "scatter": float(np.float32(row["extent"][3])),
+    }
+    if what in wanted:
+        assert np.isclose(drawn, wanted[what], rtol=1e-6).any()
+    assert len(drawn) > 5 and view.told.object
+
+
+def test_a_tap_on_a_point_selects_its_contact(state):
+    from app.views.statistics import View
+
+    opened(state)
+    view = View(state)
+    view.what.value = "scatter"
+    state.tab = view.name
+    fig = view.plots.objects[0].object
+    fig.renderers[0].data_source.selected.indices = [5]
+    assert state.contact == 5 and view.chosen.data["x"] == [float(state.replay.normal[0, 5])]
+
+
+def test_a_tap_on_a_mu_shows_its_states(state):
+    from app.views.statistics import View
+
+    opened(state)
+    view = View(state)
+    state.tab = view.name
+    settled(state)
+    fig = view.plots.objects[0].object
+    source = next(r.data_source for r in fig.renderers if r.glyph.__class__.__name__ == "Scatter")
+    mus = list(next(iter(source.data.values())))
+    source.selected.indices = [mus.index(1)]
+    settled(state, done=lambda: state.cell.mu == 1)

@@ -1,0 +1,91 @@
+"""What the states in the stores say together: measures and extents against μ, as plain arrays."""
+
+import threading
+from collections import OrderedDict
+
+import numpy as np
+
+from granforce import study
+
+MEASURES = ("eta1", "eta2", "eta3", "coordination", "dimension", "packing_fraction")
+CORRELATIONS = ("correlation", "correlation_low", "correlation_high")
+KEPT = 1000  # rows in memory, for all visitors: some 10 kB each
+MOST_CURVES = 5  # of a distribution in one plot
+
+_rows = OrderedDict()
+_lock = threading.Lock()
+
+
+def alike(cells, cell):
+    """Cells of other packings and μ made like this one: seed and friction may differ."""
+    return [other for other in cells if _kin(other.selection) == _kin(cell.selection)]
+
+
+def _kin(selection):
+    """What is the same for all cells of one statistic."""
+    packing = {k: v for k, v in selection.packing.items() if k not in ("seed", "mu")}
+    own_mu = None if selection.same_mu else selection.packing["mu"]
+    relax = selection.relax if selection.kind == "walk" else ""
+    return packing, own_mu, selection.kind, relax, selection.states
+
+
+def rows(cells):
+    """One dict a cell: mu, seed, measures, correlations, `normal` and `extent` (N_c,) in ⟨f_n⟩."""
+    return [_row(cell.store, cell.name, cell.selection) for cell in cells]
+
+
+def exact_rows(library, cells):
+    """The same from exact intervals, of those packings whose intervals a store has."""
+    found = []
+    for cell in cells:
+        params = study.exact_parameters(cell.selection.packing, mu=cell.selection.mu)
+        for store in library.stores:
+            name = store.name("intervals", params, version=study.INTERVALS_VERSION)
+            if name in store:
+                found.append(_row(store, name, cell.selection))
+                break
+    return found
+
+
+def _row(store, name, selection):
+    key = str(store.path), name
+    with _lock:
+        if key in _rows:
+            _rows.move_to_end(key)
+            return _rows[key]
+    dataset = store[name]  # lazily: the states, most of it, are not read
+    scale = dataset["force_scale"].item()
+    row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
+    row |= {k: dataset[k].item() for k in (*MEASURES, *CORRELATIONS) if k in dataset}
+    low, high = dataset["low"].values[:, 0], dataset["high"].values[:, 0]
+    row |= {"normal": dataset["original"].values[:, 0] / scale, "extent": (high - low) / scale}
+    with _lock:
+        _rows[key] = row
+        while len(_rows) > KEPT:
+            _rows.popitem(last=False)
+    return row
+
+
+def groups(found, mu, most=MOST_CURVES):
+    """{μ: extents of the packings with it}: of this μ and some others, spread over all there are.
+
+    Packings whose forces are determined are left out.
+    """
+    by_mu = {}
+    for row in found:
+        if row["extent"].max(initial=0) > study.UNDETERMINED:
+            by_mu.setdefault(row["mu"], []).append(row["extent"])
+    others = sorted(value for value in by_mu if value != mu)
+    most -= mu in by_mu
+    pick = np.unique(np.linspace(0, len(others) - 1, min(most, len(others))).round().astype(int))
+    chosen = sorted({others[k] for k in pick} | ({mu} & set(by_mu)))
+    return {value: by_mu[value] for value in chosen}
+
+
+def histogram(values, bins=40, largest=None):
+    """Edges (bins + 1,) and probability density (bins,) of values from 0 to the largest."""
+    values = np.asarray(values).ravel()
+    largest = float(values.max(initial=0)) if largest is None else largest
+    edges = np.linspace(0, largest or 1.0, bins + 1)
+    counts = np.histogram(values, edges)[0]
+    return edges, counts / max(1, len(values)) / np.diff(edges)

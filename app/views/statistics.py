@@ -1,0 +1,280 @@
+"""Statistics of the states on screen, and of all those in the stores that were made alike."""
+
+import threading
+
+import numpy as np
+import panel as pn
+import panel_material_ui as pmui
+from bokeh.document import Document
+from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
+
+from .. import distributions
+from ..jobs import reading
+from .packing import exact_intervals
+from .parts import Seen, choice, figure, note, savable
+from .style import DARK, DOT, ORIGINAL, PALE, hover, quiet_legend
+
+WHAT = {
+    "eta": "η(μ)",
+    "extent": "P(ΔFₙ)",
+    "correlation": "corr(μ)",
+    "scatter": "ΔFₙ – fₙ",
+    "force": "P(fₙ)",
+}
+SCALES = {"linear": "linear", "log": "logarithmic"}
+SCALED = ("eta", "extent", "force")  # those that have both scales
+LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
+
+# HoloViews keeps its options in one place for all threads.
+_drawing = threading.Lock()
+
+
+class View(Seen):
+    """One figure at a time; those over μ are drawn in a thread by granforce.figures."""
+
+    name, title = "statistics", "Statistics"
+
+    def __init__(self, state):
+        super().__init__(state, "replay", "exact", "catalogue")
+        self.what, self.scale = choice(WHAT, "eta"), choice(SCALES, "log")
+        self.plots = pn.Column(sizing_mode="stretch_width")
+        self.told = note()
+        self.task = state.task(reading)
+        self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
+        self.chosen = ColumnDataSource({"x": [], "y": []})
+        for widget in (self.what, self.scale):
+            widget.param.watch(self.refresh, "value")
+        self.task.param.watch(self._follow, ["running", "message"])
+        state.param.watch(self._mark, "contact")
+        self.catch_up()
+
+    def panel(self):
+        """Choices, figure, and what it shows."""
+        return pn.Column(
+            pn.FlexBox(self.what, self.scale, sizing_mode="stretch_width"),
+            self.bar,
+            self.plots,
+            self.told,
+            sizing_mode="stretch_width",
+        )
+
+    def update(self):
+        """Draw the figure chosen: at once from the states on screen, or over μ in a thread."""
+        state, what = self.state, self.what.value
+        self.scale.visible = what in SCALED
+        self.task.cancel()
+        if state.replay is None:
+            return
+        if what in ("scatter", "force"):
+            self.bar.visible = False
+            draw = self._scatter if what == "scatter" else self._force
+            self.plots.objects = [_pane(draw(state.replay))]
+            return
+        log = self.scale.value == "log"
+        cells = distributions.alike(state.catalogue, state.cell) or [state.cell]
+        work = over_friction(state.library, cells, state.cell.mu, what, log)
+        self.task.start(work, self._show)
+
+    def _show(self, found):
+        figures, text = found
+        for fig in figures:
+            self._choosable(fig)
+        self.plots.objects = [_pane(fig) for fig in figures]
+        self.told.object = text
+
+    def _follow(self, *events):
+        self.bar.visible = self.task.running and self.what.value in DRAWN
+        if self.task.message:
+            self.told.object = self.task.message
+
+    def _choosable(self, fig):
+        """A tap on a point shows the states with its μ."""
+        points = [r for r in fig.select(GlyphRenderer) if isinstance(r.glyph, Scatter)]
+        if self.what.value == "extent" or not points:
+            return
+        for renderer in points:
+            source = renderer.data_source
+            source.selected.on_change("indices", lambda a, o, n, s=source: self._tapped(s, n))
+            renderer.nonselection_glyph = renderer.glyph
+        fig.add_tools(TapTool(renderers=points))
+        if self.state.cell.mu > 0:
+            here = Span(
+                location=self.state.cell.mu, dimension="height", line_width=9, line_alpha=0.18,
+                line_color="#888888",
+            )  # fmt: skip
+            fig.add_layout(here)
+
+    def _tapped(self, source, indices):
+        if indices:
+            self.state.choose(mu=float(next(iter(source.data.values()))[indices[0]]))
+
+    # Of the states on screen
+
+    def _scatter(self, replay):
+        """ΔF_n against the original f_n, one point a contact; a tap selects the contact."""
+        original = replay.normal[0]
+        seen = (replay.high - replay.low)[:, 0]
+        exact = exact_intervals(self.state.exact, replay)
+        fig = figure("extent_against_force", None, "original fₙ / ⟨fₙ⟩", "ΔFₙ / ⟨fₙ⟩", height=380)
+        layers = [("of the states", seen, DARK, 4.5)]
+        if exact:
+            layers.insert(0, ("exact", exact["high"] - exact["low"], PALE, 6))
+        for label, extent, colour, size in layers:
+            source = ColumnDataSource(
+                {"x": original, "y": extent.astype(np.float32), "contact": replay.backbone}
+            )
+            points = fig.scatter(
+                "x", "y", source=source, color=colour, size=size, alpha=0.75, legend_label=label,
+                nonselection_alpha=0.75,
+            )  # fmt: skip
+            source.selected.on_change("indices", lambda a, o, n, s=source: self._select(s, n))
+        rows = ("contact", "@contact"), ("fₙ", "@x{0.000}"), ("ΔFₙ", "@y{0.000}")
+        fig.add_tools(hover([points], *rows), TapTool())
+        fig.scatter(
+            "x", "y", source=self.chosen, size=13, fill_alpha=0, line_color=DOT, line_width=2
+        )
+        self._points = original, seen
+        self._mark()
+        quiet_legend(fig, "top_right")
+        values = [f"of the states {replay.summary['correlation']:.2f}"]
+        if exact:
+            values.append(f"exact {self.state.exact['correlation'].item():.2f}")
+        self.told.object = f"Correlation of fₙ with ΔFₙ: {', '.join(values)}."
+        return fig
+
+    def _select(self, source, indices):
+        if indices:
+            self.state.contact = int(indices[0])
+            source.selected.indices = []
+
+    def _mark(self, *events):
+        """A ring around the selected contact."""
+        contact = self.state.contact
+        if self.what.value != "scatter" or not self.visible:
+            return
+        none = contact is None or not hasattr(self, "_points")
+        x, y = ([], []) if none else ([float(v[contact])] for v in self._points)
+        self.chosen.data = {"x": x, "y": y}
+
+    def _force(self, replay):
+        """P(f_n) of the original network and of all states shown."""
+        log = self.scale.value == "log"
+        fig = figure(
+            "force_distribution", None, "fₙ / ⟨fₙ⟩", "P(fₙ)", height=380,
+            y_axis_type="log" if log else "linear",
+        )  # fmt: skip
+        several = len(replay.normal) > 1
+        layers = [("original", replay.normal[0], ORIGINAL)]
+        if several:
+            layers.insert(0, ("states", replay.normal[1:], DARK))
+        largest = min(LARGEST, float(replay.normal.max()))
+        for label, values, colour in layers:
+            edges, density = distributions.histogram(values, largest=largest)
+            height = np.where(density > 0, density, np.nan) if log else density
+            middle = (edges[1:] + edges[:-1]) / 2
+            if label == "states":
+                fig.quad(
+                    left=edges[:-1], right=edges[1:], top=height,
+                    bottom=np.nanmin(height) / 2 if log else 0,
+                    fill_color=PALE, line_color=PALE, legend_label=label,
+                )  # fmt: skip
+            else:
+                fig.line(middle, height, color=colour, line_width=2, legend_label=label)
+                fig.scatter(middle, height, color=colour, size=5)
+        quiet_legend(fig, "top_right")
+        beyond = float(np.mean(replay.normal > LARGEST))
+        self.told.object = (
+            f"{len(replay.normal) - 1} states of {replay.normal.shape[1]} contacts; "
+            f"{beyond:.2%} of the forces lie beyond the axis."
+        )
+        return fig
+
+
+def _pane(fig):
+    return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
+
+
+def over_friction(library, cells, mu, what, log):
+    """Work that reads the cells and draws a figure of the paper: ([Bokeh figures], caption)."""
+
+    def work(job):
+        job.begin(f"reading {len(cells)} results")
+        rows = distributions.rows(cells)
+        exact = distributions.exact_rows(library, cells)
+        job.begin("drawing")
+        with _drawing:
+            return DRAWN[what](rows, exact, mu, log)
+
+    return work
+
+
+def _indeterminacy(rows, exact, mu, log):
+    from granforce import figures  # HoloViews takes its time
+
+    page = list(figures.indeterminacy(rows, beside={"exact": exact} if exact else None))
+    chosen = [page[1] if log else page[0], page[2]]
+    seeds = len({row["seed"] for row in rows})
+    text = (
+        "η1, η2 and 0.15 η3 of the states against μ, and the coordination z of the backbone"
+        f"{_over(seeds)}. A tap on a point shows its states."
+    )
+    if exact:
+        text += f" Dashed: 0.15 η3 of exact intervals, where known ({len(exact)} packings)."
+    drawn = _rendered(chosen, ("indeterminacy", "coordination"), heights=(330, 210))
+    legend = drawn[0].legend[0]
+    drawn[0].center.remove(legend)
+    drawn[0].add_layout(legend.clone(orientation="horizontal", ncols=3, visible=True), "above")
+    return drawn, text
+
+
+def _extents(rows, exact, mu, log):
+    from granforce import figures
+
+    chosen = distributions.groups(rows, mu)
+    page = list(figures.extents(chosen))
+    text = (
+        "Distribution of ΔFₙ, the extent of each normal force over the states, in units of its "
+        "mean; tails fitted by exp(−(λx)ᵇ) beyond the median: b = 1 is exponential, larger b "
+        "falls faster."
+    )
+    return _rendered([page[1] if log else page[0]], ("extents",), heights=(380,)), text
+
+
+def _correlations(rows, exact, mu, log):
+    from granforce import figures
+
+    known = [row for row in rows if np.isfinite(row["correlation"])]
+    drawn = figures.correlations(known, beside={"exact": exact} if exact else None)
+    text = (
+        "Correlation of the original fₙ with ΔFₙ over contacts. Bars: the range with any other "
+        "sampled network in place of the original."
+    )
+    return _rendered([drawn], ("correlation",), heights=(380,)), text
+
+
+DRAWN = {"eta": _indeterminacy, "extent": _extents, "correlation": _correlations}
+
+
+def _over(seeds):
+    return f"; means over {seeds} packings with their standard errors" if seeds > 1 else ""
+
+
+def _rendered(frames, names, heights):
+    """HoloViews frames as Bokeh figures that fill the width."""
+    import holoviews as hv
+
+    renderer, drawn = hv.renderer("bokeh"), []
+    for frame, name, height in zip(frames, names, heights, strict=True):
+        # A document of its own: the current one would be that of whoever is served right now.
+        fig = renderer.get_plot(frame, doc=Document()).state
+        fig.update(
+            output_backend="canvas",
+            frame_width=None, frame_height=None, width=None, height=height,
+            sizing_mode="stretch_width", min_border_left=56, min_border_right=12,
+        )  # fmt: skip
+        fig.title.text = ""
+        fig.toolbar.update(logo=None, autohide=True)
+        if fig.legend:
+            fig.legend.update(border_line_alpha=0, background_fill_alpha=0, spacing=0, padding=2)
+        drawn.append(savable(fig, name))
+    return drawn
