@@ -1,0 +1,220 @@
+"""Local perturbation: a pair of forces ±F pushes the two grains of one contact apart.
+
+Protocol. The geometry is fixed and grains are rigid. From the packing's own force network F is
+raised step by step; each step starts from the last equilibrium and follows the flow of contact
+dynamics (`exact_step`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps
+found no equilibrium. As long as grains come to rest, each load lies RISE of the way to the static
+limit load, beyond which no equilibrium exists; after the first motion, F is halved in from the
+last equilibrium. The critical force F_crit is the largest load at rest, known to `precision` ⟨f_n⟩.
+The pair counts in the balance of the grains and in the pressure like a force of the contact
+itself, but not in its Coulomb cone, and the box may dilate at constant pressure.
+
+F_crit ≤ limit load. They are not equal: sliding contacts do not dilate (the law is not
+associated), so grains can set off although an equilibrium exists.
+"""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce import exact_step
+from granforce.bounds import limit_load_bounds
+from granforce.polytope import Ensemble, ensemble
+from granforce.records import Cancelled, InputError, NotJammedError, positive
+from granforce.relax.nearest import nearest
+
+# Part of the way from the last load at rest to the limit load that the next load goes.
+RISE = 0.4
+# Implicit steps after which no equilibrium is said to be found.
+MOST_STEPS = 150
+# What steady motion may still breach Coulomb's law by, relative to the fastest contact, and the
+# steps spent on that.
+STEADY, STEADY_STEPS = 1e-3, 500
+
+
+class CriticalForce(NamedTuple):
+    """Largest force pair on one contact under which grains come to rest, and the motion above."""
+
+    contact: int  # position in the packing's contact list
+    low: float  # F_crit, force: largest load that ended at rest
+    high: float  # least load above that did not, or the limit load if none was tried
+    limit_load: float  # force
+    forces: np.ndarray  # (N_c, 2) equilibrium under `low`, on the ensemble's contacts
+    residual: float  # its unbalance with the load, ⟨f_n⟩, by Ensemble.residual
+    violation: float  # ⟨f_n⟩, by Ensemble.violation
+    moving: exact_step.Outcome | None  # the end under `high`; None where that was not tried
+    converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
+    counts: dict  # loads at rest, in steady motion, undecided; flow steps; linear systems
+    seconds: float
+
+
+class Response(NamedTuple):
+    """First motion above the critical force, scaled so that rms |u| of the backbone is 1."""
+
+    contact: int
+    force: float  # the load
+    displacement: np.ndarray  # (N, 2) u, intrinsic (without dilation); NaN for rattlers
+    rotation: np.ndarray  # (N,) rotation times radius; NaN for rattlers
+    dilation: float  # of the box, ΔL/L times the largest radius
+    opening: np.ndarray  # (N_c,) normal relative displacement of the ensemble's contacts
+    opened: np.ndarray  # (N_c,) bool, contacts without force
+    slid: np.ndarray  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
+    kept: np.ndarray  # (N_c,) bool, all others
+    breach: float  # of Coulomb's law, relative to the fastest relative velocity
+    fastest: float  # largest relative displacement at a contact
+    converged: bool  # breach ≤ STEADY
+
+
+def critical_force(
+    packing, contact, *, mu=None, limit_load=None, precision=0.01, max_steps=MOST_STEPS, cancel=None
+):
+    """F_crit of one contact (position in the packing's contact list) with its bracket.
+
+    packing: a Packing, or its Ensemble. mu: friction coefficient, by default the packing's.
+    limit_load: force, computed if not given. precision: of the bracket, ⟨f_n⟩. max_steps: of the
+    flow per load. cancel() returning True raises Cancelled.
+
+    Raises InputError for a contact that carries nothing in any state of S.
+    """
+    begin = time.perf_counter()
+    precision = positive(precision, "precision")
+    S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
+    position = _position(S, contact)
+    if limit_load is None:
+        limit_load = limit_load_bounds(S, [position]).load[0]
+    limit = float(limit_load) / S.force_scale
+    step = exact_step.make_step(S)
+    forces, low, high, moving = _start(S) / S.force_scale, 0.0, limit, None
+    counts = {"at rest": 0, "moving": 0, "undecided": 0, "flow steps": 0, "linear systems": 0}
+    while high - low > precision:
+        if cancel is not None and cancel():
+            raise Cancelled(f"critical force of contact {contact} cancelled")
+        load = low + (RISE if moving is None else 0.5) * (high - low)
+        load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
+        outcome = exact_step.relax(step, forces, position, load, max_steps=max_steps)
+        counts["flow steps"] += outcome.steps
+        counts["linear systems"] += outcome.iterations
+        if outcome.at_rest:
+            low, forces = load, outcome.forces
+            counts["at rest"] += 1
+        else:
+            high, moving = load, outcome
+            counts["moving" if outcome.converged else "undecided"] += 1
+    loaded = forces.copy()
+    loaded[position, 0] += low
+    return CriticalForce(
+        int(contact),
+        low * S.force_scale,
+        high * S.force_scale,
+        limit * S.force_scale,
+        forces * S.force_scale,
+        S.residual(loaded * S.force_scale),
+        S.violation(forces * S.force_scale),
+        moving,
+        bool(moving is None or moving.converged),
+        counts,
+        time.perf_counter() - begin,
+    )
+
+
+def _position(S, contact):
+    """Position among the ensemble's contacts; InputError if it is none of them."""
+    position = np.flatnonzero(S.index == contact)
+    if not len(position):
+        raise InputError(
+            f"contact {contact} is none of the {len(S.index)} that carry a load in this packing"
+        )
+    return int(position[0])
+
+
+def _start(S):
+    if S.admits(S.original):
+        return S.original
+    found = nearest(S, S.original)
+    if not found.converged:
+        raise NotJammedError(
+            f"no admissible network found to start from (residual {found.residual:.1e} ⟨f_n⟩)"
+        )
+    return found.forces
+
+
+def response(packing, contact, force=None, *, mu=None, critical=None, precision=0.01):
+    """The first motion under a force pair on one contact, beyond its critical force.
+
+    force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩
+    above the limit load where the bracket ends there). critical: the CriticalForce, computed if not
+    given. The motion is that of one step of contact dynamics from rest, followed until Coulomb's
+    law is breached by at most STEADY of the fastest relative velocity.
+
+    Raises InputError where the grains come to rest under this load.
+    """
+    S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
+    if critical is None:
+        critical = critical_force(S, contact, precision=precision)
+    position, scale = _position(S, contact), S.force_scale
+    step = exact_step.make_step(S)
+    moving = critical.moving
+    load = critical.high / scale + (precision if moving is None else 0.0)
+    if force is not None:
+        load, moving = float(force) / scale, None
+    if moving is None or moving.breach > STEADY:
+        start = critical.forces / scale if moving is None else moving.forces
+        moving = exact_step.relax(
+            step, start, position, load, steady=STEADY, max_steps=STEADY_STEPS
+        )
+    if moving.at_rest:
+        raise InputError(
+            f"the grains stay at rest under a force of {load * scale:.6g} on contact {contact}: "
+            "the critical force lies above"
+        )
+    return _response(S, step, int(contact), position, load * scale, moving)
+
+
+def _response(S, step, contact, position, load, moving):
+    velocity = exact_step.grain_velocities(step, S, moving.velocity)
+    unit = np.sqrt(np.mean(np.sum(velocity[:, :2] ** 2, axis=1)))
+    relative = exact_step.relative_velocities(step, moving.velocity) / unit
+    count = len(S.packing.r)
+    displacement, rotation = np.full((count, 2), np.nan), np.full(count, np.nan)
+    displacement[S.grains] = velocity[:, :2] / unit
+    rotation[S.grains] = velocity[:, 2] / unit
+    box = moving.velocity[np.argmax(step.order)] if S.has_pressure_row else 0.0
+    normal, tangential = moving.forces.T
+    opened = normal <= 0
+    slid = ~opened & (np.abs(tangential) >= S.mu * normal)
+    return Response(
+        contact,
+        float(load),
+        displacement,
+        rotation,
+        float(box / unit * S.packing.r.max() / S.contacts.length.sum()),
+        relative[:, 0],
+        opened,
+        slid,
+        ~opened & ~slid,
+        moving.breach,
+        float(np.abs(relative).max()),
+        bool(moving.breach <= STEADY),
+    )
+
+
+def profile(packing, displacement, contact, edges):
+    """Mean |u| of the grains in shells around a contact, (shells,); NaN where there are none.
+
+    displacement (N, 2), NaN for grains that do not count; edges (shells + 1,): distances from the
+    point of contact, by the nearest periodic image.
+    """
+    c = packing.contacts
+    centre = packing.x[c.i[contact]] + c.arm_i[contact] * c.normal[contact]
+    apart = packing.x - centre
+    periodic = np.isfinite(packing.box)
+    side = np.where(periodic, packing.box, 1.0)
+    apart -= np.where(periodic, side * np.round(apart / side), 0.0)
+    size = np.linalg.norm(displacement, axis=1)
+    known = np.isfinite(size)
+    shell = np.searchsorted(edges, np.linalg.norm(apart, axis=1), side="right") - 1
+    known &= (shell >= 0) & (shell < len(edges) - 1)
+    total = np.bincount(shell[known], size[known], len(edges) - 1)
+    grains = np.bincount(shell[known], minlength=len(edges) - 1)
+    return np.where(grains > 0, total / np.maximum(grains, 1), np.nan)
