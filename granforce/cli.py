@@ -204,6 +204,11 @@ def _add_study(commands):
     command.add_argument("--quick", action="store_true", help="a small version, in minutes")
     command.add_argument("--out", metavar="FOLDER", default="study", help="(default study)")
     command.add_argument("--parts", help="compute only these parts, names separated by commas")
+    command.add_argument(
+        "--table",
+        metavar="STORE",
+        help="compute nothing: take this reduced study, as data/study.zarr",
+    )
     group = command.add_argument_group("size")
     group.add_argument("-n", type=int, help="number of disks (default 400)")
     group.add_argument("--mu", help="friction coefficients, separated by commas")
@@ -211,6 +216,9 @@ def _add_study(commands):
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
     group.add_argument("--gauss-seidel-packings", type=int, help="walks as in the paper (3)")
     group.add_argument("--exact-packings", type=int, help="with exact intervals (default 3)")
+    group.add_argument("--uniform-packings", type=int, help="with uniform states (default 3)")
+    group.add_argument("--perturb-packings", type=int, help="pushed at contacts (default 3)")
+    group.add_argument("--perturb-contacts", type=int, help="contacts pushed in each (default 30)")
     group.add_argument("--sizes", help="other numbers of disks (default 100,200,800,1600)")
     command.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     _add_scheduler(command)

@@ -137,7 +137,7 @@ VARIABLES: dict[str, Variable] = {
 _ROW_SCALARS = (
     *("mu", "eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
-    *("residual", "max_gap", "seconds"),
+    *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "seconds"),
 )
 _FORCE = "mean normal force"
 
@@ -157,11 +157,19 @@ VARIABLES |= {
         ("row",), "float64", _FORCE, "mean distance of states from their centre"
     ),
     "row_undetermined": Variable(("row",), "float64", "1", "contacts without a unique force"),
+    "row_undetermined_part": Variable(("row",), "float64", "1", "their part of all that carry"),
+    "row_original_ratio": Variable(
+        ("row",), "float64", "1", "distance of the original network over that of uniform states"
+    ),
+    "row_walk_ratio": Variable(
+        ("row",), "float64", "1", "mean distance of walk states over that of uniform states"
+    ),
     "row_clusters": Variable(("row",), "float64", "1", "clusters of undetermined contacts"),
     "row_largest_cluster": Variable(("row",), "float64", "1", "contacts of the largest cluster"),
     "sample_row": Variable(("sample",), "int64", "1", "row that the contact belongs to"),
     "sample_contact": Variable(("sample",), "int64", "1", "position of the contact in the packing"),
     "sample_normal": Variable(("sample",), "float64", _FORCE, "original f_n"),
+    "sample_least": Variable(("sample",), "float64", _FORCE, "least f_n"),
     "sample_extent": Variable(("sample",), "float64", _FORCE, "ΔF_n"),
     "shown_row": Variable(("shown",), "int64", "1", "row that the shown contact belongs to"),
     "shown_normal": Variable(("shown_state", "shown"), "float64", _FORCE, "f_n in some states"),

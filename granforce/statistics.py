@@ -22,17 +22,26 @@ def mean_interval(values):
     return mean, float(mean - reach), float(mean + reach)
 
 
-def by_friction(rows, name):
+def grouped(rows, name, by="mu"):
     """{μ: array of the values of one name over packings}, in order of μ; NaN left out.
 
-    rows: dicts with "mu" and the name (rows without it are passed over).
+    rows: dicts with μ (or what else to group by) and the name; rows without it are passed over.
     """
     found = {}
     for row in rows:
         value = row.get(name)
         if value is not None and np.isfinite(value):
-            found.setdefault(row["mu"], []).append(value)
-    return {mu: np.array(found[mu]) for mu in sorted(found)}
+            found.setdefault(row[by], []).append(value)
+    return {key: np.array(found[key]) for key in sorted(found)}
+
+
+def means(rows, name, by="mu", factor=1.0):
+    """Points [(μ, mean, standard error over packings)] of one name, times a factor."""
+    points = []
+    for key, values in grouped(rows, name, by).items():
+        error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
+        points.append((key, factor * values.mean(), factor * error))
+    return points
 
 
 def bootstrap(statistic, groups, seed=0, resamples=RESAMPLES):

@@ -45,6 +45,7 @@ class Kind(NamedTuple):
 COMPUTE = {
     "packing": Kind(study.get_packing, study.PACKING_VERSION),
     "walk": Kind(study.get_walk, study.WALK_VERSION, keeps_states=True),
+    "uniform": Kind(study.get_uniform, study.UNIFORM_VERSION, keeps_states=True),
     "intervals": Kind(study.get_intervals, study.INTERVALS_VERSION),
     "limit_loads": Kind(study.get_limit_loads, study.LIMIT_LOADS_VERSION),
 }

@@ -47,7 +47,7 @@ def test_a_tail_needs_values():
 
 def test_values_are_grouped_in_order_of_friction():
     rows = [{"mu": 1, "a": 5.0}, {"mu": 0, "a": 2.0}, {"mu": 1, "a": np.nan}, {"mu": 3}]
-    found = statistics.by_friction(rows, "a")
+    found = statistics.grouped(rows, "a")
     assert list(found) == [0, 1]
     assert found[1].tolist() == [5]
 

@@ -2,11 +2,27 @@
 
 Inputs are plain: rows are dicts of numbers, one for each packing or walk (as `study.row` gives
 them), other arrays are named by the function that takes them. Where one μ has several rows, points
-are means with 95 % confidence intervals.
+are means and bars their standard errors.
 """
 
 from granforce.figures.bench import walk_against_exact
 from granforce.figures.indeterminacy import correlations, extents, indeterminacy
+from granforce.figures.networks import places, possible_forces
+from granforce.figures.response import perturbation
 from granforce.figures.style import save
+from granforce.figures.variations import distances, frozen, opened, sizes
 
-__all__ = ["correlations", "extents", "indeterminacy", "save", "walk_against_exact"]
+__all__ = [
+    "correlations",
+    "distances",
+    "extents",
+    "frozen",
+    "indeterminacy",
+    "opened",
+    "perturbation",
+    "places",
+    "possible_forces",
+    "save",
+    "sizes",
+    "walk_against_exact",
+]

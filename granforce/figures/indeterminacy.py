@@ -17,15 +17,19 @@ def indeterminacy(rows, *, beside=None, backend="bokeh"):
     style.ready(backend)
     curves = []
     for k, (name, label, factor) in enumerate(_MEASURES):
-        curves.append((_means(rows, name, factor), label, style.COLOURS[k], "solid", k))
+        curves.append(
+            (statistics.means(rows, name, factor=factor), label, style.COLOURS[k], "solid", k)
+        )
     for source, dash in zip(beside or {}, ("dashed", "dotted"), strict=False):
         for k, (name, label, factor) in enumerate(_MEASURES):
-            points = _means(beside[source], name, factor)
+            points = statistics.means(beside[source], name, factor=factor)
             if points:
                 curves.append((points, f"{label}, {source}", style.COLOURS[k], dash, k))
-    linear = style.frame(_drawn(curves, backend), backend, title="Indeterminacy", x="μ", y="η")
+    linear = style.frame(
+        style.curves(curves, backend), backend, title="Indeterminacy", x="μ", y="η"
+    )
     log = style.frame(
-        _drawn(curves, backend, log=True),
+        style.curves(curves, backend, log=True),
         backend,
         title="the same, log–log",
         x="μ",
@@ -34,9 +38,9 @@ def indeterminacy(rows, *, beside=None, backend="bokeh"):
         logy=True,
         legend="bottom_right",
     )
-    z = [(_means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
+    z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
     contacts = style.frame(
-        _drawn(z, backend, log=True),
+        style.curves(z, backend, log=True),
         backend,
         title="Coordination",
         x="μ",
@@ -92,14 +96,14 @@ def correlations(rows, *, beside=None, backend="bokeh"):
     """
     style.ready(backend)
     middle, low, high = (
-        {mu: values.mean() for mu, values in statistics.by_friction(rows, name).items() if mu > 0}
+        {mu: values.mean() for mu, values in statistics.grouped(rows, name).items() if mu > 0}
         for name in ("correlation", "correlation_low", "correlation_high")
     )
     reach = [(mu, middle[mu], middle[mu] - low[mu], high[mu] - middle[mu]) for mu in middle]
     drawn = [style.bars(reach, style.COLOURS[0], backend)]
     sources = {"walk": rows, **(beside or {})}
     for k, (label, dash) in enumerate(zip(sources, style.DASHES, strict=False)):
-        points = [p[:2] for p in _means(sources[label], "correlation") if p[0] > 0]
+        points = [p[:2] for p in statistics.means(sources[label], "correlation") if p[0] > 0]
         drawn.append(style.line(points, label, style.COLOURS[k], backend, dash))
         drawn.append(style.dots(points, label, style.COLOURS[k], backend, style.MARKERS[k]))
     return style.frame(
@@ -111,22 +115,3 @@ def correlations(rows, *, beside=None, backend="bokeh"):
         logx=True,
         legend="top_right",
     )
-
-
-def _means(rows, name, factor=1.0):
-    """Points (μ, mean, standard error over packings)."""
-    points = []
-    for mu, values in statistics.by_friction(rows, name).items():
-        error = values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
-        points.append((mu, factor * values.mean(), factor * error))
-    return points
-
-
-def _drawn(curves, backend, log=False):
-    for points, label, colour, dash, k in curves:
-        shown = [p for p in points if p[0] > 0 and p[1] > 0] if log else points
-        yield style.line([p[:2] for p in shown], label, colour, backend, dash)
-        yield style.dots([p[:2] for p in shown], label, colour, backend, style.MARKERS[k])
-        # On a logarithmic axis a bar may not reach 0.
-        reach = [(x, y, min(e, 0.9 * y) if log else e, e) for x, y, e in shown]
-        yield style.bars([bar for bar in reach if bar[3] > 0], colour, backend)

@@ -8,6 +8,7 @@ from granforce.records import InputError
 
 # Okabe and Ito's palette: told apart by colour-blind eyes.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
+GREY = "#999999"
 MARKERS = ("o", "s", "^", "d", "v", "+", "x", "*")
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
@@ -54,6 +55,29 @@ def bars(points, colour, backend, horizontal=False):
     return hv.ErrorBars(points, vdims=["y", "below", "above"], horizontal=horizontal).opts(
         backend=backend, **look
     )
+
+
+def words(points, backend):
+    """Words at points (x, y, text), beside what they name."""
+    look = {"text_font_size": "8pt", "text_color": "#555555", "text_align": "left"}
+    if backend == "matplotlib":
+        look = {"size": 8, "color": "#555555", "horizontalalignment": "left"}
+    labels = [(x, y, f" {text}") for x, y, text in points]
+    return hv.Labels(labels, ["x", "y"], "text").opts(backend=backend, **look)
+
+
+def curves(series, backend, log=False):
+    """Lines with points and error bars: series of (points, label, colour, dash, marker's number).
+
+    points: (x, y, standard error), as `statistics.means` gives them; log: only x, y > 0.
+    """
+    for points, label, colour, dash, k in series:
+        shown = [p for p in points if p[0] > 0 and p[1] > 0] if log else points
+        yield line([p[:2] for p in shown], label, colour, backend, dash)
+        yield dots([p[:2] for p in shown], label, colour, backend, MARKERS[k % len(MARKERS)])
+        # On a logarithmic axis a bar may not reach 0.
+        reach = [(x, y, min(e, 0.9 * y) if log else e, e) for x, y, e in shown]
+        yield bars([bar for bar in reach if bar[3] > 0], colour, backend)
 
 
 def frame(elements, backend, *, title, x, y, legend=None, **options):

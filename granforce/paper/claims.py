@@ -33,7 +33,7 @@ class Claim(NamedTuple):
 
 
 def judged(table):
-    """All claims about a `table.Table`; those without data say so."""
+    """All claims about a `tables.Table`; those without data say so."""
     return [claim for family in FAMILIES for claim in family(table)]
 
 
@@ -62,7 +62,7 @@ def agreement(table):
 def maximum(table):
     """η(μ) is largest near μ = 0.1."""
     for name, label in (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3")):
-        groups = _positive(statistics.by_friction(table.part("walk"), name))
+        groups = _positive(statistics.grouped(table.part("walk"), name))
         if len(groups) > 2:
             yield _claim(
                 f"{label}(μ) is not monotonic: largest near μ = 0.1",
@@ -76,7 +76,7 @@ def maximum(table):
 
 def small_friction(table):
     """η ∝ μ at small μ, with a floor from the solver's accuracy at 0."""
-    groups = statistics.by_friction(table.part("walk"), "eta2")
+    groups = statistics.grouped(table.part("walk"), "eta2")
     few = {mu: values for mu, values in groups.items() if 0 < mu <= SMALL[1]}
 
     def slope(*values):
@@ -101,7 +101,7 @@ def small_friction(table):
 
 def coordination(table):
     """z falls from 4 towards 3."""
-    groups = statistics.by_friction(table.part("walk"), "coordination")
+    groups = statistics.grouped(table.part("walk"), "coordination")
     ends = [groups[min(groups)], groups[max(groups)]] if groups else [[], []]
 
     def fall(*values):
@@ -155,7 +155,7 @@ def extents(table, part="walk"):
 
 def correlation(table):
     """corr(f_n, ΔF_n) is significant at intermediate μ and vanishes at large μ."""
-    groups = statistics.by_friction(table.part("walk"), "correlation")
+    groups = statistics.grouped(table.part("walk"), "correlation")
     for word, span, good, fair in (
         ("is significant at intermediate", MIDDLE, (0.1, 1), (0, 1)),
         ("vanishes at large", LARGE, (-0.1, 0.1), (-0.2, 0.2)),
@@ -228,14 +228,17 @@ def size(table):
 
 def centre(table):
     """The original network lies closer to the centre of S than sampled states."""
-    rows = [r for r in table.part("walk") if r.get("mean_distance", 0) > 0 and r["mu"] > 0]
-    yield _claim(
-        "the original network lies closer to the centre than sampled ones",
-        "its distance over the mean of the walk's states, mean over packings",
-        np.mean,
-        [[r["original_distance"] / r["mean_distance"] for r in rows]] if rows else [],
-        good=(0, 1),
-    )
+    rows = [r for r in table.part("walk") if r["dimension"] > 0]
+    walked = [r["original_distance"] / r["mean_distance"] for r in rows]
+    uniform = [r["original_ratio"] for r in table.part("uniform") if "original_ratio" in r]
+    for ratios, word in ((walked, "the walk's"), (uniform, "uniform")):
+        yield _claim(
+            f"the original network lies closer to the centre than {word} states",
+            f"its distance over the mean of {word} states, mean over packings",
+            np.mean,
+            [ratios] if ratios else [],
+            good=(0, 1),
+        )
 
 
 FAMILIES = (

@@ -1,39 +1,58 @@
 """The command `granforce study`: compute, reduce, draw, judge."""
 
+import json
 import sys
 from pathlib import Path
 
+from granforce.paper import claims, drawings, tables
 from granforce.paper import plan as plans
 from granforce.records import InputError, friction
 from granforce.store import open_store
-from granforce.terminal import Bar
+from granforce.terminal import Bar, table
+
+_LEAST = {"n": 3, "packings": 1, "states": 2}
+_NUMBERS = (
+    *("n", "packings", "states", "gauss_seidel_packings", "exact_packings"),
+    *("uniform_packings", "perturb_packings", "perturb_contacts"),
+)
 
 
 def main(arguments):
-    """Run the study into a folder. Returns 1 if a cell failed."""
-    plan = plan_of(arguments)
-    parts = None if arguments.parts is None else arguments.parts.split(",")
-    wanted = plans.chosen(plan, parts)
+    """Run the study into a folder. Returns 1 if a cell failed.
+
+    The folder gets cells.zarr (every cell), study.zarr (the reduced table), figures, and the claims
+    as claims.json.
+    """
     folder = Path(arguments.out)
-    store = open_store(folder / "cells.zarr")
-    failed = compute(store.path, wanted, arguments)
+    failed = []
+    if arguments.table is None:
+        plan = plan_of(arguments)
+        parts = None if arguments.parts is None else arguments.parts.split(",")
+        wanted = plans.chosen(plan, parts)
+        store = open_store(folder / "cells.zarr")
+        failed = compute(store.path, wanted, arguments)
+        reduced = tables.reduce(store.path, plan)
+        tables.save(reduced, folder / "study.zarr")
+    else:
+        reduced = tables.load(arguments.table)
+    with Bar("figures", "figure") as progress:
+        drawings.draw(reduced, folder / "figures", progress=progress)
+    told = [claim._asdict() for claim in claims.judged(reduced)]
+    (folder / "claims.json").write_text(json.dumps(told, indent=1, ensure_ascii=False))
+    report(told, reduced, arguments.json)
     return 1 if failed else 0
 
 
 def plan_of(arguments):
     """The Plan of the command line's options; InputError for impossible ones."""
     plan = plans.QUICK if arguments.quick else plans.Plan()
-    given = {
-        "n": arguments.n,
-        "packings": arguments.packings,
-        "states": arguments.states,
-        "gauss_seidel_packings": arguments.gauss_seidel_packings,
-        "exact_packings": arguments.exact_packings,
-    }
-    for name, value in given.items():
-        if value is not None and value < (1 if name in ("n", "packings", "states") else 0):
-            raise InputError(f"--{name.replace('_', '-')} is too small: {value}")
-    plan = plan._replace(**{name: value for name, value in given.items() if value is not None})
+    for name in _NUMBERS:
+        value = getattr(arguments, name)
+        if value is None:
+            continue
+        if value < _LEAST.get(name, 0):
+            raise InputError(f"{name.replace('_', ' ')} must be at least {_LEAST.get(name, 0)}")
+        plan = plan._replace(**{name: value})
     if arguments.mu is not None:
         plan = plan._replace(frictions=_numbers("mu", arguments.mu, friction))
     if arguments.sizes is not None:
@@ -74,3 +93,23 @@ def compute(path, wanted, arguments):
     for cell, message in failed:
         print(f"granforce: {cell.kind} of {cell.parameters}: {message}", file=sys.stderr)
     return failed
+
+
+def report(told, reduced, as_json):
+    """Claims and verdicts on stdout."""
+    if as_json:
+        print(json.dumps({"claims": told, "skipped": reduced.skipped}, indent=1))
+        return
+    lines = [
+        {
+            "claim": claim["statement"],
+            "measured": f"{claim['value']:.3g}",
+            "95 %": f"{claim['low']:.3g} … {claim['high']:.3g}",
+            "criterion": claim["criterion"],
+            "verdict": claim["verdict"],
+        }
+        for claim in told
+    ]
+    table(lines, ("claim", "measured", "95 %", "criterion", "verdict"), {})
+    if reduced.skipped["missing_cells"]:
+        print(f"{reduced.skipped['missing_cells']} cells of the plan are missing", file=sys.stderr)

@@ -1,9 +1,10 @@
 """Plan of the study: which cells it is made of, and how they are computed.
 
 Parts: "packing" and "walk" (every packing), "gauss_seidel" (the paper's own relaxation, on some),
-"exact" (intervals), "frozen" (exact intervals of the inner part with all forces outside held),
-"opened" and "opened_exact" (packings made without friction, cones opened to μ), "size" and
-"size_exact" (other numbers of disks).
+"exact" (intervals), "uniform" (uniform states of S), "perturb" (critical forces and responses of
+some contacts), "frozen" (exact intervals of the inner part with all forces outside held), "opened"
+and "opened_exact" (packings made without friction, cones opened to μ), "size" and "size_exact"
+(other numbers of disks).
 """
 
 from typing import NamedTuple
@@ -26,6 +27,9 @@ class Plan(NamedTuple):
     states: int = 1000
     gauss_seidel_packings: int = 3
     exact_packings: int = 3
+    uniform_packings: int = 3
+    perturb_packings: int = 3
+    perturb_contacts: int = 30
     sizes: tuple = (100, 200, 800, 1600)
     size_frictions: tuple = (0.1, 1.0)
     largest_exact: int = 800  # exact intervals of other sizes up to here
@@ -38,6 +42,9 @@ QUICK = Plan(
     states=60,
     gauss_seidel_packings=1,
     exact_packings=2,
+    uniform_packings=2,
+    perturb_packings=1,
+    perturb_contacts=4,
     sizes=(20, 80),
     size_frictions=(0.1,),
     largest_exact=80,
@@ -115,6 +122,17 @@ def _exacts(plan, seed):
     return [_exact("exact", plan.n, seed, mu) for mu in plan.frictions]
 
 
+def _uniform(plan, seed):
+    if seed > plan.uniform_packings:
+        return []
+    found = []
+    for mu in plan.frictions:
+        # All states are kept: their mean is the centre that distances are measured from.
+        named = study.uniform_parameters(study.packing_parameters(plan.n, mu, seed), plan.states)
+        found.append(Task("uniform", sweep.Cell("uniform", named), plan.n, mu, seed))
+    return found
+
+
 def _frozen(plan, seed):
     if seed > plan.exact_packings:
         return []
@@ -145,6 +163,7 @@ def _sizes(plan, seed):
 _PARTS = {
     "walk": _walks,
     "exact": _exacts,
+    "uniform": _uniform,
     "gauss_seidel": _gauss_seidel,
     "frozen": _frozen,
     "opened": _opened,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce import measures, study
+from granforce import measures, study, sweep
 from granforce.paper import plan as plans
 from granforce.records import InputError
 from granforce.schema import labelled
@@ -17,12 +17,13 @@ SHOWN_FRICTIONS = (0.01, 0.1, 1.0, 10.0)  # whose states and packings are kept f
 SHOWN_STATES = 30
 
 # Parts whose contacts are kept one by one.
-SAMPLED = ("walk", "exact", "frozen", "uniform")
+SAMPLED = ("walk", "exact", "uniform")
+SAMPLES = ("row", "contact", "normal", "least", "extent")
 
 _SCALARS = (
     *("eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
-    *("residual", "max_gap", "seconds"),
+    *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "seconds"),
 )
 
 
@@ -31,7 +32,7 @@ class Table(NamedTuple):
 
     plan: dict  # fields of `plans.Plan`
     rows: list  # dicts: part, n, mu, seed, and the columns of the schema's row_… that apply
-    samples: dict  # {"row", "contact", "normal", "extent"}: arrays, forces in ⟨f_n⟩
+    samples: dict  # {name of SAMPLES: array}: row, contact, f_n, its least value, ΔF_n in ⟨f_n⟩
     shown: list  # (row, normal forces (S, N_c) in ⟨f_n⟩) of some walks
     packings: dict  # {row: Packing} of those walks
     skipped: dict  # counts: cells of the plan that the store lacked
@@ -41,22 +42,20 @@ class Table(NamedTuple):
         return [r for r in self.rows if r["part"] in names and n in (None, r["n"])]
 
     def contacts(self, part):
-        """[(row, contact numbers, f_n, ΔF_n)] of a sampled part, forces in ⟨f_n⟩."""
+        """[(row, contact numbers, f_n, least f_n, ΔF_n)] of a sampled part, forces in ⟨f_n⟩."""
         found = []
+        # Samples lie row by row.
+        edges = np.searchsorted(self.samples["row"], np.arange(len(self.rows) + 1))
         for k, row in enumerate(self.rows):
+            chosen = slice(edges[k], edges[k + 1])
             if row["part"] == part:
-                chosen = self.samples["row"] == k
-                if chosen.any():
-                    arrays = (
-                        self.samples[name][chosen] for name in ("contact", "normal", "extent")
-                    )
-                    found.append((row, *arrays))
+                found.append((row, *(self.samples[name][chosen] for name in SAMPLES[1:])))
         return found
 
     def extents(self, part):
         """{μ: list of ΔF_n (N_c,) of each packing} of a sampled part."""
         found = {}
-        for row, _, _, extent in self.contacts(part):
+        for row, *_, extent in self.contacts(part):
             found.setdefault(row["mu"], []).append(extent)
         return found
 
@@ -64,24 +63,44 @@ class Table(NamedTuple):
 def reduce(path, plan):
     """The Table of what the store at path has of a plan. InputError where it has nothing."""
     store = open_store(path, readonly=True)
-    rows, samples, shown, packings = [], [], [], {}
+    rows, samples, shown, packings, centres = [], [], [], {}, {}
     wanted = plans.tasks(plan)
     for task, dataset in plans.finished(path, plan):
         k = len(rows)
         rows.append(row_of(task, dataset))
         if task.part in SAMPLED:
             samples.append(_samples(k, dataset))
+        if task.part == "uniform":
+            centres[task.mu, task.seed] = dataset["states"].values.mean(axis=0), rows[k]
         if task.part == "walk" and task.seed == 1 and task.mu in SHOWN_FRICTIONS:
             shown.append((k, _shown(dataset)))
             packings[k] = study.get_packing(store, task.cell.parameters["packing"])[0]
+    _compare_distances(store, wanted, centres)
     if not rows:
         raise InputError(f"the store at {path} holds nothing of this study")
     joined = {
         name: np.concatenate([part[name] for part in samples]) if samples else np.zeros(0)
-        for name in ("row", "contact", "normal", "extent")
+        for name in SAMPLES
     }
     skipped = {"missing_cells": len(wanted) - len(rows)}
     return Table(plan._asdict(), rows, joined, shown, packings, skipped)
+
+
+def _compare_distances(store, wanted, centres):
+    """Distances of original and walk states from the mean of uniform states, beside those' own."""
+    for task in wanted:
+        key = task.mu, task.seed
+        if task.part != "walk" or key not in centres:
+            continue
+        walk = sweep.load(store, task.cell)
+        middle, row = centres[key]
+        if walk is not None and row["dimension"] > 0:
+            unit = row["mean_distance"] * walk["force_scale"].item()
+            for name, states in (
+                ("original_ratio", walk["original"].values[None]),
+                ("walk_ratio", walk["states"].values),
+            ):
+                row[name] = float(measures.distances(states, middle).mean() / unit)
 
 
 def row_of(task, dataset):
@@ -100,6 +119,7 @@ def row_of(task, dataset):
     if "cluster" in dataset:
         counts = np.bincount(dataset["cluster"].values[dataset["cluster"].values >= 0])
         row["undetermined"] = int(counts.sum())
+        row["undetermined_part"] = row["undetermined"] / max(1, row["contacts"])
         row["clusters"] = len(counts)
         row["largest_cluster"] = int(counts.max(initial=0))
     return row
@@ -112,6 +132,7 @@ def _samples(k, dataset):
         "row": np.full(len(extent), k),
         "contact": dataset["backbone"].values,
         "normal": dataset["original"].values[:, 0] / scale,
+        "least": dataset["low"].values[:, 0] / scale,
         "extent": extent / scale,
     }
 
@@ -128,7 +149,7 @@ def save(table, path):
     dataset = _dataset(table)
     store.clear("study")
     digest = hashlib.sha256(json.dumps(table.rows).encode()).hexdigest()[:16]
-    single = ("sample_normal", "sample_extent", "shown_normal")
+    single = ("sample_normal", "sample_least", "sample_extent", "shown_normal")
     store.save(
         "study",
         {**table.plan, "rows": digest},
@@ -179,9 +200,7 @@ def _table(store, entry, dataset):
         row = {name: values[k].item() for name, values in columns.items()}
         row |= {"part": parts[row["part"]], "n": int(row["n"]), "seed": int(row["seed"])}
         rows.append({name: value for name, value in row.items() if value == value})
-    samples = {
-        name: dataset[f"sample_{name}"].values for name in ("row", "contact", "normal", "extent")
-    }
+    samples = {name: dataset[f"sample_{name}"].values for name in SAMPLES}
     shown, packings = [], {}
     if "shown_row" in dataset:
         for k in np.unique(dataset["shown_row"]).tolist():

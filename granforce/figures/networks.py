@@ -1,0 +1,83 @@
+"""Figures 3 and 5: the forces that single contacts can have, and where those contacts are."""
+
+import numpy as np
+
+from granforce.figures import style
+
+SHOWN_CONTACTS = 40
+
+
+def possible_forces(groups, *, backend="bokeh", largest=3.0):
+    """Figure 3: values of f_n / f_n,orig of contacts, weak to strong, for several μ.
+
+    groups: {μ: (original (N_c,), states (S, N_c), least (N_c,), extent (N_c,))}: normal forces of
+    the original network and of some states, and the interval seen in all of them, in one unit.
+    SHOWN_CONTACTS contacts, evenly spaced in the order of their force, are drawn: the interval as a
+    bar, states as points.
+    """
+    style.ready(backend)
+    frames = []
+    for k, mu in enumerate(sorted(groups)):
+        original, states, least, extent = (np.asarray(values) for values in groups[mu])
+        order = np.argsort(original, kind="stable")
+        order = order[original[order] > 0]
+        chosen = order[np.linspace(0, len(order) - 1, min(SHOWN_CONTACTS, len(order))).astype(int)]
+        scale = original[chosen]
+        x = np.arange(1, len(chosen) + 1)
+        colour = style.COLOURS[k % len(style.COLOURS)]
+        low, high = least[chosen] / scale, (least + extent)[chosen] / scale
+        middle = np.clip((low + high) / 2, 0, largest)
+        bars = list(zip(x, middle, middle - low, np.minimum(high, largest) - middle, strict=True))
+        ratio = states[:, chosen] / scale
+        points = [(a, b) for column, a in zip(ratio.T, x, strict=True) for b in column]
+        points = [(a, b) for a, b in points if b <= largest]
+        drawn = [
+            style.bars(bars, style.GREY, backend),
+            style.dots(points, "states", colour, backend, size=2),
+            style.line([(0, 1), (len(x) + 1, 1)], "original", style.GREY, backend, "dashed"),
+        ]
+        axes = {"x": "contacts, weak to strong", "y": "f_n / f_n,orig", "ylim": (0, largest)}
+        frames.append(style.frame(drawn, backend, title=f"μ = {mu:g}", **axes))
+    return style.page(frames, backend, columns=2)
+
+
+def places(groups, *, backend="bokeh", part=0.1):
+    """Figure 5: where the strongest and the least determined contacts are.
+
+    groups: {μ: (packing, contacts, normal, extent)}: a Packing, positions in its contact list, and
+    their f_n and ΔF_n, in any unit. The given part of the contacts is marked, those with largest
+    f_n on the left, with largest ΔF_n on the right.
+    """
+    style.ready(backend)
+    frames = []
+    for mu in sorted(groups):
+        packing, contacts, normal, extent = groups[mu]
+        at = contact_points(packing, contacts)
+        marks = (("strongest", normal, style.COLOURS[1]), ("least determined", extent, "#0072B2"))
+        for word, values, colour in marks:
+            count = max(1, round(part * len(at)))
+            chosen = np.argsort(-np.asarray(values), kind="stable")[:count]
+            drawn = [
+                style.dots(at, "contacts", style.GREY, backend, size=1),
+                style.dots(at[chosen], word, colour, backend, size=5),
+            ]
+            box = packing.box
+            frames.append(
+                style.frame(
+                    drawn,
+                    backend,
+                    title=f"μ = {mu:g}: {word} {100 * part:g} %",
+                    x="x",
+                    y="y",
+                    xlim=(0, box[0]),
+                    ylim=(0, box[1]),
+                )
+            )
+    return style.page(frames, backend, columns=2)
+
+
+def contact_points(packing, contacts):
+    """Points of contact (n, 2), folded into the box."""
+    c = packing.contacts
+    at = packing.x[c.i[contacts]] + c.arm_i[contacts, None] * c.normal[contacts]
+    return np.where(np.isfinite(packing.box), np.mod(at, packing.box), at)
