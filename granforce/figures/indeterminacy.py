@@ -29,7 +29,7 @@ def indeterminacy(rows, *, beside=None, backend="bokeh"):
         style.curves(curves, backend), backend, title="Indeterminacy", x="μ", y="η"
     )
     log = style.frame(
-        style.curves(curves, backend, log=True),
+        style.curves(curves, backend, logx=True, logy=True),
         backend,
         title="the same, log–log",
         x="μ",
@@ -40,7 +40,7 @@ def indeterminacy(rows, *, beside=None, backend="bokeh"):
     )
     z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
     contacts = style.frame(
-        style.curves(z, backend, log=True),
+        style.curves(z, backend, logx=True),
         backend,
         title="Coordination",
         x="μ",

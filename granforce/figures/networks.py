@@ -58,7 +58,7 @@ def places(groups, *, backend="bokeh", part=0.1):
             count = max(1, round(part * len(at)))
             chosen = np.argsort(-np.asarray(values), kind="stable")[:count]
             drawn = [
-                style.dots(at, "contacts", style.GREY, backend, size=1),
+                style.dots(at, "contacts", style.GREY, backend, size=2),
                 style.dots(at[chosen], word, colour, backend, size=5),
             ]
             box = packing.box
@@ -71,6 +71,7 @@ def places(groups, *, backend="bokeh", part=0.1):
                     y="y",
                     xlim=(0, box[0]),
                     ylim=(0, box[1]),
+                    **style.equal_scales(box, backend),
                 )
             )
     return style.page(frames, backend, columns=2)

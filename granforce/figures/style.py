@@ -66,17 +66,18 @@ def words(points, backend):
     return hv.Labels(labels, ["x", "y"], "text").opts(backend=backend, **look)
 
 
-def curves(series, backend, log=False):
+def curves(series, backend, logx=False, logy=False):
     """Lines with points and error bars: series of (points, label, colour, dash, marker's number).
 
-    points: (x, y, standard error), as `statistics.means` gives them; log: only x, y > 0.
+    points: (x, y, standard error), as `statistics.means` gives them; those that a logarithmic axis
+    cannot show are left out.
     """
     for points, label, colour, dash, k in series:
-        shown = [p for p in points if p[0] > 0 and p[1] > 0] if log else points
+        shown = [p for p in points if (p[0] > 0 or not logx) and (p[1] > 0 or not logy)]
         yield line([p[:2] for p in shown], label, colour, backend, dash)
         yield dots([p[:2] for p in shown], label, colour, backend, MARKERS[k % len(MARKERS)])
         # On a logarithmic axis a bar may not reach 0.
-        reach = [(x, y, min(e, 0.9 * y) if log else e, e) for x, y, e in shown]
+        reach = [(x, y, min(e, 0.9 * y) if logy else e, e) for x, y, e in shown]
         yield bars([bar for bar in reach if bar[3] > 0], colour, backend)
 
 
@@ -95,6 +96,14 @@ def frame(elements, backend, *, title, x, y, legend=None, **options):
     return hv.Overlay(elements).opts(
         backend=backend, show_legend=legend is not None, axiswise=True, **options
     )
+
+
+def equal_scales(box, backend):
+    """Options of a frame in which both axes have the same scale: box, its sides."""
+    if backend == "matplotlib":
+        return {"aspect": "equal"}
+    width = FRAME_PIXELS[0]
+    return {"frame_width": width, "frame_height": round(width * box[1] / box[0])}
 
 
 def page(frames, backend, columns=3):

@@ -21,7 +21,7 @@ def sizes(rows, *, backend="bokeh"):
         ]
         frames.append(
             style.frame(
-                style.curves(series, backend, log=True),
+                style.curves(series, backend, logx=True),
                 backend,
                 title=f"μ = {mu:g}",
                 x="N",
@@ -39,7 +39,8 @@ def opened(rows, own, *, backend="bokeh"):
     rows: dicts with mu (of the cones), eta2, eta3; own: the same of packings made with that μ.
     """
     sources = (("made at μ = 0", rows, "solid"), ("made at μ", own, "dashed"))
-    return _frames(sources, backend, (("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15)), logy=True)
+    names = (("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
+    return _frames(sources, backend, names, "top_left", logy=True)
 
 
 def frozen(periodic, inner, *, backend="bokeh"):
@@ -50,7 +51,7 @@ def frozen(periodic, inner, *, backend="bokeh"):
     """
     sources = (("periodic", periodic, "solid"), ("frozen surroundings", inner, "dashed"))
     names = (("undetermined_part", "undetermined part", 1.0), ("clusters", "clusters", 1.0))
-    return _frames(sources, backend, names)
+    return _frames(sources, backend, names, "right")
 
 
 def distances(rows, *, backend="bokeh"):
@@ -64,7 +65,7 @@ def distances(rows, *, backend="bokeh"):
         (statistics.means(rows, name), label, style.COLOURS[k], "solid", k)
         for k, (name, label) in enumerate((("original_ratio", "original"), ("walk_ratio", "walk")))
     ]
-    drawn = list(style.curves(series, backend, log=True))
+    drawn = list(style.curves(series, backend, logx=True))
     if series[0][0]:
         ends = [(mu, 1.0) for mu, *_ in series[0][0] if mu > 0]
         drawn.append(style.line(ends, "uniform", style.GREY, backend, "dashed"))
@@ -79,19 +80,17 @@ def distances(rows, *, backend="bokeh"):
     )
 
 
-def _frames(sources, backend, names, **options):
+def _frames(sources, backend, names, legend, logy=False):
     """One frame for each name against μ > 0, with all sources: (word, rows, dash)."""
     style.ready(backend)
     frames = []
-    for name, label, factor in names:
+    for last, (name, label, factor) in enumerate(names, 1 - len(names)):
         series = [
             (statistics.means(rows, name, factor=factor), word, style.COLOURS[k], dash, k)
             for k, (word, rows, dash) in enumerate(sources)
         ]
-        drawn = style.curves(series, backend, log=True)
-        frames.append(
-            style.frame(
-                drawn, backend, title=label, x="μ", y=label, logx=True, legend="top_left", **options
-            )
-        )
+        drawn = style.curves(series, backend, logx=True, logy=logy)
+        shown = None if last and legend == "right" else legend  # between frames is no room for one
+        axes = {"x": "μ", "y": label, "logx": True, "logy": logy}
+        frames.append(style.frame(drawn, backend, title=label, legend=shown, **axes))
     return style.page(frames, backend, columns=2)

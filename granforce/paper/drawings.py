@@ -26,13 +26,16 @@ def draw(table, folder, *, suffixes=(".html", ".png", ".svg"), progress=None):
 def all_figures(table):
     """{file name: figure(backend=…)} of all figures that a table has the data of."""
     walk = table.part("walk")
-    beside = {part: table.part(part) for part in ("exact", "uniform") if table.part(part)}
+    exact, uniform = table.part("exact"), table.part("uniform")
+    beside = {word: rows for word, rows in (("exact", exact), ("uniform", uniform)) if rows}
     made = {}
     if walk:
-        made["figure1"] = _later(figures.indeterminacy, walk, beside=beside)
+        made["figure1"] = _later(figures.indeterminacy, walk, beside={"exact": exact})
         made["figure4"] = _later(figures.extents, _some(table.extents("walk")))
         made["figure6"] = _later(figures.correlations, walk, beside=beside)
-    if table.part("exact"):
+    if uniform:
+        made["figure1_uniform"] = _later(figures.indeterminacy, walk, beside={"uniform": uniform})
+    if exact:
         made["figure4_exact"] = _later(figures.extents, _some(table.extents("exact")))
     if table.part("perturb"):
         made["figure2"] = _later(figures.perturbation, with_indeterminacy(table))
@@ -44,10 +47,10 @@ def all_figures(table):
     if table.part("opened"):
         made["opened"] = _later(figures.opened, table.part("opened"), walk)
     if table.part("frozen"):
-        periodic = [row for row in table.part("exact") if row["mu"] > 0]
+        periodic = [row for row in exact if row["mu"] > 0]
         made["frozen"] = _later(figures.frozen, periodic, table.part("frozen"))
-    if any("walk_ratio" in row for row in table.part("uniform")):
-        made["distances"] = _later(figures.distances, table.part("uniform"))
+    if any("walk_ratio" in row for row in uniform):
+        made["distances"] = _later(figures.distances, uniform)
     return made
 
 
