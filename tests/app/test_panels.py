@@ -1,15 +1,22 @@
 """What the tabs beside the packing show, without a browser."""
 
 import io
+import json
 import time
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import xarray as xr
+import zarr
 from packings import REFERENCE, packed
 from small_store import KEPT
 
 import granforce as gf
-from app import distributions, projections, uploads
+from app import distributions, exports, projections, uploads
+from app.state import COLOURS, WIDTHS
+from app.views.packing import normal_extent
+from app.views.style import palettes
 from granforce import measures, study
 from granforce.records import InputError
 
@@ -357,3 +364,113 @@ def test_a_tap_on_a_mu_shows_its_states(state):
     mus = list(next(iter(source.data.values())))
     source.selected.indices = [mus.index(1)]
     settled(state, done=lambda: state.cell.mu == 1)
+
+
+# Export
+
+
+def test_the_table_of_contacts_holds_what_is_on_screen(state):
+    replay = opened(state).replay
+    state.compute_exact()
+    settled(state, done=lambda: state.exact is not None)
+    table = exports.csv(exports.contacts(replay, state.exact, 3)).decode().splitlines()
+    names = table[0].split(",")
+    rows = np.array([line.split(",") for line in table[1:]], dtype=float)
+    column = dict(zip(names, rows.T, strict=True))
+    assert len(rows) == replay.summary["contacts"] and "." not in table[1].split(",")[0]
+    np.testing.assert_allclose(column["f_n"], replay.normal[3] * replay.force_scale, rtol=1e-6)
+    slack = 1e-6 * replay.force_scale
+    assert np.all(column["f_n_min"] <= column["f_n_low"] + slack)
+    assert np.all(column["f_n_high"] <= column["f_n_max"] + slack)
+    packing = state.library.packing(state.cell.params["packing"])
+    place = column["contact"].astype(int)
+    np.testing.assert_array_equal(column["i"], packing.contacts.i[place])
+    np.testing.assert_array_equal(column["j"], packing.contacts.j[place])
+
+
+@pytest.mark.parametrize("kind", ["netcdf", "zarr"])
+def test_datasets_come_back_with_packing_states_and_units(state, tmp_path, kind):
+    opened(state)
+    states = state.library.dataset(state.cell)
+    packing = state.library.packing(state.cell.params["packing"])
+    whole = exports.dataset(packing, states)
+    if kind == "netcdf":
+        again = xr.open_dataset(io.BytesIO(exports.netcdf(whole)), engine="scipy", decode_cf=False)
+    else:
+        path = tmp_path / "states.zarr.zip"
+        path.write_bytes(exports.zarr_zip(whole))
+        store = zarr.storage.ZipStore(path, mode="r")
+        again = xr.open_zarr(store, consolidated=False, decode_cf=False)
+    np.testing.assert_array_equal(again["states"].values, states["states"].values)
+    np.testing.assert_array_equal(again["normal"].values, packing.contacts.normal)
+    assert again["states"].attrs["units"] == "force" and again["eta2"] == states["eta2"]
+    assert again.attrs["parameters"] == states.attrs["parameters"]
+
+
+def test_the_packing_comes_back_to_the_last_bit(state):
+    packing = state.library.packing(opened(state).cell.params["packing"])
+    again = gf.load_packing(io.BytesIO(exports.npz(packing)))
+    np.testing.assert_array_equal(again.x, packing.x)
+    np.testing.assert_array_equal(again.forces, packing.forces)
+
+
+def test_parameters_name_what_is_on_screen(state):
+    opened(state)
+    told = json.loads(exports.parameters(state.cell, state.link(), {"frame": 0}))
+    assert told["kind"] == "walk" and told["command"].startswith("granforce walk -n 30")
+    found = state.library.find("walk", told["parameters"])
+    assert found.name == state.cell.name == told["entry"]
+
+
+@pytest.mark.parametrize("colour", list(COLOURS))
+@pytest.mark.parametrize("thickness", list(WIDTHS))
+def test_the_picture_is_whole_and_to_scale(state, colour, thickness):
+    replay = opened(state).replay
+    extent = normal_extent(replay, {})
+    look = exports.Look(5, 2, colour, thickness, True, palettes(False), "#fff")
+    text = exports.picture(replay, extent, float(extent.max()), look)
+    root = ElementTree.fromstring(text)
+    width, height = map(float, root.get("viewBox").split()[2:])
+    assert width == pytest.approx(height) and root.get("width") == root.get("height")
+    circles = [e for e in root.iter() if e.tag.endswith("circle")]
+    radii = [float(c.get("r")) for c in circles[: len(replay.disks.r)]]
+    np.testing.assert_allclose(radii, replay.disks.r, rtol=1e-4)
+    lines = [e for e in root.iter() if e.tag.endswith("line")]
+    drawn = exports.chain_widths(replay, extent, look)[replay.links.contact] > 0
+    assert len(lines) == drawn.sum() > 20
+    assert len(circles) > len(replay.disks.r)  # marks of Fig. 5
+
+
+def test_colours_tell_mobilisation(state):
+    replay = opened(state).replay
+    look = exports.Look(4, 0, "mobilised", "normal", False, palettes(False), "#fff")
+    colours = exports.chain_colours(replay, None, 1.0, look)
+    shades = look.palettes["mobilised"]
+    mu = replay.summary["mu"]
+    part = replay.tangential[4] / (mu * np.maximum(replay.normal[4], 1e-9))
+    place = np.array([shades.index(colour) for colour in colours])
+    carries = replay.normal[4] > 1e-3
+    expected = (part[carries] + 1) / 2 * (len(shades) - 1)
+    assert np.abs(place[carries] - expected).max() <= 0.51
+
+
+def test_every_button_hands_a_file_over(state):
+    from app.views.export import GROUPS, View
+
+    view = View(opened(state))
+    for group in view.groups.values():
+        for key in group.files:
+            handed = []
+            group.hand_over = lambda file, png=False, to=handed: to.append(file)
+            group._handle_msg({"key": key})
+            settled(state)
+            assert len(handed[0].content) > 300 and "/" not in handed[0].name, key
+    assert sum(len(files) for files in GROUPS.values()) == 7
+
+
+def test_unknown_keys_are_ignored(state):
+    from app.views.export import View
+
+    view = View(opened(state))
+    next(iter(view.groups.values()))._handle_msg({"key": "../secret"})
+    assert not view.task.running
