@@ -21,6 +21,8 @@ _HOME = {
     "sample_uniform": "uniform",
     "intervals": "bounds",
     "limit_loads": "bounds",
+    "critical_force": "perturb",
+    "response": "perturb",
     "outline": "projection",
     "load_packing": "importers",
     "save_packing": "importers",

@@ -272,6 +272,4 @@ def _jacobian(step, D, state, data):
             pushed = D[c, 0] * (columns[c, a, 0] + coupling * columns[c, a, 1])
             turned = d_t * columns[c, a, 1]
             for k in range(rows.shape[1]):
-                data[step.place[c, a, k]] += (
-                    pushed * columns[c, k, 0] + turned * columns[c, k, 1]
-                )
+                data[step.place[c, a, k]] += pushed * columns[c, k, 0] + turned * columns[c, k, 1]

@@ -32,6 +32,9 @@ MOST_STEPS = 150
 # steps spent on that.
 STEADY, STEADY_STEPS = 1e-3, 500
 
+# How loads ended, implicit steps of the flow, and linear systems solved for them.
+COUNTS = ("loads_at_rest", "loads_moving", "loads_undecided", "flow_steps", "linear_systems")
+
 
 class CriticalForce(NamedTuple):
     """Largest force pair on one contact under which grains come to rest, and the motion above."""
@@ -45,7 +48,7 @@ class CriticalForce(NamedTuple):
     violation: float  # ⟨f_n⟩, by Ensemble.violation
     moving: exact_step.Outcome | None  # the end under `high`; None where that was not tried
     converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
-    counts: dict  # loads at rest, in steady motion, undecided; flow steps; linear systems
+    counts: dict  # COUNTS
     seconds: float
 
 
@@ -86,21 +89,21 @@ def critical_force(
     limit = float(limit_load) / S.force_scale
     step = exact_step.make_step(S)
     forces, low, high, moving = _start(S) / S.force_scale, 0.0, limit, None
-    counts = {"at rest": 0, "moving": 0, "undecided": 0, "flow steps": 0, "linear systems": 0}
+    counts = dict.fromkeys(COUNTS, 0)
     while high - low > precision:
         if cancel is not None and cancel():
             raise Cancelled(f"critical force of contact {contact} cancelled")
         load = low + (RISE if moving is None else 0.5) * (high - low)
         load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
         outcome = exact_step.relax(step, forces, position, load, max_steps=max_steps)
-        counts["flow steps"] += outcome.steps
-        counts["linear systems"] += outcome.iterations
+        counts["flow_steps"] += outcome.steps
+        counts["linear_systems"] += outcome.iterations
         if outcome.at_rest:
             low, forces = load, outcome.forces
-            counts["at rest"] += 1
+            counts["loads_at_rest"] += 1
         else:
             high, moving = load, outcome
-            counts["moving" if outcome.converged else "undecided"] += 1
+            counts["loads_moving" if outcome.converged else "loads_undecided"] += 1
     loaded = forces.copy()
     loaded[position, 0] += low
     return CriticalForce(

@@ -100,6 +100,44 @@ VARIABLES: dict[str, Variable] = {
     "load_gap": Variable(
         ("contact",), "float64", "mean normal force", "duality gap of the limit loads"
     ),
+    # the answer to a force pair on one contact
+    "critical_low": Variable(("contact",), "float64", "force", "F_crit: largest load at rest"),
+    "critical_high": Variable(
+        ("contact",), "float64", "force", "least load not at rest, or the limit load"
+    ),
+    "load_residual": Variable(
+        ("contact",), "float64", "mean normal force", "unbalance under the largest load at rest"
+    ),
+    "load_violation": Variable(
+        ("contact",), "float64", "mean normal force", "cone violation under that load"
+    ),
+    "motion_breach": Variable(
+        ("contact",), "float64", "1", "breach of Coulomb's law by the first motion"
+    ),
+    "pair_opening": Variable(("contact",), "float64", "1", "opening of the contact, rms |u| = 1"),
+    "opened": Variable(("contact",), "int64", "1", "contacts that the first motion opens"),
+    "slid": Variable(("contact",), "int64", "1", "contacts that slide in the first motion"),
+    "kept": Variable(("contact",), "int64", "1", "contacts that stick in the first motion"),
+    "loads_at_rest": Variable(("contact",), "int64", "1", "loads that ended at rest"),
+    "loads_moving": Variable(("contact",), "int64", "1", "loads that ended in steady motion"),
+    "loads_undecided": Variable(
+        ("contact",), "int64", "1", "loads that ended in motion not yet steady"
+    ),
+    "flow_steps": Variable(("contact",), "int64", "1", "implicit steps of the flow"),
+    "linear_systems": Variable(("contact",), "int64", "1", "linear systems solved"),
+    "contact_seconds": Variable(("contact",), "float64", "s", "wall time of the critical force"),
+    "displacement": Variable(
+        ("contact", "grain", "axis"), "float64", "1", "first motion u, rms 1; NaN for rattlers"
+    ),
+    "shell_radius": Variable(("shell",), "float64", "length", "middle of the shell"),
+    "profile": Variable(("contact", "shell"), "float64", "1", "mean |u| of the shell's grains"),
+    "critical_force": Variable((), "float64", "mean normal force", "mean of F_crit"),
+    "decay_exponent": Variable((), "float64", "1", "α of mean |u| ~ r^−α"),
+    "decay_low": Variable((), "float64", "1", "lower end of the 95 % interval of α"),
+    "decay_high": Variable((), "float64", "1", "upper end of the 95 % interval of α"),
+    "fit_inner": Variable(("fit",), "float64", "length", "smallest r of other fits"),
+    "fit_outer": Variable(("fit",), "float64", "length", "largest r of other fits"),
+    "fit_exponent": Variable(("fit",), "float64", "1", "α of other fits"),
     # the outline of S in a plane of force space
     "axes": Variable(
         ("plane_axis", "contact", "component"), "float64", "1", f"axes of the plane, {_COMPONENT}"

@@ -7,6 +7,7 @@ anywhere and in any order (see `granforce.sweep`).
 import hashlib
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from granforce.records import Cancelled, InputError, friction, positive
 from granforce.relax.accelerated import accelerated
 from granforce.relax.gauss_seidel import gauss_seidel
 from granforce.relax.nearest import nearest
+from granforce.responses import contact_dataset, perturbation_dataset
 from granforce.samples import uniform_dataset, walk_dataset
 from granforce.schema import dataset_packing, labelled, packing_dataset
 from granforce.tolerances import EQUILIBRIUM
@@ -32,6 +34,7 @@ UNIFORM_VERSION = 1
 INTERVALS_VERSION = 1
 LIMIT_LOADS_VERSION = 1
 OUTLINE_VERSION = 1
+PERTURBATION_VERSION = 1
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
 UNDETERMINED = 1e-6
@@ -354,6 +357,88 @@ def _component_axes(S, components):
             raise InputError(f"contact {contact} carries no load in this packing")
         axes[k, place, part] = 1.0
     return axes
+
+
+def perturbation_parameters(
+    packing, *, mu=None, contacts=None, random=None, seed=0, precision=0.01
+):
+    """The parameters that name the local perturbation of contacts of one packing.
+
+    mu: friction coefficient of the ensemble, by default the packing's. contacts: positions in the
+    packing's contact list, by default all that carry; or random: so many of those that carry, the
+    first in an order drawn from seed. precision: of F_crit, ⟨f_n⟩.
+    """
+    if contacts is not None and random is not None:
+        raise InputError("name the contacts to perturb, or how many at random, not both")
+    if random is not None and random < 1:
+        raise InputError("at least one contact must be perturbed")
+    return {
+        "packing": packing,
+        "mu": packing["mu"] if mu is None else friction(mu),
+        "contacts": None if contacts is None else sorted({int(c) for c in contacts}),
+        "random": None if random is None else int(random),
+        "seed": None if random is None else int(seed),
+        "precision": positive(precision, "precision"),
+    }
+
+
+def get_perturbation(store, parameters, *, workers=2, progress=None, cancel=None):
+    """Dataset of critical forces, first motions and α, and whether it came from the store.
+
+    Each contact is kept as it ends. progress(done, total) counts contacts; workers: threads.
+    """
+
+    def compute():
+        named = {"packing": parameters["packing"], "mu": parameters["mu"], "slice": None}
+        S, chosen = exact_ensemble(
+            store, named | {"contacts": parameters["contacts"]}, cancel=cancel
+        )
+        if parameters["random"] is not None:
+            order = np.random.default_rng(parameters["seed"]).permutation(chosen)
+            chosen = np.sort(order[: parameters["random"]])
+        if not len(chosen):
+            raise InputError("no contact to perturb")
+        parts = _perturbed(store, S, chosen, parameters, workers, progress, cancel)
+        return perturbation_dataset(S, parts)
+
+    return found_or_kept(store, "perturbation", parameters, compute, PERTURBATION_VERSION)
+
+
+def _perturbed(store, S, chosen, parameters, workers, progress, cancel):
+    """Datasets of the single contacts (positions in S), in order; those of the store are found."""
+    loads = limit_load_bounds(S, chosen, workers=workers, cancel=cancel)
+    _complete(loads, "limit loads", cancel)
+    tell = progress or (lambda done, total: None)
+    stopped = False
+
+    def one(k):
+        contact = int(S.index[chosen[k]])
+        named = {name: parameters[name] for name in ("packing", "mu", "precision")}
+        return found_or_kept(
+            store,
+            "perturbed_contact",
+            named | {"contact": contact},
+            lambda: contact_dataset(
+                S,
+                contact,
+                loads.load[k],
+                precision=parameters["precision"],
+                cancel=lambda: stopped or (cancel is not None and cancel()),
+            ),
+            PERTURBATION_VERSION,
+        )[0]
+
+    with ThreadPoolExecutor(workers) as pool:
+        waiting = [pool.submit(one, k) for k in range(len(chosen))]
+        try:
+            for done, future in enumerate(as_completed(waiting), 1):
+                future.result()
+                tell(done, len(chosen))
+        except BaseException:
+            stopped = True  # what is under way ends at its next load
+            pool.shutdown(cancel_futures=True)
+            raise
+    return [future.result() for future in waiting]
 
 
 def _complete(result, what, cancel):

@@ -48,6 +48,7 @@ COMPUTE = {
     "uniform": Kind(study.get_uniform, study.UNIFORM_VERSION, keeps_states=True),
     "intervals": Kind(study.get_intervals, study.INTERVALS_VERSION),
     "limit_loads": Kind(study.get_limit_loads, study.LIMIT_LOADS_VERSION),
+    "perturbation": Kind(study.get_perturbation, study.PERTURBATION_VERSION),
 }
 
 
