@@ -43,6 +43,7 @@ def _parser():
     _add_sweep(commands)
     _add_intervals(commands)
     _add_limit_loads(commands)
+    _add_perturb(commands)
     _add_study(commands)
     _add_import(commands)
     _add_bench(commands)
@@ -221,6 +222,7 @@ def _add_study(commands):
     group.add_argument("--perturb-contacts", type=int, help="contacts pushed in each (default 30)")
     group.add_argument("--sizes", help="other numbers of disks (default 100,200,800,1600)")
     command.add_argument("--workers", type=int, default=2, help="processes (default 2)")
+    command.add_argument("--formats", default="html,png,svg", help="of the figures; empty: none")
     _add_scheduler(command)
 
 
@@ -269,6 +271,31 @@ def _add_limit_loads(commands):
         "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
     )
     _add_exact(command)
+
+
+def _add_perturb(commands):
+    command = _command(
+        commands,
+        "perturb",
+        "perturb",
+        "push the grains of single contacts apart until they set off: critical force and motion",
+        "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
+    )
+    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
+    _add_packing(command)
+    group = command.add_argument_group("the perturbation")
+    which = group.add_mutually_exclusive_group()
+    which.add_argument("--random", type=int, default=50, help="so many contacts (default 50)")
+    which.add_argument("--contacts", help="these contacts, numbers separated by commas")
+    which.add_argument("--all", action="store_true", help="all contacts that carry")
+    group.add_argument("--draw-seed", type=int, default=0, help="seed of --random (default 0)")
+    group.add_argument("--ensemble-mu", type=float, help="friction of the contacts, if not --mu")
+    group.add_argument(
+        "--precision", type=float, default=0.01, help="of F_crit, in ⟨f_n⟩ (default 0.01)"
+    )
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    group.add_argument("--csv", metavar="FILE.csv", help="write the result per contact")
+    _add_store(command)
 
 
 def _add_import(commands):

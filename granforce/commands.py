@@ -8,6 +8,7 @@ import numpy as np
 
 from granforce import importers, study
 from granforce import sweep as sweeps
+from granforce.perturb import COUNTS
 from granforce.records import InputError
 from granforce.store import open_store
 from granforce.terminal import Bar, Steps, print_list, report, table
@@ -184,6 +185,54 @@ def _write_csv(path, columns):
         )
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}") from None
+
+
+def perturb(arguments):
+    """Critical forces and first motions of contacts, computed or found; report them."""
+    try:
+        chosen = arguments.contacts and [int(text) for text in arguments.contacts.split(",")]
+    except ValueError:
+        raise InputError("--contacts takes numbers separated by commas") from None
+    if arguments.workers < 1:
+        raise InputError("--workers must be at least 1")
+    options = {
+        "mu": arguments.ensemble_mu,
+        "contacts": chosen,
+        "random": None if arguments.all or chosen else arguments.random,
+        "seed": arguments.draw_seed,
+        "precision": arguments.precision,
+    }
+    # Bad options are told before a packing is made.
+    study.perturbation_parameters({"mu": 0.0}, **options)
+    store = open_store(arguments.cache)
+    parameters = study.perturbation_parameters(_named_packing(arguments, store), **options)
+    with Bar("local perturbation", "contact") as progress:
+        dataset, cached = study.get_perturbation(
+            store, parameters, workers=arguments.workers, progress=progress
+        )
+    scale = dataset["force_scale"].item()
+    load, limit = (dataset[name].values / scale for name in ("critical_low", "limit_load"))
+    lines = {
+        "contacts": len(load),
+        "critical_force": dataset["critical_force"].item(),
+        "critical_force_deciles": np.quantile(load, np.linspace(0, 1, 11)).tolist(),
+        "limit_load": float(limit.mean()),
+        **{name: dataset[name].item() for name in ("decay_exponent", "decay_low", "decay_high")},
+        "fit_range": json.loads(dataset.attrs["fit_range"]),
+        "decay_exponent_of_other_ranges": dataset["fit_exponent"].values.tolist(),
+        **{name: int(dataset[name].sum()) for name in COUNTS},
+        **{name: dataset[name].item() for name in ("rattlers", "unloaded_contacts")},
+        "largest_residual": float(dataset["load_residual"].max()),
+        "largest_breach": float(dataset["motion_breach"].max()),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    if arguments.csv:
+        names = ("limit_load", "critical_low", "critical_high", "pair_opening")
+        names += ("opened", "slid", "kept", *COUNTS)
+        columns = {"contact": dataset["backbone"].values}
+        _write_csv(arguments.csv, columns | {name: dataset[name].values for name in names})
+    report(lines, arguments.json)
 
 
 def _exact_source(arguments, store):
