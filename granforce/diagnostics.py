@@ -39,12 +39,12 @@ class Mixing(NamedTuple):
 def mixing(draws, varies):
     """Mixing of draws (chains, draws, …); varies (…): which components vary in the target at all.
 
-    A component that should vary, and does not in these draws, has R̂ = ∞ and is worth nothing.
+    A component that should vary, and does not in any chain, has R̂ = ∞ and is worth nothing.
     """
     values = draws[:, :, varies]
     answers = np.full((3, values.shape[2]), np.nan)
     if draws.shape[1] >= FEWEST_DRAWS:
-        stuck = np.all(values == values[:1, :1], axis=(0, 1))
+        stuck = np.all(values == values[:, :1], axis=(0, 1))
         answers[:, stuck] = [[np.inf], [0.0], [0.0]]
         if not stuck.all():
             answers[:, ~stuck] = _by_arviz(values[:, :, ~stuck])

@@ -21,13 +21,13 @@ from granforce.tolerances import FLAT
 # Mean length of a path in root mean square distances of states from the centre; what an effective
 # state costs has its minimum, a flat one, near this.
 PATH = 2.0
-# Paths between states that are kept: 1000 states are then worth 600 to 900 independent ones.
-PATHS_PER_STATE = 4
+# Paths between states that are kept: 1000 states are then worth 400 to 700 independent ones.
+PATHS_PER_STATE = 2
 # Moves of hit-and-run per state and dimension; its chains mix more slowly by about this factor.
 MOVES_PER_DIMENSION = 20
 # States dropped at the start of each chain; from the first part comes the length of the paths of
 # the second, and from that the length for good.
-WARM_UP = 10, 20
+WARM_UP = 20, 40
 # Turns after which a path is not taken, per dimension; a usual path has less than one.
 MOST_TURNS = 10
 # Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed., 11.4);
@@ -227,7 +227,7 @@ def _extend(ensemble, sample, states, workers, progress, cancel):
     while have < target and not (cancel is not None and cancel()):
         count = min(_ROUND, target - have)
         ends, moves = _together(made, ends, count, sample.reach, sample.method, workers)
-        new = _forces(ensemble, made, np.stack([one.slacks for one in moves]))
+        new = forces_of(ensemble, made, np.stack([one.slacks for one in moves]))
         parts.append((new, ensemble.residual(new), ensemble.violation(new)))
         counts = _counted(counts, moves)
         have += count
@@ -243,7 +243,7 @@ def _extend(ensemble, sample, states, workers, progress, cancel):
         states=forces,
         residual=residual,
         violation=violation,
-        mixing=mixing(forces, _varying(ensemble, made)),
+        mixing=mixing(forces, varying(ensemble, made)),
         counts=counts,
         sampling_seconds=sample.sampling_seconds + drawn - begin,
         diagnosis_seconds=sample.diagnosis_seconds + time.perf_counter() - drawn,
@@ -252,7 +252,7 @@ def _extend(ensemble, sample, states, workers, progress, cancel):
     return sample, have >= target
 
 
-def _forces(ensemble, chart, slacks):
+def forces_of(ensemble, chart, slacks):
     """Forces (…, N_c, 2) of slacks (…, rows)."""
     y = chart.points(slacks)
     T = ensemble.scaled_form[2]
@@ -260,7 +260,7 @@ def _forces(ensemble, chart, slacks):
     return ensemble.to_forces(x.reshape(*y.shape[:-1], -1))
 
 
-def _varying(ensemble, chart):
+def varying(ensemble, chart):
     """Mask (N_c, 2) of components that are not the same in all of S."""
     T = ensemble.scaled_form[2].tocsc()
     slopes = T[:, chart.moving] @ (chart.centre[chart.moving, None] * chart.G[: len(chart.moving)])

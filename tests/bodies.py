@@ -6,10 +6,9 @@ coordinate has a scale of its own, spread over four decades where `skew` is set.
 
 from typing import NamedTuple
 
+import arviz
 import numpy as np
 from scipy import linalg, sparse, spatial, stats
-
-from granforce.diagnostics import mixing
 
 
 class Body(NamedTuple):
@@ -17,18 +16,19 @@ class Body(NamedTuple):
     b: np.ndarray  # (rows,)
     dimension: int
     mean: np.ndarray  # (n,)
-    variance: np.ndarray  # (n,) 0 for coordinates that are the same in all of the body
+    variance: np.ndarray  # (n,)
+    kurtosis: np.ndarray  # (n,) fourth central moment over the square of the variance
     marginal: list  # n distribution functions, or empty where they are not known
 
 
-def _skewed(A, b, dimension, mean, variance, marginal, skew, seed=0):
+def _skewed(A, b, dimension, mean, variance, kurtosis, marginal, skew, seed=0):
     rng = np.random.default_rng(seed)
     n, rows = A.shape[1], A.shape[0]
     scale = 10 ** rng.uniform(-2, 2, n) if skew else np.ones(n)
     mix = rng.normal(size=(rows, rows)) + 2 * np.sqrt(rows) * np.eye(rows) if skew else np.eye(rows)
     marginal = [_stretched(cdf, c) for cdf, c in zip(marginal, scale, strict=bool(marginal))]
     mixed = sparse.csc_matrix(mix @ (A / scale))
-    return Body(mixed, mix @ b, dimension, scale * mean, scale**2 * variance, marginal)
+    return Body(mixed, mix @ b, dimension, scale * mean, scale**2 * variance, kurtosis, marginal)
 
 
 def _stretched(cdf, scale):
@@ -39,14 +39,14 @@ def simplex(d, skew=False):
     """Σ y = 1 in d + 1 coordinates: each is Beta(1, d)."""
     one = stats.beta(1, d)
     n = d + 1
-    moments = np.full(n, one.mean()), np.full(n, one.var())
+    moments = (np.full(n, v) for v in (one.mean(), one.var(), one.stats("k") + 3))
     return _skewed(np.ones((1, n)), np.ones(1), d, *moments, [one.cdf] * n, skew)
 
 
 def box(d, skew=False):
     """The unit cube with the slacks of its upper walls: all uniform in [0, 1]."""
     A = np.hstack([np.eye(d), np.eye(d)])
-    moments = np.full(2 * d, 0.5), np.full(2 * d, 1 / 12)
+    moments = (np.full(2 * d, v) for v in (0.5, 1 / 12, 9 / 5))
     return _skewed(A, np.ones(d), d, *moments, [stats.uniform.cdf] * (2 * d), skew)
 
 
@@ -54,18 +54,20 @@ def product(sizes, skew=False):
     """Simplices side by side."""
     parts = [simplex(d) for d in sizes]
     A = linalg.block_diag(*[part.A.toarray() for part in parts])
-    joined = [np.concatenate([part[k] for part in parts]) for k in (1, 3, 4)]
+    b, *moments = (np.concatenate([part[k] for part in parts]) for k in (1, 3, 4, 5))
     marginal = [cdf for part in parts for cdf in part.marginal]
-    return _skewed(A, joined[0], sum(sizes), joined[1], joined[2], marginal, skew)
+    return _skewed(A, b, sum(sizes), *moments, marginal, skew)
 
 
 def cross_polytope(d, skew=False):
-    """Σ |x_i| ≤ 1 by its 2^d walls, y = 1 − s·x with signs s; Var x_i = 2/((d + 1)(d + 2))."""
+    """Σ |x_i| ≤ 1 by its 2^d walls, y = 1 − s·x with signs s; |x| is Dirichlet(1, …, 1)."""
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * d)).reshape(d, -1).T
     A = linalg.null_space(signs.T).T
     n = len(signs)
     variance = 2 * d / ((d + 1) * (d + 2))
-    return _skewed(A, A @ np.ones(n), d, np.ones(n), np.full(n, variance), [], skew)
+    fourth = 12 * d * (d + 1) / ((d + 1) * (d + 2) * (d + 3) * (d + 4))
+    moments = (np.full(n, v) for v in (1.0, variance, fourth / variance**2))
+    return _skewed(A, A @ np.ones(n), d, *moments, [], skew)
 
 
 def known_by_triangulation(A, b, inside):
@@ -87,24 +89,24 @@ def known_by_triangulation(A, b, inside):
     return inside + null @ mean, null @ covariance @ null.T
 
 
-def z_scores(draws, mean, variance):
+def z_scores(draws, mean, variance, kurtosis):
     """z-scores (k,) of the means and of the second moments of draws (chains, states, k).
 
-    Both against the known values, in standard errors from the draws' own effective sample size.
+    Both against the known values, in known standard deviations: those of the draws would lean
+    with their means. What the draws are worth is their own effective sample size.
     """
-    everything = np.ones(draws.shape[2], dtype=bool)
     scaled = (draws - mean) / np.sqrt(variance)
-    scores = []
-    for values, spread in ((scaled, 1.0), (scaled**2 - 1, None)):
-        spread = values.std(axis=(0, 1)) if spread is None else spread
-        effective = mixing(values, everything).bulk
-        scores.append(values.mean(axis=(0, 1)) / spread * np.sqrt(effective))
-    return scores
+    squares = (scaled**2 - 1) / np.sqrt(kurtosis - 1)
+    return [values.mean(axis=(0, 1)) * np.sqrt(worth(values)) for values in (scaled, squares)]
+
+
+def worth(draws):
+    """How many independent draws the mean of each component (k,) is worth."""
+    return arviz.ess(arviz.convert_to_dataset({"value": draws}), method="mean")["value"].values
 
 
 def distance_to_marginals(draws, marginal):
     """Kolmogorov's √n D of each coordinate, n its effective sample size."""
-    effective = mixing(draws, np.ones(draws.shape[2], dtype=bool)).bulk
     flat = draws.reshape(-1, draws.shape[2])
     distance = [stats.kstest(flat[:, k], cdf).statistic for k, cdf in enumerate(marginal)]
-    return np.sqrt(effective) * np.array(distance)
+    return np.sqrt(worth(draws)) * np.array(distance)

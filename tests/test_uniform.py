@@ -20,7 +20,7 @@ from bodies import (
 from packings import lattice, packed, reference, two_disks
 from scipy import sparse
 
-from granforce import measures, samples, study, uniform
+from granforce import bench, measures, samples, study, uniform
 from granforce.chart import chart, inner_point
 from granforce.cli import main
 from granforce.diagnostics import mixing
@@ -57,7 +57,7 @@ def test_known_bodies(name):
     made, y = drawn(body, 500)
     assert made.dimension == body.dimension
     assert np.abs(body.A @ y.reshape(-1, y.shape[2]).T - body.b[:, None]).max() < 1e-9
-    means, squares = z_scores(y, body.mean, body.variance)
+    means, squares = z_scores(y, body.mean, body.variance, body.kurtosis)
     assert np.abs(means).max() < 5 and np.abs(squares).max() < 5
     if body.marginal:
         assert distance_to_marginals(y, body.marginal).max() < 2.3
@@ -68,7 +68,7 @@ def test_the_harness_sees_a_wrong_target():
     rng = np.random.default_rng(0)
     for weight, right in ((1.0, True), (1.15, False)):
         y = rng.dirichlet(np.full(21, weight), (4, 500))
-        means, squares = z_scores(y, body.mean, body.variance)
+        means, squares = z_scores(y, body.mean, body.variance, body.kurtosis)
         assert np.abs(means).max() < 5
         assert (np.sqrt(np.mean(squares**2)) < 1.5) == right
         assert (distance_to_marginals(y, body.marginal).max() < 2.3) or not right
@@ -78,7 +78,7 @@ def test_the_harness_sees_a_wrong_target():
 def test_the_second_witness_knows_the_bodies_too(name):
     body = BODIES[name]()
     _, y = drawn(body, 500, method="hit_and_run")
-    means, squares = z_scores(y, body.mean, body.variance)
+    means, squares = z_scores(y, body.mean, body.variance, body.kurtosis)
     assert np.abs(means).max() < 5 and np.abs(squares).max() < 5
 
 
@@ -86,7 +86,7 @@ def test_the_second_witness_knows_the_bodies_too(name):
 @pytest.mark.parametrize("body", [simplex(300, skew=True), box(300), product([150] * 2)])
 def test_large_bodies(body):
     _, y = drawn(body, 2000)
-    means, squares = z_scores(y, body.mean, body.variance)
+    means, squares = z_scores(y, body.mean, body.variance, body.kurtosis)
     assert np.abs(means).max() < 5 and np.abs(squares).max() < 5
     assert 0.7 < np.sqrt(np.mean(means**2)) < 1.3
     assert distance_to_marginals(y, body.marginal).max() < 2.3
@@ -127,7 +127,9 @@ def test_moments_are_those_of_a_triangulated_s():
     x = S.to_vector(sample.states) / S.force_scale
     mean, variance = T @ mean, np.diagonal(T @ covariance @ T.T.toarray())
     moving = variance > 1e-12
-    for scores in z_scores(x[:, :, moving], mean[moving], variance[moving]):
+    x, mean, variance = x[:, :, moving], mean[moving], variance[moving]
+    kurtosis = ((x - mean) ** 4).mean(axis=(0, 1)) / variance**2
+    for scores in z_scores(x, mean, variance, kurtosis):
         assert np.abs(scores).max() < 5
 
 
@@ -311,3 +313,15 @@ def test_the_command_draws_reports_and_finds(tmp_path, capsys):
     assert main([*words, "--chains", "0"]) == 2
     assert main([*words, "--workers", "0"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 2
+
+
+def test_the_benchmark_compares_walks_by_cost_and_by_moments():
+    rows = bench.uniform(True, n=30, frictions=(0.3,))
+    ours, other, *elsewhere = rows
+    assert [ours["method"], other["method"]] == list(uniform.METHODS)
+    assert ours["ratio"] == 1 and ours["two_cores"] > 0 and ours["setup_seconds"] > 0
+    cost = ours["seconds"] / ours["effective"]
+    assert ours["seconds_per_state"] == pytest.approx(cost)
+    assert other["ratio"] == pytest.approx(other["seconds_per_state"] / cost)
+    assert other["z_mean"] < 2 and other["z_square"] < 2
+    assert elsewhere and all("hopsy" in row["method"] for row in elsewhere)

@@ -13,6 +13,7 @@ from granforce.bench.report import environment, note, table
 from granforce.bench.skips import skips
 from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
 from granforce.bench.states import batches, interval_methods, intervals, walks
+from granforce.bench.uniform import uniform
 
 __all__ = [
     "PARTS",
@@ -30,6 +31,7 @@ __all__ = [
     "scaling",
     "skips",
     "tile",
+    "uniform",
     "walks",
 ]
 
@@ -46,14 +48,15 @@ PARTS = {
     "walks": (walks, "Random walks by solver"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),
+    "uniform": (uniform, "Uniform sampling of S"),
 }
 
 
 def run(folder=None, quick=True, *, parts=None, show=print):
     """Measure all parts (or those named) and return {"environment": …, part: rows}.
 
-    folder: where bench.json is written, after every part so that nothing is lost, and a figure of
-    the intervals; None: nowhere.
+    folder: where bench.json is written, after every part so that nothing is lost, and the figures
+    (bench.html, bench.png); None: nowhere.
     show: what is called with each finished table.
     """
     results = {"environment": environment(), "quick": bool(quick), "seconds": {}}
@@ -66,11 +69,8 @@ def run(folder=None, quick=True, *, parts=None, show=print):
         show(table(heading, results[name]))
         if folder is not None:
             _write(Path(folder), results)
-    if folder is not None and "intervals" in results:
-        from granforce import figures  # HoloViews takes seconds to load
-
-        figure = figures.walk_against_exact(results["intervals"])
-        figures.save(figure, Path(folder) / "walk_against_exact.html")
+    if folder is not None:
+        _draw(Path(folder), results)
     return results
 
 
@@ -79,6 +79,15 @@ def _write(folder, results):
     fresh = folder / "bench.json.part"
     fresh.write_text(json.dumps(results, indent=1, ensure_ascii=False))
     fresh.replace(folder / "bench.json")
+
+
+def _draw(folder, results):
+    from granforce import figures  # HoloViews takes seconds to load
+
+    for name, backend in (("bench.html", "bokeh"), ("bench.png", "matplotlib")):
+        figure = figures.benchmark(results, backend=backend)
+        if figure is not None:
+            figures.save(figure, folder / name)
 
 
 def main(out=None, quick=False, as_json=False):
