@@ -22,17 +22,19 @@ def frames(figure):
     return figure.values()
 
 
-def test_walks_stand_beside_the_exact_bounds(tmp_path):
+def test_the_benchmark_has_a_frame_for_each_part(tmp_path):
     rows = [
         {"mu": mu, "method": method, "seconds": seconds, "extent_part": part}
         for mu in (0.1, 1.0)
-        for method, seconds, part in (("exact", 4, 1.0), ("walk", 1, 0.3), ("walk", 9, 0.5))
+        for method, seconds, part in (("exact", 4, 1.0), ("walk", 9, 0.5), ("walk", 1, 0.3))
     ]
-    figure = figures.walk_against_exact(rows)
-    assert len(figure) == 2
-    walk = figure.values()[0].get(2)
-    assert walk.dimension_values(0).tolist() == [1, 9]
-    assert walk.dimension_values(1).tolist() == [0.3, 0.5]
+    sizes = [{"n": n, "solver": "ours", "seconds": n / 100} for n in (100, 400)]
+    results = {"intervals": rows, "scaling": [*sizes, {"n": "fit", "solver": "ours"}]}
+    figure = figures.benchmark(results)
+    scaling, first, second = (curves(frame) for frame in frames(figure))
+    np.testing.assert_allclose(scaling["ours"], ([100, 400], [1, 4]))
+    np.testing.assert_allclose(first["walk"], ([1, 9], [0.3, 0.5]))
+    np.testing.assert_allclose(second["exact"], ([4], [1.0]))
     path = tmp_path / "figure.html"
     figures.save(figure, path)
     page = path.read_text()

@@ -5,7 +5,8 @@ them), other arrays are named by the function that takes them. Where one μ has 
 are means and bars their standard errors.
 """
 
-from granforce.figures.bench import walk_against_exact
+from granforce.figures.bench import benchmark
+from granforce.figures.displacement import displacement
 from granforce.figures.indeterminacy import correlations, extents, indeterminacy
 from granforce.figures.networks import places, possible_forces
 from granforce.figures.response import perturbation
@@ -13,7 +14,9 @@ from granforce.figures.style import save
 from granforce.figures.variations import distances, frozen, opened, sizes
 
 __all__ = [
+    "benchmark",
     "correlations",
+    "displacement",
     "distances",
     "extents",
     "frozen",
@@ -24,5 +27,4 @@ __all__ = [
     "possible_forces",
     "save",
     "sizes",
-    "walk_against_exact",
 ]

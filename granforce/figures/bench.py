@@ -1,37 +1,79 @@
-"""Figure of the benchmark."""
-
-import holoviews as hv
+"""Figure of the benchmark: run time against error, size and friction."""
 
 from granforce.figures import style
 
 
-def walk_against_exact(rows):
-    """Part of the exact mean ΔF_n that walks saw, against their run time; exact bounds beside.
+def benchmark(results, *, backend="bokeh"):
+    """One frame for each part of the results that has a figure, as from `granforce.bench.run`.
 
-    rows: those of `granforce.bench.intervals`. One panel per μ.
+    relaxation: time against μ by solver; scaling: against N; compaction: mean overlap against time;
+    intervals: part of the exact mean ΔF_n that walks see against time, per μ; uniform: processor
+    time per effective state against h. None where the results have none of them.
     """
-    style.ready("bokeh")
-    panels = []
+    style.ready(backend)
+    frames = []
+    for part, draw in _DRAWN.items():
+        if part in results:
+            frames += draw(results[part], backend)
+    return style.page(frames, backend) if frames else None
+
+
+def _relaxation(rows, backend):
+    series = _by(rows, "solver", "mu", "seconds")
+    words = {"title": "one relaxation to 1e-9 ⟨f_n⟩", "x": "μ", "y": "time / s"}
+    yield _frame(series, backend, words, logx=True, logy=True)
+
+
+def _scaling(rows, backend):
+    series = _by([row for row in rows if row["n"] != "fit"], "solver", "n", "seconds")
+    words = {"title": "one relaxation against size", "x": "N", "y": "time / s"}
+    yield _frame(series, backend, words, logx=True, logy=True)
+
+
+def _compaction(rows, backend):
+    named = [row | {"name": f"Δt = {row['dt']:g}"} for row in rows]
+    series = _by(named, "name", "seconds", "overlap")
+    words = {"title": "compaction", "x": "time / s", "y": "mean overlap / r_max"}
+    yield _frame(series, backend, words, logx=True, logy=True)
+
+
+def _intervals(rows, backend):
     for mu in sorted({row["mu"] for row in rows}):
         chosen = [row for row in rows if row["mu"] == mu]
-        panels.append(hv.Overlay([*_curves(chosen)]).opts(title=f"μ = {mu:g}", **_FRAME))
-    return hv.Layout(panels).cols(2).opts(toolbar=None)
+        series = _by(chosen, "method", "seconds", "extent_part")
+        words = {"title": f"walks against exact bounds, μ = {mu:g}", "x": "time / s"}
+        words["y"] = "seen part of exact ⟨ΔF_n⟩"
+        yield _frame(series, backend, words, logx=True, ylim=(0, 1.1))
 
 
-_FRAME = {
-    "logx": True,
-    "padding": 0.1,
-    "ylim": (0, 1.1),
-    "xlabel": "run time / s",
-    "ylabel": "seen part of exact ⟨ΔF_n⟩",
-    "legend_position": "right",
-    "frame_width": 300,
-    "frame_height": 260,
+def _uniform(rows, backend):
+    series = _by(rows, "method", "h", "seconds_per_state")
+    words = {"title": "uniform sampling", "x": "h", "y": "processor time per effective state / s"}
+    yield _frame(series, backend, words, logx=True, logy=True)
+
+
+_DRAWN = {
+    "relaxation": _relaxation,
+    "scaling": _scaling,
+    "compaction": _compaction,
+    "intervals": _intervals,
+    "uniform": _uniform,
 }
 
 
-def _curves(rows):
-    for method in dict.fromkeys(row["method"] for row in rows):
-        points = [(r["seconds"], r["extent_part"]) for r in rows if r["method"] == method]
-        line = hv.Curve(points, label=method)
-        yield line * hv.Scatter(points, label=method).opts(size=8)
+def _by(rows, name, x, y):
+    """{value of the column `name`: points (x, y)} of the rows that have both."""
+    series = {}
+    for row in rows:
+        if row.get(x) is not None and row.get(y) is not None:
+            series.setdefault(row[name], []).append((row[x], row[y]))
+    return series
+
+
+def _frame(series, backend, words, **axes):
+    drawn = []
+    for k, (name, points) in enumerate(series.items()):
+        colour = style.COLOURS[k % len(style.COLOURS)]
+        drawn.append(style.line(sorted(points), name, colour, backend))
+        drawn.append(style.dots(sorted(points), name, colour, backend, style.MARKERS[k % 5]))
+    return style.frame(drawn, backend, legend="bottom_right", **words, **axes)
