@@ -142,6 +142,7 @@ def kill_one(processes):
     return victim
 
 
+@pytest.mark.slow
 def test_a_killed_dask_worker_costs_nothing_but_time(tmp_path, cluster):
     cells = [sweep.Cell("walk", cell(seed=seed, states=60)) for seed in range(1, 7)]
     killed = []
@@ -156,6 +157,7 @@ def test_a_killed_dask_worker_costs_nothing_but_time(tmp_path, cluster):
     assert_same(tmp_path / "one", tmp_path / "two")
 
 
+@pytest.mark.slow
 def test_a_killed_worker_process_costs_nothing_but_time(tmp_path):
     cells = [sweep.Cell("walk", cell(seed=seed, states=60)) for seed in range(1, 7)]
     killed = []
@@ -175,6 +177,7 @@ def die(*task):
     os._exit(1)
 
 
+@pytest.mark.slow
 def test_a_cell_that_kills_its_worker_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep, "run_cell", die)
     monkeypatch.setattr(sweep, "warm_up", lambda: None)

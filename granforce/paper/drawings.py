@@ -5,18 +5,21 @@ from granforce import figures
 SHOWN = (0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
 
 
-def draw(table, folder, *, suffixes=(".html", ".png", ".svg"), progress=None):
+FORMATS = ("html", "png", "svg")
+
+
+def draw(table, folder, *, formats=FORMATS, progress=None):
     """Draw every figure that a table has the data of into a folder; returns the paths.
 
     progress(figures drawn, figures in all).
     """
     folder.mkdir(parents=True, exist_ok=True)
-    made = all_figures(table)
+    made = all_figures(table) if formats else {}
     paths = []
     for done, (name, figure) in enumerate(made.items()):
-        for suffix in suffixes:
-            backend = "bokeh" if suffix == ".html" else "matplotlib"
-            paths.append(folder / f"{name}{suffix}")
+        for form in formats:
+            backend = "bokeh" if form == "html" else "matplotlib"
+            paths.append(folder / f"{name}.{form}")
             figures.save(figure(backend=backend), paths[-1])
         if progress is not None:
             progress(done + 1, len(made))

@@ -24,6 +24,9 @@ def main(arguments):
     as claims.json.
     """
     folder = Path(arguments.out)
+    formats = [word for word in arguments.formats.split(",") if word]
+    if set(formats) - set(drawings.FORMATS):
+        raise InputError(f"--formats {arguments.formats!r}: take some of html, png, svg")
     failed = []
     if arguments.table is None:
         plan = plan_of(arguments)
@@ -36,7 +39,7 @@ def main(arguments):
     else:
         reduced = tables.load(arguments.table)
     with Bar("figures", "figure") as progress:
-        drawings.draw(reduced, folder / "figures", progress=progress)
+        drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
     told = [claim._asdict() for claim in claims.judged(reduced)]
     (folder / "claims.json").write_text(json.dumps(told, indent=1, ensure_ascii=False))
     report(told, reduced, arguments.json)
