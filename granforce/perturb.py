@@ -59,7 +59,7 @@ class Response(NamedTuple):
     force: float  # the load
     displacement: np.ndarray  # (N, 2) u, intrinsic (without dilation); NaN for rattlers
     rotation: np.ndarray  # (N,) rotation times radius; NaN for rattlers
-    dilation: float  # of the box, ΔL/L times the largest radius
+    dilation: float  # of the box, ΔL/L per unit of u, 1/length
     opening: np.ndarray  # (N_c,) normal relative displacement of the ensemble's contacts
     opened: np.ndarray  # (N_c,) bool, contacts without force
     slid: np.ndarray  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
@@ -191,7 +191,7 @@ def _response(S, step, contact, position, load, moving):
         float(load),
         displacement,
         rotation,
-        float(box / unit * S.packing.r.max() / S.contacts.length.sum()),
+        float(box / unit / S.contacts.length.sum()),
         relative[:, 0],
         opened,
         slid,
