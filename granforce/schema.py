@@ -176,6 +176,7 @@ _ROW_SCALARS = (
     *("mu", "eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
     *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "seconds"),
+    *("critical_force", "decay_exponent", "decay_low", "decay_high"),
 )
 _FORCE = "mean normal force"
 
@@ -202,6 +203,7 @@ VARIABLES |= {
     "row_walk_ratio": Variable(
         ("row",), "float64", "1", "mean distance of walk states over that of uniform states"
     ),
+    "row_limit_load": Variable(("row",), "float64", _FORCE, "mean limit load of the contacts"),
     "row_clusters": Variable(("row",), "float64", "1", "clusters of undetermined contacts"),
     "row_largest_cluster": Variable(("row",), "float64", "1", "contacts of the largest cluster"),
     "sample_row": Variable(("sample",), "int64", "1", "row that the contact belongs to"),

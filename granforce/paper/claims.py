@@ -226,6 +226,38 @@ def size(table):
         )
 
 
+def perturbation(table):
+    """F_crit and α rise with η2, and both are largest near μ = 0.1."""
+    rows = table.answers()
+    for name, label in (("critical_force", "F_crit"), ("decay_exponent", "α")):
+        groups = {}
+        for row in rows:
+            if row["mu"] > 0 and np.isfinite(row.get(name, np.nan)):
+                groups.setdefault(row["mu"], []).append((row["eta2"], row[name]))
+
+        def rank(*pairs):
+            return stats.spearmanr([np.mean(pair, axis=0) for pair in pairs]).statistic
+
+        enough = len(groups) > 2
+        yield _claim(
+            f"{label} rises with η2",
+            f"rank correlation of mean {label} with mean η2 over μ",
+            rank,
+            groups.values() if enough else [],
+            good=(0.7, 1),
+            fair=(0.3, 1),
+        )
+        values = _positive(statistics.grouped(rows, name))
+        yield _claim(
+            f"{label} is largest near μ = 0.1",
+            "μ of the maximum",
+            _top(list(values)),
+            values.values() if enough else [],
+            good=(0.05, 0.2),
+            fair=(0.02, 0.5),
+        )
+
+
 def centre(table):
     """The original network lies closer to the centre of S than sampled states."""
     rows = [r for r in table.part("walk") if r["dimension"] > 0]
@@ -243,7 +275,7 @@ def centre(table):
 
 FAMILIES = (
     *(agreement, maximum, small_friction, coordination, extents, correlation, place, size),
-    centre,
+    *(perturbation, centre),
 )
 
 

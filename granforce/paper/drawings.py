@@ -41,7 +41,7 @@ def all_figures(table):
     if exact:
         made["figure4_exact"] = _later(figures.extents, _some(table.extents("exact")))
     if table.part("perturb"):
-        made["figure2"] = _later(figures.perturbation, with_indeterminacy(table))
+        made["figure2"] = _later(figures.perturbation, table.answers())
     if table.shown:
         made["figure3"] = _later(figures.possible_forces, _shown_forces(table))
         made["figure5"] = _later(figures.places, _shown_places(table))
@@ -55,17 +55,6 @@ def all_figures(table):
     if any("walk_ratio" in row for row in uniform):
         made["distances"] = _later(figures.distances, uniform)
     return made
-
-
-def with_indeterminacy(table):
-    """Rows of the perturbation with the η2 of the walk in the same packing."""
-    eta2 = {(row["mu"], row["seed"]): row["eta2"] for row in table.part("walk")}
-    found = []
-    for row in table.part("perturb"):
-        key = row["mu"], row["seed"]
-        if key in eta2:
-            found.append(row | {"eta2": eta2[key]})
-    return found
 
 
 def _later(figure, *arguments, **options):

@@ -133,6 +133,17 @@ def _uniform(plan, seed):
     return found
 
 
+def _perturb(plan, seed):
+    if seed > plan.perturb_packings:
+        return []
+    found = []
+    for mu in plan.frictions:
+        packing = study.packing_parameters(plan.n, mu, seed)
+        named = study.perturbation_parameters(packing, random=plan.perturb_contacts)
+        found.append(Task("perturb", sweep.Cell("perturbation", named), plan.n, mu, seed))
+    return found
+
+
 def _frozen(plan, seed):
     if seed > plan.exact_packings:
         return []
@@ -166,6 +177,7 @@ _PARTS = {
     "uniform": _uniform,
     "gauss_seidel": _gauss_seidel,
     "frozen": _frozen,
+    "perturb": _perturb,
     "opened": _opened,
     "size": _sizes,
 }

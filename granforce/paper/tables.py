@@ -24,6 +24,7 @@ _SCALARS = (
     *("eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
     *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "seconds"),
+    *("critical_force", "decay_exponent", "decay_low", "decay_high"),
 )
 
 
@@ -58,6 +59,12 @@ class Table(NamedTuple):
         for row, *_, extent in self.contacts(part):
             found.setdefault(row["mu"], []).append(extent)
         return found
+
+    def answers(self):
+        """Rows of the part "perturb", each with eta2 of the walk in the same packing."""
+        eta2 = {(row["mu"], row["seed"]): row["eta2"] for row in self.part("walk")}
+        keys = [(row, (row["mu"], row["seed"])) for row in self.part("perturb")]
+        return [row | {"eta2": eta2[key]} for row, key in keys if key in eta2]
 
 
 def reduce(path, plan):
@@ -111,6 +118,9 @@ def row_of(task, dataset):
             row[name] = float(dataset[name].max())
     if "distance_to_centre" in dataset:
         row["mean_distance"] = float(dataset["distance_to_centre"].mean())
+    if "limit_load" in dataset:
+        row["contacts"] = dataset.sizes["contact"]
+        row["limit_load"] = float(dataset["limit_load"].mean() / dataset["force_scale"])
     if "high" in dataset:
         low, high = dataset["low"].values, dataset["high"].values
         scale = dataset["force_scale"].item()
