@@ -1,17 +1,15 @@
 """Statistics of the states on screen, and of all those in the stores that were made alike."""
 
-import threading
-
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.document import Document
 from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
 
 from .. import distributions
 from ..jobs import reading
+from .drawing import drawn_here, rendered
 from .packing import exact_intervals
-from .parts import Seen, choice, figure, note, savable
+from .parts import Seen, choice, figure, note
 from .style import DARK, DOT, ORIGINAL, PALE, hover, quiet_legend
 
 WHAT = {
@@ -24,9 +22,6 @@ WHAT = {
 SCALES = {"linear": "linear", "log": "logarithmic"}
 SCALED = ("eta", "extent", "force")  # those that have both scales
 LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
-
-# HoloViews keeps its options in one place for all threads.
-_drawing = threading.Lock()
 
 
 class View(Seen):
@@ -202,7 +197,7 @@ def over_friction(library, cells, mu, what, log):
         rows = distributions.rows(cells)
         exact = distributions.exact_rows(library, cells)
         job.begin("drawing")
-        with _drawing:
+        with drawn_here:
             return DRAWN[what](rows, exact, mu, log)
 
     return work
@@ -220,7 +215,7 @@ def _indeterminacy(rows, exact, mu, log):
     )
     if exact:
         text += f" Dashed: 0.15 η3 of exact intervals, where known ({len(exact)} packings)."
-    drawn = _rendered(chosen, ("indeterminacy", "coordination"), heights=(330, 210))
+    drawn = rendered(chosen, ("indeterminacy", "coordination"), heights=(330, 210))
     legend = drawn[0].legend[0]
     drawn[0].center.remove(legend)
     drawn[0].add_layout(legend.clone(orientation="horizontal", ncols=3, visible=True), "above")
@@ -237,7 +232,7 @@ def _extents(rows, exact, mu, log):
         "mean; tails fitted by exp(−(λx)ᵇ) beyond the median: b = 1 is exponential, larger b "
         "falls faster."
     )
-    return _rendered([page[1] if log else page[0]], ("extents",), heights=(380,)), text
+    return rendered([page[1] if log else page[0]], ("extents",), heights=(380,)), text
 
 
 def _correlations(rows, exact, mu, log):
@@ -249,7 +244,7 @@ def _correlations(rows, exact, mu, log):
         "Correlation of the original fₙ with ΔFₙ over contacts. Bars: the range with any other "
         "sampled network in place of the original."
     )
-    return _rendered([drawn], ("correlation",), heights=(380,)), text
+    return rendered([drawn], ("correlation",), heights=(380,)), text
 
 
 DRAWN = {"eta": _indeterminacy, "extent": _extents, "correlation": _correlations}
@@ -257,24 +252,3 @@ DRAWN = {"eta": _indeterminacy, "extent": _extents, "correlation": _correlations
 
 def _over(seeds):
     return f"; means over {seeds} packings with their standard errors" if seeds > 1 else ""
-
-
-def _rendered(frames, names, heights):
-    """HoloViews frames as Bokeh figures that fill the width."""
-    import holoviews as hv
-
-    renderer, drawn = hv.renderer("bokeh"), []
-    for frame, name, height in zip(frames, names, heights, strict=True):
-        # A document of its own: the current one would be that of whoever is served right now.
-        fig = renderer.get_plot(frame, doc=Document()).state
-        fig.update(
-            output_backend="canvas",
-            frame_width=None, frame_height=None, width=None, height=height,
-            sizing_mode="stretch_width", min_border_left=56, min_border_right=12,
-        )  # fmt: skip
-        fig.title.text = ""
-        fig.toolbar.update(logo=None, autohide=True)
-        if fig.legend:
-            fig.legend.update(border_line_alpha=0, background_fill_alpha=0, spacing=0, padding=2)
-        drawn.append(savable(fig, name))
-    return drawn

@@ -13,7 +13,7 @@ from packings import REFERENCE, packed
 from small_store import KEPT
 
 import granforce as gf
-from app import distributions, exports, projections, uploads
+from app import distributions, exports, perturbations, projections, uploads
 from app.state import COLOURS, WIDTHS
 from app.views.packing import normal_extent
 from app.views.style import palettes
@@ -474,3 +474,113 @@ def test_unknown_keys_are_ignored(state):
     view = View(opened(state))
     next(iter(view.groups.values()))._handle_msg({"key": "../secret"})
     assert not view.task.running
+
+
+# Perturb
+
+
+def test_a_pushed_contact_gives_way_between_its_bounds(state):
+    from app.views.perturb import View
+
+    opened(state)
+    state.tab = "perturb"
+    view = View(state)
+    assert (
+        view.strongest.visible and not view.push.visible and "Click a contact" in view.told.object
+    )
+    view._take_strongest()
+    assert state.contact == int(np.argmax(state.replay.normal[0])) and view.push.visible
+    view._push()
+    settled(state, done=lambda: view.pushed is not None)
+    pushed = view.pushed[0]
+    assert 0 < pushed.low <= pushed.high <= pushed.limit + 0.02
+    backbone = int((state.replay.disks.contacts[~state.replay.disks.image] > 0).sum())
+    assert len(pushed.size) == backbone
+    assert np.sqrt(np.mean(pushed.size**2)) == pytest.approx(1)
+    contacts = state.replay.summary["contacts"]
+    assert pushed.opened + pushed.slid + pushed.kept == contacts
+    assert state.displacement is pushed.displacement and len(view.plots.objects) == 1
+    assert f"{pushed.low:.3f}" in view.numbers.object
+
+
+def test_the_field_moves_only_while_its_tab_is_seen(state):
+    from app.views.perturb import View
+
+    opened(state)
+    state.contact, state.tab = 3, "perturb"
+    view = View(state)
+    view._push()
+    settled(state, done=lambda: view.pushed is not None)
+    field = state.displacement
+    assert field is not None
+    state.tab = "intervals"
+    assert state.displacement is None
+    state.tab = "perturb"
+    assert state.displacement is field
+    view.animate.value = False
+    assert state.displacement is None
+    view.animate.value = True
+    state.contact = 4
+    assert view.pushed is None and state.displacement is None
+
+
+def test_distances_are_those_of_the_nearest_images():
+    packing = packed(30, 0.3)
+    distance = perturbations._distances(packing, 2)
+    c = packing.contacts
+    assert distance[c.i[2]] == pytest.approx(packing.r[c.i[2]], rel=1e-6)
+    assert distance[c.j[2]] == pytest.approx(packing.r[c.j[2]], rel=1e-6)
+    assert distance.max() <= np.hypot(*packing.box) / 2
+
+
+def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
+    from app.views.perturb import View
+
+    opened(state)
+    state.contact, state.tab = 3, "perturb"
+    view = View(state)
+    view._push()
+    settled(state, done=lambda: view.pushed is not None)
+    view.what.value = "all"
+    assert not view.plots.objects
+    view._push()
+    settled(state, done=lambda: view.loads is not None)
+    assert view.loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
+    view.plots.objects[0].object.renderers[0].data_source.selected.indices = [8]
+    assert state.contact == 8 and view.chosen.data["y"] == [view.loads.load[8]]
+
+
+def test_nothing_is_pushed_without_friction(state):
+    from app.views.perturb import View
+
+    opened(state)
+    state.choose(mu=0)
+    settled(state, done=lambda: state.cell.mu == 0)
+    state.contact, state.tab = 3, "perturb"
+    view = View(state)
+    assert not view.push.visible and "isostatic" in view.told.object
+
+
+def test_figure_2_takes_what_the_stores_hold(state, monkeypatch):
+    from app.views.perturb import View
+
+    monkeypatch.setattr(perturbations, "ENOUGH_CONTACTS", 3)
+    opened(state)
+    library, cells = state.library, list(state.catalogue)
+    assert perturbations.over_store(library, cells, state.cell) == []
+    for cell in cells[1:]:
+        library.lend_packing(cell.selection.packing)
+        params = study.perturbation_parameters(cell.selection.packing, random=4)
+        study.get_perturbation(library.cache, params)
+    few = study.perturbation_parameters(cells[1].selection.packing, contacts=[5])
+    study.get_perturbation(library.cache, few)
+    found = perturbations.over_store(library, cells, state.cell)
+    assert sorted(row["mu"] for row in found) == [0.1, 1]
+    assert all(0 < row["critical_force"] <= row["limit_load"] for row in found)
+    assert {row["eta2"] for row in found} == {row["eta2"] for row in distributions.rows(cells[1:])}
+    state.tab = "perturb"
+    view = View(state)
+    view.what.value = "store"
+    settled(state)
+    # Boxes of 30 disks are too small for an exponent: one panel of the two.
+    assert "2 perturbed packings" in view.told.object and len(view.plots.objects) == 1

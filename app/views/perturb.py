@@ -1,0 +1,267 @@
+"""Push the grains of a contact apart: limit load, critical force, and how the packing gives way."""
+
+import numpy as np
+import panel as pn
+import panel_material_ui as pmui
+from bokeh.models import ColumnDataSource, TapTool
+
+from .. import perturbations
+from .drawing import drawn_here, rendered
+from .parts import Seen, choice, figure, note
+from .progress import Progress
+from .style import DARK, DOT, ORIGINAL, hover, quiet_legend
+
+WHAT = {"one": "one contact", "all": "limit loads of all", "store": "F_crit, α against η2"}
+TILE = (
+    '<div style="padding:4px 10px;border-radius:6px;background:rgba(128,128,128,.1)">'
+    '<div style="font-size:11px;opacity:.75">{}</div>'
+    '<div style="font-size:15px;font-variant-numeric:tabular-nums">{}</div></div>'
+)
+TILES = '<div style="display:flex;flex-wrap:wrap;gap:6px">{}</div>'
+HINT = "Click a contact in the packing: a pair of forces ±F will push its two grains apart."
+
+
+class View(Seen):
+    """The selected contact pushed; limit loads of all; critical force and decay over the store."""
+
+    name, title = "perturb", "Perturb"
+
+    def __init__(self, state):
+        super().__init__(state, "replay", "contact")
+        self.what = choice(WHAT, "one")
+        self.strongest = pmui.Button(
+            label="Take the strongest contact", variant="outlined", size="small", margin=(4, 8)
+        )
+        self.push = pmui.Button(label="Push", color="primary", size="small", margin=(4, 8))
+        self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
+        self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
+        self.plots = pn.Column(sizing_mode="stretch_width")
+        self.told = note()
+        self.task = state.task()
+        self.loads = self.pushed = self._shown = None
+        self.chosen = ColumnDataSource({"x": [], "y": []})
+        self.what.param.watch(self.refresh, "value")
+        self.animate.param.watch(self._animate, "value")
+        self.push.on_click(lambda event: self._push())
+        self.strongest.on_click(lambda event: self._take_strongest())
+        self.task.param.watch(self._failed, "message")
+        state.param.watch(self._animate, "tab")
+        self.catch_up()
+
+    def panel(self):
+        """Choices, buttons, numbers and plot."""
+        wide = {"sizing_mode": "stretch_width"}
+        return pn.Column(
+            pn.FlexBox(self.what, **wide),
+            pn.FlexBox(self.push, self.strongest, self.animate, **wide),
+            Progress(self.task).panel(),
+            self.numbers,
+            self.plots,
+            self.told,
+            **wide,
+        )
+
+    def update(self):
+        """Show what is chosen; what is not known yet waits for a click, but for Fig. 2."""
+        state, what = self.state, self.what.value
+        if state.replay is not self._shown:
+            self._shown, self.loads = state.replay, None
+        if self.pushed is not None and not self._holds():
+            self.task.cancel()
+            self.pushed = None
+        one = what == "one"
+        self.push.visible = (one and state.contact is not None) or what == "all"
+        self.push.label = "Push" if one else "Compute"
+        self.strongest.visible = one and state.contact is None
+        self.animate.visible = one and self.pushed is not None
+        if state.replay is None:
+            return
+        if state.replay.summary["mu"] == 0:
+            self._say("At μ = 0 the packing is isostatic: any force moves it, and F_crit is 0.")
+            self.push.visible = self.strongest.visible = False
+            return
+        {"one": self._one, "all": self._all, "store": self._store}[what]()
+        self._animate()
+
+    def _holds(self):
+        """Whether what was pushed is still the contact selected."""
+        contact, replay = self.pushed[1:]
+        return contact == self.state.contact and replay is self.state.replay
+
+    def _say(self, text, plots=(), numbers=""):
+        self.told.object, self.numbers.object = text, numbers
+        self.plots.objects = [
+            pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0) for fig in plots
+        ]
+
+    def _failed(self, event):
+        if event.new:
+            self.told.object = event.new
+
+    # One contact
+
+    def _take_strongest(self):
+        self.state.contact = int(np.argmax(self.state.replay.normal[0]))
+
+    def _push(self):
+        state = self.state
+        if self.what.value == "all":
+            work = perturbations.limit_loads(state.library, state.cell)
+            self.task.start(work, self._loads_known)
+            return
+        contact, replay = state.contact, state.replay
+        if contact is None or replay is None:
+            return
+        work = perturbations.push(state.library, state.cell, replay, contact)
+        self.task.start(work, lambda found: self._gave_way(found, contact, replay))
+
+    def _gave_way(self, found, contact, replay):
+        if contact == self.state.contact and replay is self.state.replay:
+            self.pushed = found, contact, replay
+            self.refresh()
+
+    def _one(self):
+        state, replay = self.state, self.state.replay
+        if state.contact is None:
+            self._say(HINT)
+            return
+        tiles = [
+            ("contact", f"{replay.backbone[state.contact]}"),
+            ("fₙ", f"{replay.normal[0, state.contact]:.3f} ⟨fₙ⟩"),
+        ]
+        if self.pushed is None:
+            known = self.loads is not None
+            if known:
+                tiles.append(("limit load", f"{self.loads.load[state.contact]:.3f} ⟨fₙ⟩"))
+            text = "Push: F is raised until contact dynamics finds no equilibrium any more."
+            self._say(text, numbers=_tiles(tiles))
+            return
+        pushed = self.pushed[0]
+        tiles += [
+            ("F_crit", f"{pushed.low:.3f} ⟨fₙ⟩"),
+            ("limit load", f"{pushed.limit:.3f} ⟨fₙ⟩"),
+            ("opened", f"{pushed.opened}"),
+            ("slid", f"{pushed.slid}"),
+            ("kept", f"{pushed.kept}"),
+            ("α", f"{pushed.exponent:.2f}"),
+        ]
+        text = (
+            f"F_crit lies between {pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩, never above the "
+            "limit load, beyond which no equilibrium exists. Above it the grains set off: |u| is "
+            "their first motion without dilation; its mean in shells falls like "
+            f"r^−{pushed.exponent:.2f}."
+        )
+        self._say(text, [self._decay(pushed)], _tiles(tiles))
+
+    def _decay(self, pushed):
+        """|u| of every grain against its distance from the contact, and its mean in shells."""
+        fig = figure(
+            "displacement", None, "distance r from the contact", "|u| / rms", height=330,
+            x_axis_type="log", y_axis_type="log",
+        )  # fmt: skip
+        seen = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
+        fig.scatter(
+            pushed.distance[seen], pushed.size[seen], size=4, color=DARK, alpha=0.5,
+            legend_label="grains",
+        )  # fmt: skip
+        known = np.isfinite(pushed.profile) & (pushed.profile > 0)
+        fig.line(
+            pushed.radius[known], pushed.profile[known], color=ORIGINAL, line_width=2.5,
+            legend_label="mean in shells",
+        )  # fmt: skip
+        quiet_legend(fig, "bottom_left")
+        return fig
+
+    def _animate(self, *events):
+        """The first motion goes to and fro on the packing while this tab is seen."""
+        shown = self.visible and self.what.value == "one" and self.animate.value
+        field = self.pushed[0].displacement if shown and self.pushed is not None else None
+        if self.state.displacement is not field:
+            self.state.displacement = field
+
+    # All contacts
+
+    def _loads_known(self, found):
+        self.loads = found
+        self.refresh()
+
+    def _all(self):
+        if self.loads is None:
+            self._say("Compute: one linear program for each contact.")
+            return
+        replay, loads = self.state.replay, self.loads
+        fig = figure("limit_loads", None, "original fₙ / ⟨fₙ⟩", "limit load / ⟨fₙ⟩", height=380)
+        source = ColumnDataSource(
+            {"x": replay.normal[0], "y": loads.load, "contact": replay.backbone}
+        )
+        points = fig.scatter(
+            "x", "y", source=source, size=4.5, color=DARK, alpha=0.75, nonselection_alpha=0.75
+        )
+        fig.scatter(
+            "x", "y", source=self.chosen, size=13, fill_alpha=0, line_color=DOT, line_width=2
+        )
+        contact = self.state.contact
+        here = [] if contact is None else [contact]
+        self.chosen.data = {"x": replay.normal[0, here], "y": loads.load[here]}
+        fig.add_tools(
+            hover(
+                [points], ("contact", "@contact"), ("fₙ", "@x{0.00}"), ("limit load", "@y{0.00}")
+            ),
+            TapTool(renderers=[points]),
+        )
+        source.selected.on_change("indices", self._tapped)
+        spread = np.percentile(loads.load, [10, 50, 90])
+        self._say(
+            f"Limit loads of {len(loads.load)} contacts: median {spread[1]:.2f} ⟨fₙ⟩, nine in ten "
+            f"below {spread[2]:.2f}, certified to {loads.gap:.0e} ⟨fₙ⟩ in {loads.seconds:.1f} s. "
+            "A tap selects a contact.",
+            [fig],
+        )
+
+    def _tapped(self, name, old, new):
+        if new:
+            self.state.contact = int(new[0])
+
+    # Over the store
+
+    def _store(self):
+        state = self.state
+        self._say("")
+        self.task.start(
+            over_store(state.library, list(state.catalogue), state.cell), self._show_store
+        )
+
+    def _show_store(self, found):
+        if self.what.value == "store":
+            self._say(*found)
+
+
+def over_store(library, cells, cell):
+    """Work that draws Fig. 2 of the paper from all perturbed packings of the stores."""
+
+    def work(job):
+        job.begin("reading the stores")
+        found = perturbations.over_store(library, cells, cell)
+        if not found:
+            return (
+                "No packing in the stores has been perturbed at enough contacts: "
+                "granforce perturb -n 400 --mu 0.1 --random 30 does it.",
+            )
+        job.begin("drawing")
+        text = (
+            f"Means over {len(found)} perturbed packings: critical force (and limit load beside "
+            "it), and decay exponent, joined in order of μ."
+        )
+        with drawn_here:
+            from granforce import figures  # HoloViews takes its time
+
+            page = list(figures.perturbation(found))
+            if not any(np.isfinite(row["decay_exponent"]) for row in found):
+                page = page[:1]  # boxes too small for a fit
+            return text, rendered(page, ("critical_force", "decay"), (280, 260))
+
+    return work
+
+
+def _tiles(tiles):
+    return TILES.format("".join(TILE.format(*tile) for tile in tiles))
