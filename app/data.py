@@ -23,7 +23,10 @@ SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 
 # Kinds of entries that hold states: (version, function that finds or computes).
-SOURCES = {"walk": (study.WALK_VERSION, study.get_walk)}
+SOURCES = {
+    "walk": (study.WALK_VERSION, study.get_walk),
+    "uniform": (study.UNIFORM_VERSION, study.get_uniform),
+}
 
 OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
 FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
@@ -212,8 +215,7 @@ def _cell(store, name):
     if entry is None or entry.version != SOURCES[entry.kind][0]:
         return None
     selection = selected(entry.kind, entry.params)
-    words = series(selection, entry.params.get("chains", 1) if entry.kind == "walk" else 1)
-    return Cell(selection, words, entry.params, store, name)
+    return Cell(selection, series(selection, entry.params), entry.params, store, name)
 
 
 def nearest_cell(cells, mu):
@@ -247,13 +249,13 @@ def make_replay(packing, dataset, mu):
     scale = float(dataset["force_scale"])
     summary = {name: array.item() for name, array in dataset.items() if array.ndim == 0}
     kept = dataset.sizes["state"]
-    states = int(summary.get("accepted", kept) + summary.get("skipped", 0))
+    walked = int(summary["accepted"] + summary["skipped"]) if "accepted" in summary else kept
     pick = _shown(kept, len(backbone))
     frames = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
     frames = (frames / scale).astype(np.float32)
-    number = np.linspace(0, states - 1, kept).astype(int)[pick] + 1
+    number = np.linspace(0, walked - 1, kept).astype(int)[pick] + 1
     summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
-    summary |= {"kept": len(pick), "states": states}
+    summary |= {"kept": len(pick), "states": walked}
     x = geometry.into_box(packing)
     window = geometry.square(x, packing)
 

@@ -12,6 +12,7 @@ from functools import partial
 
 import panel as pn
 import panel_material_ui as pmui
+from panel.util import edit_readonly
 
 from .data import Library
 from .state import VIEW, AppState
@@ -67,6 +68,9 @@ def page():
         ],
         dark_theme=state.dark,
     )
+    with edit_readonly(whole):
+        # Tasks, not every event; and pn.state, to which it was bound, would keep every closed page.
+        whole.busy = state.param.busy
 
     def parts():
         """What follows the packing, piece by piece: others wait for one piece, not for all."""
@@ -87,9 +91,9 @@ def page():
         if next(rest, "end") != "end":
             wake(partial(go_on, rest))
 
-    wake(partial(go_on, parts()))
+    pn.state.onload(partial(go_on, parts()))
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
-    _poll_while_running(state)
+    _poll_while_running(state, document)
     _tell_address(state)
     pn.state.on_session_destroyed(lambda context: state.close())
     return whole
@@ -139,17 +143,18 @@ def _module(name):
     return importlib.import_module(f"app.views.{name}")
 
 
-def _poll_while_running(state):
+def _poll_while_running(state, document):
     """Take over the progress of tasks while there are any."""
-    callback = pn.state.add_periodic_callback(state.poll, POLL_MS, start=state.busy)
+    polling = []
 
-    def switch(event):
-        if event.new:
-            callback.start()
-        else:
-            callback.stop()
+    def switch(*events):
+        if state.busy and not polling:
+            polling.append(document.add_periodic_callback(state.poll, POLL_MS))
+        elif polling and not state.busy:
+            document.remove_periodic_callback(polling.pop())
 
     state.param.watch(switch, "busy")
+    switch()
 
 
 def _tell_address(state):

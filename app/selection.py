@@ -50,9 +50,8 @@ class Selection(NamedTuple):
 
     def parameters(self):
         """Parameters of the walk or sample, as for study.get_walk or study.get_uniform."""
-        grains = self.packing.get("n", 0)
-        keep = None if not grains else max(1, int(KEPT_BYTES / (16 * 2 * grains)))
-        common = {"mu": self.mu, "keep": keep}
+        most = int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400)))
+        common = {"mu": self.mu, "keep": None if self.states <= most else most}
         if self.kind == "uniform":
             return study.uniform_parameters(self.packing, self.states, self.seed, **common)
         return study.walk_parameters(
@@ -93,8 +92,11 @@ def _unusual(packing):
     return {name: packing[name] for name in OPTIONS if packing[name] != usual[name]}
 
 
-def series(selection, chains=1):
-    """Everything but μ, in words: selections of one series form one η(μ)."""
+def series(selection, parameters=None):
+    """Everything but μ, in words: selections of one series form one η(μ).
+
+    parameters: those of the entry, where it is one.
+    """
     packing = selection.packing
     if selection.imported:
         words = [f"imported {packing['imported'][:8]}"]
@@ -105,9 +107,11 @@ def series(selection, chains=1):
             words.append(f"packed at μ = {packing['mu']:g}")
     words.append(f"{selection.states} states")
     if selection.seed != 0:
-        words.append(f"walk seed {selection.seed}")
-    if chains > 1:
-        words.append(f"{chains} chains")
+        words.append(f"seed {selection.seed} of the states")
+    usual = {"walk": 1, "uniform": 4}[selection.kind]
+    chains = (parameters or {}).get("chains", usual)
+    if chains != usual:
+        words.append(f"{chains} chain{'s' if chains > 1 else ''}")
     words.append(SOLVERS[selection.relax] if selection.kind == "walk" else KINDS[selection.kind])
     return ", ".join(words)
 
@@ -128,7 +132,7 @@ def command(selection):
     if selection.kind == "walk":
         words += ["--walk-seed", selection.seed, "--relax", selection.relax]
     elif selection.seed:
-        words += ["--walk-seed", selection.seed]
+        words += ["--sample-seed", selection.seed]
     return shlex.join(str(word) for word in words)
 
 

@@ -236,6 +236,10 @@ def _pair(text):
     return a, b
 
 
+def _flag(text):
+    return {"0": False, "1": True}[text]
+
+
 VIEW = {
     "tab": str,
     "contact": int,
@@ -244,10 +248,10 @@ VIEW = {
     "between": _pair,
     "colour": str,
     "thickness": str,
-    "overlay": bool,
+    "overlay": _flag,
     "sort": str,
     "scale": str,
-    "dark": bool,
+    "dark": _flag,
 }
 OF_A_REPLAY = ("contact", "frame", "reference", "between")
 

@@ -93,7 +93,7 @@ function layout(scene) {
   const root = document.createElement("div")
   const button = (name, title) =>
     `<button type="button" class="${name}" title="${title}" aria-label="${title}">${icon(name)}</button>`
-  root.className = "player"
+  root.className = "stage"
   root.innerHTML = `
     <div class="bar">
       ${button("restart", "restart at the original network (Home)")}
@@ -286,7 +286,7 @@ export function render({ model, view }) {
     walk = plain(given)
     const size = walk.contacts
     seen = new Seen(walk)
-    mixed = { normal: new Float32Array(size), tangential: new Float32Array(size) }
+    mixed = scene.mixed = { normal: new Float32Array(size), tangential: new Float32Array(size) }
     style = { width: new Float32Array(size), bin: new Int16Array(size) }
     walk.strong = walk.normal.subarray(0, size).map((value) => value > STRONG)
     scene.palette = plain(model.palettes).scene

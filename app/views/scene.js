@@ -26,6 +26,7 @@ class Scene {
     this.counts = { segments: 0, drawn: 0, outside: 0, thin: 0 }
     this.selected = null
     this.offset = null
+    this.mixed = null
     this.listen()
   }
 

@@ -20,6 +20,8 @@ TILES = (
     ("η2", "eta2", ".4f", "distance of two states over the mean state"),
     ("0.15 η3", "scaled_eta3", ".4f", "mean interval over mean force, times 0.15"),
     ("accepted", "acceptance", ".0%", "accepted states per attempt"),
+    ("R̂", "worst_r_hat", ".3f", "split R̂ of the component that mixes worst: 1 where chains agree"),
+    ("ESS", "least_bulk_size", ".0f", "effective sample size of the component that mixes worst"),
 )
 
 
@@ -28,9 +30,11 @@ def numbers(summary):
     values = summary | {"scaled_eta3": 0.15 * summary["eta3"]}
     if summary.get("skipped"):
         values["acceptance"] = None  # nothing was tried
-    texts = {key: _text(values.get(key), form) for _, key, form, _ in TILES}
+    texts = {key: _text(values[key], form) for _, key, form, _ in TILES if key in values}
     tiles = "".join(
-        TILE.format(name=name, value=texts[key], title=title) for name, key, _, title in TILES
+        TILE.format(name=name, value=texts[key], title=title)
+        for name, key, _, title in TILES
+        if key in texts
     )
     return f'<div class="tiles">{tiles}</div><div class="rest">{left_out(summary)}</div>'
 
@@ -44,6 +48,8 @@ LEFT_OUT = {
     "unloaded_contacts": "unloaded contacts",
     "tangential_unknowns": "tangential unknowns",
     "skipped": "states without relaxation",
+    "held": "components that cannot vary",
+    "dropped": "states on the way to the sample",
 }
 
 

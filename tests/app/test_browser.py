@@ -1,58 +1,33 @@
 """The page in a browser: it plays on the client, to scale, and asks the net for nothing."""
 
-import os
-import socket
-import subprocess
-import sys
-import time
-import urllib.error
-import urllib.request
+import base64
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from serving import CHROMIUM, FLAGS, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
+from app.state import COLOURS
+from granforce import measures
+
+# Pictures to be looked at; ignored by git.
+ARTEFACTS = ROOT / "artefacts"
 
 pytestmark = [
     pytest.mark.browser,
     pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
 ]
 
-MODEL = "Bokeh.documents[0].get_model_by_name"
-
 
 @pytest.fixture(scope="module")
 def address(shipped, tmp_path_factory):
     """The app, served from the repository's root on a free port, with stores of its own."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
     folder = tmp_path_factory.mktemp("served")
-    env = os.environ | {"GRANFORCE_DATA": str(shipped), "GRANFORCE_CACHE": str(folder / "cache")}
-    command = [sys.executable, "-m", "panel", "serve", "app", "--port", str(port)]
-    with open(folder / "log", "w") as log:
-        server = subprocess.Popen(command, cwd=ROOT, env=env, stdout=log, stderr=log)
-    url = f"http://localhost:{port}/app"
-    try:
-        _wait_until_served(url, server, folder / "log")
+    stores = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_CACHE": str(folder / "cache")}
+    with serve(folder, **stores) as (url, _):
         yield url
-    finally:
-        server.terminate()
-        server.wait(20)
-
-
-def _wait_until_served(url, server, log):
-    for _ in range(300):
-        if server.poll() is not None:
-            pytest.fail(f"the server ended: {log.read_text()}")
-        try:
-            urllib.request.urlopen(url, timeout=30).close()
-            return
-        except (urllib.error.URLError, ConnectionError):
-            time.sleep(0.1)
-    pytest.fail(f"nothing served: {log.read_text()}")
 
 
 @pytest.fixture(scope="module")
@@ -64,86 +39,364 @@ def chromium():
         browser.close()
 
 
-@pytest.fixture
-def page(chromium, address):
-    """The page, loaded; afterwards no error was told and nothing was asked from elsewhere."""
-    page = chromium.new_page(viewport={"width": 1280, "height": 900})
-    errors, foreign = [], []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda told: told.type == "error" and errors.append(told.text))
-    page.on("request", lambda request: _is_foreign(request.url) and foreign.append(request.url))
+def _context(chromium, width):
+    """A browser context, and a list that fills with errors and requests to elsewhere."""
+    context, problems = chromium.new_context(viewport={"width": width, "height": 900}), []
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    context.on("weberror", lambda error: problems.append(str(error.error)))
+    context.on("console", lambda told: told.type == "error" and problems.append(told.text))
+    context.on("request", lambda sent: _is_foreign(sent.url) and problems.append(sent.url))
+    return context, problems
+
+
+def _open(context, address):
+    page = context.new_page()
     page.goto(address)
-    page.wait_for_function(f"() => window.Bokeh?.documents[0] && {MODEL}('links')", timeout=30_000)
-    page.wait_for_function(f"() => Math.max(...{MODEL}('links').get_column('width')) > 0")
+    painted(page)
+    page.wait_for_function(f"() => {MODEL}('bars') || {MODEL}('path')")
+    page.wait_for_timeout(300)  # until the layout is at rest
+    return page
+
+
+@pytest.fixture
+def visit(chromium, address):
+    """visit(query, width): a page of its own; at the end no error and no request elsewhere."""
+    visits = []
+
+    def visit(query="", width=1280):
+        visits.append(_context(chromium, width))
+        return _open(visits[-1][0], address + query)
+
+    yield visit
+    for context, problems in visits:
+        context.close()
+        assert not problems
+
+
+@pytest.fixture(scope="module")
+def shared(chromium, address):
+    """One page for all tests that leave it as they find it, or as `page` can put it back."""
+    context, problems = _context(chromium, 1280)
+    page = _open(context, address)
     yield page
-    page.close()
-    assert not [error for error in errors if "favicon" not in error]
-    assert not foreign
+    context.close()
+    assert not problems
+
+
+@pytest.fixture
+def page(shared):
+    """The shared page at the original network at μ = 0.1, nothing selected."""
+    if scene(shared, "scene.geometry.mu") != 0.1:
+        shared.locator("input.typed").fill("0.1")
+        shared.locator("input.typed").press("Enter")
+        shared.wait_for_function(
+            "e => e.scene.geometry.mu === 0.1", arg=shared.locator(".scene").element_handle()
+        )
+    if shared.locator("button.between.on").count():
+        shared.locator("button.between").click()
+    shared.locator("button.restart").click()
+    shared.locator("button.pin").click()
+    scene(shared, "(scene.selected !== null && scene.onSelect(null), scene.reset())")
+    shared.mouse.move(5, 5)
+    shared.wait_for_function(
+        "e => e.scene.selected === null", arg=shared.locator(".scene").element_handle()
+    )
+    return shared
 
 
 def _is_foreign(url):
     return not url.startswith(("http://localhost:", "ws://localhost:", "data:", "blob:"))
 
 
-def column(page, source, name):
-    """A column of a plot as the browser holds it."""
-    return page.evaluate(f"() => Array.from({MODEL}('{source}').get_column('{name}'))")
+def at(page, x, y):
+    """Point on the page of a place in the packing."""
+    box = page.locator(".scene").bounding_box()
+    px, py = scene(page, f"scene.toPixel({x}, {y})")
+    return box["x"] + px, box["y"] + py
 
 
-def scale(page):
-    """px per unit along x and y."""
-    return page.evaluate(f"""() => {{
-        const {{inner_width, inner_height, x_range, y_range}} = {MODEL}('packing')
-        return [inner_width / (x_range.end - x_range.start),
-                inner_height / (y_range.end - y_range.start)]
-    }}""")
+def pixels(page):
+    """The chains' canvas as an array (height, width, 4)."""
+    flat, width = page.locator(".scene").evaluate(
+        """element => {
+            const {canvas} = element.scene.chains
+            const image = element.scene.chains.getImageData(0, 0, canvas.width, canvas.height)
+            const text = Array.from(image.data, (byte) => String.fromCharCode(byte)).join("")
+            return [btoa(text), canvas.width]
+        }"""
+    )
+    return np.frombuffer(base64.b64decode(flat), dtype=np.uint8).reshape(-1, width, 4)
 
 
-def settled(page):
-    """Wait until the layout no longer moves."""
-    page.wait_for_function(f"() => {MODEL}('packing').inner_width > 100")
-    page.wait_for_timeout(500)
+def link_of(page, number=0):
+    """(contact, x, y): the middle of a segment that lies inside the box."""
+    return page.locator(".scene").evaluate(
+        """(element, number) => {
+            const {x0, y0, x1, y1, contact, box} = element.scene.geometry
+            const inside = (v, side) => v > 0.1 * side && v < 0.9 * side
+            const found = Array.from(contact.keys()).filter(k => inside(x0[k], box[0]) &&
+                inside(x1[k], box[0]) && inside(y0[k], box[1]) && inside(y1[k], box[1]) &&
+                element.scene.width[k] > 0.1)
+            const k = found[number]
+            return [contact[k], (x0[k] + x1[k]) / 2, (y0[k] + y1[k]) / 2]
+        }""",
+        number,
+    )
 
 
-def test_disks_are_to_scale(page):
-    settled(page)
-    for width in (1280, 1000, 400):
-        page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_timeout(500)
-        across, up = scale(page)
-        assert across == pytest.approx(up, rel=1e-3) and across > 10
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
+def choose(page, label, option):
+    """Take an option of a select in the sidebar."""
+    page.get_by_role("combobox", name=label).click()
+    page.get_by_role("option", name=option).click()
+
+
+# The packing
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_disks_are_to_scale(visit, page, width):
+    """Painted disks are as wide as high, and as large as their radii say, in pixels."""
+    page = page if width == 1280 else visit(width=width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    size, high = page.locator(".scene").evaluate("e => [e.clientWidth, e.clientHeight]")
+    assert size == pytest.approx(high, abs=1) and size > 0.35 * width
+    (x0, y0), (x1, y1) = (scene(page, f"scene.toPixel({place})") for place in ("0, 0", "1, 1"))
+    assert x1 - x0 == pytest.approx(y0 - y1, rel=1e-9)
+    # the box's dashed edges, as painted, stand apart as its sides say
+    across, up = page.locator(".scene").evaluate(
+        """element => {
+            const {disks, geometry} = element.scene, {canvas} = disks
+            const grab = disks.getImageData.bind(disks)
+            element.scene.begin(disks)
+            disks.fillStyle = "#000"
+            disks.fillRect(0, 0, ...geometry.box)
+            const painted = (image) => {
+                let count = 0
+                for (let k = 3; k < image.data.length; k += 4) count += image.data[k] > 127
+                return count
+            }
+            const middle = Math.floor(canvas.width / 2)
+            const result = [painted(grab(0, middle, canvas.width, 1)),
+                            painted(grab(middle, 0, 1, canvas.height))]
+            element.scene.changed()
+            return result
+        }"""
+    )
+    assert across == pytest.approx(up, abs=1)
+    side = scene(page, "scene.geometry.box[0] * scene.scale * scene.ratio")
+    assert across == pytest.approx(side, abs=1.5)
+
+
+def test_hovering_tells_grain_and_contact(page):
+    contact, x, y = link_of(page)
+    page.mouse.move(*at(page, x, y))
+    tip = page.locator(".tip.on")
+    tip.wait_for()
+    assert str(scene(page, f"scene.geometry.backbone[{contact}]")) in tip.inner_text()
+    assert "fₙ / ⟨fₙ⟩" in tip.inner_text()
+    grain, x, y, r = scene(
+        page,
+        "(k => ['grain', 'x', 'y', 'r'].map(name => scene.geometry[name][k]))"
+        "(scene.geometry.touching.findIndex((n, k) => n === 0 && scene.geometry.kind[k] === 1))",
+    )
+    page.mouse.move(*at(page, x, y))
+    page.get_by_text(f"{grain} (rattler)").wait_for()
+    assert f"{r:.3f}" in tip.inner_text()
+
+
+def test_a_click_selects_the_contact_everywhere(page):
+    contact, x, y = link_of(page, 3)
+    page.mouse.click(*at(page, x, y))
+    page.wait_for_function(f"() => {MODEL}('chosen').get_column('rank').length === 1")
+    rank = column(page, "chosen", "rank")[0]
+    ranks, which = column(page, "bars", "rank"), column(page, "bars", "at")
+    assert which[ranks.index(rank)] == contact
+    page.wait_for_function(f"() => location.search.includes('contact={contact}')")
+    page.mouse.click(*at(page, x, y))
+    page.wait_for_function(f"() => {MODEL}('chosen').get_column('rank').length === 0")
+
+
+def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
+    whole = scene(page, "scene.view.half")
+    x, y = (round(value) for value in at(page, 4, 4))
+    page.mouse.move(x, y)
+    page.mouse.wheel(0, -400)
+    page.wait_for_timeout(100)
+    assert scene(page, "scene.view.half") < 0.7 * whole
+    assert at(page, 4, 4) == pytest.approx((x, y), abs=2)
+    place = at(page, 4, 4)
+    outside = scene(page, "scene.counts.outside")
+    assert outside > 0 and f"({outside} out of view" in page.locator(".skips").inner_text()
+    page.mouse.down()
+    page.mouse.move(x + 40, y + 25)
+    page.mouse.up()
+    assert at(page, 4, 4) == pytest.approx((place[0] + 40, place[1] + 25), abs=0.1)
+    page.mouse.dblclick(x, y)
+    page.wait_for_timeout(100)
+    assert scene(page, "scene.view.half") == whole
+
+
+def test_leaving_out_thin_and_unseen_chains_changes_no_pixel(page):
+    """Contacts out of view and thinner than a tenth of a pixel are counted, not drawn."""
+    page.mouse.move(*at(page, 4, 4))
+    page.mouse.wheel(0, -500)
+    page.wait_for_timeout(200)
+    counts = scene(page, "scene.counts")
+    assert counts["outside"] > 0
+    assert counts["drawn"] + counts["outside"] + counts["thin"] == counts["segments"]
+    before = pixels(page)
+    all_drawn = page.locator(".scene").evaluate(
+        """element => {
+            const {scene} = element, {order, width, bin, style, geometry} = scene
+            geometry.contact.forEach((c, k) => { width[k] = style.width[c]; bin[k] = style.bin[c] })
+            scene.begin(scene.chains)
+            const every = Array.from(geometry.contact.keys()).filter(k => width[k] > 0)
+            scene.strokeEach(every, every.length, style.colours)
+            return every.length
+        }"""
+    )
+    after = pixels(page)
+    assert all_drawn > counts["drawn"]
+    changed = np.abs(before.astype(int) - after.astype(int)).max()
+    assert changed <= 255 * 0.1 * 1.1  # a chain that thin covers at most a tenth of a pixel
+
+
+@pytest.mark.parametrize("colour", ["extent", "change", "sign"])
+def test_chains_are_coloured_by_what_is_chosen(page, colour):
+    page.locator("input.scrub").fill("3")
+    page.locator("button.pin").click()
+    page.locator("input.scrub").fill("6")
+    choose(page, "Colour", COLOURS[colour])
+    page.wait_for_function(f"() => location.search.includes('colour={colour}')")
+    page.wait_for_timeout(200)
+    normal = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
+    shown = np.array(scene(page, "Array.from(scene.style.bin)"))
+    if colour == "sign":
+        np.testing.assert_array_equal(shown, 1 + np.sign(normal[6] - normal[3]))
+    elif colour == "change":
+        change = np.clip(0.5 + (normal[6] - normal[0]) / 2, 0, 1)
+        np.testing.assert_allclose(shown, 32 * change, atol=0.501)
+    else:
+        low, high = (
+            np.array(scene(page, f"Array.from(scene.geometry.{name})")) for name in ("low", "high")
+        )
+        extent = high - low
+        most = np.sort(extent)[int(0.98 * (len(extent) - 1))]
+        np.testing.assert_allclose(shown, 32 * np.clip(extent / most, 0, 1), atol=0.501)
+
+
+def test_strong_and_undetermined_contacts_are_marked(visit):
+    page = visit("?overlay=1")
+    strong = np.array(scene(page, "Array.from(scene.style.strong)"), dtype=bool)
+    loose = np.array(scene(page, "Array.from(scene.style.loose)"), dtype=bool)
+    original = np.array(scene(page, "Array.from(scene.geometry.normal)"))[: len(strong)]
+    extent = np.array(
+        scene(page, "Array.from(scene.geometry.high, (h, k) => h - scene.geometry.low[k])")
+    )
+    np.testing.assert_array_equal(strong, original > 2)
+    np.testing.assert_array_equal(loose, extent > extent.mean())
+    page.screenshot(path=_artefact("overlay.png"))
+
+
+# Playing
 
 
 def test_play_changes_the_chains_without_the_server(page):
-    settled(page)
+    page.wait_for_timeout(500)
     page.evaluate("""() => {
         window.told = 0
         const send = WebSocket.prototype.send
         WebSocket.prototype.send = function (...given) { window.told += 1; send.apply(this, given) }
     }""")
-    before = column(page, "links", "width")
-    page.locator("input.speed").fill("3")
+    page.locator("input.speed").fill("2")
+    before = scene(page, "[scene.painted, Array.from(scene.style.width)]")
     page.locator("button.play").click()
-    page.wait_for_timeout(700)
+    page.wait_for_timeout(800)
+    assert page.evaluate("told") <= 1  # a ping may fall in
     page.locator("button.play").click()
-    assert column(page, "links", "width") != before
-    stopped = column(page, "links", "width")
+    after = scene(page, "[scene.painted, Array.from(scene.style.width)]")
+    assert after[1] != before[1] and after[0] - before[0] >= 8
     page.wait_for_timeout(400)
-    assert column(page, "links", "width") == stopped
-    assert page.evaluate("told") <= 2  # of nearly six frames; a ping may fall in
+    assert scene(page, "scene.painted") <= after[0] + 1
+
+
+def test_what_is_shown_between_two_states_is_admissible(page):
+    """Halfway frames are the mean of two states: balanced like them, and inside the cones."""
+    page.locator("input.speed").fill("2")
+    page.locator("button.play").click()
+    page.wait_for_timeout(600)
+    page.locator("button.play").click()
+    normal, tangential = (
+        np.array(scene(page, f"Array.from(scene.mixed.{name})"))
+        for name in ("normal", "tangential")
+    )
+    frames = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
+    assert not np.any(np.all(np.isclose(frames, normal, atol=1e-6), axis=1))  # none of the states
+    assert np.all(np.abs(tangential) <= 0.1 * normal + 1e-6) and np.all(normal >= 0)
 
 
 def test_step_back_and_restart(page):
-    start = column(page, "links", "f_n")
+    def normal():
+        return scene(page, "Array.from(scene.mixed.normal)")
+
+    start = normal()
     page.locator("button.step").click()
-    assert column(page, "links", "f_n") != start
+    assert normal() != start
     assert page.locator("b.state").inner_text().endswith(" of 30")
     page.locator("button.step").click()
     page.locator("button.back").click()
     page.locator("button.restart").click()
-    assert column(page, "links", "f_n") == start
+    assert normal() == start
     assert page.locator("b.state").inner_text() == "original"
+
+
+def test_keys_play_step_and_change_tabs(page):
+    page.locator(".scene").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowLeft")
+    state = page.locator("b.state")
+    first = state.inner_text()
+    assert first.endswith(" of 30")
+    page.keyboard.press("Home")
+    assert state.inner_text() == "original"
+    page.keyboard.press(" ")
+    page.locator(".stage.playing").wait_for()
+    page.keyboard.press(" ")
+    page.locator(".stage:not(.playing)").wait_for()
+    page.keyboard.press("2")
+    page.wait_for_function("() => /tab=/.test(location.search)")
+    page.keyboard.press("1")
+    page.wait_for_function("() => !/tab=/.test(location.search)")
+
+
+def test_keys_typed_into_a_field_stay_there(page):
+    typed = page.locator("input.typed")
+    typed.fill("")
+    typed.type("0.2 ")
+    assert page.locator(".stage.playing").count() == 0
+    assert "tab=" not in page.url
+
+
+def test_numbers_told_while_playing_are_those_of_measures(page):
+    """η1, η2, η3 of the frames passed, against granforce.measures."""
+    page.locator("input.scrub").fill(str(KEPT))
+    forces = [
+        np.array(scene(page, f"Array.from(scene.geometry.{name})")).reshape(KEPT + 1, -1)[1:]
+        for name in ("normal", "tangential")
+    ]
+    states = np.stack(forces, axis=2)
+    expected = {
+        "eta1": measures.eta1(states),
+        "eta2": measures.eta2(states),
+        "eta3": measures.eta3(*measures.intervals_seen(states)),
+    }
+    for name, value in expected.items():
+        assert float(page.locator(f"b.{name}").inner_text()) == pytest.approx(value, abs=6e-4)
+        grown = column(page, "growth", name)[-1]
+        assert grown == pytest.approx(value * (0.15 if name == "eta3" else 1), rel=1e-3)
+    assert page.locator("b.acceptance").inner_text().endswith("%")
+    assert re.fullmatch(r"\de-\d+", page.locator("b.residual").inner_text())
 
 
 def test_intervals_grow_with_the_walk_and_shrink_on_the_way_back(page):
@@ -159,17 +412,94 @@ def test_intervals_grow_with_the_walk_and_shrink_on_the_way_back(page):
     assert grown[3] == pytest.approx(grown[1])
 
 
-def test_mu_typed_is_computed_and_shown(page):
-    page.get_by_label("μ", exact=True).fill("0.4")
-    disks = page.get_by_label("Disks N")
-    disks.fill(str(DISKS))
-    disks.press("Tab")
-    page.get_by_role("button", name="Show or compute").click()
-    page.get_by_text("μ = 0.4, N = 30").wait_for(timeout=40_000)
-    page.wait_for_function(f"() => {MODEL}('links').get_column('f_n').some(f => f > 0)")
+def test_to_and_fro_between_the_pinned_state_and_this_one(page):
+    page.locator("input.scrub").fill("3")
+    page.locator("button.pin").click()
+    page.locator("input.scrub").fill("9")
+    page.locator("button.between").click()
+    page.wait_for_function("() => location.search.includes('between=3-9')")
+    page.locator("button.play").click()
+    page.locator("input.scrub").fill("0.5")
+    mixed = np.array(scene(page, "Array.from(scene.mixed.normal)"))
+    normal = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
+    np.testing.assert_allclose(mixed, (normal[3] + normal[9]) / 2, atol=1e-5)
+    assert "50 % of the way" in page.locator("b.state").inner_text()
+    page.locator("button.between").click()
+    page.wait_for_function("() => !location.search.includes('between')")
+
+
+# Selecting and computing
+
+
+def test_another_stored_mu_is_shown_by_a_key(page):
+    page.locator(".friction input[type=range]").press("ArrowRight")
+    page.get_by_text("μ = 1, N = 30").wait_for()
+    page.wait_for_function(
+        "e => e.scene.geometry.mu === 1", arg=page.locator(".scene").element_handle()
+    )
+
+
+def test_mu_typed_is_computed_and_shown_with_exact_intervals(page):
+    typed = page.locator("input.typed")
+    typed.fill("0.4")
+    typed.press("Enter")
+    page.get_by_role("button", name="Compute μ = 0.4").click()
+    page.get_by_text("μ = 0.4, N = 30").wait_for(timeout=60_000)
+    page.get_by_role("button", name="Compute exact intervals").click()
+    page.wait_for_function(
+        f"() => {MODEL}('bars').get_column('exact_high').every(Number.isFinite)", timeout=60_000
+    )
+    high, seen = (np.array(column(page, "bars", name)) for name in ("exact_high", "high"))
+    assert np.all(high >= seen - 1e-5)
+    page.screenshot(path=_artefact("intervals.png"))
 
 
 def test_wrong_mu_is_one_clear_line(page):
-    page.get_by_label("μ", exact=True).fill("-2")
-    page.get_by_role("button", name="Show or compute").click()
+    page.locator("input.typed").fill("-2")
+    page.locator("input.typed").press("Enter")
     page.get_by_text("friction coefficient must be finite and ≥ 0").wait_for(timeout=10_000)
+
+
+def test_a_copied_link_reopens_the_view(page, visit):
+    page.locator("input.scrub").fill("4")
+    page.keyboard.press("Tab")
+    contact, x, y = link_of(page)
+    page.mouse.click(*at(page, x, y))
+    page.wait_for_function(
+        "() => /frame=4/.test(location.search) && /contact/.test(location.search)"
+    )
+    page.get_by_role("button", name="Copy link").click()
+    link = page.evaluate("navigator.clipboard.readText()")
+    again = visit(link[link.index("?") :])
+    again.wait_for_function(
+        "e => e.scene.selected !== null", arg=again.locator(".scene").element_handle()
+    )
+    assert scene(again, "scene.selected") == contact
+    assert again.locator("b.state").inner_text() == page.locator("b.state").inner_text()
+
+
+def test_the_command_line_is_copied(page):
+    page.get_by_role("button", name="Copy CLI command").click()
+    command = page.evaluate("navigator.clipboard.readText()")
+    assert command.startswith(f"granforce walk -n {DISKS} --mu 0.1 --seed 1 --states 30")
+
+
+# Themes and widths
+
+
+@pytest.mark.parametrize("width, dark", [(1280, 1), (400, 0)])
+def test_pictures_by_day_and_by_night(visit, width, dark):
+    page = visit(f"?dark={dark}&frame=7&colour=extent", width)
+    page.wait_for_timeout(800)
+    background = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    brightness = sum(int(value) for value in re.findall(r"\d+", background)[:3]) / 3
+    assert (brightness < 80) == bool(dark)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.screenshot(
+        path=_artefact(f"page-{width}-{'dark' if dark else 'light'}.png"), full_page=True
+    )
+
+
+def _artefact(name):
+    ARTEFACTS.mkdir(exist_ok=True)
+    return str(Path(ARTEFACTS) / name)

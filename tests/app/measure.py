@@ -1,0 +1,218 @@
+"""Measures the app in Debian's chromium and prints what it found.
+
+    python tests/app/measure.py [PART …]
+
+Parts: opening (first picture, changes of μ, bytes), playing (painted frames a second of 400 disks),
+crowd (of 10,000 disks; computed first if $GRANFORCE_CACHE has none), stalls (of the server's event
+loop while pages open and while it computes), memory (over open–close cycles), visitors (ten at
+once). Each starts a server of its own on the shipped store.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
+
+from playwright.sync_api import sync_playwright  # noqa: E402
+from serving import CHROMIUM, FLAGS, painted, scene, serve  # noqa: E402
+
+SIZE = {"width": 1280, "height": 900}
+CLOSED = ("--unused-session-lifetime", "1000", "--check-unused-sessions", "500")
+
+
+class Stage:
+    """A server, a browser, and the lines printed."""
+
+    def __init__(self, folder, address, server, browser):
+        self.folder, self.address, self.server, self.browser = folder, address, server, browser
+
+    def open(self, query=""):
+        """A new page without anything cached, painted; and the seconds that took."""
+        page = self.browser.new_context(viewport=SIZE).new_page()
+        page.bytes = 0
+        page.on("websocket", lambda ws: ws.on("framereceived", lambda data: _count(page, data)))
+        begin = time.perf_counter()
+        page.goto(self.address + query)
+        painted(page, 120_000)
+        return page, time.perf_counter() - begin
+
+    def memory(self):
+        """Resident memory of the server, MB."""
+        status = Path(f"/proc/{self.server.pid}/status").read_text()
+        return int(status.split("VmRSS:")[1].split()[0]) / 1024
+
+
+def _count(page, data):
+    page.bytes += len(data)
+
+
+def opening(stage):
+    """First paint cold and warm, changes of μ within the store, bytes sent."""
+    times = []
+    for _ in range(4):
+        page, seconds = stage.open()
+        page.wait_for_timeout(3000)
+        times.append(f"{seconds:.2f} s")
+    print(f"first picture in a new browser: {times[0]} of a new server, then {times[1:]}")
+    print(f"bytes for the page's contents over the socket: {page.bytes / 1e6:.2f} MB")
+    slider = page.locator(".friction input[type=range]")
+    for visit in ("first", "second"):
+        spent, sent = [], []
+        for _ in range(3):
+            for key in ("ArrowRight", "ArrowLeft"):
+                before, bytes_before = scene(page, "scene.geometry.mu"), page.bytes
+                begin = time.perf_counter()
+                slider.press(key)
+                page.wait_for_function(
+                    "([element, mu]) => element.scene.geometry.mu !== mu",
+                    arg=[page.locator(".scene").element_handle(), before],
+                    polling=5,
+                )
+                spent.append(time.perf_counter() - begin)
+                page.wait_for_timeout(400)
+                sent.append(page.bytes - bytes_before)
+        print(
+            f"change of μ within the store, {visit} round: longest {1000 * max(spent):.0f} ms, "
+            f"mean {1000 * sum(spent) / len(spent):.0f} ms; {max(sent) / 1e6:.2f} MB at most"
+        )
+
+
+def playing(stage):
+    """400 disks: painted frames a second, and what they cost the server."""
+    _play(stage, "", "400 disks")
+
+
+def crowd(stage):
+    """The same of 10,000 disks."""
+    query = "?n=10000&seed=1&mu=0.1&source=walk&states=20&relax=accelerated"
+    page, _ = stage.open(query)
+    page.get_by_text("N = 10000").first.wait_for(timeout=1_000_000)
+    page.context.close()
+    _play(stage, query, "10,000 disks")
+
+
+def _play(stage, query, words):
+    page, _ = stage.open(query)
+    page.wait_for_timeout(4000)
+    page.locator("input.speed").fill("1")
+    print(f"{words}: segments {scene(page, 'scene.counts')}")
+    before = page.bytes
+    page.locator("button.play").click()
+    rate, frames = _rate(page, lambda: page.wait_for_timeout(3000))
+    page.locator("button.play").click()
+    sent = (page.bytes - before) / frames
+    print(f"{words}: playing: {rate:.1f} painted frames a second, {sent:.0f} bytes a frame")
+    box = page.locator(".scene").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + 200
+    page.mouse.move(x, y)
+    page.mouse.down()
+
+    def drag():
+        for k in range(90):
+            page.mouse.move(x + 4 * (k % 30), y + 2 * (k % 30))
+            page.wait_for_timeout(10)
+
+    rate, _ = _rate(page, drag)
+    page.mouse.up()
+    print(f"{words}: panning: {rate:.1f} painted frames a second")
+    page.context.close()
+
+
+def _rate(page, action):
+    """Painted frames a second while something is done, and how many they were."""
+    begin, before = time.perf_counter(), scene(page, "scene.painted")
+    action()
+    frames = scene(page, "scene.painted") - before
+    return frames / (time.perf_counter() - begin), frames
+
+
+def stalls(stage):
+    """Longest gap of the event loop: at rest, opening pages, and while states are computed."""
+    log = stage.folder / "stalls"
+    page, _ = stage.open()
+    page.wait_for_timeout(3000)
+    print(f"longest stall while the first page opens: {1000 * _longest(log):.0f} ms")
+    for _ in range(3):
+        other, _ = stage.open()
+        other.wait_for_timeout(1500)
+        other.context.close()
+    print(f"longest stall while pages open: {1000 * _longest(log):.0f} ms")
+    page.locator("input.typed").fill("0.2")
+    page.locator("input.typed").press("Enter")
+    page.get_by_role("button", name="Compute μ").click()
+    page.get_by_text("μ = 0.2, N = 400").wait_for(timeout=300_000)
+    print(f"longest stall while packing and walk are computed: {1000 * _longest(log):.0f} ms")
+    page.get_by_role("button", name="Compute exact intervals").click()
+    page.get_by_role("button", name="Compute exact intervals").wait_for(
+        state="hidden", timeout=120_000
+    )
+    page.wait_for_timeout(1000)
+    print(f"longest stall while exact intervals are computed: {1000 * _longest(log):.0f} ms")
+
+
+def _longest(log):
+    time.sleep(1.2)
+    lines = log.read_text().split("\n")[:-1]
+    log.write_text("")
+    return max(float(line.split()[1]) for line in lines)
+
+
+def memory(stage, cycles=50):
+    """How much the server grows over open–close cycles."""
+    for k in range(cycles + 5):
+        page, _ = stage.open()
+        page.locator("button.step").click()
+        page.context.close()
+        if k == 4:
+            time.sleep(3)
+            before = stage.memory()
+    time.sleep(4)
+    after = stage.memory()
+    print(f"server's memory: {before:.0f} MB after 5 pages, {after:.0f} MB after {cycles} more")
+
+
+def visitors(stage, count=10):
+    """Ten pages at once while two of them compute: time to change μ, and stalls."""
+    pages = [stage.open()[0] for _ in range(count)]
+    for page, mu in zip(pages, ("0.15", "0.25"), strict=False):
+        page.locator("input.typed").fill(mu)
+        page.locator("input.typed").press("Enter")
+        page.get_by_role("button", name="Compute μ").click()
+    time.sleep(1)
+    _longest(stage.folder / "stalls")
+    spent = []
+    for page in pages[2:]:
+        before, begin = scene(page, "scene.geometry.mu"), time.perf_counter()
+        page.locator(".friction input[type=range]").press("ArrowRight")
+        page.wait_for_function(
+            "([element, mu]) => element.scene.geometry.mu !== mu",
+            arg=[page.locator(".scene").element_handle(), before],
+        )
+        spent.append(time.perf_counter() - begin)
+    print(
+        f"{count} visitors, 2 computing: change of μ mean {1000 * sum(spent) / len(spent):.0f} ms, "
+        f"longest {1000 * max(spent):.0f} ms; longest stall of the loop "
+        f"{1000 * _longest(stage.folder / 'stalls'):.0f} ms; memory {stage.memory():.0f} MB"
+    )
+
+
+PARTS = {f.__name__: f for f in (opening, playing, crowd, stalls, memory, visitors)}
+
+
+def main(names):
+    """Measure the named parts, or all."""
+    setup = str(Path(__file__).with_name("stalls.py"))
+    for name in names or PARTS:
+        with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+            folder = Path(folder)
+            browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+            options = ("--setup", setup, *CLOSED)
+            with serve(folder, *options, STALLS=str(folder / "stalls")) as (address, server):
+                PARTS[name](Stage(folder, address, server, browser))
+            browser.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
