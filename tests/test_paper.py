@@ -12,7 +12,7 @@ import pytest
 
 from granforce import measures, sweep
 from granforce.cli import main
-from granforce.paper import claims, drawings, tables
+from granforce.paper import claims, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.records import InputError
 from granforce.store import open_store
@@ -158,6 +158,11 @@ def synthetic(eta, **options):
             for name, values in zip(tables.SAMPLES, (len(rows), 0, 0, 0, extent), strict=True):
                 samples[name].append(np.broadcast_to(values, extent.shape))
             rows.append(row)
+    for row in list(rows):
+        answer = {"part": "perturb", "n": 400, "mu": row["mu"], "seed": row["seed"]}
+        answer |= {"critical_force": 1 + eta(row["mu"]), "decay_exponent": 0.5 + eta(row["mu"])}
+        answer |= {name: f(row["mu"]) for name, f in options.items() if name in answer}
+        rows.append(answer | {"limit_load": 2 * answer["critical_force"]})
     joined = {name: np.concatenate(parts) for name, parts in samples.items()}
     return tables.Table({}, rows, joined, [], {}, {})
 
@@ -229,6 +234,8 @@ def test_what_the_paper_says_is_reproduced_by_what_it_describes():
             "corr(f_n, ΔF_n) is significant at intermediate μ",
             {"correlation": lambda mu: -0.2},
         ),
+        (claims.perturbation, "F_crit rises with η2", {"critical_force": lambda mu: 2 - mu / 10}),
+        (claims.perturbation, "α is largest near μ = 0.1", {"decay_exponent": lambda mu: 1 + mu}),
         (
             claims.centre,
             "the original network lies closer to the centre than the walk's states",
@@ -239,6 +246,27 @@ def test_what_the_paper_says_is_reproduced_by_what_it_describes():
 def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options):
     found = verdicts(synthetic(rise_and_fall, **options), [family])
     assert found[statement] == claims.FAILED
+
+
+def test_findings_compare_the_same_packings():
+    table = synthetic(rise_and_fall)
+    for part, eta3, eta2 in (("exact", 2, np.nan), ("uniform", 1, 0.5), ("gauss_seidel", 1, 1)):
+        for row in table.part("walk"):
+            copied = row | {"part": part, "eta3": eta3 * row["eta3"], "eta2": eta2 * row["eta2"]}
+            table.rows.append(copied | {"walk_ratio": 1.5, "original_ratio": 0.5})
+    told = {finding.statement: finding for finding in findings.found(table)}
+    for word in ("small", "intermediate", "large"):
+        ratio = told[f"η3 of the walk's states over exact η3, {word} μ"]
+        assert (ratio.value, ratio.low, ratio.high) == pytest.approx((0.5, 0.5, 0.5))
+        assert told[f"η2 of the walk over η2 of S, {word} μ"].value == pytest.approx(2)
+        assert told[f"η2 by Gauss–Seidel over default, {word} μ"].value == pytest.approx(1)
+    assert told["μ where exact η3 is largest"].value == pytest.approx(0.1, rel=0.3)
+    slope = told["slope of log exact η3 against log μ, μ ≤ 0.01"]
+    assert slope.low < slope.value < slope.high
+    assert slope.value == pytest.approx(0.95, abs=0.1)  # the function given, not quite ∝ μ
+    assert told["⟨F_crit⟩ over ⟨limit load⟩, large μ"].value == pytest.approx(0.5)
+    table.rows[:] = table.part("walk")
+    assert findings.found(table) == []
 
 
 def test_a_wide_interval_decides_nothing():
@@ -269,7 +297,7 @@ def test_the_command_computes_and_judges(done, tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     assert told["skipped"]["missing_cells"] == 0
     assert [claim["statement"] for claim in told["claims"]]
-    assert json.loads((tmp_path / "out" / "claims.json").read_text()) == told["claims"]
+    assert json.loads((tmp_path / "out" / "claims.json").read_text()) == told
     # The reduced study alone tells the same.
     reduced = [*("--table", f"{folder}/study.zarr"), *("--out", str(tmp_path / "again"))]
     assert main(["study", *reduced, "--formats", "", "--json"]) == 0

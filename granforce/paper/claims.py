@@ -67,7 +67,7 @@ def maximum(table):
             yield _claim(
                 f"{label}(μ) is not monotonic: largest near μ = 0.1",
                 "μ of the maximum (parabola through the three highest neighbours, log μ)",
-                _top(list(groups)),
+                peak(list(groups)),
                 groups.values(),
                 good=(0.05, 0.2),
                 fair=(min(0.05, sorted(groups)[1]), max(0.2, sorted(groups)[-2])),
@@ -123,15 +123,15 @@ def coordination(table):
     )
 
 
-def extents(table, part="walk"):
+def extents(table):
     """P(ΔF_n): monotonic or peaked, and how its tail falls."""
     tails = (
         ("small", SMALL, "exponential", (0.85, 1.15), (0.7, 1.3)),
         ("intermediate", MIDDLE, "falls faster than exponentially", (1.15, np.inf), (1, np.inf)),
         ("large", LARGE, "falls slower than exponentially", (0, 0.85), (0, 1)),
     )
-    pooled = {word: _pooled(table.extents(part), span) for word, span, *_ in tails}
-    for word, group in pooled.items():
+    groups = {word: pooled(table.extents("walk"), span) for word, span, *_ in tails}
+    for word, group in groups.items():
         peaked = word == "intermediate"
         yield _claim(
             f"P(ΔF_n) at {word} μ {'has a peak' if peaked else 'falls monotonically'}",
@@ -146,7 +146,7 @@ def extents(table, part="walk"):
             f"tail of P(ΔF_n) at {word} μ: {how}",
             "b of exp(−(λ ΔF_n)^b) beyond the median",
             lambda items: statistics.tail_exponent(np.concatenate(items)),
-            [pooled[word]] if pooled[word] else [],
+            [groups[word]] if groups[word] else [],
             good=good,
             fair=fair,
             resamples=199,  # of up to 1e5 contacts each
@@ -251,7 +251,7 @@ def perturbation(table):
         yield _claim(
             f"{label} is largest near μ = 0.1",
             "μ of the maximum",
-            _top(list(values)),
+            peak(list(values)),
             values.values() if enough else [],
             good=(0.05, 0.2),
             fair=(0.02, 0.5),
@@ -308,7 +308,7 @@ def _positive(groups):
     return {mu: values for mu, values in groups.items() if mu > 0 and np.mean(values) > 0}
 
 
-def _top(frictions):
+def peak(frictions):
     """Statistic: μ where the means over packings are largest, between grid values."""
     x = np.log(frictions)
 
@@ -323,12 +323,12 @@ def _top(frictions):
     return top
 
 
-def _pooled(groups, span):
-    """ΔF_n/⟨ΔF_n⟩ of each packing with μ in a range; packings without indeterminacy left out."""
+def pooled(groups, span):
+    """ΔF_n/⟨ΔF_n⟩ of each packing with μ > 0 in a range; those without indeterminacy left out."""
     return [
         values / values.mean()
         for mu, group in groups.items()
-        if span[0] <= mu <= span[1]
+        if mu > 0 and span[0] <= mu <= span[1]
         for values in group
         if values.any()
     ]

@@ -4,7 +4,7 @@ import json
 import sys
 from pathlib import Path
 
-from granforce.paper import claims, drawings, tables
+from granforce.paper import claims, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.records import InputError, friction
 from granforce.store import open_store
@@ -40,9 +40,13 @@ def main(arguments):
         reduced = tables.load(arguments.table)
     with Bar("figures", "figure") as progress:
         drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
-    told = [claim._asdict() for claim in claims.judged(reduced)]
+    told = {
+        "claims": [claim._asdict() for claim in claims.judged(reduced)],
+        "findings": [finding._asdict() for finding in findings.found(reduced)],
+        "skipped": reduced.skipped,
+    }
     (folder / "claims.json").write_text(json.dumps(told, indent=1, ensure_ascii=False))
-    report(told, reduced, arguments.json)
+    report(told, arguments.json)
     return 1 if failed else 0
 
 
@@ -98,21 +102,26 @@ def compute(path, wanted, arguments):
     return failed
 
 
-def report(told, reduced, as_json):
-    """Claims and verdicts on stdout."""
+def report(told, as_json):
+    """Claims with their verdicts, and findings, on stdout."""
     if as_json:
-        print(json.dumps({"claims": told, "skipped": reduced.skipped}, indent=1))
+        print(json.dumps(told, indent=1))
         return
-    lines = [
-        {
-            "claim": claim["statement"],
-            "measured": f"{claim['value']:.3g}",
-            "95 %": f"{claim['low']:.3g} … {claim['high']:.3g}",
-            "criterion": claim["criterion"],
-            "verdict": claim["verdict"],
-        }
-        for claim in told
-    ]
-    table(lines, ("claim", "measured", "95 %", "criterion", "verdict"), {})
-    if reduced.skipped["missing_cells"]:
-        print(f"{reduced.skipped['missing_cells']} cells of the plan are missing", file=sys.stderr)
+    for word, names in (
+        ("claims", ("claim", "measured", "95 %", "criterion", "verdict")),
+        ("findings", ("finding", "measured", "95 %")),
+    ):
+        lines = [
+            {
+                names[0]: claim["statement"],
+                "measured": f"{claim['value']:.3g}",
+                "95 %": f"{claim['low']:.3g} … {claim['high']:.3g}",
+                "criterion": claim["criterion"],
+                "verdict": claim["verdict"],
+            }
+            for claim in told[word]
+        ]
+        table(lines, names, {})
+        print()
+    if told["skipped"]["missing_cells"]:
+        print(f"{told['skipped']['missing_cells']} cells of the plan are missing", file=sys.stderr)
