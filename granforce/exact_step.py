@@ -26,10 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
-from granforce.relax import dissection
+from granforce.relax import dissection, frontal_lu
 from granforce.relax.gauss_seidel import BOX_MASS
 from granforce.tolerances import BALANCED
 
@@ -40,6 +38,8 @@ LONGEST, SHORTEST = 1e7, 1e-2
 NEWTON, HALVINGS = 12, 8
 # Part of the squared unbalance by which a whole Newton step must lower it.
 DECREASE = 0.1
+# Error of velocities relative to the fastest; contacts turn it into forces τ times as large.
+ROUNDING = 1e-14
 # Steady motion: what contacts still breach Coulomb's law by, relative to the fastest contact.
 STEADY = 1e-7
 
@@ -49,24 +49,20 @@ OPEN, STICKING, SLIDING = range(3)  # and −SLIDING, where f_t = −μ f_n
 class Step(NamedTuple):
     """The step problem of one ensemble, in units of ⟨f_n⟩ and r_max; Δt = 1."""
 
-    rows: np.ndarray  # (N_c, slots) rows each contact meets, numbered in order of elimination
+    plan: dissection.Plan
+    rows: np.ndarray  # (N_c, slots) rows of the ensemble that each contact meets
     columns: np.ndarray  # (N_c, slots, 2) what unit f_n, f_t do to them
     b: np.ndarray  # (rows,)
     mass: np.ndarray  # (rows,) M
     stiffness: np.ndarray  # (N_c, 2) D: effective masses of the contacts
     mu: float
-    order: np.ndarray  # (rows,) the ensemble's rows in order of elimination
-    index: np.ndarray  # row numbers of the Jacobian's entries, column after column
-    start: np.ndarray  # (rows + 1,) where its columns begin
-    place: np.ndarray  # (N_c, slots, slots) entry of each pair of rows of a contact
-    diagonal: np.ndarray  # (rows,) entries on the diagonal
 
 
 class Outcome(NamedTuple):
     """Where the forces went."""
 
     forces: np.ndarray  # (N_c, 2) ⟨f_n⟩
-    velocity: np.ndarray  # (rows,) U, by the step's rows; 0 at rest
+    velocity: np.ndarray  # (rows,) U, by the ensemble's rows; 0 at rest
     at_rest: bool
     converged: bool  # at rest, or in steady motion
     breach: float  # of Coulomb's law, relative to the fastest contact; 0 at rest
@@ -82,21 +78,17 @@ def make_step(ensemble):
     row_of[grains] = np.arange(len(grains))
     i, j = row_of[contacts.i], row_of[contacts.j]
     plan = dissection.make_plan(packing.x[grains], i, j, size, border)
-    fronts = zip(plan.first_row[:-1], plan.pivots, strict=True)
-    order = np.concatenate([plan.rows[first : first + count] for first, count in fronts])
-    by_row = dissection.slots(i, j, size, border, len(grains))
-    rows = np.argsort(order)[by_row]
+    rows = dissection.slots(i, j, size, border, len(grains))
     columns = np.zeros((*rows.shape, 2))
     A = ensemble.A.tocsr()
     for component in range(ensemble.per_contact):
         unknown = ensemble.per_contact * np.arange(len(rows)) + component
-        columns[:, :, component] = np.asarray(A[by_row, unknown[:, None]].todense())
-    mass = _inertia(ensemble, size, border)[order]
+        columns[:, :, component] = np.asarray(A[rows, unknown[:, None]].todense())
+    mass = _inertia(ensemble, size, border)
     yielding = np.einsum("csk,cs->ck", columns**2, 1 / mass[rows])
     stiffness = 1 / np.where(yielding > 0, yielding, 1.0)
-    b = np.ascontiguousarray(ensemble.b[order] / ensemble.force_scale)
-    pattern = _pattern(rows, len(order))
-    return Step(rows, columns, b, mass, stiffness, float(ensemble.mu), order, *pattern)
+    b = ensemble.b / ensemble.force_scale
+    return Step(plan, rows, columns, b, mass, stiffness, float(ensemble.mu))
 
 
 def _inertia(ensemble, size, border):
@@ -111,30 +103,10 @@ def _inertia(ensemble, size, border):
     return np.append(mass, 2 * packing.volume * BOX_MASS / ensemble.contacts.length.sum() ** 2)
 
 
-def _pattern(rows, count):
-    """Structure of M + Σ E K Eᵀ by columns, and where each contact's and M's entries stand."""
-    slots = rows.shape[1]
-    row = np.repeat(rows, slots, axis=1).ravel()
-    column = np.tile(rows, (1, slots)).ravel()
-    every = np.arange(count)
-    keys, place = np.unique(
-        np.concatenate([column * count + row, every * (count + 1)]), return_inverse=True
-    )
-    start = np.searchsorted(keys, np.arange(count + 1) * count)
-    return (
-        (keys % count).astype(np.int32),
-        start.astype(np.int32),
-        place[: row.size].reshape(len(rows), slots, slots).astype(np.int64),
-        place[row.size :].astype(np.int64),
-    )
-
-
-def grain_velocities(step, ensemble, velocity):
+def grain_velocities(ensemble, velocity):
     """Velocities (M, 3) of the backbone grains: intrinsic v_x, v_y and r ω."""
-    by_row = np.empty(len(velocity))
-    by_row[step.order] = velocity
     size = 1 + ensemble.per_contact
-    grains = by_row[: size * len(ensemble.grains)].reshape(-1, size)
+    grains = velocity[: size * len(ensemble.grains)].reshape(-1, size)
     return np.column_stack([grains, np.zeros((len(grains), 3 - size))])
 
 
@@ -154,70 +126,110 @@ def relax(step, forces, contact, load, *, max_steps, steady=STEADY):
     """
     b = step.b.copy()
     b[step.rows[contact]] -= load * step.columns[contact, :, 0]
-    velocity = np.zeros(len(b))
-    pace, iterations, breach = FIRST, 0, np.inf
+    forces, velocity = np.array(forces, order="C"), np.zeros(len(b))
+    ended, breach, steps, iterations = _follow(
+        step, frontal_lu.room(step.plan), b, forces, velocity, max_steps, steady, BALANCED / 10
+    )
+    at_rest = ended and breach == 0.0
+    return Outcome(forces, velocity, at_rest, ended, breach, steps, iterations)
+
+
+@njit(cache=True, nogil=True)
+def _follow(step, memory, b, forces, velocity, max_steps, steady, rest):
+    """Change forces and velocity in place; whether it ended, breach, steps, linear systems."""
+    pace, breach, iterations = FIRST, np.inf, 0
+    following, trial = np.empty_like(forces), np.empty_like(velocity)
     for steps in range(1, max_steps + 1):
-        found = None
-        while found is None and pace >= SHORTEST:
-            found, used = _implicit_step(step, forces, b, pace, velocity)
+        solved = False
+        while not solved and pace >= SHORTEST:
+            trial[:] = velocity
+            solved, used = _implicit_step(step, memory, forces, b, pace, trial, following)
             iterations += used
-            if found is None:
+            if not solved:
                 pace *= CUT
-        if found is None:
-            break
-        following, velocity = found
+        if not solved:
+            return False, breach, steps, iterations
+        velocity[:] = trial
         breach = _breach(step, forces, following, velocity, pace)
-        forces = following
-        if np.abs(step.mass * velocity).max() <= BALANCED / 10:
-            return Outcome(forces, np.zeros(len(b)), True, True, 0.0, steps, iterations)
+        forces[:] = following
+        if np.abs(step.mass * velocity).max() <= rest:
+            velocity[:] = 0.0
+            return True, 0.0, steps, iterations
         if breach <= steady:
-            return Outcome(forces, velocity, False, True, breach, steps, iterations)
+            return True, breach, steps, iterations
         pace = min(LONGEST, pace * GROWTH)
-    return Outcome(forces, velocity, False, False, breach, max_steps, iterations)
+    return False, breach, max_steps, iterations
 
 
+@njit(cache=True, nogil=True)
 def _breach(step, forces, following, velocity, pace):
     """Relative velocities that the forces still answer, relative to the fastest one."""
-    answered = np.abs(following - forces) / (pace * step.stiffness)
-    fastest = np.abs(relative_velocities(step, velocity)).max()
-    return float(answered.max() / fastest) if fastest > 0 else 0.0
+    answered = fastest = 0.0
+    for c in range(forces.shape[0]):
+        for component in range(2):
+            w = 0.0
+            for a in range(step.rows.shape[1]):
+                w += step.columns[c, a, component] * velocity[step.rows[c, a]]
+            change = abs(following[c, component] - forces[c, component])
+            answered = max(answered, change / (pace * step.stiffness[c, component]))
+            fastest = max(fastest, abs(w))
+    return max(answered / fastest, 1e-300) if fastest > 0.0 else 1e-300
 
 
-def _implicit_step(step, forces, b, pace, velocity):
-    """((f⁺, U⁺), linear systems solved); None in place of the pair where Newton's method fails.
+@njit(cache=True, nogil=True)
+def _implicit_step(step, memory, forces, b, pace, velocity, following):
+    """Whether Newton's method found f⁺ (in following) and U⁺ (in velocity); linear systems solved.
 
-    The first U is the given one. The squared unbalance (over masses) must fall; otherwise the
-    step is halved. It ends when a whole step leaves every contact in its state: the equations are
+    It begins at the given U. The squared unbalance (over masses) must fall; otherwise the Newton
+    step is halved. It ends when a whole one leaves every contact in its state: the equations are
     linear there, so that they are solved.
     """
     D = pace * step.stiffness
-    following, state = np.empty_like(forces), np.empty(len(forces), np.int8)
-    unbalance, data = np.empty(len(b)), np.empty(len(step.index))
+    state = np.empty(forces.shape[0], np.int8)
+    unbalance, trial = np.empty_like(b), np.empty_like(b)
+    blocks = np.empty((forces.shape[0], 2, 2))
     merit = _answer(step, forces, D, b, velocity, following, state, unbalance)
-    before = state.copy()
     for count in range(1, NEWTON + 1):
-        _jacobian(step, D, state, data)
-        J = sparse.csc_matrix((data, step.index, step.start), shape=(len(b), len(b)))
-        try:
-            factors = splu(
-                J, permc_spec="NATURAL", diag_pivot_thresh=0.1, options={"SymmetricMode": True}
-            )
-        except RuntimeError:  # singular to rounding
-            return None, count
-        direction, length = factors.solve(unbalance), 1.0
-        before[:] = state
+        before = state.copy()
+        _slopes(D, state, step.mu, blocks)
+        frontal_lu.factor(step.plan, step.columns, blocks, step.mass, memory)
+        direction = unbalance.copy()
+        frontal_lu.solve(step.plan, memory, direction)
+        length = 1.0
+        falls = False
         for _ in range(HALVINGS):
-            trial = velocity + length * direction
+            for k in range(b.shape[0]):
+                trial[k] = velocity[k] + length * direction[k]
             least = _answer(step, forces, D, b, trial, following, state, unbalance)
             if length == 1.0 and np.array_equal(state, before):
-                return (following, trial), count
-            if least < (1 - DECREASE * length) * merit:
+                # Rounding of the velocities, and no more, may be left.
+                left = BALANCED / 10 + ROUNDING * pace * np.abs(trial).max()
+                if least <= left**2:
+                    velocity[:] = trial
+                    return True, count
+            if least < (1.0 - DECREASE * length) * merit:
+                falls = True
                 break
             length *= 0.5
+        if not falls:
+            return False, count
+        velocity[:] = trial
+        merit = least
+    return False, NEWTON
+
+
+@njit(cache=True, nogil=True)
+def _slopes(D, state, mu, blocks):
+    """(∂Π) D of each contact: not symmetric, as f_t of a sliding contact follows f_n."""
+    blocks[:] = 0.0
+    for c in range(state.shape[0]):
+        if state[c] == OPEN:
+            continue
+        blocks[c, 0, 0] = D[c, 0]
+        if state[c] == STICKING:
+            blocks[c, 1, 1] = D[c, 1]
         else:
-            return None, count
-        velocity, merit = trial, least
-    return None, NEWTON
+            blocks[c, 1, 0] = np.sign(state[c]) * mu * D[c, 0]
 
 
 @njit(cache=True, nogil=True)
@@ -254,22 +266,3 @@ def _answer(step, forces, D, b, velocity, following, state, unbalance):
     for k in range(b.shape[0]):
         merit += unbalance[k] ** 2 / step.mass[k]
     return merit
-
-
-@njit(cache=True, nogil=True)
-def _jacobian(step, D, state, data):
-    """Entries of M + A (∂Π) D Aᵀ: not symmetric, as f_t of a sliding contact follows f_n."""
-    rows, columns = step.rows, step.columns
-    data[:] = 0.0
-    for k in range(step.mass.shape[0]):
-        data[step.diagonal[k]] = step.mass[k]
-    for c in range(rows.shape[0]):
-        if state[c] == OPEN:
-            continue
-        d_t = D[c, 1] if state[c] == STICKING else 0.0
-        coupling = 0.0 if state[c] == STICKING else np.sign(state[c]) * step.mu
-        for a in range(rows.shape[1]):
-            pushed = D[c, 0] * (columns[c, a, 0] + coupling * columns[c, a, 1])
-            turned = d_t * columns[c, a, 1]
-            for k in range(rows.shape[1]):
-                data[step.place[c, a, k]] += pushed * columns[c, k, 0] + turned * columns[c, k, 1]

@@ -175,14 +175,14 @@ def response(packing, contact, force=None, *, mu=None, critical=None, precision=
 
 
 def _response(S, step, contact, position, load, moving):
-    velocity = exact_step.grain_velocities(step, S, moving.velocity)
+    velocity = exact_step.grain_velocities(S, moving.velocity)
     unit = np.sqrt(np.mean(np.sum(velocity[:, :2] ** 2, axis=1)))
     relative = exact_step.relative_velocities(step, moving.velocity) / unit
     count = len(S.packing.r)
     displacement, rotation = np.full((count, 2), np.nan), np.full(count, np.nan)
     displacement[S.grains] = velocity[:, :2] / unit
     rotation[S.grains] = velocity[:, 2] / unit
-    box = moving.velocity[np.argmax(step.order)] if S.has_pressure_row else 0.0
+    box = moving.velocity[-1] if S.has_pressure_row else 0.0
     normal, tangential = moving.forces.T
     opened = normal <= 0
     slid = ~opened & (np.abs(tangential) >= S.mu * normal)

@@ -90,10 +90,7 @@ def test_motion_obeys_momentum_balance_and_coulombs_law():
     S, k, critical = first_motion()
     step, moving = exact_step.make_step(S), critical.moving
     assert critical.converged
-    f, U = moving.forces, np.empty(len(step.b))
-    U[step.order] = moving.velocity
-    mass = np.empty(len(U))
-    mass[step.order] = step.mass
+    f, U, mass = moving.forces, moving.velocity, step.mass
     loaded = f.copy()
     loaded[k, 0] += critical.high / S.force_scale
     unbalance = S.A @ S.to_vector(loaded) - S.b / S.force_scale
