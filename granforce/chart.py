@@ -20,6 +20,9 @@ from granforce.tolerances import FLAT
 _AWAY = 0.01
 # Rows of A whose remainder, relative to the largest row, is below this follow from the others.
 _DEPENDENT = 1e-11
+# Rows below this do not follow, but to balance them further than the program did would move the
+# point far: frozen boundaries have such rows.
+_NEARLY_DEPENDENT = 1e-7
 _MOST_NEWTON_STEPS = 200
 _CENTRED = 1e-9
 
@@ -53,11 +56,13 @@ def chart(A, b):
     """
     y, held = inner_point(A, b)
     moving = np.flatnonzero(~held)
-    dense = A.tocsc()[:, moving].toarray()
-    null, span = _null_space(dense)
-    # The program's point is balanced to its tolerance only: the nearest one is, to rounding.
+    inner = y[moving]
+    relative, least = _null_space(A.tocsc()[:, moving].toarray() * inner)
+    null = inner[:, None] * relative
+    # The program's point is balanced to its tolerance only: what is left is spread over all
+    # coordinates in proportion.
     for _ in range(3):
-        y[moving] += span(b - A @ y)
+        y[moving] *= 1 + least(b - A @ y)
     y[moving] = _centred(y[moving], null)
     G = np.linalg.qr(null / y[moving, None])[0]
     G = np.vstack([G, np.zeros((-len(G) % LANES, G.shape[1]))])
@@ -104,14 +109,15 @@ def _raised(A, b, low):
 
 
 def _null_space(dense):
-    """Orthonormal basis (n, h) of the null space, and a function for least solutions of A d = r."""
+    """Orthonormal basis (n, h) of the null space, and r → the least d with (matrix) d = r."""
     Q, R, order = linalg.qr(dense.T, pivoting=True)
     diagonal = np.abs(np.diagonal(R))
     rank = int(np.sum(diagonal > _DEPENDENT * diagonal.max(initial=0.0)))
-    triangle = R[:rank, :rank]
+    sure = int(np.sum(diagonal > _NEARLY_DEPENDENT * diagonal.max(initial=0.0)))
+    triangle = R[:sure, :sure]
 
     def least(r):
-        return Q[:, :rank] @ linalg.solve_triangular(triangle, r[order[:rank]], trans="T")
+        return Q[:, :sure] @ linalg.solve_triangular(triangle, r[order[:sure]], trans="T")
 
     return Q[:, rank:], least
 

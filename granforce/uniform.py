@@ -16,7 +16,7 @@ from granforce import billiard
 from granforce.chart import Chart, chart
 from granforce.diagnostics import Mixing, mixing
 from granforce.records import InputError
-from granforce.tolerances import FLAT
+from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
 
 # Mean length of a path in root mean square distances of states from the centre; what an effective
 # state costs has its minimum, a flat one, near this.
@@ -63,7 +63,7 @@ class UniformSample(NamedTuple):
     residual: np.ndarray  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
     violation: np.ndarray  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component, (N_c, 2)
-    reached: bool  # complete, R̂ ≤ MIXED, and worth as many independent states as wanted
+    reached: bool  # complete, all in S, R̂ ≤ MIXED, worth as many independent states as wanted
     counts: dict  # turns, refused paths, dropped states, held coordinates, skipped (h = 0)
     setup_seconds: float  # wall time of the chart
     sampling_seconds: float  # wall time of the steps, those dropped included
@@ -159,7 +159,7 @@ def sample_uniform(
         enough = not h or not effective or sample.effective >= effective
         if enough or not complete or done >= most:
             mixed = not h or sample.mixing.worst_r_hat <= MIXED
-            return sample._replace(reached=bool(complete and enough and mixed))
+            return sample._replace(reached=bool(complete and enough and mixed and _inside(sample)))
         growth = 1.1 * effective / max(sample.effective, 1.0)
         states = min(most, int(done * min(2.0, max(1.1, growth))) + 1)
 
@@ -250,6 +250,11 @@ def _extend(ensemble, sample, states, workers, progress, cancel):
         ends=ends,
     )
     return sample, have >= target
+
+
+def _inside(sample):
+    balanced = sample.residual.max(initial=0.0) <= BALANCED
+    return balanced and sample.violation.max(initial=0.0) <= ADMISSIBLE
 
 
 def forces_of(ensemble, chart, slacks):

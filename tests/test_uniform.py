@@ -5,6 +5,7 @@ with probability 5e-5 k, so a right sampler fails here with a new seed about onc
 """
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,18 +18,21 @@ from bodies import (
     simplex,
     z_scores,
 )
-from packings import lattice, packed, reference, two_disks
+from packings import REFERENCE, lattice, packed, reference, two_disks
 from scipy import sparse
 
 from granforce import bench, measures, samples, study, uniform
 from granforce.chart import chart, inner_point
 from granforce.cli import main
 from granforce.diagnostics import mixing
+from granforce.importers import read_lammps
 from granforce.polytope import ensemble
 from granforce.random_walk import walk
 from granforce.records import Cancelled, InputError, NotJammedError
 from granforce.store import open_store
 from granforce.uniform import sample_uniform
+
+LAMMPS = str(Path(__file__).parent / "lammps" / "lammps_n400_mu0.3.{}.dump")
 
 BODIES = {
     "segment": lambda: box(1),
@@ -147,7 +151,7 @@ def test_two_methods_agree(S, sample):
 
 @pytest.mark.parametrize("name", ["n100_mu0.1_s11", "n100_mu1_s12"])
 def test_exact_intervals_contain_every_state(name):
-    packing, bounds = reference(name), np.load(f"tests/reference/{name}.npz")
+    packing, bounds = reference(name), np.load(REFERENCE / f"{name}.npz")
     S = ensemble(packing)
     states = sample_uniform(S, 200).flat
     slack = 1e-6 * S.force_scale
@@ -226,6 +230,17 @@ def test_a_single_point_is_drawn_without_a_step(packing):
     assert np.ptp(sample.flat, axis=0).max() == 0 and sample.residual.max() < 1e-10
     assert sample.counts["skipped"] == 12 and sample.counts["turns"] == 0
     assert np.isnan(sample.mixing.least_bulk)
+
+
+def test_frozen_boundaries_and_packings_from_elsewhere():
+    packing = packed(60, 0.1)
+    inner = ensemble(packing, frozen=study.outside_slice(packing, (0.1, 0.9, 0.0, 1.0)))
+    soft = ensemble(read_lammps(*(LAMMPS.format(part) for part in ("particles", "contacts")), 0.3))
+    assert not inner.has_pressure_row and inner.dimension > 0 and soft.dimension > 100
+    for S in (inner, soft):
+        sample = sample_uniform(S, 100)
+        assert sample.chart.dimension == S.dimension
+        assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
 
 
 @pytest.mark.parametrize("packing", [lattice(4, 4, 0.5), lattice(4, 4, 0.2, triangular=True)])
