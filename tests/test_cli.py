@@ -129,6 +129,24 @@ def test_a_frozen_frame_determines_more(run):
     assert free["undetermined_clusters"] == 1
 
 
+def test_perturbation_of_chosen_contacts(run, tmp_path):
+    table = tmp_path / "contacts.csv"
+    words = ["perturb", *SMALL[:4], "--json", "--csv", table]
+    code, out, _ = run(*words, "--random", 3)
+    assert code == 0
+    report = json.loads(out)
+    assert report["contacts"] == 3
+    assert 0 <= report["critical_force"] <= report["limit_load"]
+    rows = np.genfromtxt(table, delimiter=",", names=True)
+    assert np.all(rows["critical_low"] <= rows["limit_load"])
+    chosen = ",".join(str(int(c)) for c in rows["contact"])
+    again = json.loads(run(*words, "--contacts", chosen)[1])
+    assert again["critical_force"] == report["critical_force"]
+    code, _, err = run(*words, "--contacts", "9999")
+    assert code == 2
+    assert len(err.splitlines()[-1:]) == 1 and "9999" in err
+
+
 def test_limit_loads_of_chosen_contacts(run, tmp_path):
     bounds = tmp_path / "loads.csv"
     words = ["limit-loads", *SMALL[:4], "--json", "--csv", bounds]
