@@ -117,6 +117,7 @@ class Tabs:
         self.tabs = pmui.Tabs(
             *((TABS[name], self.pages[name]) for name in self.names),
             active=self.names.index(state.tab),
+            sx={"& .MuiTab-root": {"minWidth": 0, "padding": "12px 9px", "fontSize": "0.8rem"}},
             sizing_mode="stretch_width",
         )
         self.tabs.param.watch(lambda event: self._show(self.names[event.new]), "active")

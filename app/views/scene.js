@@ -2,7 +2,8 @@
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
 const LEAST = 0.1 // px; thinner chains are not drawn
-const FEW = 2500 // chains drawn one by one, with round ends; more are gathered by colour
+const FEW = 2500 // chains drawn one by one, with round ends; more are gathered in classes
+const FINE = 16 // colours; of more, every second serves where chains are gathered
 const GRAB = 6 // px from a chain that still mean it
 const ZOOM = [0.02, 4] // least and largest part of the whole view
 
@@ -163,7 +164,7 @@ class Scene {
     this.begin(chains)
     chains.globalAlpha = style.alpha
     if (drawn <= FEW) this.strokeEach(order, drawn, style.colours)
-    else this.fillByColour(order, drawn, style.colours)
+    else this.strokeByClass(order, drawn, style.colours)
     chains.globalAlpha = 1
     this.drawMarks(style)
     this.painted++
@@ -191,27 +192,31 @@ class Scene {
     }
   }
 
-  fillByColour(order, count, colours) {
-    const { chains, width, bin } = this
-    const first = new Int32Array(colours.length + 1), sorted = new Int32Array(count)
-    for (let n = 0; n < count; n++) first[bin[order[n]] + 1]++
-    for (let b = 0; b < colours.length; b++) first[b + 1] += first[b]
-    const place = first.slice()
-    for (let n = 0; n < count; n++) sorted[place[bin[order[n]]]++] = order[n]
-    for (let b = 0; b < colours.length; b++) {
-      if (first[b] === first[b + 1]) continue
-      chains.beginPath()
-      for (let n = first[b]; n < first[b + 1]; n++) {
-        const k = sorted[n], [xa, ya, xb, yb] = this.ends(k)
-        const dx = xb - xa, dy = yb - ya, half = width[k] / (2 * Math.hypot(dx, dy))
-        const ox = -dy * half, oy = dx * half
-        chains.moveTo(xa + ox, ya + oy)
-        chains.lineTo(xb + ox, yb + oy)
-        chains.lineTo(xb - ox, yb - oy)
-        chains.lineTo(xa - ox, ya - oy)
+  /** Many chains: one stroke for all of about the same colour and width, in half the time. */
+  strokeByClass(order, count, colours) {
+    const { chains, width, bin, scale } = this, classes = new Map()
+    const { x0, y0, x1, y1 } = this.geometry
+    for (let n = 0; n < count; n++) {
+      const k = order[n]
+      const thickness = Math.round(2 * Math.log2((width[k] * scale) / LEAST)) // half octaves
+      const colour = colours.length > FINE ? bin[k] - (bin[k] % 2) : bin[k]
+      const key = 64 * colour + thickness
+      let path = classes.get(key)
+      if (!path) classes.set(key, (path = new Path2D()))
+      if (this.offset) {
+        const [xa, ya, xb, yb] = this.ends(k)
+        path.moveTo(xa, ya)
+        path.lineTo(xb, yb)
+      } else {
+        path.moveTo(x0[k], y0[k])
+        path.lineTo(x1[k], y1[k])
       }
-      chains.fillStyle = colours[b]
-      chains.fill()
+    }
+    chains.lineCap = "butt"
+    for (const [key, path] of classes) {
+      chains.strokeStyle = colours[key >> 6]
+      chains.lineWidth = (LEAST * 2 ** ((key & 63) / 2)) / scale
+      chains.stroke(path)
     }
   }
 
