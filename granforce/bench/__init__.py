@@ -45,10 +45,10 @@ PARTS = {
     "compaction_frictions": (compaction_frictions, "Compaction at each μ"),
     "compaction_growth": (compaction_growth, "Compaction against the number of disks"),
     "skips": (skips, "What skipping is worth"),
-    "walks": (walks, "Random walks by solver"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),
     "uniform": (uniform, "Uniform sampling of S"),
+    "walks": (walks, "Random walks by solver"),
 }
 
 
