@@ -115,8 +115,6 @@ def _hopsy(S, made, rounded):
         begin = time.process_time()
         _, places = hopsy.sample(chains, streams, HOPSY_STATES // 4, thinning=thinning)
         seconds = time.process_time() - begin
-        if setup:
-            places = places @ problem.transformation.T + problem.shift
         slacks = np.ones((*places.shape[:2], len(made.G)))
         slacks[..., : len(walls)] -= places @ walls.T
         states = forces_of(S, made, slacks)[:, places.shape[1] // 10 :]  # warm-up
