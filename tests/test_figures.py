@@ -5,6 +5,7 @@ import re
 import holoviews as hv
 import numpy as np
 import pytest
+from packings import packed
 
 from granforce import figures
 from granforce.records import InputError
@@ -107,3 +108,77 @@ def test_one_backend_does_not_displace_the_other():
     assert hv.Store.current_backend == current
     with pytest.raises(InputError, match="take bokeh or matplotlib"):
         figures.indeterminacy(ROWS, backend="plotly")
+
+
+@pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
+def test_perturbation_is_joined_in_order_of_friction(backend):
+    rows = [
+        {"mu": mu, "eta2": eta + k, "critical_force": 2 + k, "decay_exponent": mu, "limit_load": 5}
+        for mu, eta in ((0.1, 3), (0, 0), (10, 1))
+        for k in (0, 2)
+    ]
+    rows.append({"mu": 1, "eta2": 2.0, "critical_force": 1.0, "decay_exponent": np.nan})
+    force, decay = frames(figures.perturbation(rows, backend=backend))
+    np.testing.assert_allclose(curves(force)["F_crit"], ([1, 4, 2, 2], [3, 3, 1, 3]))
+    np.testing.assert_allclose(curves(force)["limit load"], ([1, 4, 2], [5, 5, 5]))
+    np.testing.assert_allclose(curves(decay)["α"], ([1, 4, 2], [0, 0.1, 10]))
+    words = force.traverse(lambda e: e, [hv.Labels])[0].dimension_values(2)
+    assert [word.strip() for word in words] == ["0", "0.1", "1", "10"]
+
+
+def test_possible_forces_are_relative_to_the_original(rng):
+    original = np.array([4.0, 0.0, 1.0, 2.0])
+    states = original * np.array([[0.5], [1.5]]) + [0, 0, 0, 9]
+    least, extent = original / 2, original
+    figure = figures.possible_forces({0.1: (original, states, least, extent)})
+    (frame,) = frames(figure)
+    dots = frame.traverse(lambda e: e, [hv.Scatter])[0]
+    # Weak to strong; no ratio to a force that is 0, none drawn beyond the frame.
+    assert sorted(zip(*(dots.dimension_values(k) for k in (0, 1)), strict=True)) == [
+        *((1, 0.5), (1, 1.5), (3, 0.5), (3, 1.5))
+    ]
+    bars = frame.traverse(lambda e: e, [hv.ErrorBars])[0]
+    middle, reach = (bars.dimension_values(name) for name in ("y", "below"))
+    np.testing.assert_allclose(middle - reach, 0.5)
+    np.testing.assert_allclose(middle + bars.dimension_values("above"), 1.5)
+
+
+def test_places_mark_the_largest_at_their_points_of_contact():
+    packing = packed(30, 0.3)
+    contacts = np.arange(0, len(packing.contacts.i), 2)
+    normal, extent = np.arange(len(contacts)), -np.arange(len(contacts))
+    figure = figures.places({0.3: (packing, contacts, normal, extent)}, part=0.1)
+    count = round(0.1 * len(contacts))
+    for frame, chosen in zip(frames(figure), (contacts[-count:], contacts[:count]), strict=True):
+        marked = frame.traverse(lambda e: e, [hv.Scatter])[1]
+        at = np.column_stack([marked.dimension_values(k) for k in (0, 1)])
+        assert np.all((at >= 0) & (at <= packing.box))
+        # Every mark lies on the rims of both disks of one of the contacts chosen.
+        for point in at:
+            reach = []
+            for c in chosen:
+                ends = packing.contacts.i[c], packing.contacts.j[c]
+                step = np.array([point - packing.x[g] for g in ends])
+                step -= packing.box * np.round(step / packing.box)
+                reach.append(np.abs(np.linalg.norm(step, axis=1) - packing.r[list(ends)]).max())
+            assert min(reach) < 1e-6
+
+
+def test_variations_show_what_the_rows_hold():
+    rows = [{"mu": mu, "n": n, "eta2": n * mu, "eta3": 1} for mu in (0.1, 1) for n in (100, 400)]
+    small, large = frames(figures.sizes(rows))
+    np.testing.assert_allclose(curves(small)["η2"], ([100, 400], [10, 40]))
+    np.testing.assert_allclose(curves(large)["0.15 η3"], ([100, 400], [0.15, 0.15]))
+    eta2, _ = frames(figures.opened(rows, rows[:1]))
+    np.testing.assert_allclose(curves(eta2)["made at μ = 0"], ([0.1, 1], [25, 250]))
+    np.testing.assert_allclose(curves(eta2)["made at μ"], ([0.1], [10]))
+    inner = [{"mu": 0.1, "undetermined_part": 0.0, "clusters": 3}]
+    part, clusters = frames(figures.frozen([], inner))
+    np.testing.assert_allclose(curves(part)["frozen surroundings"], ([0.1], [0]))
+    np.testing.assert_allclose(curves(clusters)["frozen surroundings"], ([0.1], [3]))
+    far = figures.distances([{"mu": 0.1, "original_ratio": 0.5, "walk_ratio": 1.5}])
+    assert {label: y.tolist() for label, (_, y) in curves(far).items()} == {
+        "original": [0.5],
+        "walk": [1.5],
+        "uniform": [1.0],
+    }
