@@ -14,9 +14,10 @@ def rendered(frames, names, heights):
     """HoloViews frames as Bokeh figures that fill the width, each with its name and height."""
     import holoviews as hv
 
-    renderer, drawn = hv.renderer("bokeh"), []
+    # In its mode "server" the renderer takes the document given and puts its theme on that one;
+    # else it would be the current document, that of whoever is served right now.
+    renderer, drawn = hv.renderer("bokeh").instance(mode="server"), []
     for frame, name, height in zip(frames, names, heights, strict=False):
-        # A document of its own: the current one would be that of whoever is served right now.
         fig = renderer.get_plot(frame, doc=Document()).state
         fig.update(
             output_backend="canvas",

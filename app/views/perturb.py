@@ -45,6 +45,7 @@ class View(Seen):
         self.push.on_click(lambda event: self._push())
         self.strongest.on_click(lambda event: self._take_strongest())
         self.task.param.watch(self._failed, "message")
+        self.task.param.watch(lambda event: self.push.param.update(disabled=event.new), "running")
         state.param.watch(self._animate, "tab")
         self.catch_up()
 

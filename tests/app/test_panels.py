@@ -584,3 +584,21 @@ def test_figure_2_takes_what_the_stores_hold(state, monkeypatch):
     settled(state)
     # Boxes of 30 disks are too small for an exponent: one panel of the two.
     assert "2 perturbed packings" in view.told.object and len(view.plots.objects) == 1
+
+
+def test_figures_drawn_in_a_thread_leave_other_pages_alone(monkeypatch):
+    """HoloViews would take, and theme, the document that is being served just then."""
+    import holoviews as hv
+
+    from app.views.drawing import rendered
+
+    class Served(Exception):
+        pass
+
+    def served():
+        raise Served
+
+    hv.extension("bokeh")
+    monkeypatch.setattr("holoviews.plotting.bokeh.renderer.curdoc", served)
+    (fig,) = rendered([hv.Curve([1, 2, 3])], ["curve"], [200])
+    assert fig.height == 200 and fig.document is None

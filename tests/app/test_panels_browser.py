@@ -1,0 +1,234 @@
+"""The tabs beside the packing in a browser: what they show, and the files they take and give."""
+
+import io
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from packings import REFERENCE
+from serving import CHROMIUM, FLAGS, MODEL, column, painted, serve
+from small_store import DISKS, KEPT, ROOT
+
+import granforce as gf
+
+# Pictures to be looked at; ignored by git.
+ARTEFACTS = ROOT / "artefacts" / "panels"
+LAMMPS = REFERENCE.parent / "lammps"
+PATIENCE = 60_000  # ms, on a busy machine
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def address(shipped, tmp_path_factory):
+    """The app with stores of its own."""
+    with serve(tmp_path_factory.mktemp("served"), GRANFORCE_DATA=str(shipped)) as (url, _):
+        yield url
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as context:
+        browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(chromium, address, request):
+    """visit(query, width, height): a page; at the end a picture, and no error was told."""
+    errors, pages = [], []
+
+    def visit(query, width=1280, height=1000):
+        page = chromium.new_page(viewport={"width": width, "height": height})
+        page.set_default_timeout(PATIENCE)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("console", lambda told: told.type == "error" and errors.append(told.text))
+        page.goto(address + query)
+        painted(page, PATIENCE)
+        pages.append(page)
+        return page
+
+    yield visit
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    for number, page in enumerate(pages):
+        page.keyboard.press("Escape")  # a sidebar above a narrow page
+        page.wait_for_timeout(300)
+        page.screenshot(path=ARTEFACTS / f"{request.node.name}-{number}.png", full_page=True)
+        page.close()
+    assert not [error for error in errors if "favicon" not in error]
+
+
+def filled(page, source, least=3):
+    """Wait until a source has rows."""
+    page.wait_for_function(f"() => {MODEL}('{source}')?.get_length() >= {least}")
+
+
+def figure_of(page, source):
+    """px per unit along x and y of the plot that shows a source."""
+    return page.evaluate(
+        """name => {
+            const models = [...Bokeh.documents[0]._all_models.values()]
+            const source = models.find((model) => model.name === name)
+            const fig = models.find((model) => model.type === "Figure" &&
+                model.renderers.some((renderer) => renderer.data_source === source))
+            const {inner_width, inner_height, x_range, y_range} = fig
+            return [inner_width / (x_range.end - x_range.start),
+                    inner_height / (y_range.end - y_range.start)]
+        }""",
+        source,
+    )
+
+
+def drawn(page, number=1):
+    """Wait until so many plots of the visible tab have been painted."""
+    page.wait_for_function(
+        """number => {
+            const figures = [...Bokeh.documents[0]._all_models.values()]
+                .filter((model) => model.type === "Figure" && model.inner_width > 50)
+            return figures.length >= number
+        }""",
+        arg=number,
+    )
+    page.wait_for_timeout(300)
+
+
+def download(page, action, folder):
+    """The file that an action has the browser save, and its content."""
+    with page.expect_download() as saved:
+        action()
+    path = folder / saved.value.suggested_filename
+    saved.value.save_as(path)
+    return path
+
+
+@pytest.mark.parametrize("width, dark", [(1280, 0), (1280, 1), (400, 0)])
+def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
+    page = visit(f"?tab=projection&dark={dark}", width)
+    filled(page, "outer")
+    page.wait_for_timeout(500)
+    across, up = figure_of(page, "path")
+    assert across == pytest.approx(up, rel=1e-3)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    path = np.stack([column(page, "path", name) for name in "xy"], axis=1)
+    assert len(path) == KEPT + 1
+    for _ in range(2):
+        page.locator("button.step").dispatch_event("click")  # the sidebar may lie above it
+    page.wait_for_function(
+        f"() => Math.abs({MODEL}('here').get_column('x')[0] - {path[2, 0]}) < 1e-6"
+    )
+    assert column(page, "here", "y")[0] == pytest.approx(path[2, 1], abs=1e-6)
+    outer = np.stack([column(page, "outer", name) for name in "xy"], axis=1)
+    assert np.all(path.max(axis=0) <= outer.max(axis=0) + 1e-6)
+
+
+def test_one_contact_in_its_cone(visit):
+    page = visit("?tab=projection&contact=3")
+    filled(page, "outer")
+    page.get_by_role("button", name="fₙ, fₜ of a contact").click()
+    page.wait_for_function(f"() => {MODEL}('outer').get_column('x')?.every((x) => x > -1e-6)")
+    filled(page, "outer")
+    normal, tangential = (np.array(column(page, "outer", name)) for name in "xy")
+    assert np.all(np.abs(tangential) <= 0.1 * normal + 1e-3)
+
+
+def test_statistics_are_drawn_one_after_another(visit):
+    page = visit("?tab=statistics")
+    drawn(page, 2)
+    page.get_by_text("A tap on a point shows its states").wait_for()
+    for words, text in (
+        ("P(ΔFₙ)", "Distribution of ΔFₙ"),
+        ("corr(μ)", "Bars: the range"),
+        ("ΔFₙ – fₙ", "Correlation of fₙ with ΔFₙ"),
+        ("P(fₙ)", "of the forces lie beyond"),
+        ("η(μ)", "coordination z"),
+    ):
+        page.get_by_role("button", name=words, exact=True).click()
+        page.get_by_text(text).wait_for()
+        drawn(page)
+        name = words.replace("(", "_").replace(")", "").replace(" ", "")
+        ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=ARTEFACTS / f"statistics-{name}.png")
+
+
+def test_statistics_by_night_on_a_narrow_screen(visit):
+    page = visit("?tab=statistics&dark=1", width=400)
+    drawn(page, 2)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+def test_a_contact_is_pushed_and_its_field_seen(visit):
+    page = visit("?tab=perturb&contact=5")
+    before = page.locator(".scene").evaluate("element => element.scene.offset")
+    page.get_by_role("button", name="Push", exact=True).click()
+    page.get_by_text("F_crit lies between").wait_for()
+    assert before is None
+    page.wait_for_function(
+        "scene => Math.abs(scene.scene.offset?.amplitude) > 0.001",
+        arg=page.locator(".scene").element_handle(),
+    )
+    field = page.locator(".scene").evaluate("element => element.scene.offset.field.length")
+    assert field == 2 * DISKS
+    drawn(page)
+    page.get_by_label("animate the first motion").click()
+    page.wait_for_function(
+        "scene => scene.scene.offset === null", arg=page.locator(".scene").element_handle()
+    )
+
+
+def test_dumps_are_dropped_reported_and_shown(visit):
+    page = visit("?tab=upload")
+    files = [LAMMPS / f"lammps_n400_mu0.3.{part}.dump" for part in ("particles", "contacts")]
+    page.locator("input[type=file]").set_input_files(files[:1])
+    page.get_by_text("Now drop the dump of the contacts").wait_for()
+    page.locator("input[type=file]").set_input_files(files[1:])
+    page.get_by_text("dimension h of S").wait_for()
+    page.get_by_text("imported").first.wait_for()
+    page.wait_for_function("() => /packing=/.test(location.search)")
+
+
+def test_what_is_no_packing_is_refused_in_one_line(visit, tmp_path):
+    page = visit("?tab=upload")
+    (tmp_path / "notes.txt").write_text("no packing at all")
+    page.locator("input[type=file]").set_input_files(tmp_path / "notes.txt")
+    page.get_by_text("neither an NPZ of granforce").wait_for()
+
+
+def test_everything_can_be_taken_along(visit, tmp_path):
+    page = visit("?tab=export&frame=3")
+
+    def take(words):
+        button = page.get_by_role("button", name=words, exact=True)
+        return download(page, button.click, tmp_path)
+
+    svg = ElementTree.fromstring(take("SVG").read_text())
+    assert len([e for e in svg.iter() if e.tag.endswith("circle")]) >= DISKS
+    assert take("PNG").read_bytes()[:4] == b"\x89PNG"
+    rows = take("Contacts (CSV)").read_text().splitlines()
+    assert rows[0].startswith("contact,i,j,f_n_original") and len(rows) > DISKS
+    packing = gf.load_packing(io.BytesIO(take("Packing (NPZ)").read_bytes()))
+    assert len(packing.r) == DISKS
+    assert take("States (NetCDF)").read_bytes()[:3] == b"CDF"
+    assert take("States (Zarr, zipped)").read_bytes()[:2] == b"PK"
+    assert '"command": "granforce walk' in take("Parameters (JSON)").read_text()
+
+
+@pytest.mark.parametrize("tab, number", [("projection", 1), ("statistics", 2)])
+def test_plots_are_saved_as_svg(visit, tmp_path, tab, number):
+    page = visit(f"?tab={tab}")
+    drawn(page, number)
+    if tab == "projection":
+        filled(page, "outer")
+    # Toolbars are hidden until the pointer is on the plot; their buttons work all the same.
+    save = """() => {
+        const models = [...Bokeh.documents[0]._all_models.values()]
+        const tool = models.find((m) => m.description === "Save as SVG")
+        return tool.callback.execute(tool)
+    }"""
+    path = download(page, lambda: page.evaluate(save), tmp_path)
+    svg = ElementTree.fromstring(path.read_text())
+    assert path.suffix == ".svg" and len(list(svg.iter())) > 30
