@@ -5,7 +5,7 @@ The kernels release the interpreter lock, so a thread keeps neither the page nor
 
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
 
 import param
 
@@ -13,10 +13,29 @@ from granforce.records import Cancelled, InputError
 
 from .limits import LIMITS
 
+
+class Pool:
+    """Threads that run jobs in turn; they end with the server, whatever they are doing."""
+
+    def __init__(self, workers, name):
+        self._jobs = SimpleQueue()
+        for k in range(workers):
+            # Not concurrent.futures: its threads would keep a server that is to end waiting.
+            threading.Thread(target=self._serve, name=f"{name}-{k}", daemon=True).start()
+
+    def submit(self, job):
+        """Have job.run() called when a thread is free."""
+        self._jobs.put(job)
+
+    def _serve(self):
+        while True:
+            self._jobs.get().run()
+
+
 # All users together: more would only slow each other down.
-computing = ThreadPoolExecutor(LIMITS.computations, thread_name_prefix="granforce-compute")
+computing = Pool(LIMITS.computations, "granforce-compute")
 # What only reads stores must not wait for a computation to end.
-reading = ThreadPoolExecutor(2, thread_name_prefix="granforce-read")
+reading = Pool(2, "granforce-read")
 
 
 class Job:
@@ -33,11 +52,10 @@ class Job:
         self.seconds_left = None  # of this stage
         self.error = ""
         self.result = None
-        self.ended = False
         self._work, self._on_end = work, on_end
         self._begun = time.perf_counter()
-        self._cancel = threading.Event()
-        self._future = pool.submit(self._run)
+        self._cancel, self._ended = threading.Event(), threading.Event()
+        pool.submit(self)
 
     def begin(self, stage):
         """Enter a stage; its time left is counted from here."""
@@ -52,23 +70,28 @@ class Job:
         self.seconds_left = spent / done * (total - done) if 0 < done <= total else None
 
     def cancel(self):
-        """Ask it to end; it does so within about a second."""
+        """Ask it to end; it does so within about a second, or when it comes to its turn."""
         self._cancel.set()
-        if self._future.cancel():
-            self._finish()
 
     def cancelled(self):
         """Whether it was asked to end."""
         return self._cancel.is_set()
 
-    def wait(self, timeout=None):
-        """Until it ends; for tests and scripts."""
-        self._future.result(timeout)
+    @property
+    def ended(self):
+        """Whether it has ended, one way or another."""
+        return self._ended.is_set()
 
-    def _run(self):
+    def wait(self, timeout=None):
+        """Whether it ends in time, in s; for tests and scripts."""
+        return self._ended.wait(timeout)
+
+    def run(self):
+        """Do the work; called by a thread of the pool."""
         self.begin("starting")
         try:
-            self.result = self._work(self)
+            if not self.cancelled():
+                self.result = self._work(self)
         except Cancelled:
             pass
         except InputError as error:
@@ -76,13 +99,10 @@ class Job:
         except Exception as error:  # told on the page, or nobody would see it
             self.error = f"the computation failed: {type(error).__name__}: {error}"
         finally:
-            self._finish()
-
-    def _finish(self):
-        self.ended = True
-        self._work = None  # what it refers to may be large
-        if self._on_end is not None:
-            self._on_end()
+            self._work = None  # what it refers to may be large
+            self._ended.set()
+            if self._on_end is not None:
+                self._on_end()
 
 
 class Task(param.Parameterized):

@@ -93,6 +93,9 @@ def page():
 
     pn.state.onload(partial(go_on, parts()))
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
+    packing.player.param.watch(
+        lambda event: whole.param.update(sidebar_open=not event.new), "narrow"
+    )
     _poll_while_running(state, document)
     _tell_address(state)
     pn.state.on_session_destroyed(lambda context: state.close())

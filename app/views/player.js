@@ -9,6 +9,8 @@ const PLOTS_MS = 66 // the plots beside are repainted no more often than this wh
 const DIM = 0.35 // chains under the marks of Fig. 5
 const SWING = 2.2 // s, for the displacement field to go to and fro
 
+const NARROW = 900 // px; there the sidebar lies over the page
+
 const ICONS = {
   restart: "M6 5h2v14H6zM20 5v14L9 12z",
   back: "M18 5v14L8 12z",
@@ -422,6 +424,7 @@ export function render({ model, view }) {
   const observer = new ResizeObserver(() => scene.resize())
   observer.observe(scene.root)
   model.on("remove", () => { observer.disconnect(); window.removeEventListener("keydown", key) })
+  model.narrow = window.innerWidth < NARROW
   load()
   displace()
   return root

@@ -318,8 +318,7 @@ def test_closing_the_page_ends_its_computation(state):
     while job.fraction is None:
         time.sleep(0.01)  # until it is under way
     state.close()
-    job.wait(30)
-    assert job.ended and job.result is None and job.error == ""
+    assert job.wait(30) and job.result is None and job.error == ""
 
 
 def test_progress_grows_and_estimates_the_rest(state, wait_for):
@@ -478,6 +477,5 @@ def test_a_walk_in_the_store_is_found_not_computed(library):
     chosen = selected("walk", cell_parameters(1))
     stored = library.find("walk", cell_parameters(1))
     job = Job(compute.states(library, chosen))
-    job.wait(60)
-    assert job.error == "" and job.result.cell.mu == 1
+    assert job.wait(60) and job.error == "" and job.result.cell.mu == 1
     assert stored.store is library.shipped
