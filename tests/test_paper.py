@@ -51,7 +51,7 @@ def test_the_default_plan_is_the_papers():
     frictions = {task.mu for task in walks}
     assert 0 in frictions
     assert len(frictions - {0}) >= 12
-    assert min(frictions - {0}) == 0.001
+    assert {0.001, 10} <= frictions
     assert max(frictions) == 10
     for mu in frictions:
         assert {task.seed for task in walks if task.mu == mu} == set(range(1, 11))
@@ -261,7 +261,7 @@ def test_findings_compare_the_same_packings():
         assert told[f"η2 of the walk over η2 of S, {word} μ"].value == pytest.approx(2)
         assert told[f"η2 by Gauss–Seidel over default, {word} μ"].value == pytest.approx(1)
     assert told["μ where exact η3 is largest"].value == pytest.approx(0.1, rel=0.3)
-    slope = told["slope of log exact η3 against log μ, μ ≤ 0.01"]
+    slope = told["slope of log exact η3 against log μ, μ = 0.001 … 0.01"]
     assert slope.low < slope.value < slope.high
     assert slope.value == pytest.approx(0.95, abs=0.1)  # the function given, not quite ∝ μ
     assert told["⟨F_crit⟩ over ⟨limit load⟩, large μ"].value == pytest.approx(0.5)

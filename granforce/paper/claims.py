@@ -77,15 +77,12 @@ def maximum(table):
 def small_friction(table):
     """η ∝ μ at small μ, with a floor from the solver's accuracy at 0."""
     groups = statistics.grouped(table.part("walk"), "eta2")
-    few = {mu: values for mu, values in groups.items() if 0 < mu <= SMALL[1]}
-
-    def slope(*values):
-        return np.polyfit(np.log(list(few)), [np.log(np.mean(v)) for v in values], 1)[0]
-
+    few = {mu: groups[mu] for mu in [mu for mu in groups if mu > 0][:2]}
+    word = " and ".join(f"{mu:g}" for mu in few)
     yield _claim(
         "η ∝ μ at small μ",
-        f"slope of log η2 against log μ, 0 < μ ≤ {SMALL[1]:g}",
-        slope,
+        f"slope of log η2 against log μ, μ = {word}",
+        slope(few),
         few.values() if len(few) > 1 else [],
         good=(0.9, 1.1),
         fair=(0.7, 1.3),
@@ -213,13 +210,10 @@ def size(table):
             if row["mu"] == mu:
                 groups.setdefault(row["n"], []).append(row["eta2"])
 
-        def slope(*values, sizes=tuple(groups)):
-            return np.polyfit(np.log(sizes), [np.log(np.mean(v)) for v in values], 1)[0]
-
         yield _claim(
             f"η hardly depends on N (μ = {mu:g})",
             f"slope of log η2 against log N, N = {min(groups)} … {max(groups)}",
-            slope,
+            slope(groups),
             groups.values() if len(groups) > 1 else [],
             good=(-0.1, 0.1),
             fair=(-0.3, 0.3),
@@ -306,6 +300,12 @@ def _range(ends):
 
 def _positive(groups):
     return {mu: values for mu, values in groups.items() if mu > 0 and np.mean(values) > 0}
+
+
+def slope(groups):
+    """Statistic: slope of the logarithm of means over packings against that of the keys."""
+    x = np.log(list(groups))
+    return lambda *values: np.polyfit(x, [np.log(np.mean(v)) for v in values], 1)[0]
 
 
 def peak(frictions):

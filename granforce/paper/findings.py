@@ -7,7 +7,7 @@ packing. They tell why a claim holds or does not.
 import numpy as np
 
 from granforce import statistics
-from granforce.paper.claims import LARGE, MIDDLE, SMALL, Claim, peak, pooled
+from granforce.paper.claims import LARGE, MIDDLE, SMALL, Claim, peak, pooled, slope
 
 _RANGES = (("small", SMALL), ("intermediate", MIDDLE), ("large", LARGE))
 
@@ -54,11 +54,7 @@ def exact_shape(table):
         groups = {mu: values for mu, values in groups.items() if mu > 0 and values.mean() > 0}
         if len(groups) > 2:
             yield _finding(f"μ where {label} is largest", peak(list(groups)), groups.values())
-        few = {mu: values for mu, values in groups.items() if mu <= SMALL[1]}
-        if len(few) > 1:
-            yield _finding(
-                f"slope of log {label} against log μ, μ ≤ {SMALL[1]:g}", _slope(few), few
-            )
+        yield from _growth(groups, label)
     for word, span in _RANGES:
         items = pooled(table.extents("exact"), span)
         if items:
@@ -70,6 +66,21 @@ def exact_shape(table):
             )
 
 
+def opened(table):
+    """How η grows with the friction of the cones alone, in packings made without friction."""
+    groups = statistics.grouped(table.part("opened_exact"), "eta3")
+    yield from _growth(groups, "exact η3, packings made at μ = 0,")
+
+
+def _growth(groups, label):
+    """Slopes on both sides of the crossover at 0.001."""
+    for low, high in ((0, 0.001), (0.001, SMALL[1])):
+        few = {mu: groups[mu] for mu in groups if low <= mu <= high and mu > 0}
+        if len(few) > 1:
+            ends = f"μ = {min(few):g} … {max(few):g}"
+            yield _finding(f"slope of log {label} against log μ, {ends}", slope(few), few)
+
+
 def size(table):
     """Whether exact η3 depends on N."""
     rows = table.part("size_exact", "exact")
@@ -77,7 +88,7 @@ def size(table):
         groups = statistics.grouped([row for row in rows if row["mu"] == mu], "eta3", "n")
         if len(groups) > 1:
             yield _finding(
-                f"slope of log exact η3 against log N, μ = {mu:g}", _slope(groups), groups
+                f"slope of log exact η3 against log N, μ = {mu:g}", slope(groups), groups
             )
 
 
@@ -91,7 +102,7 @@ def strength(table):
     yield from _by_range(statistics.grouped(rows, "part_of_load"), "⟨F_crit⟩ over ⟨limit load⟩")
 
 
-FAMILIES = (sampled_part, measure, solver, exact_shape, size, strength)
+FAMILIES = (sampled_part, measure, solver, exact_shape, opened, size, strength)
 
 
 def _ratios(table, name, above, below):
@@ -110,11 +121,6 @@ def _by_range(groups, statement):
         values = [v for mu, group in groups.items() if low <= mu <= high for v in group]
         if values:
             yield _finding(f"{statement}, {word} μ", np.mean, [values])
-
-
-def _slope(groups):
-    x = np.log(list(groups))
-    return lambda *values: np.polyfit(x, [np.log(np.mean(v)) for v in values], 1)[0]
 
 
 def _finding(statement, statistic, groups, **options):
