@@ -144,14 +144,15 @@ class View(Seen):
             ("opened", f"{pushed.opened}"),
             ("slid", f"{pushed.slid}"),
             ("kept", f"{pushed.kept}"),
-            ("α", f"{pushed.exponent:.2f}"),
         ]
         text = (
             f"F_crit lies between {pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩, never above the "
             "limit load, beyond which no equilibrium exists. Above it the grains set off: |u| is "
-            "their first motion without dilation; its mean in shells falls like "
-            f"r^−{pushed.exponent:.2f}."
+            "their first motion without dilation."
         )
+        if np.isfinite(pushed.exponent):  # not in boxes too small for a fit
+            tiles.append(("α", f"{pushed.exponent:.2f}"))
+            text += f" Its mean in shells falls like r^−{pushed.exponent:.2f}."
         self._say(text, [self._decay(pushed)], _tiles(tiles))
 
     def _decay(self, pushed):

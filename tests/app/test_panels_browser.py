@@ -108,7 +108,7 @@ def download(page, action, folder):
 
 @pytest.mark.parametrize("width, dark", [(1280, 0), (1280, 1), (400, 0)])
 def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
-    page = visit(f"?tab=projection&dark={dark}", width)
+    page = visit(f"?tab=projection&dark={dark}", width, 1000 if width > 400 else 2200)
     filled(page, "outer")
     page.wait_for_timeout(500)
     across, up = figure_of(page, "path")
@@ -156,7 +156,7 @@ def test_statistics_are_drawn_one_after_another(visit):
 
 
 def test_statistics_by_night_on_a_narrow_screen(visit):
-    page = visit("?tab=statistics&dark=1", width=400)
+    page = visit("?tab=statistics&dark=1", width=400, height=2200)
     drawn(page, 2)
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
