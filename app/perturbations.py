@@ -10,8 +10,6 @@ from .distributions import alike, rows
 
 # Fewer contacts than this say little about the mean over all.
 ENOUGH_CONTACTS = 10
-# Parts of the bar: limit loads, before the dynamics.
-LOAD_SHARE = 0.2
 
 
 class Loads(NamedTuple):
