@@ -7,7 +7,6 @@ a visitor may ask for, see app/limits.py.
 
 import gc
 import importlib
-import importlib.util
 from functools import partial
 
 import panel as pn
@@ -54,7 +53,7 @@ def page():
         pn.Column(),
     )
     whole = pmui.Page(
-        title="granforce — how undetermined are contact forces?",
+        title="granforce — see force space",
         sidebar=[sidebar],
         sidebar_width=290,
         main=[
@@ -93,9 +92,6 @@ def page():
 
     pn.state.onload(partial(go_on, parts()))
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
-    packing.player.param.watch(
-        lambda event: whole.param.update(sidebar_open=not event.new), "narrow"
-    )
     _poll_while_running(state, document)
     _tell_address(state)
     pn.state.on_session_destroyed(lambda context: state.close())
@@ -113,7 +109,7 @@ class Tabs:
 
     def __init__(self, state):
         self.state = state
-        self.names = [name for name in TABS if _module(name) is not None]
+        self.names = list(TABS)
         self.pages = {name: pn.Column(sizing_mode="stretch_width") for name in self.names}
         if state.tab not in self.names:
             state.tab = self.names[0]
@@ -142,9 +138,8 @@ class Tabs:
 
 
 def _module(name):
-    if importlib.util.find_spec(f"app.views.{name}") is None:
-        return None
-    return importlib.import_module(f"app.views.{name}")
+    # Relative: `panel serve` names the package after the folder, without a place to find it by.
+    return importlib.import_module(f".views.{name}", __package__)
 
 
 def _poll_while_running(state, document):

@@ -9,7 +9,7 @@ const PLOTS_MS = 66 // the plots beside are repainted no more often than this wh
 const DIM = 0.35 // chains under the marks of Fig. 5
 const SWING = 2.2 // s, for the displacement field to go to and fro
 
-const NARROW = 900 // px; there the sidebar lies over the page
+const NARROW = 600 // px; there the sidebar lies over the page
 
 const ICONS = {
   restart: "M6 5h2v14H6zM20 5v14L9 12z",
@@ -424,8 +424,12 @@ export function render({ model, view }) {
   const observer = new ResizeObserver(() => scene.resize())
   observer.observe(scene.root)
   model.on("remove", () => { observer.disconnect(); window.removeEventListener("keydown", key) })
-  model.narrow = window.innerWidth < NARROW
   load()
   displace()
+  if (window.innerWidth < NARROW) {
+    const models = [...view.model.document._all_models.values()]
+    const page = models.find(({ data }) => data?.sidebar_open !== undefined)
+    setTimeout(() => { if (page) page.data.sidebar_open = false }, 200) // when it listens
+  }
   return root
 }

@@ -30,7 +30,6 @@ class Player(JSComponent):
     thickness = param.String(default="normal")
     overlay = param.Boolean()
     scale = param.String(default="mean")
-    narrow = param.Boolean(doc="set by the browser where the sidebar would cover the packing")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
     # One module from three files: a component has no address from which it could import others.
