@@ -25,7 +25,9 @@ def serve(folder, *options, **variables):
         port = free.getsockname()[1]
     env = os.environ | variables
     env.setdefault("GRANFORCE_CACHE", str(folder / "cache"))
-    command = [sys.executable, "-m", "panel", "serve", "app", "--port", str(port), *options]
+    # The program, not `python -m panel`, which would find modules in the working folder too.
+    panel = Path(sys.executable).with_name("panel")
+    command = [str(panel), "serve", "app", "--port", str(port), *options]
     with open(folder / "log", "w") as log:
         server = subprocess.Popen(command, cwd=ROOT, env=env, stdout=log, stderr=log)
     try:
