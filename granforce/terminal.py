@@ -34,6 +34,8 @@ def table(rows, names, heads):
 def text(value):
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, (list, tuple)):
+        return " ".join(text(part) for part in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
