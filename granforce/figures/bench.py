@@ -21,7 +21,7 @@ def benchmark(results, *, backend="bokeh"):
 def _relaxation(rows, backend):
     series = _by(rows, "solver", "mu", "seconds")
     words = {"title": "one relaxation to 1e-9 ⟨f_n⟩", "x": "μ", "y": "time / s"}
-    yield _frame(series, backend, words, logx=True, logy=True)
+    yield _frame(series, backend, words, room=50.0, logx=True, logy=True)
 
 
 def _scaling(rows, backend):
@@ -34,7 +34,7 @@ def _compaction(rows, backend):
     named = [row | {"name": f"Δt = {row['dt']:g}"} for row in rows]
     series = _by(named, "name", "seconds", "overlap")
     words = {"title": "compaction", "x": "time / s", "y": "mean overlap / r_max"}
-    yield _frame(series, backend, words, logx=True, logy=True)
+    yield _frame(series, backend, words, legend="top_right", logx=True, logy=True)
 
 
 def _intervals(rows, backend):
@@ -43,13 +43,13 @@ def _intervals(rows, backend):
         series = _by(chosen, "method", "seconds", "extent_part")
         words = {"title": f"walks against exact bounds, μ = {mu:g}", "x": "time / s"}
         words["y"] = "seen part of exact ⟨ΔF_n⟩"
-        yield _frame(series, backend, words, logx=True, ylim=(0, 1.1))
+        yield _frame(series, backend, words, legend="bottom_right", logx=True, ylim=(-0.6, 1.1))
 
 
 def _uniform(rows, backend):
     series = _by(rows, "method", "h", "seconds_per_state")
     words = {"title": "uniform sampling", "x": "h", "y": "processor time per effective state / s"}
-    yield _frame(series, backend, words, logx=True, logy=True)
+    yield _frame(series, backend, words, room=200.0, logx=True, logy=True)
 
 
 _DRAWN = {
@@ -70,10 +70,14 @@ def _by(rows, name, x, y):
     return series
 
 
-def _frame(series, backend, words, **axes):
+def _frame(series, backend, words, *, legend="top_left", room=1.0, **axes):
+    """room: factor by which a logarithmic axis reaches above the data, for the legend."""
     drawn = []
+    y = [point[1] for points in series.values() for point in points]
+    if room > 1:
+        axes["ylim"] = min(y) / 2, room * max(y)
     for k, (name, points) in enumerate(series.items()):
         colour = style.COLOURS[k % len(style.COLOURS)]
         drawn.append(style.line(sorted(points), name, colour, backend))
         drawn.append(style.dots(sorted(points), name, colour, backend, style.MARKERS[k % 5]))
-    return style.frame(drawn, backend, legend="bottom_right", **words, **axes)
+    return style.frame(drawn, backend, legend=legend, **words, **axes)
