@@ -5,9 +5,11 @@ raised step by step; each step starts from the last equilibrium and follows the 
 dynamics (`exact_step`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps
 found no equilibrium. As long as grains come to rest, each load lies RISE of the way to the static
 limit load, beyond which no equilibrium exists; after the first motion, F is halved in from the
-last equilibrium. The critical force F_crit is the largest load at rest, known to `precision` ⟨f_n⟩.
-The pair counts in the balance of the grains and in the pressure like a force of the contact
-itself, but not in its Coulomb cone, and the box may dilate at constant pressure.
+last equilibrium. Motion above the bracket that was not steady yet is followed for STEADY_STEPS;
+if it comes to rest, the rise goes on from there. The critical force F_crit is the largest load at
+rest, known to `precision` ⟨f_n⟩. The pair counts in the balance of the grains and in the pressure
+like a force of the contact itself, but not in its Coulomb cone, and the box may dilate at constant
+pressure.
 
 F_crit ≤ limit load. They are not equal: sliding contacts do not dilate (the law is not
 associated), so grains can set off although an equilibrium exists.
@@ -88,22 +90,20 @@ def critical_force(
         limit_load = limit_load_bounds(S, [position]).load[0]
     limit = float(limit_load) / S.force_scale
     step = exact_step.make_step(S)
-    forces, low, high, moving = _start(S) / S.force_scale, 0.0, limit, None
+    forces, low, high = _start(S) / S.force_scale, 0.0, limit
     counts = dict.fromkeys(COUNTS, 0)
-    while high - low > precision:
-        if cancel is not None and cancel():
-            raise Cancelled(f"critical force of contact {contact} cancelled")
-        load = low + (RISE if moving is None else 0.5) * (high - low)
-        load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
-        outcome = exact_step.relax(step, forces, position, load, max_steps=max_steps)
-        counts["flow_steps"] += outcome.steps
-        counts["linear_systems"] += outcome.iterations
-        if outcome.at_rest:
-            low, forces = load, outcome.forces
-            counts["loads_at_rest"] += 1
-        else:
-            high, moving = load, outcome
-            counts["loads_moving" if outcome.converged else "loads_undecided"] += 1
+    while True:
+        low, high, forces, moving = _bracket(
+            step, position, low, high, forces, precision, max_steps, counts, cancel
+        )
+        if moving is None or moving.breach <= STEADY:
+            break
+        # What was taken for motion is followed on: it may come to rest after all.
+        followed = _relax(step, moving.forces, position, high, counts, STEADY_STEPS, STEADY)
+        if not followed.at_rest:
+            moving = followed
+            break
+        low, high, forces, moving = high, limit, followed.forces, None
     loaded = forces.copy()
     loaded[position, 0] += low
     return CriticalForce(
@@ -119,6 +119,36 @@ def critical_force(
         counts,
         time.perf_counter() - begin,
     )
+
+
+def _bracket(step, position, low, high, forces, precision, max_steps, counts, cancel):
+    """Loads raised from `low` until rest and motion are `precision` apart, or rest reaches `high`.
+
+    Returns the bracket, the last equilibrium and the motion above it, None where there was none.
+    """
+    moving = None
+    while high - low > precision:
+        if cancel is not None and cancel():
+            raise Cancelled("critical force cancelled")
+        load = low + (RISE if moving is None else 0.5) * (high - low)
+        load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
+        outcome = _relax(step, forces, position, load, counts, max_steps)
+        if outcome.at_rest:
+            low, forces = load, outcome.forces
+        else:
+            high, moving = load, outcome
+    return low, high, forces, moving
+
+
+def _relax(step, forces, position, load, counts, max_steps, steady=exact_step.STEADY):
+    outcome = exact_step.relax(step, forces, position, load, steady=steady, max_steps=max_steps)
+    counts["flow_steps"] += outcome.steps
+    counts["linear_systems"] += outcome.iterations
+    if outcome.at_rest:
+        counts["loads_at_rest"] += 1
+    else:
+        counts["loads_moving" if outcome.converged else "loads_undecided"] += 1
+    return outcome
 
 
 def _position(S, contact):
@@ -161,8 +191,8 @@ def response(packing, contact, force=None, *, mu=None, critical=None, precision=
     load = critical.high / scale + (precision if moving is None else 0.0)
     if force is not None:
         load, moving = float(force) / scale, None
-    if moving is None or moving.breach > STEADY:
-        start = critical.forces / scale if moving is None else moving.forces
+    if moving is None:
+        start = critical.forces / scale
         moving = exact_step.relax(
             step, start, position, load, steady=STEADY, max_steps=STEADY_STEPS
         )

@@ -55,6 +55,17 @@ def test_sliding_lets_grains_set_off_below_the_limit_load():
     assert min(part) < 0.8
 
 
+def test_what_is_given_up_too_early_is_followed_before_it_counts_as_motion():
+    S = ensemble(packed(60, 0.1))
+    for contact in S.index[:60:12]:
+        found = critical_force(S, contact, max_steps=2)
+        assert found.moving is None or found.moving.breach <= perturb.STEADY
+        # Two steps decide next to nothing: without following F_crit would be far too low.
+        usual = critical_force(S, contact)
+        assert found.low == pytest.approx(usual.low, rel=0.1, abs=0.02 * S.force_scale)
+        assert response(S, contact, critical=found).converged
+
+
 def swept(S, forces, position, load, sweeps):
     """Gauss–Seidel sweeps under a pair: forces and unbalance, in ⟨f_n⟩."""
     problem, velocity, dilation, _ = _from_rest(S)
