@@ -48,10 +48,13 @@ def bootstrap(statistic, groups, seed=0, resamples=RESAMPLES):
     """(value, low, high) of statistic(*groups) with a percentile interval.
 
     groups: sequences, one item per packing; each group is resampled on its own. Groups of one
-    packing do not vary. The result is a function of the seed.
+    packing do not vary; where all are such there is no interval (NaN). The result is a function of
+    the seed.
     """
     rng = np.random.default_rng(seed)
     groups = [list(group) for group in groups]
+    if max(map(len, groups)) < 2:
+        return float(statistic(*groups)), float("nan"), float("nan")
     drawn = np.empty(resamples)
     for k in range(resamples):
         chosen = [rng.integers(len(group), size=len(group)) for group in groups]
