@@ -17,6 +17,7 @@ from .data import Library
 from .state import VIEW, AppState
 from .views.controls import Controls
 from .views.packing import PackingView
+from .views.parts import together
 from .views.summary import SummaryView
 
 POLL_MS = 200  # how often the page asks running work how far it is
@@ -39,7 +40,7 @@ def page():
     document = pn.state.curdoc
 
     def wake(function):
-        document.add_next_tick_callback(function)
+        document.add_next_tick_callback(partial(together, function))
 
     query = pn.state.location.search if pn.state.location else ""
     state = AppState(pn.state.as_cached("library", _open_library), wake, query)
@@ -129,7 +130,7 @@ class Tabs:
 
     def _show(self, name):
         self.fill(name)  # first, so that those who follow the state find it in the page
-        self.state.tab = name
+        together(self.state.param.update, tab=name)
 
     def fill(self, name):
         """Make the view of a tab, once."""
@@ -148,7 +149,8 @@ def _poll_while_running(state, document):
 
     def switch(*events):
         if state.busy and not polling:
-            polling.append(document.add_periodic_callback(state.poll, POLL_MS))
+            poll = partial(together, state.poll)
+            polling.append(document.add_periodic_callback(poll, POLL_MS))
         elif polling and not state.busy:
             document.remove_periodic_callback(polling.pop())
 

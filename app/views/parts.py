@@ -3,6 +3,7 @@
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import CustomAction, CustomJS, SaveTool
+from panel.io import unlocked
 
 from .style import plot
 
@@ -26,6 +27,14 @@ setTimeout(() => URL.revokeObjectURL(link.href), 1000)
 """
 
 
+def together(function, **arguments):
+    """Call a function, and send all it changes on the page as one message, in its turn."""
+    # Bokeh sends by itself what Panel does not hold, and that may overtake what waits in Panel's
+    # queue: changes of a plot would reach a browser that has not got the plot yet.
+    with unlocked():
+        function(**arguments)
+
+
 class Seen:
     """A view that calls `update` when something watched has changed, but only while it is seen.
 
@@ -46,7 +55,7 @@ class Seen:
         """Update if need be and if seen; to be called once when the view has been built."""
         if self._stale and self.visible:
             self._stale = False
-            self.update()
+            together(self.update)
 
     def refresh(self, *events):
         """Update, now or when next seen."""
