@@ -91,6 +91,11 @@ def _add_packing(command, several=False):
     group.add_argument("--sweeps", type=int, default=100, help="sweeps per step (default 100)")
 
 
+def _add_any_packing(command):
+    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
+    _add_packing(command)
+
+
 def _add_walk_options(command):
     group = command.add_argument_group("the random walk")
     group.add_argument("--states", type=int, default=1000, help="accepted states (default 1000)")
@@ -133,8 +138,7 @@ def _add_walk(commands):
 
 
 def _add_source(command):
-    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
-    _add_packing(command)
+    _add_any_packing(command)
     _add_walk_options(command)
     _add_store(command)
 
@@ -147,8 +151,7 @@ def _add_uniform(commands):
         "draw force networks of a packing uniformly, and tell how well that went",
         "granforce uniform -n 400 --mu 0.1 --seed 1 --states 1000 --effective 500",
     )
-    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
-    _add_packing(command)
+    _add_any_packing(command)
     group = command.add_argument_group("the sample")
     group.add_argument("--states", type=int, default=1000, help="at least so many (default 1000)")
     group.add_argument("--sample-seed", type=int, default=0, help="seed of the draws (default 0)")
@@ -236,8 +239,7 @@ def _add_scheduler(command):
 
 
 def _add_exact(command):
-    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
-    _add_packing(command)
+    _add_any_packing(command)
     group = command.add_argument_group("the ensemble")
     group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
     group.add_argument("--contacts", help="only these contacts, numbers separated by commas")
@@ -281,8 +283,7 @@ def _add_perturb(commands):
         "push the grains of single contacts apart until they set off: critical force and motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
     )
-    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
-    _add_packing(command)
+    _add_any_packing(command)
     group = command.add_argument_group("the perturbation")
     which = group.add_mutually_exclusive_group()
     which.add_argument("--random", type=int, default=50, help="so many contacts (default 50)")

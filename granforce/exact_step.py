@@ -28,6 +28,7 @@ import numpy as np
 from numba import njit
 
 from granforce.relax import dissection, frontal_lu
+from granforce.relax.accelerated import geometry
 from granforce.relax.gauss_seidel import BOX_MASS
 from granforce.tolerances import BALANCED
 
@@ -72,32 +73,20 @@ class Outcome(NamedTuple):
 
 def make_step(ensemble):
     """The step problem of an ensemble with the inertia of contact dynamics: m, I and box."""
-    packing, contacts, grains = ensemble.packing, ensemble.contacts, ensemble.grains
-    size, border = 1 + ensemble.per_contact, ensemble.has_pressure_row
-    row_of = np.full(len(packing.r), -1)
-    row_of[grains] = np.arange(len(grains))
-    i, j = row_of[contacts.i], row_of[contacts.j]
-    plan = dissection.make_plan(packing.x[grains], i, j, size, border)
-    rows = dissection.slots(i, j, size, border, len(grains))
-    columns = np.zeros((*rows.shape, 2))
-    A = ensemble.A.tocsr()
-    for component in range(ensemble.per_contact):
-        unknown = ensemble.per_contact * np.arange(len(rows)) + component
-        columns[:, :, component] = np.asarray(A[rows, unknown[:, None]].todense())
-    mass = _inertia(ensemble, size, border)
-    yielding = np.einsum("csk,cs->ck", columns**2, 1 / mass[rows])
+    shape = geometry(ensemble)
+    mass = _inertia(ensemble)
+    yielding = np.einsum("csk,cs->ck", shape.columns**2, 1 / mass[shape.rows])
     stiffness = 1 / np.where(yielding > 0, yielding, 1.0)
-    b = ensemble.b / ensemble.force_scale
-    return Step(plan, rows, columns, b, mass, stiffness, float(ensemble.mu))
+    return Step(shape.plan, shape.rows, shape.columns, shape.b, mass, stiffness, shape.mu)
 
 
-def _inertia(ensemble, size, border):
-    packing = ensemble.packing
+def _inertia(ensemble):
+    packing, size = ensemble.packing, 1 + ensemble.per_contact
     longest = float(packing.r.max())
     # The velocity that goes with a torque/r is r ω: its inertia is I/r² = m/2.
     grain = np.pi * (packing.r[ensemble.grains] / longest) ** 2
     mass = (grain[:, None] * np.array([1.0, 1.0, 0.5])[:size]).ravel()
-    if not border:
+    if not ensemble.has_pressure_row:
         return mass
     # The one that goes with the mean normal force Σ f_n ℓ / Σ ℓ is λ Σ ℓ.
     return np.append(mass, 2 * packing.volume * BOX_MASS / ensemble.contacts.length.sum() ** 2)

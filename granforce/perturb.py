@@ -23,8 +23,8 @@ import numpy as np
 from granforce import exact_step
 from granforce.bounds import limit_load_bounds
 from granforce.polytope import Ensemble, ensemble
-from granforce.records import Cancelled, InputError, NotJammedError, positive
-from granforce.relax.nearest import nearest
+from granforce.records import Cancelled, InputError, positive
+from granforce.relax.nearest import starting_network
 
 # Part of the way from the last load at rest to the limit load that the next load goes.
 RISE = 0.4
@@ -85,12 +85,12 @@ def critical_force(
     begin = time.perf_counter()
     precision = positive(precision, "precision")
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
-    position = _position(S, contact)
+    (position,) = S.positions([contact])
     if limit_load is None:
         limit_load = limit_load_bounds(S, [position]).load[0]
     limit = float(limit_load) / S.force_scale
     step = exact_step.make_step(S)
-    forces, low, high = _start(S) / S.force_scale, 0.0, limit
+    forces, low, high = starting_network(S) / S.force_scale, 0.0, limit
     counts = dict.fromkeys(COUNTS, 0)
     while True:
         low, high, forces, moving = _bracket(
@@ -103,7 +103,7 @@ def critical_force(
         if not followed.at_rest:
             moving = followed
             break
-        low, high, forces, moving = high, limit, followed.forces, None
+        low, high, forces = high, limit, followed.forces
     loaded = forces.copy()
     loaded[position, 0] += low
     return CriticalForce(
@@ -151,27 +151,6 @@ def _relax(step, forces, position, load, counts, max_steps, steady=exact_step.ST
     return outcome
 
 
-def _position(S, contact):
-    """Position among the ensemble's contacts; InputError if it is none of them."""
-    position = np.flatnonzero(S.index == contact)
-    if not len(position):
-        raise InputError(
-            f"contact {contact} is none of the {len(S.index)} that carry a load in this packing"
-        )
-    return int(position[0])
-
-
-def _start(S):
-    if S.admits(S.original):
-        return S.original
-    found = nearest(S, S.original)
-    if not found.converged:
-        raise NotJammedError(
-            f"no admissible network found to start from (residual {found.residual:.1e} ⟨f_n⟩)"
-        )
-    return found.forces
-
-
 def response(packing, contact, force=None, *, mu=None, critical=None, precision=0.01):
     """The first motion under a force pair on one contact, beyond its critical force.
 
@@ -185,7 +164,7 @@ def response(packing, contact, force=None, *, mu=None, critical=None, precision=
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
     if critical is None:
         critical = critical_force(S, contact, precision=precision)
-    position, scale = _position(S, contact), S.force_scale
+    (position,), scale = S.positions([contact]), S.force_scale
     step = exact_step.make_step(S)
     moving = critical.moving
     load = critical.high / scale + (precision if moving is None else 0.0)

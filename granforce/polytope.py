@@ -86,6 +86,17 @@ class Ensemble:
         scale = 1 / np.where(largest > 0, largest, 1.0)
         return sparse.csc_matrix(sparse.diags(scale) @ A), scale * self.b / self.force_scale, T
 
+    def positions(self, contacts):
+        """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
+        contacts = np.asarray(contacts, dtype=int)
+        unknown = np.setdiff1d(contacts, self.index)
+        if len(unknown):
+            raise InputError(
+                f"contact {unknown[0]} is none of the {len(self.index)} that carry a load in this "
+                "packing"
+            )
+        return np.searchsorted(self.index, contacts)
+
     def to_vector(self, forces):
         """Forces (…, N_c, 2) as vectors x (…, unknowns)."""
         forces = np.asarray(forces, dtype=np.float64)

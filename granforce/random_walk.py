@@ -12,7 +12,7 @@ import numpy as np
 
 from granforce.records import Cancelled, InputError, NotJammedError
 from granforce.relax.accelerated import accelerated
-from granforce.relax.nearest import nearest
+from granforce.relax.nearest import starting_network
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
 
@@ -45,15 +45,7 @@ def init(ensemble, seed):
 
     seed: anything numpy.random.default_rng takes. Raises NotJammedError where S is empty.
     """
-    forces = ensemble.original
-    if not ensemble.admits(forces):
-        found = nearest(ensemble, forces)
-        if not found.converged:
-            raise NotJammedError(
-                f"no admissible network found to start from (residual {found.residual:.1e} ⟨f_n⟩)"
-            )
-        forces = found.forces
-    return WalkState(np.array(forces), np.random.default_rng(seed))
+    return WalkState(np.array(starting_network(ensemble)), np.random.default_rng(seed))
 
 
 def step(ensemble, state, *, relax=accelerated, **options):

@@ -75,8 +75,7 @@ def walk_parameters(packing, states, seed=0, *, mu=None, relax="accelerated", ch
     if not 1 <= int(chains) <= int(states) or (keep is not None and keep < 1):
         raise InputError("states, keep and chains must be at least 1, and chains ≤ states")
     return {
-        "packing": packing,
-        "mu": packing["mu"] if mu is None else friction(mu),
+        **_cones(packing, mu),
         "states": int(states),
         "seed": int(seed),
         "relax": relax,
@@ -109,8 +108,7 @@ def get_walk(store, parameters, *, workers=1, dtypes=None, progress=None, cancel
     """
 
     def compute():
-        packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
-        S = ensemble(packing, parameters["mu"])
+        S = _ensemble(store, parameters, cancel)
         begin = time.perf_counter()
         done = walk(
             S,
@@ -149,8 +147,7 @@ def uniform_parameters(packing, states, seed=0, *, mu=None, chains=4, effective=
     if min(int(states), int(chains)) < 1 or (keep is not None and keep < 1):
         raise InputError("states, keep and chains must be at least 1")
     return {
-        "packing": packing,
-        "mu": packing["mu"] if mu is None else friction(mu),
+        **_cones(packing, mu),
         "states": int(states),
         "seed": int(seed),
         "chains": int(chains),
@@ -167,8 +164,7 @@ def get_uniform(store, parameters, *, workers=2, dtypes=None, progress=None, can
     """
 
     def compute():
-        packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
-        S = ensemble(packing, parameters["mu"])
+        S = _ensemble(store, parameters, cancel)
         begin = time.perf_counter()
         drawn = sample_uniform(
             S,
@@ -188,6 +184,18 @@ def get_uniform(store, parameters, *, workers=2, dtypes=None, progress=None, can
     return found_or_kept(store, "uniform", parameters, compute, UNIFORM_VERSION, dtypes)
 
 
+def _ensemble(store, parameters, cancel, slice_=None):
+    """The ensemble of a named packing and friction, with the forces outside a slice frozen."""
+    packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
+    frozen = None if slice_ is None else outside_slice(packing, slice_)
+    return ensemble(packing, parameters["mu"], frozen=frozen)
+
+
+def _cones(packing, mu):
+    """What names an ensemble: its packing, and its friction coefficient, by default that of it."""
+    return {"packing": packing, "mu": packing["mu"] if mu is None else friction(mu)}
+
+
 def exact_parameters(packing, *, mu=None, contacts=None, slice_=None):
     """The parameters that name exact bounds or limit loads of one packing.
 
@@ -195,11 +203,9 @@ def exact_parameters(packing, *, mu=None, contacts=None, slice_=None):
     packing's contact list, by default all that carry. slice_: (x0, x1, y0, y1) in parts of the
     box: contacts with a grain outside are frozen at their original forces.
     """
-    mu = packing["mu"] if mu is None else friction(mu)
     chosen = None if contacts is None else sorted({int(c) for c in contacts})
     return {
-        "packing": packing,
-        "mu": mu,
+        **_cones(packing, mu),
         "contacts": chosen,
         "slice": None if slice_ is None else [float(edge) for edge in slice_],
     }
@@ -207,20 +213,10 @@ def exact_parameters(packing, *, mu=None, contacts=None, slice_=None):
 
 def exact_ensemble(store, parameters, *, cancel=None):
     """The ensemble that exact_parameters name, and the asked contacts as positions in it."""
-    packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
-    frozen = None
-    if parameters["slice"] is not None:
-        frozen = outside_slice(packing, parameters["slice"])
-    S = ensemble(packing, parameters["mu"], frozen=frozen)
+    S = _ensemble(store, parameters, cancel, parameters["slice"])
     if parameters["contacts"] is None:
         return S, np.arange(len(S.index))
-    asked = np.array(parameters["contacts"], dtype=int)
-    unknown = np.setdiff1d(asked, S.index)
-    if len(unknown):
-        raise InputError(
-            f"contact {unknown[0]} is none of the {len(S.index)} that carry a load in this packing"
-        )
-    return S, np.searchsorted(S.index, asked)
+    return S, S.positions(parameters["contacts"])
 
 
 def get_intervals(store, parameters, *, workers=2, progress=None, cancel=None):
@@ -301,9 +297,8 @@ def outline_parameters(packing, *, mu=None, components=None, states=None, tolera
     """
     if (components is None) == (states is None):
         raise InputError("the plane of an outline is given by two components, or by states")
-    mu = packing["mu"] if mu is None else friction(mu)
     chosen = None if components is None else [[int(c), int(part)] for c, part in components]
-    named = {"packing": packing, "mu": mu, "tolerance": float(tolerance)}
+    named = _cones(packing, mu) | {"tolerance": float(tolerance)}
     return named | {"components": chosen, "states": states}
 
 
@@ -315,8 +310,7 @@ def get_outline(store, parameters, axes=None, *, workers=2, progress=None, cance
     """
 
     def compute():
-        packing, _ = get_packing(store, parameters["packing"], cancel=cancel)
-        S = ensemble(packing, parameters["mu"])
+        S = _ensemble(store, parameters, cancel)
         plane = _component_axes(S, parameters["components"]) if axes is None else axes
         begin = time.perf_counter()
         found = outline(
@@ -373,8 +367,7 @@ def perturbation_parameters(
     if random is not None and random < 1:
         raise InputError("at least one contact must be perturbed")
     return {
-        "packing": packing,
-        "mu": packing["mu"] if mu is None else friction(mu),
+        **_cones(packing, mu),
         "contacts": None if contacts is None else sorted({int(c) for c in contacts}),
         "random": None if random is None else int(random),
         "seed": None if random is None else int(seed),

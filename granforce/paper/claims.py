@@ -62,7 +62,7 @@ def agreement(table):
 def maximum(table):
     """η(μ) is largest near μ = 0.1."""
     for name, label in (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3")):
-        groups = _positive(statistics.grouped(table.part("walk"), name))
+        groups = positive(statistics.grouped(table.part("walk"), name))
         if len(groups) > 2:
             yield _claim(
                 f"{label}(μ) is not monotonic: largest near μ = 0.1",
@@ -91,7 +91,7 @@ def small_friction(table):
         "η vanishes at μ = 0 within the solver's accuracy",
         "mean η2 at μ = 0",
         np.mean,
-        [groups[0]] if 0 in groups else [],
+        [groups.get(0, [])],
         good=(0, 1e-7),
     )
 
@@ -109,7 +109,7 @@ def coordination(table):
         (ends[1], "largest", 3, (3.0, 3.1)),
     ):
         told = f"z → {limit} at the {word} μ"
-        yield _claim(told, "mean z there", np.mean, [values] if len(values) else [], good=good)
+        yield _claim(told, "mean z there", np.mean, [values], good=good)
     yield _claim(
         "z falls with μ",
         "rank correlation of mean z with μ",
@@ -134,7 +134,7 @@ def extents(table):
             f"P(ΔF_n) at {word} μ {'has a peak' if peaked else 'falls monotonically'}",
             "how far the density at small ΔF_n lies below its maximum, in parts of it",
             _dip,
-            [group] if group else [],
+            [group],
             good=(0.25, 1) if peaked else (0, 0.1),
             fair=(0.1, 1) if peaked else (0, 0.25),
         )
@@ -143,7 +143,7 @@ def extents(table):
             f"tail of P(ΔF_n) at {word} μ: {how}",
             "b of exp(−(λ ΔF_n)^b) beyond the median",
             lambda items: statistics.tail_exponent(np.concatenate(items)),
-            [groups[word]] if groups[word] else [],
+            [groups[word]],
             good=good,
             fair=fair,
             resamples=199,  # of up to 1e5 contacts each
@@ -162,7 +162,7 @@ def correlation(table):
             f"corr(f_n, ΔF_n) {word} μ",
             "mean over packings",
             np.mean,
-            [values] if values else [],
+            [values],
             good=good,
             fair=fair,
         )
@@ -179,7 +179,7 @@ def place(table):
         "with only the pressure prescribed, indeterminacy is everywhere",
         "undetermined part of the contacts that carry, all μ > 0 (exact)",
         np.mean,
-        [share["exact"]] if share["exact"] else [],
+        [share["exact"]],
         good=(0.9, 1),
         fair=(0.5, 1),
     )
@@ -187,7 +187,7 @@ def place(table):
         "and not in clusters",
         "mean number of clusters of undetermined contacts",
         np.mean,
-        [parts["exact"]] if parts["exact"] else [],
+        [parts["exact"]],
         good=(1, 1.1),
         fair=(1, 2),
     )
@@ -195,7 +195,7 @@ def place(table):
         "with frozen boundary forces it clusters",
         "mean number of clusters inside the frozen boundary",
         np.mean,
-        [parts["frozen"]] if parts["frozen"] else [],
+        [parts["frozen"]],
         good=(1.5, np.inf),
         fair=(1.05, np.inf),
     )
@@ -241,7 +241,7 @@ def perturbation(table):
             good=(0.7, 1),
             fair=(0.3, 1),
         )
-        values = _positive(statistics.grouped(rows, name))
+        values = positive(statistics.grouped(rows, name))
         yield _claim(
             f"{label} is largest near μ = 0.1",
             "μ of the maximum",
@@ -262,7 +262,7 @@ def centre(table):
             f"the original network lies closer to the centre than {word} states",
             f"its distance over the mean of {word} states, mean over packings",
             np.mean,
-            [ratios] if ratios else [],
+            [ratios],
             good=(0, 1),
         )
 
@@ -274,11 +274,11 @@ FAMILIES = (
 
 
 def _claim(statement, measured, statistic, groups, *, good, fair=None, **options):
-    """Judge one number: `groups` as for `statistics.bootstrap`; none of them is no data."""
+    """Judge one number: `groups` as for `statistics.bootstrap`; no or empty ones are no data."""
     fair = good if fair is None else fair
     groups = [list(group) for group in groups]
     criterion = _range(good) + ("" if fair == good else f" [{_range(fair)}]")
-    if not groups:
+    if not groups or not all(groups):
         unknown = float("nan")
         return Claim(statement, measured, unknown, unknown, unknown, criterion, MISSING)
     value, low, high = statistics.bootstrap(statistic, groups, **options)
@@ -300,7 +300,8 @@ def _range(ends):
     return f"{low:g} … {high:g}"
 
 
-def _positive(groups):
+def positive(groups):
+    """Groups of μ > 0 whose mean is positive."""
     return {mu: values for mu, values in groups.items() if mu > 0 and np.mean(values) > 0}
 
 

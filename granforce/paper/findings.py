@@ -7,7 +7,7 @@ packing. They tell why a claim holds or does not.
 import numpy as np
 
 from granforce import statistics
-from granforce.paper.claims import LARGE, MIDDLE, SMALL, Claim, peak, pooled, slope
+from granforce.paper.claims import LARGE, MIDDLE, SMALL, Claim, peak, pooled, positive, slope
 
 _RANGES = (("small", SMALL), ("intermediate", MIDDLE), ("large", LARGE))
 
@@ -50,8 +50,7 @@ def solver(table):
 def exact_shape(table):
     """Maximum, small-μ slope and tails of the exact and of the uniform indeterminacy."""
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
-        groups = statistics.grouped(table.part(part), name)
-        groups = {mu: values for mu, values in groups.items() if mu > 0 and values.mean() > 0}
+        groups = positive(statistics.grouped(table.part(part), name))
         if len(groups) > 2:
             yield _finding(f"μ where {label} is largest", peak(list(groups)), groups.values())
         yield from _growth(groups, label)

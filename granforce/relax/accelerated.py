@@ -89,10 +89,10 @@ def accelerated(ensemble, start, *, tolerance=BALANCED, max_iterations=100):
     N = 400, μ = 0.01 … 10, it takes 0.5 to 0.9 of the time of `nearest`, at N = 25,600 half.
     """
     begin = time.perf_counter()
-    geometry = _geometry(ensemble)
+    shape = geometry(ensemble)
     target = np.ascontiguousarray(start, dtype=np.float64) / ensemble.force_scale
-    at = _room_for(geometry)
-    iterations, ended = _relax(geometry, target, at, min(tolerance, BALANCED) / 4, max_iterations)
+    at = _room_for(shape)
+    iterations, ended = _relax(shape, target, at, min(tolerance, BALANCED) / 4, max_iterations)
     forces = at.x * ensemble.force_scale
     residual = ensemble.residual(forces)
     return Relaxation(
@@ -118,7 +118,7 @@ _known = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
 
 
-def _geometry(ensemble):
+def geometry(ensemble):
     """The Geometry of an ensemble, made on first use and kept as long as the ensemble."""
     with _lock:
         found = _known.get(ensemble)

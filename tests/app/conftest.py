@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from serving import CHROMIUM, FLAGS
 from small_store import cell_parameters
 
 from granforce import study
@@ -17,6 +18,16 @@ def shipped(tmp_path_factory):
     for mu in (0, 0.1, 1):
         study.get_walk(store, cell_parameters(mu), dtypes={"states": "float32"})
     return path
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """Debian's chromium, once for each module."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as context:
+        browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import CHROMIUM, FLAGS, MODEL, column, painted, scene, serve
+from serving import CHROMIUM, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 from granforce import measures
@@ -27,15 +27,6 @@ def address(shipped, tmp_path_factory):
     stores = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_CACHE": str(folder / "cache")}
     with serve(folder, **stores) as (url, _):
         yield url
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as context:
-        browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        yield browser
-        browser.close()
 
 
 def _context(chromium, width):

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from packings import REFERENCE
-from serving import CHROMIUM, FLAGS, MODEL, column, painted, serve
+from serving import CHROMIUM, MODEL, column, painted, serve
 from small_store import DISKS, KEPT, ROOT
 
 import granforce as gf
@@ -27,15 +27,6 @@ def address(shipped, tmp_path_factory):
     """The app with stores of its own."""
     with serve(tmp_path_factory.mktemp("served"), GRANFORCE_DATA=str(shipped)) as (url, _):
         yield url
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as context:
-        browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture
