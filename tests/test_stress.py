@@ -5,7 +5,7 @@ The quick cases run always, the long ones with -m stress.
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from packings import lattice, packed, reference
 
@@ -207,8 +207,9 @@ def test_a_gap_at_the_tolerance_opens_or_closes_a_contact():
 @given(
     seed=st.integers(0, 2**32 - 1),
     amplitude=st.floats(1e-9, 1e3),
-    mu=st.sampled_from([0.02, 0.3, 5.0]),
+    mu=st.sampled_from([0.001, 0.02, 0.3, 5.0]),
 )
+@example(seed=500, amplitude=64.0, mu=0.02)  # hard for regularised linear systems
 def test_any_start_is_relaxed_into_s(seed, amplitude, mu):
     S = ensemble(packed(30, mu))
     start = np.random.default_rng(seed).normal(size=S.original.shape) * amplitude

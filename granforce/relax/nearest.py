@@ -6,7 +6,7 @@ import numpy as np
 import piqp
 from scipy import sparse
 
-from granforce.records import Relaxation
+from granforce.records import NotJammedError, Relaxation
 from granforce.tolerances import BALANCED
 
 
@@ -47,6 +47,21 @@ def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
     )
 
 
+def starting_network(ensemble):
+    """The packing's own network (N_c, 2), or the nearest admissible one if that left S.
+
+    Raises NotJammedError where S is empty.
+    """
+    if ensemble.admits(ensemble.original):
+        return ensemble.original
+    found = nearest(ensemble, ensemble.original)
+    if not found.converged:
+        raise NotJammedError(
+            f"no admissible network found to start from (residual {found.residual:.1e} ⟨f_n⟩)"
+        )
+    return found.forces
+
+
 def least_unbalanced(A, b):
     """y ≥ 0 with the least |A y − b|², and that residual vector, shapes (n,) and (m,)."""
     rows, columns = A.shape
@@ -71,6 +86,8 @@ def _solver(max_iterations):
     solver.settings.max_iter = max_iterations
     solver.settings.eps_abs = 1e-12
     solver.settings.eps_rel = 1e-13
-    # Near isostaticity (small μ) the default regularisation leaves the dual short of its target.
+    # At small μ, far starts and dependent rows the regularised systems alone, or those with the
+    # default's regularisation, end short of their target.
     solver.settings.reg_lower_limit = 1e-14
+    solver.settings.iterative_refinement_always_enabled = True
     return solver
