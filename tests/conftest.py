@@ -1,7 +1,15 @@
-"""Fixtures of all tests."""
+"""Fixtures of all tests, and the examples that properties are tried on."""
+
+import os
 
 import numpy as np
 import pytest
+from hypothesis import settings
+
+# The same examples in every run, as all other random numbers here; HYPOTHESIS_PROFILE=default
+# looks for new ones.
+settings.register_profile("same", derandomize=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 
 @pytest.fixture
