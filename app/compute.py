@@ -1,11 +1,38 @@
 """What the page computes on demand, as work for jobs.Task; all goes through study and the cache."""
 
+import threading
+from contextlib import contextmanager
+from weakref import WeakValueDictionary
+
 from granforce import study
+from granforce.records import Cancelled
 
 from .data import SOURCES, Shown
 
 # A compaction's part of the bar; it never seems to be at its end.
 PACKING_SHARE, NEARLY = 0.5, 0.95
+# How often a job that waits for another one asks whether it was cancelled, s.
+_ASK = 0.2
+
+_turns, _turns_lock = WeakValueDictionary(), threading.Lock()
+
+
+@contextmanager
+def in_turn(job, *named):
+    """One job at a time of those named alike: the next finds in the cache what the first made.
+
+    Raises Cancelled where the job is cancelled while it waits.
+    """
+    with _turns_lock:
+        turn = _turns.setdefault(repr(named), threading.Lock())
+    while not turn.acquire(timeout=_ASK):
+        job.stage = "being computed for another page"
+        if job.cancelled():
+            raise Cancelled
+    try:
+        yield
+    finally:
+        turn.release()
 
 
 def states(library, selection):
@@ -13,17 +40,18 @@ def states(library, selection):
 
     def work(job):
         params = selection.parameters()
-        cell = library.find(selection.kind, params)
-        if cell is None:
-            _make_packing(job, library, selection.packing)
-            job.begin("states")
-            SOURCES[selection.kind][1](
-                library.cache,
-                params,
-                progress=lambda done, total: _tell_states(job, done, total),
-                cancel=job.cancelled,
-            )
+        with in_turn(job, selection.kind, params):
             cell = library.find(selection.kind, params)
+            if cell is None:
+                _make_packing(job, library, selection.packing)
+                job.begin("states")
+                SOURCES[selection.kind][1](
+                    library.cache,
+                    params,
+                    progress=lambda done, total: _tell_states(job, done, total),
+                    cancel=job.cancelled,
+                )
+                cell = library.find(selection.kind, params)
         return library.shown(cell)
 
     return work
@@ -34,15 +62,17 @@ def exact(library, shown, workers=2):
 
     def work(job):
         selection = shown.cell.selection
-        library.lend_packing(selection.packing)
-        job.begin("exact intervals")
-        dataset, _ = study.get_intervals(
-            library.cache,
-            study.exact_parameters(selection.packing, mu=selection.mu),
-            workers=workers,
-            progress=job.tell,
-            cancel=job.cancelled,
-        )
+        params = study.exact_parameters(selection.packing, mu=selection.mu)
+        with in_turn(job, "intervals", params):
+            library.lend_packing(selection.packing)
+            job.begin("exact intervals")
+            dataset, _ = study.get_intervals(
+                library.cache,
+                params,
+                workers=workers,
+                progress=job.tell,
+                cancel=job.cancelled,
+            )
         found = Shown(shown.cell, shown.replay, dataset)
         library.keep_in_memory(found)
         return found

@@ -55,6 +55,7 @@ class Job:
         self._work, self._on_end = work, on_end
         self._begun = time.perf_counter()
         self._cancel, self._ended = threading.Event(), threading.Event()
+        self._taken = threading.Lock()  # by the thread that runs it, or by whoever cancels it first
         pool.submit(self)
 
     def begin(self, stage):
@@ -70,8 +71,10 @@ class Job:
         self.seconds_left = spent / done * (total - done) if 0 < done <= total else None
 
     def cancel(self):
-        """Ask it to end; it does so within about a second, or when it comes to its turn."""
+        """Ask it to end; it does so within about a second, or at once if it has not begun."""
         self._cancel.set()
+        if self._taken.acquire(blocking=False):
+            self._end()
 
     def cancelled(self):
         """Whether it was asked to end."""
@@ -87,11 +90,12 @@ class Job:
         return self._ended.wait(timeout)
 
     def run(self):
-        """Do the work; called by a thread of the pool."""
+        """Do the work, unless cancelled before; called by a thread of the pool."""
+        if not self._taken.acquire(blocking=False):
+            return
         self.begin("starting")
         try:
-            if not self.cancelled():
-                self.result = self._work(self)
+            self.result = self._work(self)
         except Cancelled:
             pass
         except InputError as error:
@@ -99,10 +103,13 @@ class Job:
         except Exception as error:  # told on the page, or nobody would see it
             self.error = f"the computation failed: {type(error).__name__}: {error}"
         finally:
-            self._work = None  # what it refers to may be large
-            self._ended.set()
-            if self._on_end is not None:
-                self._on_end()
+            self._end()
+
+    def _end(self):
+        self._work = None  # what it refers to may be large
+        self._ended.set()
+        if self._on_end is not None:
+            self._on_end()
 
 
 class Task(param.Parameterized):

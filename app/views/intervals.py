@@ -7,8 +7,9 @@ from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 
 from ..state import SCALES, SORTS
 from .packing import exact_intervals
+from .parts import figure
 from .progress import Progress
-from .style import DARK, DOT, ORIGINAL, PALE, SERIES, hover, plot, quiet_legend
+from .style import DARK, DOT, ORIGINAL, PALE, SERIES, hover, quiet_legend
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
@@ -146,7 +147,8 @@ class View:
     # Figures
 
     def _bars_figure(self):
-        fig = plot(
+        fig = figure(
+            "intervals",
             None,
             "contacts",
             "fₙ / ⟨fₙ⟩",
@@ -201,7 +203,8 @@ class View:
         return fig
 
     def _growth_figure(self):
-        fig = plot(
+        fig = figure(
+            "eta_so_far",
             "η of the states shown so far (dashed: of all states)",
             "states",
             "η",

@@ -384,6 +384,56 @@ def test_errors_of_a_job_are_told_not_raised():
     assert "ZeroDivisionError" in task.message and done == []
 
 
+def test_a_job_that_waits_is_cancelled_at_once():
+    from app.jobs import Job, Pool
+
+    release, begun = threading.Event(), []
+    pool = Pool(1, "test")
+    first = Job(lambda job: release.wait(30), pool)
+    second = Job(begun.append, pool)
+    second.cancel()
+    assert second.ended and not first.ended
+    release.set()
+    assert first.wait(10) and Job(lambda job: None, pool).wait(10) and begun == []
+
+
+def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
+    from app import compute
+    from app.jobs import Job, Pool
+    from app.selection import selected
+
+    made, walk, begin = [], study.walk, threading.Barrier(2)
+    monkeypatch.setattr(study, "walk", lambda *a, **k: made.append(1) or walk(*a, **k))
+    work = compute.states(library, selected("walk", cell_parameters(0.2)))
+    pool = Pool(2, "test")
+    jobs = [Job(lambda job: begin.wait(10) >= 0 and work(job), pool) for _ in range(2)]
+    assert all(job.wait(60) and job.error == "" for job in jobs)
+    assert [job.result.cell.mu for job in jobs] == [0.2, 0.2] and made == [1]
+
+
+def test_a_job_that_waits_for_another_page_can_be_cancelled():
+    from app import compute
+    from app.jobs import Job, Pool
+
+    inside, release = threading.Event(), threading.Event()
+
+    def work(job):
+        with compute.in_turn(job, "walk", {"mu": 1}):
+            inside.set()
+            release.wait(30)
+
+    pool = Pool(2, "test")
+    first = Job(work, pool)
+    assert inside.wait(10)
+    second = Job(work, pool)
+    while "another page" not in second.stage:
+        time.sleep(0.01)
+    second.cancel()
+    assert second.wait(10) and not first.ended
+    release.set()
+    assert first.wait(10) and first.error == second.error == ""
+
+
 def test_a_job_wakes_the_page_when_it_ends():
     from app.jobs import Task
 
