@@ -17,7 +17,7 @@ from .data import Library
 from .state import VIEW, AppState
 from .views.controls import Controls
 from .views.packing import PackingView
-from .views.parts import together
+from .views.parts import PLAIN, together
 from .views.summary import SummaryView
 
 POLL_MS = 200  # how often the page asks running work how far it is
@@ -117,7 +117,7 @@ class Tabs:
         self.tabs = pmui.Tabs(
             *((TABS[name], self.pages[name]) for name in self.names),
             active=self.names.index(state.tab),
-            sx={"& .MuiTab-root": {"minWidth": 0, "padding": "12px 9px", "fontSize": "0.8rem"}},
+            sx={"& .MuiTab-root": {"minWidth": 0, "padding": "12px 8px", **PLAIN}},
             sizing_mode="stretch_width",
         )
         self.tabs.param.watch(lambda event: self._show(self.names[event.new]), "active")

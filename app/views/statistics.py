@@ -3,7 +3,7 @@
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
+from bokeh.models import ColumnDataSource, GlyphRenderer, LegendItem, Scatter, Span, TapTool
 
 from .. import distributions
 from ..jobs import reading
@@ -20,7 +20,13 @@ WHAT = {
     "force": "P(fₙ)",
 }
 SCALES = {"linear": "linear", "log": "logarithmic"}
-SCALED = ("eta", "extent", "force")  # those that have both scales
+SCALED = ("eta", "force")  # those that have both scales
+# Beside the linear plot, in its upper right corner where there is nothing, as in the paper; on a
+# narrow screen, below it.
+INSET = """
+:host { position: absolute; top: 118px; right: 8px; width: 52% !important; }
+@media (max-width: 700px) { :host { position: static; width: 100% !important; } }
+"""
 LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
 
 
@@ -74,7 +80,10 @@ class View(Seen):
         figures, text = found
         for fig in figures:
             self._choosable(fig)
-        self.plots.objects = [_pane(fig) for fig in figures]
+        panes = [_pane(fig) for fig in figures]
+        if self.what.value == "extent":
+            panes[1] = pn.Column(panes[1], stylesheets=[INSET], css_classes=["inset"])
+        self.plots.objects = panes
         self.told.object = text
 
     def _follow(self, *events):
@@ -216,23 +225,39 @@ def _indeterminacy(rows, exact, mu, log):
     if exact:
         text += f" Dashed: 0.15 η3 of exact intervals, where known ({len(exact)} packings)."
     drawn = rendered(chosen, ("indeterminacy", "coordination"), heights=(330, 210))
-    legend = drawn[0].legend[0]
-    drawn[0].center.remove(legend)
-    drawn[0].add_layout(legend.clone(orientation="horizontal", ncols=3, visible=True), "above")
+    _legend_above(drawn[0], 3)
     return drawn, text
+
+
+def _legend_above(fig, columns):
+    legend = fig.legend[0]
+    fig.center.remove(legend)
+    fig.add_layout(legend.clone(orientation="horizontal", ncols=columns, visible=True), "above")
 
 
 def _extents(rows, exact, mu, log):
     from granforce import figures
 
     chosen = distributions.groups(rows, mu)
-    page = list(figures.extents(chosen))
+    names = "extents", "extents_logarithmic"
+    drawn = rendered(list(figures.extents(chosen)), names, heights=(440, 185))
+    # HoloViews gave the legend to the second one; the series of both are a line and dots each.
+    series = drawn[1].legend[0].items
+    drawn[0].legend.items = [
+        LegendItem(label=item.label, renderers=drawn[0].renderers[2 * k : 2 * k + 2])
+        for k, item in enumerate(series)
+    ]
+    _legend_above(drawn[0], 2)
+    drawn[1].legend.visible = False
+    quiet = {"min_border_left": 30, "min_border_right": 0, "border_fill_alpha": 0}
+    drawn[1].update(background_fill_alpha=0, **quiet)
+    drawn[1].axis.axis_label = None
     text = (
         "Distribution of ΔFₙ, the extent of each normal force over the states, in units of its "
-        "mean; tails fitted by exp(−(λx)ᵇ) beyond the median: b = 1 is exponential, larger b "
-        "falls faster."
+        "mean, and the same on a logarithmic scale; tails fitted by exp(−(λx)ᵇ) beyond the "
+        "median: b = 1 is exponential, larger b falls faster."
     )
-    return rendered([page[1] if log else page[0]], ("extents",), heights=(380,)), text
+    return drawn, text
 
 
 def _correlations(rows, exact, mu, log):

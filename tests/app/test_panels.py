@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 import zarr
 from packings import REFERENCE, packed
+from panel.pane import Bokeh
 from small_store import KEPT
 
 import granforce as gf
@@ -325,8 +326,8 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     assert not view.plots.objects and not view.task.running
     state.tab = view.name
     settled(state)
-    figures = [pane.object for pane in view.plots.objects]
-    assert len(figures) == (2 if what == "eta" else 1)
+    figures = [pane.object for pane in view.plots.select(Bokeh)]
+    assert len(figures) == (2 if what in ("eta", "extent") else 1)
     columns = [r.data_source.data for fig in figures for r in fig.renderers]
     drawn = np.concatenate([np.ravel(v).astype(float) for c in columns for v in c.values()])
     row = distributions.rows([state.cell])[0]

@@ -152,6 +152,20 @@ def test_statistics_by_night_on_a_narrow_screen(visit):
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_logarithmic_extents_are_an_inset_where_there_is_room(visit, width):
+    page = visit("?tab=statistics", width, 1000 if width > 400 else 2200)
+    drawn(page, 2)
+    page.get_by_role("button", name="P(ΔFₙ)", exact=True).dispatch_event("click")
+    page.locator(".inset").wait_for()
+    drawn(page, 2)
+    whole = page.locator(":has(> .inset) .bk-Figure").first.bounding_box()
+    inset = page.locator(".inset").bounding_box()
+    within = inset["y"] + inset["height"] < whole["y"] + whole["height"]
+    assert within == (width > 400)
+    assert inset["x"] + inset["width"] <= width
+
+
 def test_a_contact_is_pushed_and_its_field_seen(visit):
     page = visit("?tab=perturb&contact=5")
     before = page.locator(".scene").evaluate("element => element.scene.offset")
