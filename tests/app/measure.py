@@ -141,10 +141,10 @@ def stalls(stage):
         other.wait_for_timeout(1500)
         other.context.close()
     print(f"longest stall while pages open: {1000 * _longest(log):.0f} ms")
-    page.locator("input.typed").fill("0.2")
+    page.locator("input.typed").fill("0.17")
     page.locator("input.typed").press("Enter")
     page.get_by_role("button", name="Compute μ").click()
-    page.get_by_text("μ = 0.2, N = 400").wait_for(timeout=300_000)
+    page.get_by_text("μ = 0.17, N = 400").wait_for(timeout=300_000)
     print(f"longest stall while packing and walk are computed: {1000 * _longest(log):.0f} ms")
     page.get_by_role("button", name="Compute exact intervals").click()
     page.get_by_role("button", name="Compute exact intervals").wait_for(
