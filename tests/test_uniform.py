@@ -117,10 +117,10 @@ def test_every_state_is_in_s(S, sample):
 @pytest.mark.slow
 def test_more_than_a_thousand_dimensions():
     S = ensemble(packed(2000, 0.1))
-    sample = sample_uniform(S, 100)
+    sample = sample_uniform(S, 400)
     assert sample.chart.dimension == S.dimension > 1000
     assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
-    assert sample.counts["refused"] == 0 and sample.mixing.worst_r_hat < 1.2
+    assert sample.counts["refused"] == 0 and sample.mixing.worst_r_hat < 1.1
 
 
 def test_chains_mix(sample):
