@@ -85,7 +85,7 @@ def page():
         yield
         right.append(tabs.tabs)
         yield
-        tabs.fill(state.tab)
+        yield from tabs.filling(state.tab)
 
     def go_on(rest):
         if next(rest, "end") != "end":
@@ -134,8 +134,17 @@ class Tabs:
 
     def fill(self, name):
         """Make the view of a tab, once."""
+        for _ in self.filling(name):
+            pass
+
+    def filling(self, name):
+        """The same, piece by piece."""
         if not self.pages[name].objects:
-            self.pages[name].append(_module(name).View(self.state).panel())
+            view = _module(name).View(self.state)
+            yield
+            for piece in view.panel().objects:
+                self.pages[name].append(piece)
+                yield
 
 
 def _module(name):
