@@ -53,8 +53,8 @@ def wait_for_fixture():
     return wait_for
 
 
-def wait_for(state, seconds=60):
-    """Poll as the page does until no task is running any more."""
+def wait_for(state, seconds=240):
+    """Poll as the page does until no task runs any more; the first ones compile all kernels."""
     end = time.monotonic() + seconds
     while state.busy and time.monotonic() < end:
         time.sleep(0.005)
