@@ -28,7 +28,7 @@ class Plan(NamedTuple):
     frictions: tuple = FRICTIONS
     packings: int = 10
     states: int = 1000
-    gauss_seidel_packings: int = 3
+    gauss_seidel_packings: int = 2
     exact_packings: int = 3
     uniform_packings: int = 3
     perturb_packings: int = 3
