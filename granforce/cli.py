@@ -218,7 +218,7 @@ def _add_study(commands):
     group.add_argument("--mu", help="friction coefficients, separated by commas")
     group.add_argument("--packings", type=int, help="packings at each μ (default 10)")
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
-    group.add_argument("--gauss-seidel-packings", type=int, help="walks as in the paper (3)")
+    group.add_argument("--gauss-seidel-packings", type=int, help="walks as in the paper (2)")
     group.add_argument("--exact-packings", type=int, help="with exact intervals (default 3)")
     group.add_argument("--uniform-packings", type=int, help="with uniform states (default 3)")
     group.add_argument("--perturb-packings", type=int, help="pushed at contacts (default 3)")
