@@ -15,8 +15,9 @@ from granforce.store import open_store
 
 # The smallest two lie where soft modes do not yet amplify friction beyond its linear effect.
 FRICTIONS = (0, 0.00001, 0.0001, 0.001, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1, 2, 5, 10)
-# Below this it takes minutes to follow a first motion; none of the paper's claims needs it.
-LEAST_PERTURBED = 0.001
+# Below this it takes minutes to follow a first motion, and bounds within a frozen surrounding end
+# uncertified: contacts are perturbed and forces frozen from here on.
+LEAST_FOLLOWED = 0.001
 SLICE = (0.2, 0.8, 0.2, 0.8)  # inner part whose surroundings are frozen, in parts of the box
 KEPT_STATES = 100  # of each walk, evenly spaced: measures come from all
 
@@ -141,7 +142,7 @@ def _perturb(plan, seed):
         return []
     found = []
     for mu in plan.frictions:
-        if 0 < mu < LEAST_PERTURBED:
+        if 0 < mu < LEAST_FOLLOWED:
             continue
         packing = study.packing_parameters(plan.n, mu, seed)
         named = study.perturbation_parameters(packing, random=plan.perturb_contacts)
@@ -152,7 +153,7 @@ def _perturb(plan, seed):
 def _frozen(plan, seed):
     if seed > plan.exact_packings:
         return []
-    frictions = [mu for mu in plan.frictions if mu > 0]
+    frictions = [mu for mu in plan.frictions if mu >= LEAST_FOLLOWED]
     return [_exact("frozen", plan.n, seed, mu, slice_=SLICE) for mu in frictions]
 
 
