@@ -56,8 +56,11 @@ def test_the_default_plan_is_the_papers():
     assert max(frictions) == 10
     for mu in frictions:
         assert {task.seed for task in walks if task.mu == mu} == set(range(1, 11))
-        for part in ("exact", "uniform", "gauss_seidel"):
-            assert sum(task.part == part and task.mu == mu for task in found) >= 3
+        least = {"exact": 3, "uniform": 3, "gauss_seidel": 2}
+        if mu == 0 or mu >= 0.001:
+            least["perturb"] = 3
+        for part, packings in least.items():
+            assert sum(task.part == part and task.mu == mu for task in found) >= packings
     assert {task.n for task in found} == {100, 200, 400, 800, 1600}
     assert all(task.cell.parameters["states"] == 1000 for task in walks)
     names = [json.dumps([task.cell.kind, task.cell.parameters]) for task in found]
