@@ -25,10 +25,12 @@ def in_turn(job, *named):
     """
     with _turns_lock:
         turn = _turns.setdefault(repr(named), threading.Lock())
+    stage = job.stage
     while not turn.acquire(timeout=_ASK):
         job.stage = "being computed for another page"
         if job.cancelled():
             raise Cancelled
+    job.stage = stage
     try:
         yield
     finally:

@@ -6,6 +6,7 @@ import numpy as np
 
 from granforce import study
 
+from .compute import in_turn
 from .distributions import alike, rows
 
 # Fewer contacts than this say little about the mean over all.
@@ -45,8 +46,9 @@ def _found_or_made(library, kind, params, version, get, job):
         found = store.load(kind, params, version=version)
         if found is not None:
             return found
-    library.lend_packing(params["packing"])
-    return get(library.cache, params, progress=job.tell, cancel=job.cancelled)[0]
+    with in_turn(job, kind, params):
+        library.lend_packing(params["packing"])
+        return get(library.cache, params, progress=job.tell, cancel=job.cancelled)[0]
 
 
 def limit_loads(library, cell, workers=2):

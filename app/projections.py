@@ -8,6 +8,8 @@ from scipy.spatial import ConvexHull, QhullError
 from granforce import measures, study
 from granforce.records import InputError
 
+from .compute import in_turn
+
 
 class Plane(NamedTuple):
     """Two axes of force space, and where states lie in their plane. Forces are in ⟨f_n⟩."""
@@ -109,16 +111,17 @@ def outline(library, cell, replay, plane, workers=2):
             found = store.load("outline", params, version=study.OUTLINE_VERSION)
             if found is not None:
                 return _outlined(replay, plane, found)
-        library.lend_packing(selection.packing)
-        job.begin("outline of S")
-        found, _ = study.get_outline(
-            library.cache,
-            params,
-            None if chosen else plane.axes,
-            workers=workers,
-            progress=job.tell,
-            cancel=job.cancelled,
-        )
+        with in_turn(job, "outline", params):
+            library.lend_packing(selection.packing)
+            job.begin("outline of S")
+            found, _ = study.get_outline(
+                library.cache,
+                params,
+                None if chosen else plane.axes,
+                workers=workers,
+                progress=job.tell,
+                cancel=job.cancelled,
+            )
         return _outlined(replay, plane, found)
 
     return work
