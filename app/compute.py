@@ -86,6 +86,11 @@ def _make_packing(job, library, packing):
     library.lend_packing(packing)
     if "imported" in packing:
         return
+    with in_turn(job, "packing", packing):
+        _compact(job, library, packing)
+
+
+def _compact(job, library, packing):
     steps = library.expected_steps(packing["n"], packing["mu"])
 
     def tell(step, message):
