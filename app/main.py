@@ -5,7 +5,6 @@ GRANFORCE_DATA names, and on the user's own cache (GRANFORCE_CACHE); GRANFORCE_L
 a visitor may ask for, see app/limits.py.
 """
 
-import gc
 import importlib
 from functools import partial
 
@@ -14,12 +13,23 @@ import panel_material_ui as pmui
 from panel.util import edit_readonly
 
 from .data import Library
+from .jobs import settle
 from .state import VIEW, AppState
 from .views.controls import Controls
 from .views.packing import PackingView
 from .views.parts import PLAIN, together
 from .views.summary import SummaryView
 
+# Packing and tabs; under each other where there is no room.
+SIDE_BY_SIDE = {
+    "& .main-content": {
+        "display": "grid",
+        "gridTemplateColumns": "repeat(auto-fit, minmax(min(100%, 440px), 1fr))",
+        "alignItems": "start",
+        "alignContent": "start",
+        "columnGap": "8px",
+    }
+}
 POLL_MS = 200  # how often the page asks running work how far it is
 
 # The tabs: name in links → title, module of app.views whose `View(state)` fills it when first seen.
@@ -45,35 +55,24 @@ def page():
     query = pn.state.location.search if pn.state.location else ""
     state = AppState(pn.state.as_cached("library", _open_library), wake, query)
     state.message = state.message or " ".join(state.library.notes)
-    packing = PackingView(state)
     wide = {"sizing_mode": "stretch_width"}
-    source = pmui.Typography(state.param.source, variant="subtitle2", margin=(8, 10, 0, 10))
-    left, right, sidebar = (
-        pn.Column(source, packing.panel(), **wide),
-        pn.Column(**wide),
-        pn.Column(),
-    )
+    packing = PackingView(state)
+    left, right, sidebar = pn.Column(packing.player, **wide), pn.Column(**wide), pn.Column()
     whole = pmui.Page(
         title="granforce — see force space",
         sidebar=[sidebar],
         sidebar_width=290,
-        main=[
-            pmui.Grid(
-                pmui.Grid(left, size={"xs": 12, "md": 6}),
-                pmui.Grid(right, size={"xs": 12, "md": 6}),
-                container=True,
-                spacing=1,
-                **wide,
-            )
-        ],
+        main=[left, right],
+        sx=SIDE_BY_SIDE,
         dark_theme=state.dark,
+        busy_indicator=None,  # but the player's: for this one Bokeh looks through the whole page
     )
     with edit_readonly(whole):
-        # Tasks, not every event; and pn.state, to which it was bound, would keep every closed page.
-        whole.busy = state.param.busy
+        whole.busy = False  # pn.state, to which it was bound, would keep every closed page
 
     def parts():
-        """What follows the packing, piece by piece: others wait for one piece, not for all."""
+        """What follows the packing."""
+        left.append(packing.legend)
         widgets = Controls(state).panel()
         yield
         for k in range(0, len(widgets), 3):
@@ -87,11 +86,7 @@ def page():
         yield
         yield from tabs.filling(state.tab)
 
-    def go_on(rest):
-        if next(rest, "end") != "end":
-            wake(partial(go_on, rest))
-
-    pn.state.onload(partial(go_on, parts()))
+    pn.state.onload(partial(state.in_turn, parts()))
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     _poll_while_running(state, document)
     _tell_address(state)
@@ -101,7 +96,7 @@ def page():
 
 def _open_library():
     """The stores, once for all visitors."""
-    gc.freeze()  # else collections go through all that was imported: up to 0.2 s of the event loop
+    settle()
     return Library()
 
 
@@ -111,6 +106,7 @@ class Tabs:
     def __init__(self, state):
         self.state = state
         self.names = list(TABS)
+        self._begun = set()
         self.pages = {name: pn.Column(sizing_mode="stretch_width") for name in self.names}
         if state.tab not in self.names:
             state.tab = self.names[0]
@@ -120,7 +116,7 @@ class Tabs:
             sx={"& .MuiTab-root": {"minWidth": 0, "padding": "12px 8px", **PLAIN}},
             sizing_mode="stretch_width",
         )
-        self.tabs.param.watch(lambda event: self._show(self.names[event.new]), "active")
+        self.tabs.param.watch(lambda event: state.in_turn(self._showing()), "active")
         state.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
 
     def choose(self, number):
@@ -128,22 +124,22 @@ class Tabs:
         if 1 <= number <= len(self.names):
             self.tabs.active = number - 1
 
-    def _show(self, name):
-        self.fill(name)  # first, so that those who follow the state find it in the page
-        together(self.state.param.update, tab=name)
-
-    def fill(self, name):
-        """Make the view of a tab, once."""
-        for _ in self.filling(name):
-            pass
+    def _showing(self):
+        name = self.names[self.tabs.active]
+        yield from self.filling(name)  # first, so that those who follow the state find it there
+        if name == self.names[self.tabs.active]:
+            self.state.tab = name
 
     def filling(self, name):
-        """The same, piece by piece."""
-        if not self.pages[name].objects:
+        """Make the view of a tab, once; a generator of pieces."""
+        if name not in self._begun:
+            self._begun.add(name)
+            yield
             view = _module(name).View(self.state)
             yield
-            for piece in view.panel().objects:
-                self.pages[name].append(piece)
+            pieces = list(view.panel())
+            for k in range(0, len(pieces), 2):  # not one by one: each time Bokeh goes through all
+                self.pages[name].extend(pieces[k : k + 2])
                 yield
 
 

@@ -1,5 +1,7 @@
 """What the page is showing and doing, as parameters: no widgets, no plots."""
 
+from functools import partial
+
 import param
 
 from granforce.records import InputError
@@ -67,6 +69,14 @@ class AppState(param.Parameterized):
         self.open(query)
 
     # Tasks
+
+    def in_turn(self, pieces):
+        """Have a generator run to its end; other pages are served between its pieces."""
+        if self._wake is None:
+            for _ in pieces:
+                pass
+        elif next(pieces, "end") != "end":
+            self._wake(partial(self.in_turn, pieces))
 
     def task(self, pool=computing):
         """A new Task of this page: work off the event loop, ended when the page is closed."""

@@ -62,7 +62,7 @@ class Controls:
             self.kind,
             self.relax,
             self.go,
-            self.progress.panel(),
+            self.progress,
             self.error,
             self.series,
             pmui.Typography("Force chains", **HEADING),

@@ -13,6 +13,7 @@ drawn_here = threading.Lock()
 def rendered(frames, names, heights):
     """HoloViews frames as Bokeh figures that fill the width, each with its name and height."""
     import holoviews as hv
+    import matplotlib.axes  # noqa: F401  HoloViews loads a part, Panel the rest: on the page's thread
 
     # In its mode "server" the renderer takes the document given and puts its theme on that one;
     # else it would be the current document, that of whoever is served right now.

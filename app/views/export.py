@@ -2,7 +2,6 @@
 
 import numpy as np
 import panel as pn
-import panel_material_ui as pmui
 
 from .. import exports
 from ..jobs import reading
@@ -12,8 +11,7 @@ from .packing import SATURATION, exact_intervals, normal_extent
 from .parts import note
 from .style import palettes
 
-HEADING = {"variant": "overline", "margin": (8, 10, -6, 10)}
-GROUPS = {
+FILES = {
     "Picture of the packing": {"svg": "SVG", "png": "PNG"},
     "Data on screen": {
         "csv": "Contacts (CSV)",
@@ -39,19 +37,13 @@ class View:
     def __init__(self, state):
         self.state = state
         self.task = state.task(reading)
-        self.groups = {
-            heading: Handover(self._asked, files=files, margin=(4, 10))
-            for heading, files in GROUPS.items()
-        }
+        self.buttons = Handover(self._asked, files=FILES, margin=(12, 10, 0, 10))
         self.told = note()
         self.task.param.watch(self._follow, "message")
 
     def panel(self):
-        """Headings and buttons."""
-        parts = []
-        for heading, buttons in self.groups.items():
-            parts += [pmui.Typography(heading, **HEADING), buttons]
-        return pn.Column(*parts, self.told, note(HELP), sizing_mode="stretch_width")
+        """Buttons, and what they are for."""
+        return pn.Column(self.buttons, self.told, note(HELP), sizing_mode="stretch_width")
 
     def _asked(self, key):
         state = self.state
@@ -59,8 +51,9 @@ class View:
         if state.replay is None:
             self.told.object = "There is nothing on screen yet."
             return
-        buttons = next(b for b in self.groups.values() if key in b.files)
-        self.task.start(self._making(key), lambda file: buttons.hand_over(file, png=key == "png"))
+        self.task.start(
+            self._making(key), lambda file: self.buttons.hand_over(file, png=key == "png")
+        )
 
     def _making(self, key):
         """Work that makes a file of what is on screen now."""

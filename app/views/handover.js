@@ -4,6 +4,7 @@ const SCALE = 2 // pixels of a PNG per pixel of its SVG
 
 export function render({ model, view }) {
   const root = document.createElement("div")
+  root.className = "handover"
   const plain = (given) => (given instanceof Map ? Object.fromEntries(given) : given)
 
   // Bokeh takes what came from the server for new until the page next tells the server something,
@@ -13,18 +14,25 @@ export function render({ model, view }) {
     model.send_msg(message)
   }
 
+  function button(key, words) {
+    const made = document.createElement("button")
+    made.type = "button"
+    made.textContent = words
+    made.dataset.key = key
+    made.addEventListener("click", () => {
+      made.classList.add("busy")
+      ask({ key })
+    })
+    return made
+  }
+
   function offer() {
     root.replaceChildren()
-    for (const [key, words] of Object.entries(plain(model.files))) {
-      const button = document.createElement("button")
-      button.type = "button"
-      button.textContent = words
-      button.dataset.key = key
-      button.addEventListener("click", () => {
-        button.classList.add("busy")
-        ask({ key })
-      })
-      root.append(button)
+    for (const [heading, files] of Object.entries(plain(model.files))) {
+      const group = document.createElement("section")
+      group.append(Object.assign(document.createElement("h4"), { textContent: heading }))
+      for (const [key, words] of Object.entries(plain(files))) group.append(button(key, words))
+      root.append(group)
     }
   }
 

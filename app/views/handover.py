@@ -8,15 +8,19 @@ from panel.custom import JSComponent
 
 
 class Handover(JSComponent):
-    """One button for each of `files` {key: words}; `on_ask(key)` has `hand_over` called in time."""
+    """A button for each of `files`; `on_ask(key)` has `hand_over` called in time."""
 
-    files = param.Dict(default={}, doc="{key: words}")
+    files = param.Dict(default={}, doc="{heading: {key: words}}")
 
     _esm = Path(__file__).with_name("handover.js")
     _stylesheets: ClassVar = [
         """
         :host { display: block; }
-        div { display: flex; flex-wrap: wrap; gap: 6px; }
+        section { display: flex; flex-wrap: wrap; gap: 6px; margin-bottom: 14px; }
+        h4 {
+          flex: 1 0 100%; margin: 0; font-size: 12px; font-weight: 400; letter-spacing: 0.08em;
+          text-transform: uppercase;
+        }
         button {
           padding: 7px 12px; border-radius: 5px; background: transparent; font: inherit;
           font-size: 13px; color: inherit; border: 1px solid rgba(128, 128, 128, 0.5);
@@ -38,5 +42,5 @@ class Handover(JSComponent):
 
     def _handle_msg(self, message):
         key = message.get("key")
-        if key in self.files:
+        if any(key in group for group in self.files.values()):
             self._on_ask(key)

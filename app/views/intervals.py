@@ -47,7 +47,7 @@ class View:
         choices = pn.FlexBox(self.sort, self.scale, self.exact, sizing_mode="stretch_width")
         return pn.Column(
             choices,
-            self.progress.panel(),
+            self.progress,
             pn.pane.Bokeh(self.figure, **wide),
             self.left_out,
             pn.pane.Bokeh(self.growth_figure, **wide),

@@ -8,7 +8,7 @@ from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference")  # both ways
-FOLLOWED = ("tab", "colour", "thickness", "overlay", "scale")  # from the state only
+FOLLOWED = ("source", "busy", "tab", "colour", "thickness", "overlay", "scale")  # from the state
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
@@ -29,7 +29,7 @@ DOT = """<svg width="12" height="12" style="vertical-align:middle;margin-left:8p
 
 
 class PackingView:
-    """Disks, chains and the player's buttons."""
+    """Disks, chains and the player's buttons: the views `player` and, below it, `legend`."""
 
     def __init__(self, state):
         self.state = state
@@ -50,10 +50,6 @@ class PackingView:
         state.param.watch(self._explain, shown)
         self._show()
         self._explain()
-
-    def panel(self):
-        """Player and legend."""
-        return pn.Column(self.player, self.legend, sizing_mode="stretch_width")
 
     def _swing(self, event):
         self.state.between = None if event.new is None else tuple(event.new)

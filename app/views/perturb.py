@@ -55,7 +55,7 @@ class View(Seen):
         return pn.Column(
             pn.FlexBox(self.what, **wide),
             pn.FlexBox(self.push, self.strongest, self.animate, **wide),
-            Progress(self.task).panel(),
+            Progress(self.task),
             self.numbers,
             self.plots,
             self.told,

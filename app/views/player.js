@@ -97,6 +97,7 @@ function layout(scene) {
     `<button type="button" class="${name}" title="${title}" aria-label="${title}">${icon(name)}</button>`
   root.className = "stage"
   root.innerHTML = `
+    <div class="source"></div>
     <div class="bar">
       ${button("restart", "restart at the original network (Home)")}
       ${button("back", "one state back (←)")}
@@ -413,6 +414,10 @@ export function render({ model, view }) {
   }
 
   const again = () => { if (walk && !playing) show(position, false) }
+  const nameSource = () => { part("source").textContent = model.source }
+  const showBusy = () => root.classList.toggle("busy", model.busy)
+  model.on("source", nameSource)
+  model.on("busy", showBusy)
   model.on("walk", load)
   model.on("exact", () => { if (walk) { loadExact(); again() } })
   model.on("between", () => { if (walk) { const k = frame(); retrack(); show(swinging() ? 0 : k) } })
@@ -424,6 +429,8 @@ export function render({ model, view }) {
   const observer = new ResizeObserver(() => scene.resize())
   observer.observe(scene.root)
   model.on("remove", () => { observer.disconnect(); window.removeEventListener("keydown", key) })
+  nameSource()
+  showBusy()
   load()
   displace()
   if (window.innerWidth < NARROW) {

@@ -21,6 +21,8 @@ class Player(JSComponent):
     walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
     palettes = param.Dict(default={}, doc="colours, see style.palettes")
+    source = param.String(doc="where the states come from, in words")
+    busy = param.Boolean()
     contact = param.Integer(default=None, allow_None=True)
     frame = param.Integer(default=0)
     reference = param.Integer(default=0)

@@ -8,6 +8,7 @@ from bokeh.models import ColumnDataSource, DataRange1d
 from granforce.records import InputError
 
 from .. import projections
+from ..jobs import reading
 from .parts import Seen, choice, figure, note
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, PALE, hover, quiet_legend
@@ -37,7 +38,7 @@ class View(Seen):
         self.other = pmui.IntInput(
             label="second contact", value=0, start=0, size="small", width=130, margin=(2, 8)
         )
-        self.task = state.task()
+        self.task, self.projecting = state.task(), state.task(reading)
         self.told = note()
         for widget in (self.planes, self.other):
             widget.param.watch(self.refresh, "value")
@@ -50,7 +51,7 @@ class View(Seen):
         return pn.Column(
             pn.FlexBox(self.planes, self.other, sizing_mode="stretch_width"),
             pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
-            Progress(self.task).panel(),
+            Progress(self.task),
             self.told,
             sizing_mode="stretch_width",
         )
@@ -70,11 +71,20 @@ class View(Seen):
             return
         self.shown = wanted
         self.task.cancel()
+        self.projecting.cancel()
+        if wanted[1] == "principal":
+            self.projecting.start(
+                lambda job: projections.principal(replay),
+                lambda plane: self._projected(replay, plane),
+            )
+            return
         try:
-            plane = self._plane(replay)
+            self._projected(replay, self._components(replay))
         except InputError as error:
             self.told.object = str(error)
-            return
+
+    def _projected(self, replay, plane):
+        state = self.state
         self._show(replay, plane)
         if replay.summary["dimension"] == 0:
             self.told.object = "At h = 0 the forces are determined: S is one point."
@@ -82,9 +92,8 @@ class View(Seen):
         work = projections.outline(state.library, state.cell, replay, plane)
         self.task.start(work, lambda found: self._outlined(replay, found))
 
-    def _plane(self, replay):
-        if self.planes.value == "principal":
-            return projections.principal(replay)
+    def _components(self, replay):
+        """The plane of one contact's forces, or of two contacts' normal forces."""
         contact = self.state.contact
         if contact is None:
             contact = int(np.argmax(replay.high[:, 0] - replay.low[:, 0]))

@@ -167,7 +167,7 @@ class Scene {
     else this.strokeByClass(order, drawn, style.colours)
     chains.globalAlpha = 1
     this.drawMarks(style)
-    this.painted++
+    if (!this.painted++) performance.mark("packing painted") // how long opening took
   }
 
   ends(k) {

@@ -77,14 +77,23 @@ class View(Seen):
         self.task.start(work, self._show)
 
     def _show(self, found):
-        figures, text = found
+        self.state.in_turn(self._showing(found))
+
+    def _showing(self, found):
+        figures, self.told.object = found
+        panes = self._panes(figures)
+        self.plots.objects = panes[:1]
+        yield
+        if self.plots.objects == panes[:1]:  # nothing else was chosen
+            self.plots.extend(panes[1:])
+
+    def _panes(self, figures):
         for fig in figures:
             self._choosable(fig)
         panes = [_pane(fig) for fig in figures]
         if self.what.value == "extent":
             panes[1] = pn.Column(panes[1], stylesheets=[INSET], css_classes=["inset"])
-        self.plots.objects = panes
-        self.told.object = text
+        return panes
 
     def _follow(self, *events):
         self.bar.visible = self.task.running and self.what.value in DRAWN

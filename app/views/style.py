@@ -68,7 +68,7 @@ def plot(title, x, y, **options):
         "toolbar_location": "above",
         "sizing_mode": "stretch_width",
         "min_border_left": 56,
-        "min_border_right": 12,
+        "min_border_right": 18,
     }
     fig = figure(title=title, x_axis_label=x, y_axis_label=y, **settled | options)
     fig.toolbar.logo = None

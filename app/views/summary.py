@@ -4,7 +4,8 @@ import panel as pn
 
 TILE = '<div class="tile" title="{title}"><div class="name">{name}</div><div>{value}</div></div>'
 STYLE = """
-.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(52px, 1fr)); gap: 5px; }
+.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(52px, 1fr)); gap: 5px;
+  margin-top: 6px; }
 .tile { padding: 4px 6px 3px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
   font-variant-numeric: tabular-nums; font-size: 13.5px; line-height: 18px; }
 .tile .name { font-size: 11px; line-height: 13px; opacity: 0.75; }

@@ -61,7 +61,7 @@ class View:
         return pn.Column(
             self.dropper,
             pn.FlexBox(self.mu, self.box, self.pressure, self.read, sizing_mode="stretch_width"),
-            Progress(self.task).panel(),
+            Progress(self.task),
             self.error,
             self.waiting,
             self.report,

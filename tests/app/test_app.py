@@ -1,5 +1,7 @@
 """Data, state, links and tasks of the app, without a browser."""
 
+import gc
+import sys
 import threading
 import time
 
@@ -409,6 +411,37 @@ def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
     jobs = [Job(lambda job: begin.wait(10) >= 0 and work(job), pool) for _ in range(2)]
     assert all(job.wait(60) and job.error == "" for job in jobs)
     assert [job.result.cell.mu for job in jobs] == [0.2, 0.2] and made == [1]
+
+
+def test_a_packing_that_two_pages_need_is_made_once(library, monkeypatch):
+    from app import compute
+    from app.jobs import Job, Pool
+    from app.selection import select
+
+    made, pack, begin = [], study.pack, threading.Barrier(2)
+    monkeypatch.setattr(study, "pack", lambda *a, **k: made.append(1) or pack(*a, **k))
+    pool, jobs = Pool(2, "test"), []
+    for states in (3, 4):
+        work = compute.states(library, select(DISKS, 0.2, 7, states=states))
+        jobs.append(Job(lambda job, work=work: begin.wait(10) >= 0 and work(job), pool))
+    assert all(job.wait(60) and job.error == "" for job in jobs)
+    assert [len(job.result.replay.number) for job in jobs] == [4, 5] and made == [1]
+
+
+def test_what_was_imported_is_spared_by_collections_once():
+    from app.jobs import settle
+
+    settle()
+    kept = [[] for _ in range(1000)]
+    before = gc.get_freeze_count()
+    settle()
+    assert gc.get_freeze_count() <= before
+    sys.modules["granforce_nothing"] = sys
+    try:
+        settle()
+    finally:
+        del sys.modules["granforce_nothing"]
+    assert gc.get_freeze_count() >= before + len(kept)
 
 
 def test_a_job_that_waits_for_another_page_can_be_cancelled():

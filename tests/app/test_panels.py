@@ -88,8 +88,9 @@ def test_the_outline_holds_the_path_and_is_kept(state):
     view = View(state)
     assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
     state.tab = view.name
-    assert view.task.running and len(view.path.data["x"]) == KEPT + 1
+    assert view.projecting.running
     settled(state)
+    assert len(view.path.data["x"]) == KEPT + 1
     corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
     path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
     merged = projections.hull(np.concatenate([corners, path]))
@@ -456,24 +457,24 @@ def test_colours_tell_mobilisation(state):
 
 
 def test_every_button_hands_a_file_over(state):
-    from app.views.export import GROUPS, View
+    from app.views.export import View
 
     view = View(opened(state))
-    for group in view.groups.values():
-        for key in group.files:
-            handed = []
-            group.hand_over = lambda file, png=False, to=handed: to.append(file)
-            group._handle_msg({"key": key})
-            settled(state)
-            assert len(handed[0].content) > 300 and "/" not in handed[0].name, key
-    assert sum(len(files) for files in GROUPS.values()) == 7
+    keys = [key for group in view.buttons.files.values() for key in group]
+    for key in keys:
+        handed = []
+        view.buttons.hand_over = lambda file, png=False, to=handed: to.append(file)
+        view.buttons._handle_msg({"key": key})
+        settled(state)
+        assert len(handed[0].content) > 300 and "/" not in handed[0].name, key
+    assert len(keys) == 7
 
 
 def test_unknown_keys_are_ignored(state):
     from app.views.export import View
 
     view = View(opened(state))
-    next(iter(view.groups.values()))._handle_msg({"key": "../secret"})
+    view.buttons._handle_msg({"key": "../secret"})
     assert not view.task.running
 
 

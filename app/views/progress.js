@@ -1,0 +1,31 @@
+// How far a task is, with a button that cancels it; nothing is seen while it rests.
+
+export function render({ model, view }) {
+  const root = document.createElement("div")
+  root.className = "progress"
+  root.innerHTML = `
+    <div class="bar" role="progressbar" aria-valuemin="0" aria-valuemax="100"><div></div></div>
+    <span></span><button type="button">Cancel</button>`
+  const [bar, words, button] = root.children
+
+  function show() {
+    root.hidden = !model.running
+    const known = model.fraction !== null && model.fraction !== undefined
+    const percent = known ? Math.round(100 * model.fraction) : 40
+    bar.classList.toggle("unknown", !known)
+    bar.firstElementChild.style.width = `${percent}%`
+    if (known) bar.setAttribute("aria-valuenow", percent)
+    else bar.removeAttribute("aria-valuenow")
+    words.textContent = model.words
+  }
+
+  button.addEventListener("click", () => {
+    // Bokeh takes what came from the server for new until the page next tells the server something,
+    // and would send this component, functions and all, along with its first message.
+    view.model.document?._new_models?.delete(view.model)
+    model.send_msg({ cancel: true })
+  })
+  for (const name of ["running", "fraction", "words"]) model.on(name, show)
+  show()
+  return root
+}
