@@ -30,7 +30,7 @@ SOURCES = {
 
 OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
 FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
-SHOWN_KEPT = 8  # cells in memory, for all visitors
+SHOWN_KEPT = 16  # cells in memory, for all visitors
 
 
 class Cell(NamedTuple):

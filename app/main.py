@@ -85,6 +85,7 @@ def page():
         right.append(tabs.tabs)
         yield
         yield from tabs.filling(state.tab)
+        state.read_ahead()
 
     pn.state.onload(partial(state.in_turn, parts()))
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")

@@ -8,7 +8,7 @@ from granforce.records import InputError
 
 from . import compute
 from .data import best_cell, nearest_cell
-from .jobs import Task, computing, reading
+from .jobs import Job, Task, computing, reading
 from .limits import LIMITS
 from .selection import link, read_link
 
@@ -148,8 +148,18 @@ class AppState(param.Parameterized):
         shown = self.library.shown_in_memory(cell)
         if shown is not None:
             self._show(shown)
+            self.read_ahead()
         else:
-            self.reader.start(lambda job: self.library.shown(cell), self._show)
+            self.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
+
+    def read_ahead(self):
+        """Have the cells with the nearest μ read meanwhile: they are the likeliest next."""
+        cells = self.cells()
+        if self.cell in cells:
+            here = cells.index(self.cell)
+            for near in cells[max(here - 1, 0) : here + 2]:
+                if self.library.shown_in_memory(near) is None:
+                    Job(lambda job, near=near: self.library.shown(near), reading)
 
     def _look_up(self, wanted, view):
         library = self.library
@@ -178,6 +188,10 @@ class AppState(param.Parameterized):
 
     def _list(self, cells):
         self.catalogue = list(cells)
+
+    def _show_and_read_ahead(self, shown):
+        self._show(shown)
+        self.read_ahead()
 
     def _show(self, shown, view=None):
         cell, replay, exact = shown

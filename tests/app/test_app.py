@@ -255,6 +255,20 @@ def test_a_cell_in_memory_is_shown_at_once(state):
     assert state.cell.mu == 1 and not state.busy
 
 
+def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatch):
+    from app import state as module
+
+    asked = []
+    monkeypatch.setattr(module, "Job", lambda work, pool: asked.append(work(None).cell.mu))
+    state.choose(mu=1)
+    wait_for(state)
+    assert asked == []  # 0.1 is in memory, and 0 is no neighbour
+    state.choose(mu=0.1)
+    assert asked == [0] and state.library.shown_in_memory(cell_at(state.library, 0)) is not None
+    state.choose(mu=1)
+    assert asked == [0]
+
+
 def test_stored_states_are_found_whatever_was_kept_of_them(state, wait_for):
     state.ask(small(1, STATES, relax="nearest"))
     wait_for(state)
