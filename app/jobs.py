@@ -3,8 +3,6 @@
 The kernels release the interpreter lock, so a thread keeps neither the page nor others waiting.
 """
 
-import gc
-import sys
 import threading
 import time
 from queue import SimpleQueue
@@ -13,21 +11,8 @@ import param
 
 from granforce.records import Cancelled, InputError
 
+from .garbage import settle
 from .limits import LIMITS
-
-_settled = 0
-
-
-def settle():
-    """Spare collections of garbage what was imported until now: it stays, and is most there is.
-
-    A collection holds the page up, 0.1 s for a million references.
-    """
-    global _settled
-    loaded = sum(not name.startswith("bokeh_app_") for name in sys.modules.copy())
-    if loaded > _settled:  # seldom, since what pages left to be collected is spared, too
-        _settled = loaded
-        gc.freeze()
 
 
 class Pool:

@@ -10,10 +10,11 @@ from functools import partial
 
 import panel as pn
 import panel_material_ui as pmui
+import param
 from panel.util import edit_readonly
 
+from . import garbage
 from .data import Library
-from .jobs import settle
 from .state import VIEW, AppState
 from .views.controls import Controls
 from .views.packing import PackingView
@@ -68,7 +69,8 @@ def page():
         busy_indicator=None,  # but the player's: for this one Bokeh looks through the whole page
     )
     with edit_readonly(whole):
-        whole.busy = False  # pn.state, to which it was bound, would keep every closed page
+        # pn.state, to which it was bound, would keep every closed page, and does if given a value.
+        whole.busy = param.rx(False)
 
     def parts():
         """What follows the packing."""
@@ -91,13 +93,14 @@ def page():
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     _poll_while_running(state, document)
     _tell_address(state)
-    pn.state.on_session_destroyed(lambda context: state.close())
+    closed = garbage.opened()  # a name of the page: those of this module are gone by then
+    pn.state.on_session_destroyed(lambda context: (state.close(), closed()))
     return whole
 
 
 def _open_library():
     """The stores, once for all visitors."""
-    settle()
+    garbage.settle()
     return Library()
 
 

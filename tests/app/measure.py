@@ -17,12 +17,9 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, FLAGS, painted, scene, serve  # noqa: E402
+from serving import CHROMIUM, CLOSED, FLAGS, painted, scene, serve  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
-# Long enough for a busy machine: a session given up before its page has connected comes back
-# without what panel serve knows of it.
-CLOSED = ("--unused-session-lifetime", "10000", "--check-unused-sessions", "500")
 
 
 class Stage:

@@ -14,6 +14,9 @@ from small_store import ROOT
 
 CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
+# Closed pages are soon given up, but not too soon for a busy machine: a session given
+# up before its page has connected comes back without what panel serve knows of it.
+CLOSED = ("--unused-session-lifetime", "10000", "--check-unused-sessions", "500")
 MODEL = "Bokeh.documents[0].get_model_by_name"
 
 

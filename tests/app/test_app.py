@@ -443,7 +443,7 @@ def test_a_packing_that_two_pages_need_is_made_once(library, monkeypatch):
 
 
 def test_what_was_imported_is_spared_by_collections_once():
-    from app.jobs import settle
+    from app.garbage import settle
 
     settle()
     kept = [[] for _ in range(1000)]

@@ -1,12 +1,14 @@
 """The tabs beside the packing in a browser: what they show, and the files they take and give."""
 
 import io
+import time
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from packings import REFERENCE
-from serving import CHROMIUM, MODEL, column, painted, serve
+from serving import CHROMIUM, CLOSED, MODEL, column, painted, serve
 from small_store import DISKS, KEPT, ROOT
 
 import granforce as gf
@@ -237,3 +239,28 @@ def test_plots_are_saved_as_svg(visit, tmp_path, tab, number):
     path = download(page, lambda: page.evaluate(save), tmp_path)
     svg = ElementTree.fromstring(path.read_text())
     assert path.suffix == ".svg" and len(list(svg.iter())) > 30
+
+
+def test_closed_pages_are_forgotten(chromium, shipped, tmp_path):
+    alive, setup = tmp_path / "alive", Path(__file__).with_name("alive.py")
+    variables = {"GRANFORCE_DATA": str(shipped), "ALIVE": str(alive)}
+
+    def wait_for(count):
+        end = time.monotonic() + PATIENCE / 1000
+        while not (alive.exists() and int(alive.read_text() or -1) in count):
+            assert time.monotonic() < end, alive.read_text()
+            time.sleep(0.1)
+
+    with serve(tmp_path, "--setup", str(setup), *CLOSED, **variables) as (url, _):
+        pages = []
+        for _ in range(3):
+            pages.append(chromium.new_page())
+            pages[-1].goto(url)
+            painted(pages[-1], PATIENCE)
+        for tab in ("Statistics", "Force space", "Perturb", "Your packing", "Export"):
+            pages[0].get_by_role("tab", name=tab).click()
+            pages[0].wait_for_timeout(500)
+        wait_for([3])
+        for page in pages:
+            page.close()
+        wait_for([0, 1])  # Panel may keep the last one until the next
