@@ -142,8 +142,9 @@ class Tabs:
             view = _module(name).View(self.state)
             yield
             pieces = list(view.panel())
-            for k in range(0, len(pieces), 2):  # not one by one: each time Bokeh goes through all
-                self.pages[name].extend(pieces[k : k + 2])
+            # Choices, then two at a time: not one by one, since each time Bokeh goes through all.
+            for k in range(-1, len(pieces), 2):
+                self.pages[name].extend(pieces[max(k, 0) : k + 2])
                 yield
 
 

@@ -4,8 +4,8 @@
 
 Parts: opening (first picture, changes of μ, bytes), playing (painted frames a second of 400 disks),
 crowd (of 10,000 disks; computed first if $GRANFORCE_CACHE has none), stalls (of the server's event
-loop while pages open and while it computes), memory (over open–close cycles), visitors (ten at
-once). Each starts a server of its own on the shipped store.
+loop while pages and tabs open and while it computes), memory (over open–close cycles), visitors
+(ten at once). Each starts a server of its own on the shipped store.
 """
 
 import os
@@ -129,7 +129,7 @@ def _rate(page, action):
 
 
 def stalls(stage):
-    """Longest gap of the event loop: at rest, opening pages, and while states are computed."""
+    """Longest gap of the event loop: opening pages and tabs, and while states are computed."""
     log = stage.folder / "stalls"
     page, _ = stage.open()
     page.wait_for_timeout(3000)
@@ -139,6 +139,10 @@ def stalls(stage):
         other.wait_for_timeout(1500)
         other.context.close()
     print(f"longest stall while pages open: {_longest(log)}")
+    for tab in ("Statistics", "Force space", "Perturb", "Your packing", "Export", "Intervals"):
+        page.get_by_role("tab", name=tab).click()
+        page.wait_for_timeout(3000)
+    print(f"longest stall while tabs are opened: {_longest(log)}")
     page.locator("input.typed").fill("0.17")
     page.locator("input.typed").press("Enter")
     page.get_by_role("button", name="Compute μ").click()
