@@ -1,6 +1,6 @@
 """Collections of garbage hold every page up, so they spare what stays anyway.
 
-A collection takes 0.1 s for a million references, and most belong to imported modules.
+A full one takes 0.1 s for 200,000 objects; imported modules hold 300,000 and more, a page 20,000.
 """
 
 import gc

@@ -4,7 +4,6 @@ const SCALE = 2 // pixels of a PNG per pixel of its SVG
 
 export function render({ model, view }) {
   const root = document.createElement("div")
-  root.className = "handover"
   const plain = (given) => (given instanceof Map ? Object.fromEntries(given) : given)
 
   // Bokeh takes what came from the server for new until the page next tells the server something,

@@ -14,7 +14,7 @@ class Progress(JSComponent):
     fraction = param.Number(default=None, allow_None=True)
     words = param.String()
 
-    # One component of ours, not a column of three others: those take Panel ten times as long.
+    # One component of ours, not a column of three others: those take Panel five times as long.
     _esm = Path(__file__).with_name("progress.js")
     _stylesheets: ClassVar = [
         """

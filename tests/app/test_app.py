@@ -481,6 +481,30 @@ def test_a_job_that_waits_for_another_page_can_be_cancelled():
     assert first.wait(10) and first.error == second.error == ""
 
 
+def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
+    from app.views.progress import Progress
+
+    task = state.task()
+    progress, told = Progress(task), threading.Event()
+    assert not progress.running
+
+    def work(job):
+        job.begin("counting")
+        job.tell(1, 4)
+        told.set()
+        while not job.cancelled():
+            time.sleep(0.01)
+
+    task.start(work)
+    assert told.wait(10)
+    state.poll()
+    assert progress.running and progress.fraction == 0.25
+    assert progress.words.startswith("counting — about ")
+    progress._handle_msg({"cancel": True})
+    wait_for(state)
+    assert not progress.running
+
+
 def test_a_job_wakes_the_page_when_it_ends():
     from app.jobs import Task
 
