@@ -5,7 +5,8 @@
 const WIDTH = 0.23 // of a chain that carries the mean normal force, in largest radii
 const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const STRONG = 2 // in ⟨fₙ⟩: contacts that Fig. 5 of the paper marks
-const PLOTS_MS = 66 // the plots beside are repainted no more often than this while playing
+const PLOTS_MS = 66 // the plots beside are repainted no more often than this while playing,
+const PLOTS_FRAMES = 3 // nor than every so many frames, where frames take long
 const DIM = 0.35 // chains under the marks of Fig. 5
 const SWING = 2.2 // s, for the displacement field to go to and fro
 
@@ -262,13 +263,14 @@ export function render({ model, view }) {
 
   function tick(now) {
     if (!playing || !root.isConnected) return
-    position += (direction * Math.max(0, now - before) * speed()) / (swinging() ? 8000 : 1000)
+    const took = Math.max(0, now - before)
+    position += (direction * took * speed()) / (swinging() ? 8000 : 1000)
     before = now
     if (swinging() && (position >= last() || position <= 0)) direction = position <= 0 ? 1 : -1
     position = Math.max(0, Math.min(last(), position))
     if (!swinging()) seen.until(frame())
     paint()
-    if (now - toldPlots > PLOTS_MS) {
+    if (now - toldPlots > Math.max(PLOTS_MS, PLOTS_FRAMES * took)) {
       paintPlots(now)
       read()
     }
