@@ -37,6 +37,17 @@ def in_turn(job, *named):
         turn.release()
 
 
+def found_or_made(library, job, stage, kind, params, version, get):
+    """The dataset of these parameters from a store, or from get(cache, params) in this stage."""
+    found = library.stored(kind, params, version)
+    if found is None:
+        with in_turn(job, kind, params):
+            library.lend_packing(params["packing"])
+            job.begin(stage)
+            found, _ = get(library.cache, params, progress=job.tell, cancel=job.cancelled)
+    return found
+
+
 def states(library, selection):
     """Work that finds or computes the states of a Selection; results in their Shown."""
 
@@ -59,22 +70,21 @@ def states(library, selection):
     return work
 
 
-def exact(library, shown, workers=2):
+def exact(library, shown):
     """Work that computes the exact intervals beside what is shown; results in a new Shown."""
 
     def work(job):
         selection = shown.cell.selection
         params = study.exact_parameters(selection.packing, mu=selection.mu)
-        with in_turn(job, "intervals", params):
-            library.lend_packing(selection.packing)
-            job.begin("exact intervals")
-            dataset, _ = study.get_intervals(
-                library.cache,
-                params,
-                workers=workers,
-                progress=job.tell,
-                cancel=job.cancelled,
-            )
+        dataset = found_or_made(
+            library,
+            job,
+            "exact intervals",
+            "intervals",
+            params,
+            study.INTERVALS_VERSION,
+            study.get_intervals,
+        )
         found = Shown(shown.cell, shown.replay, dataset)
         library.keep_in_memory(found)
         return found

@@ -180,8 +180,12 @@ class Library:
     def exact(self, selection):
         """The exact intervals of a selection's packing at its μ as a dataset, or None."""
         params = study.exact_parameters(selection.packing, mu=selection.mu)
+        return self.stored("intervals", params, study.INTERVALS_VERSION)
+
+    def stored(self, kind, params, version):
+        """The dataset of these parameters from the first store that has it, or None."""
         for store in self.stores:
-            found = store.load("intervals", params, version=study.INTERVALS_VERSION)
+            found = store.load(kind, params, version=version)
             if found is not None:
                 return found
         return None

@@ -89,7 +89,7 @@ def page():
         yield from tabs.filling(state.tab)
         state.read_ahead()
 
-    pn.state.onload(partial(state.in_turn, parts()))
+    pn.state.onload(partial(state.piecewise, parts()))
     whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     _poll_while_running(state, document)
     _tell_address(state)
@@ -120,7 +120,7 @@ class Tabs:
             sx={"& .MuiTab-root": {"minWidth": 0, "padding": "12px 8px", **PLAIN}},
             sizing_mode="stretch_width",
         )
-        self.tabs.param.watch(lambda event: state.in_turn(self._showing()), "active")
+        self.tabs.param.watch(lambda event: state.piecewise(self._showing()), "active")
         state.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
 
     def choose(self, number):

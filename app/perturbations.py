@@ -6,7 +6,7 @@ import numpy as np
 
 from granforce import study
 
-from .compute import in_turn
+from .compute import found_or_made
 from .distributions import alike, rows
 
 # Fewer contacts than this say little about the mean over all.
@@ -41,24 +41,19 @@ class Pushed(NamedTuple):
     seconds: float
 
 
-def _found_or_made(library, kind, params, version, get, job):
-    for store in library.stores:
-        found = store.load(kind, params, version=version)
-        if found is not None:
-            return found
-    with in_turn(job, kind, params):
-        library.lend_packing(params["packing"])
-        return get(library.cache, params, progress=job.tell, cancel=job.cancelled)[0]
-
-
-def limit_loads(library, cell, workers=2):
+def limit_loads(library, cell):
     """Work, for jobs.Task, that finds or computes the limit loads of all contacts."""
 
     def work(job):
-        job.begin("limit loads of all contacts")
         params = study.exact_parameters(cell.selection.packing, mu=cell.selection.mu)
-        found = _found_or_made(
-            library, "limit_loads", params, study.LIMIT_LOADS_VERSION, study.get_limit_loads, job
+        found = found_or_made(
+            library,
+            job,
+            "limit loads of all contacts",
+            "limit_loads",
+            params,
+            study.LIMIT_LOADS_VERSION,
+            study.get_limit_loads,
         )
         scale = found["force_scale"].item()
         numbers = (found[name].item() for name in ("max_gap", "seconds"))
@@ -71,19 +66,19 @@ def push(library, cell, replay, contact):
     """Work that finds or computes what a growing force pair on one contact does."""
 
     def work(job):
-        job.begin("contact dynamics under a growing load")
         params = study.perturbation_parameters(
             cell.selection.packing,
             mu=cell.selection.mu,
             contacts=[int(replay.backbone[contact])],
         )
-        found = _found_or_made(
+        found = found_or_made(
             library,
+            job,
+            "contact dynamics under a growing load",
             "perturbation",
             params,
             study.PERTURBATION_VERSION,
             study.get_perturbation,
-            job,
         )
         return _pushed(found, library.packing(cell.selection.packing), contact)
 

@@ -1,5 +1,6 @@
 """Force space seen in a plane: states of a Replay projected, and the outline of S there."""
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 from granforce import measures, study
 from granforce.records import InputError
 
-from .compute import in_turn
+from .compute import found_or_made
 
 
 class Plane(NamedTuple):
@@ -95,7 +96,7 @@ def area(polygon):
     return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
-def outline(library, cell, replay, plane, workers=2):
+def outline(library, cell, replay, plane):
     """Work, for jobs.Task, that finds or computes the outline of S in a Plane."""
 
     def work(job):
@@ -107,21 +108,10 @@ def outline(library, cell, replay, plane, workers=2):
             components=chosen or None,
             states=None if chosen else cell.params,
         )
-        for store in library.stores:
-            found = store.load("outline", params, version=study.OUTLINE_VERSION)
-            if found is not None:
-                return _outlined(replay, plane, found)
-        with in_turn(job, "outline", params):
-            library.lend_packing(selection.packing)
-            job.begin("outline of S")
-            found, _ = study.get_outline(
-                library.cache,
-                params,
-                None if chosen else plane.axes,
-                workers=workers,
-                progress=job.tell,
-                cancel=job.cancelled,
-            )
+        get = partial(study.get_outline, axes=None if chosen else plane.axes)
+        found = found_or_made(
+            library, job, "outline of S", "outline", params, study.OUTLINE_VERSION, get
+        )
         return _outlined(replay, plane, found)
 
     return work

@@ -70,13 +70,13 @@ class AppState(param.Parameterized):
 
     # Tasks
 
-    def in_turn(self, pieces):
+    def piecewise(self, pieces):
         """Have a generator run to its end; other pages are served between its pieces."""
         if self._wake is None:
             for _ in pieces:
                 pass
         elif next(pieces, "end") != "end":
-            self._wake(partial(self.in_turn, pieces))
+            self._wake(partial(self.piecewise, pieces))
 
     def task(self, pool=computing):
         """A new Task of this page: work off the event loop, ended when the page is closed."""
@@ -147,8 +147,7 @@ class AppState(param.Parameterized):
         """Put a cell on screen: at once if it is in memory, else when it is read."""
         shown = self.library.shown_in_memory(cell)
         if shown is not None:
-            self._show(shown)
-            self.read_ahead()
+            self._show_and_read_ahead(shown)
         else:
             self.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
 

@@ -77,7 +77,7 @@ class View(Seen):
         self.task.start(work, self._show)
 
     def _show(self, found):
-        self.state.in_turn(self._showing(found))
+        self.state.piecewise(self._showing(found))
 
     def _showing(self, found):
         figures, self.told.object = found
