@@ -14,29 +14,22 @@ export function render({ model, view }) {
   const input = root.querySelector("input"), told = root.querySelector(".told")
   const tell = (text) => { told.textContent = text }
 
-  // Bokeh takes what came from the server for new until the page next tells the server something,
-  // and would send this component, functions and all, along with its first message.
-  function ask(message) {
-    view.model.document?._new_models?.delete(view.model)
-    model.send_msg(message)
-  }
-
   async function send(files) {
     const chosen = [...files], size = chosen.reduce((sum, file) => sum + file.size, 0)
     if (!chosen.length) return
     if (size > model.most) return tell(`${(size / 1e6).toFixed(1)} MB are too many; at most ${model.most / 1e6} MB`)
     let sent = 0
-    ask({ begin: true })
+    ask(model, view, { begin: true })
     for (const file of chosen) {
       for (let at = 0; at < file.size || at === 0; at += PIECE) {
         const data = await file.slice(at, at + PIECE).arrayBuffer()
-        ask({ name: file.name, data })
+        ask(model, view, { name: file.name, data })
         sent += data.byteLength
         tell(`sending … ${Math.round((100 * sent) / Math.max(1, size))} %`)
         await new Promise((resolve) => setTimeout(resolve))
       }
     }
-    ask({ end: true })
+    ask(model, view, { end: true })
     tell("")
   }
 

@@ -6,6 +6,8 @@ from typing import ClassVar
 import param
 from panel.custom import JSComponent
 
+from .scripts import joined
+
 FOLDER = Path(__file__).parent
 NAME_LENGTH = 120  # of a file's name, as shown in messages
 
@@ -16,7 +18,7 @@ class Dropper(JSComponent):
     label = param.String()
     most = param.Integer(doc="bytes of all files of one drop together")
 
-    _esm = FOLDER / "dropper.js"
+    _esm = joined("ask", "dropper")
     _stylesheets: ClassVar = [FOLDER / "dropper.css"]
 
     def __init__(self, on_files, on_refusal, **params):

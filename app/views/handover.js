@@ -6,13 +6,6 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   const plain = (given) => (given instanceof Map ? Object.fromEntries(given) : given)
 
-  // Bokeh takes what came from the server for new until the page next tells the server something,
-  // and would send this component, functions and all, along with its first message.
-  function ask(message) {
-    view.model.document?._new_models?.delete(view.model)
-    model.send_msg(message)
-  }
-
   function button(key, words) {
     const made = document.createElement("button")
     made.type = "button"
@@ -20,7 +13,7 @@ export function render({ model, view }) {
     made.dataset.key = key
     made.addEventListener("click", () => {
       made.classList.add("busy")
-      ask({ key })
+      ask(model, view, { key })
     })
     return made
   }

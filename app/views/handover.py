@@ -1,10 +1,11 @@
 """Buttons that hand files over: made when asked for, saved by the browser."""
 
-from pathlib import Path
 from typing import ClassVar
 
 import param
 from panel.custom import JSComponent
+
+from .scripts import joined
 
 
 class Handover(JSComponent):
@@ -12,7 +13,7 @@ class Handover(JSComponent):
 
     files = param.Dict(default={}, doc="{heading: {key: words}}")
 
-    _esm = Path(__file__).with_name("handover.js")
+    _esm = joined("ask", "handover")
     _stylesheets: ClassVar = [
         """
         :host { display: block; }

@@ -7,6 +7,8 @@ import numpy as np
 import param
 from panel.custom import JSComponent
 
+from .scripts import joined
+
 FOLDER = Path(__file__).parent
 
 
@@ -34,8 +36,7 @@ class Player(JSComponent):
     scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    # One module from three files: a component has no address from which it could import others.
-    _esm = "\n".join((FOLDER / f"{name}.js").read_text() for name in ("seen", "scene", "player"))
+    _esm = joined("seen", "scene", "player")
     _stylesheets: ClassVar = [FOLDER / "player.css"]
 
     def __init__(self, **params):

@@ -19,12 +19,7 @@ export function render({ model, view }) {
     words.textContent = model.words
   }
 
-  button.addEventListener("click", () => {
-    // Bokeh takes what came from the server for new until the page next tells the server something,
-    // and would send this component, functions and all, along with its first message.
-    view.model.document?._new_models?.delete(view.model)
-    model.send_msg({ cancel: true })
-  })
+  button.addEventListener("click", () => ask(model, view, { cancel: true }))
   for (const name of ["running", "fraction", "words"]) model.on(name, show)
   show()
   return root

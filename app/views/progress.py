@@ -1,10 +1,11 @@
 """How far a task is, with a button that cancels it; nothing is seen while it rests."""
 
-from pathlib import Path
 from typing import ClassVar
 
 import param
 from panel.custom import JSComponent
+
+from .scripts import joined
 
 
 class Progress(JSComponent):
@@ -15,7 +16,7 @@ class Progress(JSComponent):
     words = param.String()
 
     # One component of ours, not a column of three others: those take Panel five times as long.
-    _esm = Path(__file__).with_name("progress.js")
+    _esm = joined("ask", "progress")
     _stylesheets: ClassVar = [
         """
         :host { display: block; width: 100%; }
