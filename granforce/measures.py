@@ -7,10 +7,18 @@ import numpy as np
 from scipy import sparse, stats
 from scipy.sparse import csgraph
 
+from granforce.records import InputError
+
+
+def _some(states):
+    if not states.size:
+        raise InputError("nothing to measure: there are no states, or no contacts")
+    return states
+
 
 def mean_network(states):
     """G_c = ⟨F_c⟩, the mean force of each contact over states, shape (N_c, 2)."""
-    return states.mean(axis=0)
+    return _some(states).mean(axis=0)
 
 
 def eta1(states):
@@ -25,7 +33,7 @@ def eta2(states):
 
     The mean over pairs is 2 S/(S − 1) times the variance, so no pair is ever formed; 0 for S = 1.
     """
-    count = len(states)
+    count = len(_some(states))
     if count < 2:
         return 0.0
     mean = mean_network(states)
@@ -43,7 +51,7 @@ def eta3(low, high):
 
 def intervals_seen(states):
     """Smallest and largest value of each component over states, two arrays (N_c, 2)."""
-    return states.min(axis=0), states.max(axis=0)
+    return _some(states).min(axis=0), states.max(axis=0)
 
 
 def normal_extent(low, high):
@@ -63,7 +71,7 @@ def correlation_range(states, extent):
 
     The paper's error bar of the correlation.
     """
-    values = [correlation(state[:, 0], extent) for state in states]
+    values = [correlation(state[:, 0], extent) for state in _some(states)]
     return float(np.min(values)), float(np.max(values))
 
 
@@ -89,12 +97,39 @@ def principal_axes(states, count=2):
     return axes.reshape(count, *states.shape[1:]), share
 
 
-def growing_eta3(states):
-    """η3 from the first 1, 2, … S states, shape (S,)."""
-    low = np.minimum.accumulate(states, axis=0)
-    high = np.maximum.accumulate(states, axis=0)
-    extent, middle = (high - low).mean(axis=(1, 2)), (high + low).mean(axis=(1, 2)) / 2
-    return extent / middle
+class Growth:
+    """η1, η2 and η3 of states that are added one by one."""
+
+    def __init__(self):
+        self.count = 0
+
+    def add(self, state):
+        """One more state (N_c, 2); (η1, η2, η3) of all until now."""
+        if not self.count:
+            self._first, self._low, self._high = state, state, state
+            self._shift, self._square = np.zeros(state.shape), np.zeros(len(state))
+        self.count += 1
+        # Moments about the first state: where all are alike, their variance is 0 to the last bit.
+        moved = np.subtract(state, self._first, dtype=float)
+        self._shift += moved
+        self._square += (moved**2).sum(axis=1)
+        shift = self._shift / self.count
+        variance = np.maximum(0.0, self._square / self.count - (shift**2).sum(axis=1))
+        size = np.linalg.norm(self._first + shift, axis=1)
+        pairs = 2 * self.count / max(1, self.count - 1) * variance.sum()
+        self._low, self._high = np.minimum(self._low, state), np.maximum(self._high, state)
+        return (
+            np.sqrt(variance).mean() / size.mean(),
+            np.sqrt(pairs / (size**2).sum()),
+            (self._high - self._low).mean() / ((self._high + self._low).mean() / 2),
+        )
+
+
+def growing(states):
+    """η1, η2 and η3 of the first 1, 2, … S states: {"eta1": (S,), "eta2": (S,), "eta3": (S,)}."""
+    growth = Growth()
+    values = np.array([growth.add(state) for state in _some(states)])
+    return dict(zip(("eta1", "eta2", "eta3"), values.T, strict=True))
 
 
 def position_in_interval(normal_forces, low, high):

@@ -6,11 +6,16 @@ Signs: **n** points from grain i to grain j, **t** = (−n_y, n_x); the force on
 f_n n + f_t t, and f_n ≥ 0 presses.
 """
 
+import os
 from typing import NamedTuple
 
 import numpy as np
 
-from granforce.tolerances import MU_DIGITS, RIGID_OVERLAP
+from granforce import notebook
+from granforce.tolerances import LARGEST_UNIT, MU_DIGITS, RIGID_OVERLAP
+
+# Whole numbers up to here are exact in kernels, in JSON and in floats alike.
+LARGEST_WHOLE = 2**53
 
 
 class InputError(ValueError):
@@ -19,6 +24,10 @@ class InputError(ValueError):
 
 class NotJammedError(InputError):
     """No admissible force network exists, or none was reached within the budget."""
+
+
+class UndecidedError(InputError):
+    """Solvers reached no result that could be checked: nothing is known either way."""
 
 
 class Cancelled(Exception):
@@ -47,7 +56,9 @@ class Packing(NamedTuple):
     forces: np.ndarray  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force
     mu: float  # friction coefficient μ
     pressure: float  # P0, force per length; nan where no pressure is prescribed
-    load: np.ndarray  # (N, 3) external force and torque on each grain (zero in a periodic box)
+    load: (
+        np.ndarray
+    )  # (N, 3) external force and torque on each grain; NaN: its balance is left open
     info: dict  # how it was made: seed, steps, skipped work, … (plain numbers and strings)
 
     @property
@@ -59,6 +70,10 @@ class Packing(NamedTuple):
     def packing_fraction(self):
         """φ = Σ π r² / V, rattlers included."""
         return float(np.pi * np.sum(self.r**2) / self.volume)
+
+    def _repr_svg_(self):
+        """The packing as notebooks show it."""
+        return notebook.packing_svg(self)
 
 
 class Relaxation(NamedTuple):
@@ -112,6 +127,51 @@ def positive(value, name):
     return number
 
 
+def whole(value, name, least=0, most=LARGEST_WHOLE):
+    """The value as an int from least to most (None: any size); InputError otherwise."""
+    try:
+        number = int(value)
+        exact = number == value
+    except (TypeError, ValueError, OverflowError):
+        exact = False
+    if not exact:
+        raise InputError(f"{name} must be a whole number, got {value!r:.40}")
+    if number < least:
+        raise InputError(f"{name} must be at least {least}, got {value!r:.40}")
+    if most is not None and number > most:
+        raise InputError(f"{name} must be at most {most}, got {value!r:.40}")
+    return number
+
+
+def random_seed(value, name="seed"):
+    """The value as an int ≥ 0 of any size; InputError otherwise."""
+    return whole(value, name, most=None)
+
+
+def check_memory(needed, what):
+    """InputError where what needs more bytes than this machine has memory."""
+    try:
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return  # not told by this system: an allocation will fail instead
+    if needed > there:
+        raise InputError(
+            f"{what} would need {min(needed, 1e300) / 1e9:.3g} GB of memory, and this machine has "
+            f"{there / 1e9:.3g} GB; ask for less"
+        )
+
+
+def moderate(value, name):
+    """The value as a float > 0 whose powers stay finite; InputError otherwise."""
+    number = positive(value, name)
+    if not 1 / LARGEST_UNIT <= number <= LARGEST_UNIT:
+        raise InputError(
+            f"{name} must lie between {1 / LARGEST_UNIT:g} and {LARGEST_UNIT:g}, got {number:g}; "
+            "choose another unit"
+        )
+    return number
+
+
 def make_contacts(i, j, normal, length, r):
     """Contacts from array-likes, cast once: grains i, j and centre distances (N_c,), normals.
 
@@ -145,8 +205,8 @@ def make_contacts(i, j, normal, length, r):
 def make_packing(x, r, box, contacts, forces, mu, pressure=np.nan, load=None, info=None):
     """A Packing from array-likes, cast and validated once; see the fields of Packing.
 
-    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, or box sides not above the
-    largest diameter (a grain may not touch its own image).
+    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, a contact given twice, or box
+    sides not above the largest diameter (a grain may not touch its own image).
     """
     r = float_array(r, (-1,), "radii")
     if np.any(r <= 0):
@@ -155,10 +215,36 @@ def make_packing(x, r, box, contacts, forces, mu, pressure=np.nan, load=None, in
     box = np.array(box, dtype=np.float64)
     if box.shape != (2,) or np.any(np.isnan(box)) or np.any(box <= 2 * r.max(initial=0)):
         raise InputError(f"box sides must be two numbers above the largest diameter, got {box}")
-    load = np.zeros((len(r), 3)) if load is None else float_array(load, (len(r), 3), "loads")
+    load = np.zeros((len(r), 3)) if load is None else _loads(load, len(r))
     if not np.isnan(pressure):
-        pressure = positive(pressure, "pressure")
+        pressure = moderate(pressure, "pressure")
     forces = float_array(forces, (len(contacts.i), 2), "forces")
+    _check_repeated(contacts)
     return Packing(
         x, r, box, contacts, forces, friction(mu), float(pressure), load, dict(info or {})
     )
+
+
+def _loads(load, count):
+    """Loads (N, 3) whose rows are finite, or NaN as a whole."""
+    load = np.array(load, dtype=np.float64, order="C")
+    left_open = np.isnan(load).all(axis=-1) if load.ndim == 2 else np.zeros(len(load), dtype=bool)
+    float_array(np.where(left_open[..., None], 0.0, load), (count, 3), "loads")
+    return load
+
+
+def _check_repeated(contacts):
+    """Two grains touch twice only through different images, whose normals differ by 60° or more."""
+    low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
+    normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)
+    order = np.lexsort((high, low))
+    for apart in range(1, len(order)):
+        a, b = order[:-apart], order[apart:]
+        same = (low[a] == low[b]) & (high[a] == high[b])
+        if not same.any():
+            return
+        for k in np.flatnonzero(same & (np.sum(normal[a] * normal[b], axis=1) > 0.75)):
+            raise InputError(
+                f"contacts {min(a[k], b[k])} and {max(a[k], b[k])} are one: both join grains "
+                f"{low[a[k]]} and {high[a[k]]}; give each contact once"
+            )

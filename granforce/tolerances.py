@@ -31,11 +31,15 @@ ADMISSIBLE = 1e-9
 # A contact whose largest possible f_n (in ⟨f_n⟩) is below this carries nothing.
 CARRYING = 1e-7
 
+# A contact seen with at least this f_n (in ⟨f_n⟩) in a balanced state carries. Of one seen with
+# less that has to be shown: states balanced to BALANCED had 3e-7 where nothing can carry.
+SEEN_CARRYING = 1e-4
+
 # A cone coordinate that stays below this (in ⟨f_n⟩) in all of S is held where it is for sampling.
 FLAT = 1e-8
 
-# The certificate of jamming: relative distance |f − f_dyn| / |f_dyn| between the dynamic forces
-# and the nearest admissible network on the same contacts.
+# A network that certifies jamming: relative distance |f − f_dyn| / |f_dyn| between the dynamic
+# forces and the nearest admissible network on the same contacts.
 JAMMED_DISTANCE = 1e-2
 
 # Largest duality gap (in ⟨f_n⟩) of a certified bound on a force, or of a limit load.
@@ -43,6 +47,13 @@ INTERVAL_GAP = 1e-8
 
 # Feasibility tolerance asked of the linear and quadratic programs (forces in ⟨f_n⟩).
 PROGRAM = 1e-10
+
+# Largest friction coefficient a packing is made with: at 10⁵ the rounding of f_t = μ f_n alone
+# reaches BALANCED, and no network can be certified.
+LARGEST_FRICTION = 1e4
+
+# Pressures and radii lie within this factor of 1: squares and products of forces stay finite.
+LARGEST_UNIT = 1e60
 
 # Friction coefficients are compared and stored on this relative grid (0.1 + 0.2 is 0.3).
 MU_DIGITS = 9

@@ -6,8 +6,8 @@ coordinate has a scale of its own, spread over four decades where `skew` is set.
 
 from typing import NamedTuple
 
-import arviz
 import numpy as np
+from arviz_stats.base import array_stats
 from scipy import linalg, sparse, spatial, stats
 
 
@@ -102,7 +102,7 @@ def z_scores(draws, mean, variance, kurtosis):
 
 def worth(draws):
     """How many independent draws the mean of each component (k,) is worth."""
-    return arviz.ess(arviz.convert_to_dataset({"value": draws}), method="mean")["value"].values
+    return array_stats.ess(draws, chain_axis=0, draw_axis=1, method="mean")
 
 
 def distance_to_marginals(draws, marginal):

@@ -15,3 +15,17 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 @pytest.fixture
 def rng():
     return np.random.default_rng(20090501)
+
+
+@pytest.fixture
+def nobody():
+    """Rights of an ordinary user, for whom mode bits hold, also where the tests run as root."""
+    if os.geteuid() != 0:
+        yield
+        return
+    try:
+        os.seteuid(65534)
+    except OSError:
+        pytest.skip("cannot give up root's rights here")
+    yield
+    os.seteuid(0)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from granforce.compaction import pack
-from granforce.importers import load_packing
+from granforce.packing.compaction import pack
+from granforce.packing.importers import load_packing
 from granforce.records import make_contacts, make_packing
 
 REFERENCE = Path(__file__).parent / "reference"

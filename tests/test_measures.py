@@ -46,10 +46,20 @@ def test_measures_do_not_depend_on_the_unit_of_force(states):
         assert eta(1e9 * states) == pytest.approx(eta(states))
 
 
-def test_growing_eta3_ends_at_eta3(states):
-    growing = measures.growing_eta3(states)
-    assert growing[0] == 0
-    assert growing[-1] == pytest.approx(measures.eta3(*measures.intervals_seen(states)))
+def test_growing_measures_are_those_of_the_first_states(states):
+    growing = measures.growing(states)
+    for count in (1, 2, 7, len(states)):
+        first = states[:count]
+        wanted = measures.eta1(first), measures.eta2(first)
+        wanted += (measures.eta3(*measures.intervals_seen(first)),)
+        assert [growing[name][count - 1] for name in ("eta1", "eta2", "eta3")] == pytest.approx(
+            wanted, rel=1e-9, abs=1e-15
+        )
+
+
+def test_growing_measures_of_one_state_are_zero(states):
+    growing = measures.growing(np.repeat(states[:1], 4, axis=0))
+    assert not np.any([growing["eta1"], growing["eta2"], growing["eta3"]])
 
 
 def test_correlation_and_its_range(states):

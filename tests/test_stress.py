@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from packings import lattice, packed, reference
 
 from granforce import measures
-from granforce.bounds import intervals
-from granforce.compaction import pack
-from granforce.neighbours import find_pairs, separations
-from granforce.polytope import ensemble
-from granforce.random_walk import walk
+from granforce.explore.intervals import intervals
+from granforce.explore.random_walk import walk
+from granforce.forces.ensemble import ensemble
+from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.nearest import nearest
+from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.packing.compaction import pack
+from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import Contacts, NotJammedError, make_contacts, make_packing
-from granforce.relax.accelerated import accelerated
-from granforce.relax.gauss_seidel import gauss_seidel
-from granforce.relax.nearest import nearest
 
 
 def assert_sound(packing, overlap=1e-7):
@@ -84,12 +84,12 @@ def test_crystals_with_dependent_equations(triangular, mu, vacancy, rng):
         packing = without_grain(packing, 14)
     S = ensemble(packing)
     start = rng.uniform(-1, 2, S.original.shape)
-    found = nearest(S, start)
+    found = nearest_piqp(S, start)
     assert found.converged
     swept = gauss_seidel(S, start)
     assert swept.residual < 1e-10
     assert S.violation(found.forces) < 1e-9
-    bounds = intervals(S, [0, 5])
+    bounds = intervals(S, S.index[[0, 5]])
     assert bounds.max_gap <= 1e-8
     for forces in (found.forces, swept.forces):
         inside = forces[[0, 5]]
@@ -99,7 +99,7 @@ def test_crystals_with_dependent_equations(triangular, mu, vacancy, rng):
 
 def test_a_box_much_longer_than_wide(rng):
     S = ensemble(lattice(60, 4, 0.3, triangular=True))
-    assert nearest(S, rng.uniform(0, 2, S.original.shape)).converged
+    assert nearest_piqp(S, rng.uniform(0, 2, S.original.shape)).converged
     assert gauss_seidel(S, rng.uniform(0, 2, S.original.shape)).residual < 1e-10
 
 
@@ -131,12 +131,12 @@ def test_rounding_noise_on_the_geometry_stays_small(rng):
         packing.pressure,
     )
     S, T = ensemble(packing), ensemble(shaken)
-    one, two = (nearest(E, start[E.index]).forces for E in (S, T))
+    one, two = (nearest_piqp(E, start[E.index]).forces for E in (S, T))
     assert np.abs(one - two).max() < 1e-8 * S.force_scale
 
 
-@pytest.mark.parametrize("one", [nearest, accelerated])
-@pytest.mark.parametrize("other", [nearest, accelerated])
+@pytest.mark.parametrize("one", [nearest_piqp, nearest])
+@pytest.mark.parametrize("other", [nearest_piqp, nearest])
 def test_order_of_contacts_does_not_matter_between_solvers(one, other, rng):
     packing = reference("n100_mu1_s12")
     order = rng.permutation(len(packing.contacts.i))
@@ -157,8 +157,8 @@ def test_forces_scale_with_the_pressure_between_solvers(pressure, rng):
     )
     start = rng.uniform(0, 2, packing.forces.shape)
     S, T = ensemble(packing), ensemble(scaled)
-    one = nearest(S, start[S.index]).forces
-    two = accelerated(T, pressure * start[T.index]).forces / pressure
+    one = nearest_piqp(S, start[S.index]).forces
+    two = nearest(T, pressure * start[T.index]).forces / pressure
     assert np.abs(one - two).max() < 1e-9 * S.force_scale
 
 
@@ -175,14 +175,14 @@ def test_one_contact_short_of_rigidity_fails_loudly(mu):
         packing = packing._replace(contacts=contacts, forces=packing.forces[keep])
         try:
             T = ensemble(packing)
-            packing = packing._replace(forces=T.expand(nearest(T, T.original).forces))
+            packing = packing._replace(forces=T.expand(nearest_piqp(T, T.original).forces))
         except NotJammedError as error:
             assert "grain" in str(error)
             failed += 1
             continue
         assert mu > 0 and T.dimension < S.dimension
     whole = ensemble(packing, prune=False)
-    for relax in (nearest, accelerated):
+    for relax in (nearest_piqp, nearest):
         assert not relax(whole, whole.original).converged
     with pytest.raises(NotJammedError):
         walk(whole, 3, 0)
@@ -213,7 +213,7 @@ def test_a_gap_at_the_tolerance_opens_or_closes_a_contact():
 def test_any_start_is_relaxed_into_s(seed, amplitude, mu):
     S = ensemble(packed(30, mu))
     start = np.random.default_rng(seed).normal(size=S.original.shape) * amplitude
-    found = nearest(S, start)
+    found = nearest_piqp(S, start)
     assert found.converged
     assert S.violation(found.forces) == pytest.approx(0, abs=1e-9)
     # Nearest: no admissible state on the way to the original is closer.

@@ -6,14 +6,17 @@
 
 import json
 import time
-from pathlib import Path
 
+from granforce.bench.conditions import knowledge
+from granforce.bench.inference import inference
+from granforce.bench.kernel import growth, kernel, starts
 from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
 from granforce.bench.report import environment, note, table
 from granforce.bench.skips import skips
 from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
 from granforce.bench.states import batches, interval_methods, intervals, walks
 from granforce.bench.uniform import uniform
+from granforce.system.files import make_folder, written
 
 __all__ = [
     "PARTS",
@@ -23,13 +26,18 @@ __all__ = [
     "compaction_growth",
     "contact_updates",
     "environment",
+    "growth",
+    "inference",
     "interval_methods",
     "intervals",
+    "kernel",
+    "knowledge",
     "main",
     "relaxation",
     "run",
     "scaling",
     "skips",
+    "starts",
     "tile",
     "uniform",
     "walks",
@@ -40,6 +48,9 @@ PARTS = {
     "contact_updates": (contact_updates, "One contact update of Gauss–Seidel"),
     "relaxation": (relaxation, "One relaxation to 1e-9 ⟨f_n⟩, from the same kicked starts"),
     "scaling": (scaling, "One relaxation against the number of disks"),
+    "kernel": (kernel, "Factorisation: part of what the machine can do"),
+    "starts": (starts, "Nearest networks: PIQP, one at a time, and in lanes"),
+    "growth": (growth, "Set-up, relaxation and exact bound against the number of disks"),
     "batches": (batches, "Chains of one packing on one and two threads"),
     "compaction": (compaction, "Compaction: run time and overlap by time step and sweeps"),
     "compaction_frictions": (compaction_frictions, "Compaction at each μ"),
@@ -48,6 +59,8 @@ PARTS = {
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),
     "uniform": (uniform, "Uniform sampling of S"),
+    "inference": (inference, "The likeliest network of a measurement"),
+    "knowledge": (knowledge, "What is prescribed and known, beside HiGHS and PIQP"),
     "walks": (walks, "Random walks by solver"),
 }
 
@@ -59,6 +72,7 @@ def run(folder=None, quick=True, *, parts=None, show=print):
     (bench.html, bench.png); None: nowhere.
     show: what is called with each finished table.
     """
+    folder = None if folder is None else make_folder(folder)
     results = {"environment": environment(), "quick": bool(quick), "seconds": {}}
     for name in parts or PARTS:
         measure, heading = PARTS[name]
@@ -68,21 +82,15 @@ def run(folder=None, quick=True, *, parts=None, show=print):
         note(f"{name}: {results['seconds'][name]:.1f} s")
         show(table(heading, results[name]))
         if folder is not None:
-            _write(Path(folder), results)
+            with written(folder / "bench.json") as file:
+                file.write(json.dumps(results, indent=1, ensure_ascii=False).encode())
     if folder is not None:
-        _draw(Path(folder), results)
+        _draw(folder, results)
     return results
 
 
-def _write(folder, results):
-    folder.mkdir(parents=True, exist_ok=True)
-    fresh = folder / "bench.json.part"
-    fresh.write_text(json.dumps(results, indent=1, ensure_ascii=False))
-    fresh.replace(folder / "bench.json")
-
-
 def _draw(folder, results):
-    from granforce import figures  # HoloViews takes seconds to load
+    from granforce import figures
 
     for name, backend in (("bench.html", "bokeh"), ("bench.png", "matplotlib")):
         figure = figures.benchmark(results, backend=backend)

@@ -5,8 +5,8 @@ import time
 import numpy as np
 
 from granforce.bench.report import exponent, note
-from granforce.compaction import pack
-from granforce.polytope import ensemble
+from granforce.forces.ensemble import ensemble
+from granforce.packing.compaction import pack
 from granforce.records import NotJammedError
 
 FRICTIONS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
@@ -73,7 +73,7 @@ def _packed(n, mu, seed, **options):
         "seconds": seconds,
         "steps": packing.info["steps"],
         "contact_updates": packing.info["contact_updates"],
-        "certificates": packing.info["certificates_tried"],
+        "networks_tried": packing.info["certificates_tried"],
         "overlap": packing.info["mean_overlap_of_dynamics"],
         "phi": packing.packing_fraction,
         "z": S.coordination,

@@ -12,8 +12,9 @@ import numpy as np
 from scipy import sparse
 
 from granforce.bench.report import note
-from granforce.contact_dynamics import add_forces, set_stiffness, sweep
-from granforce.relax.gauss_seidel import _from_rest
+from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
+from granforce.forces.gauss_seidel import _from_rest
+from granforce.numerics.lanes import ONE
 
 # Environment variable naming a Python that can import Siconos, which has no package on PyPI.
 INTERPRETER = "GRANFORCE_SICONOS_PYTHON"
@@ -96,5 +97,5 @@ def _ours(S, start, sweeps):
     set_stiffness(problem)
     add_forces(problem, force, velocity, 0.0)
     for _ in range(sweeps):
-        sweep(problem, order, S.mu, force, velocity, 0.0)
+        sweep(problem, order, S.mu, force, velocity, 0.0, ONE)
     return force, time.perf_counter() - begin

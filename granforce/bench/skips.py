@@ -5,15 +5,17 @@ import time
 
 import numpy as np
 
-from granforce import compaction, study
 from granforce.bench.report import note
 from granforce.bench.solvers import kicked
-from granforce.bounds import intervals
-from granforce.compaction import pack
-from granforce.polytope import ensemble
-from granforce.relax.accelerated import accelerated
-from granforce.relax.gauss_seidel import gauss_seidel
-from granforce.store import open_store
+from granforce.explore.intervals import intervals
+from granforce.forces.ensemble import ensemble
+from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.nearest import nearest
+from granforce.packing import compaction
+from granforce.packing.compaction import pack
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.store import open_store
 
 
 def skips(quick=True, *, n=None, mu=0.1):
@@ -59,8 +61,8 @@ def _rattlers(packing, S):
     """A relaxation of all contacts of all grains, as in an import that has not been looked at."""
     whole = ensemble(packing, prune=False)
     start = kicked(whole, 1, 0)[0]
-    few = _seconds(lambda: accelerated(S, start[S.index]))
-    every = _seconds(lambda: accelerated(whole, start))
+    few = _seconds(lambda: nearest(S, start[S.index]))
+    every = _seconds(lambda: nearest(whole, start))
     count = S.skipped["rattlers"] + S.skipped["unloaded_contacts"]
     return _row("rattlers and unloaded contacts, one relaxation", count, few, every)
 
@@ -69,8 +71,8 @@ def _tangential(packing):
     """The balance of a frictionless packing with the unknowns f_t kept (at μ = 1e-6) or not."""
     without = ensemble(packing, mu=1e-6)
     S = ensemble(packing)
-    few = _seconds(lambda: intervals(S, [0, 1]))
-    every = _seconds(lambda: intervals(without, [0, 1]))
+    few = _seconds(lambda: intervals(S, S.index[:2]))
+    every = _seconds(lambda: intervals(without, without.index[:2]))
     told = "tangential unknowns and torque rows at μ = 0, four bounds"
     return _row(told, S.skipped["tangential_unknowns"], few, every)
 
@@ -112,9 +114,9 @@ def _programs(S):
 def _cells(n, mu):
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(folder)
-        named = study.walk_parameters(study.packing_parameters(n, mu, 1), 50)
+        named = kinds.WALK.parameters(kinds.PACKING.parameters(n, mu, 1), 50)
         begin = time.perf_counter()
-        study.get_walk(store, named)
+        study.get(store, kinds.WALK, named)
         every = time.perf_counter() - begin
-        few = _seconds(lambda: study.get_walk(store, named))
+        few = _seconds(lambda: study.get(store, kinds.WALK, named))
     return _row("a finished cell (packing, 50 states)", 1, few, every)

@@ -11,14 +11,14 @@ import numpy as np
 
 from granforce import measures
 from granforce.bench.report import note
-from granforce.bounds import intervals as exact_intervals
-from granforce.compaction import pack
-from granforce.polytope import ensemble
-from granforce.random_walk import walk
+from granforce.explore.intervals import intervals as exact_intervals
+from granforce.explore.random_walk import walk
+from granforce.forces.ensemble import ensemble
+from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.nearest import nearest
+from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.packing.compaction import pack
 from granforce.records import NotJammedError
-from granforce.relax.accelerated import accelerated
-from granforce.relax.gauss_seidel import gauss_seidel
-from granforce.relax.nearest import nearest
 from granforce.tolerances import EQUILIBRIUM
 
 WALKS = {
@@ -29,14 +29,14 @@ WALKS = {
         "max_iterations": 20_000,
     },
     "Gauss–Seidel, exact finish": {"relax": gauss_seidel},
-    "nearest (PIQP)": {"relax": nearest},
-    "accelerated": {"relax": accelerated},
+    "nearest (PIQP)": {"relax": nearest_piqp},
+    "nearest": {"relax": nearest},
 }
 FRICTIONS = (0.01, 0.1, 1.0)
 # Attempts per state after which a walk has failed: Gauss–Seidel alone, few of whose relaxations
 # end in equilibrium at large μ, would take hours.
 ATTEMPTS = 4
-# Packings of the exact intervals for `granforce.bench_intervals`, where the sources are at hand.
+# Packings of the exact intervals for `granforce.bench.exact`, where the sources are at hand.
 REFERENCES = Path("tests/reference")
 
 
@@ -203,19 +203,19 @@ def _growing(S, name, counts, eta3, extent):
 
 
 def interval_methods(quick=True, *, folder=REFERENCES):
-    """Exact intervals against other tools, by `granforce.bench_intervals` (needs its packings).
+    """Exact intervals against other tools, by `granforce.bench.exact` (needs its packings).
 
     Rows with time, ratio to a plain loop over programs, and error against the reference bounds
     in ⟨f_n⟩; one row that says so where the reference files are not at hand.
     """
     if not any(Path(folder).glob("*.npz")):
         return [{"packing": None, "note": f"reference packings not found in {folder}"}]
-    from granforce import bench_intervals
+    from granforce.bench import exact
 
     note("intervals against other tools")
     # Its own table would mix with ours on stdout.
     with contextlib.redirect_stdout(sys.stderr):
-        found = bench_intervals.run(quick, folder)
+        found = exact.run(quick, folder)
     return [
         {
             "packing": packing,

@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.bench.report import note
-from granforce.chart import chart
-from granforce.compaction import pack
-from granforce.diagnostics import Mixing, mixing
-from granforce.polytope import ensemble
-from granforce.uniform import METHODS, forces_of, step, varying, warm_up
+from granforce.explore.chart import chart
+from granforce.explore.mixing import Mixing, mixing
+from granforce.explore.uniform import METHODS, forces_of, step, varying, warm_up
+from granforce.forces.contact_problem import inner_network
+from granforce.forces.ensemble import ensemble
+from granforce.packing.compaction import pack
 
 # Dimension up to which hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79, is waited
 # for. Beyond it hopsy gets our rounding only.
@@ -38,7 +39,7 @@ def uniform(quick=True, *, n=None, frictions=None, seed=1, rounded=None):
     for mu in frictions:
         S = ensemble(pack(n, mu, seed))
         begin = time.process_time()
-        made = chart(*S.scaled_form[:2])
+        made = chart(*S.scaled_form[:2], inner_network(S))
         setup = time.process_time() - begin
         runs = [_ours(S, made, method, seed) for method in METHODS]
         runs += _hopsy(S, made, rounded)
@@ -74,7 +75,8 @@ def _ours(S, made, method, seed):
     for count in (1, STATES // 4):  # the first time it is compiled
         begin = time.process_time()
         ends, reach, _ = warm_up(made, 4, seed + METHODS.index(method), method=method)
-        done = [step(made, end, count, reach, method=method)[1].slacks for end in ends]
+        options = {"count": count, "reach": reach, "method": method}
+        done = [step(made, end, **options)[1].slacks for end in ends]
         seconds = time.process_time() - begin
     states = forces_of(S, made, np.array(done))
     return _Run(method, states, mixing(states, varying(S, made)), seconds, 0.0)
@@ -86,7 +88,7 @@ def _two_cores(made, seed):
     for workers in (1, 2):
         begin = time.perf_counter()
         with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(lambda end: step(made, end, STATES, reach), ends))
+            list(pool.map(lambda end: step(made, end, count=STATES, reach=reach), ends))
         wall.append(time.perf_counter() - begin)
     return wall[0] / wall[1]
 

@@ -8,23 +8,35 @@ are means and bars their standard errors.
 from granforce.figures.bench import benchmark
 from granforce.figures.displacement import displacement
 from granforce.figures.indeterminacy import correlations, extents, indeterminacy
-from granforce.figures.networks import places, possible_forces
+from granforce.figures.networks import overlaid, places, possible_forces
 from granforce.figures.response import perturbation
 from granforce.figures.style import save
-from granforce.figures.variations import distances, frozen, opened, sizes
+from granforce.figures.variations import (
+    distances,
+    effort,
+    frozen,
+    opened,
+    samplers,
+    sizes,
+    stresses,
+)
 
 __all__ = [
     "benchmark",
     "correlations",
     "displacement",
     "distances",
+    "effort",
     "extents",
     "frozen",
     "indeterminacy",
     "opened",
+    "overlaid",
     "perturbation",
     "places",
     "possible_forces",
+    "samplers",
     "save",
     "sizes",
+    "stresses",
 ]

@@ -35,8 +35,14 @@ def displacement(packing, field, contact=None, *, backend="bokeh"):
     low, high = (np.zeros(2), packing.box) if whole else (x.min(axis=0), x.max(axis=0))
     limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     shape = {"data_aspect": 1} if backend == "bokeh" else {"aspect": "equal"}
+    words = {f"{axis}label": style.typeset(axis, backend) for axis in "xy"}
     return hv.Overlay(drawn).opts(
-        title="First motion", xlabel="x", ylabel="y", backend=backend, **limits, **shape
+        title="First motion",
+        **words,
+        legend_position=style.beside("top_right", backend),
+        backend=backend,
+        **limits,
+        **shape,
     )
 
 

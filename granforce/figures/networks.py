@@ -7,13 +7,13 @@ from granforce.figures import style
 SHOWN_CONTACTS = 40
 
 
-def possible_forces(groups, *, backend="bokeh", largest=3.0):
+def possible_forces(groups, *, backend="bokeh", largest=3.0, contacts=SHOWN_CONTACTS):
     """Figure 3: values of f_n / f_n,orig of contacts, weak to strong, for several μ.
 
     groups: {μ: (original (N_c,), states (S, N_c), least (N_c,), extent (N_c,))}: normal forces of
     the original network and of some states, and the interval seen in all of them, in one unit.
-    SHOWN_CONTACTS contacts, evenly spaced in the order of their force, are drawn: the interval as a
-    bar, states as points.
+    So many contacts, evenly spaced in the order of their force, are drawn (all where there are no
+    more): the interval as a bar, states as points.
     """
     style.ready(backend)
     frames = []
@@ -21,13 +21,14 @@ def possible_forces(groups, *, backend="bokeh", largest=3.0):
         original, states, least, extent = (np.asarray(values) for values in groups[mu])
         order = np.argsort(original, kind="stable")
         order = order[original[order] > 0]
-        chosen = order[np.linspace(0, len(order) - 1, min(SHOWN_CONTACTS, len(order))).astype(int)]
+        chosen = order[np.linspace(0, len(order) - 1, min(contacts, len(order))).astype(int)]
         scale = original[chosen]
         x = np.arange(1, len(chosen) + 1)
         colour = style.COLOURS[k % len(style.COLOURS)]
         low, high = least[chosen] / scale, (least + extent)[chosen] / scale
-        middle = np.clip((low + high) / 2, 0, largest)
-        bars = list(zip(x, middle, middle - low, np.minimum(high, largest) - middle, strict=True))
+        inside = low <= largest
+        low, high = low[inside], np.minimum(high[inside], largest)
+        bars = list(zip(x[inside], low, np.zeros_like(low), high - low, strict=True))
         ratio = states[:, chosen] / scale
         points = [(a, b) for column, a in zip(ratio.T, x, strict=True) for b in column]
         points = [(a, b) for a, b in points if b <= largest]
@@ -67,13 +68,47 @@ def places(groups, *, backend="bokeh", part=0.1):
                     drawn,
                     backend,
                     title=f"μ = {mu:g}: {word} {100 * part:g} %",
-                    x="x",
-                    y="y",
+                    x="x / r_max",
+                    y="y / r_max",
                     xlim=(0, box[0]),
                     ylim=(0, box[1]),
                     **style.equal_scales(box, backend),
                 )
             )
+    return style.page(frames, backend, columns=2)
+
+
+def overlaid(groups, *, backend="bokeh"):
+    """Figure 5: where forces are strong, f_n > 2⟨f_n⟩, and where undetermined, ΔF_n > ⟨ΔF_n⟩.
+
+    groups: as for `places`; both are drawn over each other, and the title counts them.
+    """
+    style.ready(backend)
+    frames = []
+    for mu in sorted(groups):
+        packing, contacts, normal, extent = groups[mu]
+        at, normal, extent = contact_points(packing, contacts), *map(np.asarray, (normal, extent))
+        strong, loose = normal > 2 * normal.mean(), extent > extent.mean()
+        drawn = [
+            style.dots(at, "contacts", style.GREY, backend, size=1),
+            style.dots(at[loose], "ΔF_n > ⟨ΔF_n⟩", style.COLOURS[4], backend, "s", size=6),
+            style.dots(at[strong], "f_n > 2⟨f_n⟩", style.COLOURS[1], backend, size=4),
+        ]
+        box = packing.box
+        last = mu == max(groups)
+        frames.append(
+            style.frame(
+                drawn,
+                backend,
+                title=f"μ = {mu:g}: {strong.sum()} strong, {loose.sum()} undetermined",
+                x="x / r_max",
+                y="y / r_max",
+                xlim=(0, box[0]),
+                ylim=(0, box[1]),
+                legend=style.beside("top_right", backend) if last else None,
+                **style.equal_scales(box, backend),
+            )
+        )
     return style.page(frames, backend, columns=2)
 
 

@@ -1,10 +1,15 @@
 """How figures look, in either backend: colours, lines, points, frames; and how they are saved."""
 
+import io
+import re
+from html import escape
 from pathlib import Path
 
 import holoviews as hv
+import numpy as np
 
 from granforce.records import InputError
+from granforce.system.files import written
 
 # Okabe and Ito's palette: told apart by colour-blind eyes.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
@@ -13,6 +18,43 @@ MARKERS = ("o", "s", "^", "d", "v", "+", "x", "*")
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
 FRAME_INCHES = (4.2, 3.5)
+# A letter's width and height, and how far words may be from their points, in parts of a frame.
+_LETTER = 0.022, 0.055
+_FAR = 0.05, 0.07, 0.09, 0.12, 0.15, 0.18, 0.22
+
+# Symbols as they are written here: as mathtext for pictures, in Unicode for pages.
+SYMBOLS = {
+    "ΔF_n": (r"\Delta F_n", "ΔFₙ"),
+    "F_crit": (r"F_\mathrm{crit}", "Fᶜʳⁱᵗ"),
+    "f_n,orig": (r"f_{n,\mathrm{orig}}", "fₙ,orig"),
+    "f_n": ("f_n", "fₙ"),
+    "r_max": (r"r_\mathrm{max}", "rₘₐₓ"),
+    "r^−α": (r"r^{-\alpha}", "r⁻ᵅ"),
+    "|u|": ("|u|", "|u|"),
+    "Δt": (r"\Delta t", "Δt"),
+    "η1": (r"\eta_1", "η₁"),
+    "η2": (r"\eta_2", "η₂"),
+    "η3": (r"\eta_3", "η₃"),
+    "η": (r"\eta", "η"),
+    "μ": (r"\mu", "μ"),
+    "α": (r"\alpha", "α"),
+    "P(": ("P(", "P("),
+}
+# Letters alone are symbols, too, where a value, a unit or nothing follows; units are not.
+_SYMBOL = re.compile("|".join(map(re.escape, SYMBOLS)) + r"|(?<!/ )\b[a-zA-Z]\b(?= =|$| /)")
+
+
+def typeset(text, backend):
+    """A text with its symbols in mathematical type; what is typeset already stays as it is."""
+    if "$" in text:
+        return text
+
+    def symbol(match):
+        written = match.group()
+        maths, plain = SYMBOLS.get(written, (written, written))
+        return f"${maths}$" if backend == "matplotlib" else plain
+
+    return _SYMBOL.sub(symbol, text)
 
 
 def ready(backend):
@@ -57,13 +99,50 @@ def bars(points, colour, backend, horizontal=False):
     )
 
 
-def words(points, backend):
-    """Words at points (x, y, text), beside what they name."""
-    look = {"text_font_size": "8pt", "text_color": "#555555", "text_align": "left"}
+def words(points, strokes, backend):
+    """Words for points (x, y, text), clear of strokes (x, y, x, y) where there is room for them.
+
+    A thin line leads from each word to its point.
+    """
+    look, thin = {"text_font_size": "8pt", "text_color": "#555555"}, {"line_width": 0.5}
     if backend == "matplotlib":
-        look = {"size": 8, "color": "#555555", "horizontalalignment": "left"}
-    labels = [(x, y, f" {text}") for x, y, text in points]
-    return hv.Labels(labels, ["x", "y"], "text").opts(backend=backend, **look)
+        look, thin = {"size": 8, "color": "#555555"}, {"linewidth": 0.5}
+    places = _clear_places(points, np.array(strokes, dtype=float).reshape(-1, 2, 2))
+    labels = [(x, y, text) for (x, y), (*_, text) in zip(places, points, strict=True)]
+    leaders = [(*point[:2], x, y) for (x, y), point in zip(places, points, strict=True)]
+    yield hv.Segments(leaders).opts(backend=backend, color="#999999", **thin)
+    yield hv.Labels(labels, ["x", "y"], "text").opts(backend=backend, **look)
+
+
+def _clear_places(points, strokes):
+    """Middles (n, 2) of words for points (x, y, text), none over strokes (m, 2, 2) if possible.
+
+    Of places around each point the nearest that covers least is taken, in parts of the frame.
+    """
+    at = np.array([point[:2] for point in points], dtype=float).reshape(-1, 2)
+    ends = np.concatenate([at, strokes.reshape(-1, 2)])
+    low, span = ends.min(axis=0), np.ptp(ends, axis=0)
+    span[span == 0] = 1.0
+    at, strokes = (at - low) / span, (strokes - low) / span
+    along = np.linspace(0, 1, 100)[:, None, None]
+    ink = (strokes[:, 0] + along * (strokes[:, 1] - strokes[:, 0])).reshape(-1, 2)
+    ink, angle = np.concatenate([ink, at]), np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    places = []
+    for here, (*_, text) in zip(at, points, strict=True):
+        size = np.array([_LETTER[0] * (len(text) + 1), _LETTER[1]])
+        tried = [(far, here + far * around) for far in _FAR]
+        distance = np.repeat([far for far, _ in tried], len(around))
+        tried = np.concatenate([place for _, place in tried])
+        covered = (np.abs(tried[:, None] - ink) < size / 2).all(axis=2).sum(axis=1)
+        outside = (np.abs(tried - 0.5) > 0.53).any(axis=1)
+        best = tried[np.argmin(covered + 1000 * outside + 10 * distance)]
+        places.append(best)
+        # Words and their leaders are in the way of others.
+        corners = best + size / 2 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1], [0, 0]])
+        leader = here + along[:, 0] * (best - here)
+        ink = np.concatenate([ink, np.repeat(corners, 20, axis=0), leader])
+    return low + span * np.array(places).reshape(-1, 2)
 
 
 def curves(series, backend, logx=False, logy=False):
@@ -81,6 +160,14 @@ def curves(series, backend, logx=False, logy=False):
         yield bars([bar for bar in reach if bar[3] > 0], colour, backend)
 
 
+def beside(corner, backend):
+    """Place of a legend that would lie over data: beside the frame, in pages in this corner.
+
+    A page has no room beside its frames, and can be moved under the legend.
+    """
+    return corner if backend == "bokeh" else "right"
+
+
 def frame(elements, backend, *, title, x, y, legend=None, **options):
     """Elements in one frame. legend: its corner, such as "top_right"; options: logx, ylim, …"""
     if backend == "bokeh":
@@ -88,14 +175,43 @@ def frame(elements, backend, *, title, x, y, legend=None, **options):
         options = {"frame_width": width, "frame_height": height, "toolbar": "above"} | options
     else:
         options = {"aspect": "auto", "fontscale": 0.9} | options
+        options["hooks"] = [_typeset_legend]
     if legend is not None:
         options["legend_position"] = legend
-    options = {"title": title, "xlabel": x, "ylabel": y, "padding": 0.05} | options
+    words = {"title": title, "xlabel": x, "ylabel": y}
+    words = {name: typeset(text, backend) for name, text in words.items()}
+    options = words | {"padding": 0.05} | options
     # Ranges are each frame's own: by their names HoloViews would share them along a layout.
     elements = [element.opts(axiswise=True, backend=backend) for element in elements]
     return hv.Overlay(elements).opts(
         backend=backend, show_legend=legend is not None, axiswise=True, **options
     )
+
+
+def inset(outer, inner, place, backend):
+    """The frames of which one is an inset of the other, as a list.
+
+    place: (left, bottom, width, height) in parts of the outer frame. Pages have no insets: there
+    both frames stand beside each other.
+    """
+    if backend == "bokeh":
+        return [outer, inner]
+
+    def draw(plot, _):
+        axes = plot.handles["axis"].inset_axes(place)
+        small = inner.opts(backend=backend, clone=True, title="", fontscale=0.65, show_legend=False)
+        kind = hv.Store.registry[backend][hv.Overlay]
+        made = kind(small, fig=axes.figure, axis=axes)
+        made._close_figures = False  # the outer frame's is not done
+        made.initialize_plot()
+
+    return [outer.opts(backend=backend, clone=True, hooks=[_typeset_legend, draw])]
+
+
+def _typeset_legend(plot, element):
+    legend = plot.handles["axis"].get_legend()
+    for text in [] if legend is None else legend.get_texts():
+        text.set_text(typeset(text.get_text(), "matplotlib"))
 
 
 def equal_scales(box, backend):
@@ -111,32 +227,60 @@ def page(frames, backend, columns=3):
     layout = hv.Layout(list(frames)).cols(columns)
     if backend == "bokeh":
         return layout.opts(shared_axes=False, backend=backend)
-    return layout.opts(sublabel_format="", hspace=0.3, vspace=0.35, backend=backend)
+    (width, height), (rows, across) = FRAME_INCHES, layout.shape
+    size = {"fig_inches": (across * width, rows * height)}
+    return layout.opts(sublabel_format="", hspace=0.3, vspace=0.35, backend=backend, **size)
 
 
-def save(figure, path):
+def save(figure, path, caption=""):
     """Write a figure: a page that needs no network (.html), or a picture (.png, .svg).
 
     Pages are for figures made with the backend "bokeh", pictures with "matplotlib": no browser.
+    caption: what the figure shows, kept in the file: the title of a page, the Description of a PNG,
+    <desc> in an SVG.
     """
     path = Path(path)
     if path.suffix == ".html":
         ready("bokeh")
-        hv.save(figure, path, backend="bokeh", resources="inline")
+        text = io.StringIO()
+        title = caption or path.stem
+        hv.save(figure, text, fmt="html", backend="bokeh", resources="inline", title=title)
+        content = text.getvalue().encode()
     elif path.suffix in (".png", ".svg"):
-        ready("matplotlib")
-        from matplotlib import rc_context  # seconds to load, of use here only
-
-        drawn = hv.render(figure, backend="matplotlib")
-        rows, columns = figure.shape if isinstance(figure, hv.Layout) else (1, 1)
-        width, height = FRAME_INCHES
-        drawn.set_size_inches(columns * width, rows * height)
-        # Names in SVG come from a fixed salt, not from chance: the same figure, the same file.
-        with rc_context({"svg.hashsalt": "granforce"}):
-            metadata = {"Date": None} if path.suffix == ".svg" else None
-            drawn.savefig(path, dpi=150, bbox_inches="tight", metadata=metadata)
+        content = _picture(figure, path.suffix.removeprefix("."), caption)
     else:
         raise InputError(f"figures are saved as .html, .png or .svg, not {path.suffix!r}")
+    with written(path) as file:
+        file.write(content)
+
+
+def rendered(figure):
+    """A figure for pictures as a Matplotlib figure of the size that all its frames need."""
+    ready("matplotlib")
+    drawn = hv.render(figure, backend="matplotlib")
+    rows, columns = figure.shape if isinstance(figure, hv.Layout) else (1, 1)
+    width, height = FRAME_INCHES
+    drawn.set_size_inches(columns * width, rows * height)
+    return drawn
+
+
+def _picture(figure, form, caption):
+    """A figure as the bytes of a PNG or an SVG, with its caption."""
+    drawn = rendered(figure)
+    from matplotlib import rc_context  # seconds to load, of use here only
+
+    metadata = {"Title": "granforce", "Description": caption}
+    if form == "svg":
+        metadata["Date"] = None  # the same figure, the same file
+    file = io.BytesIO()
+    # Names in SVG come from a fixed salt, not from chance.
+    with rc_context({"svg.hashsalt": "granforce"}):
+        drawn.savefig(file, format=form, dpi=150, bbox_inches="tight", metadata=metadata)
+    content = file.getvalue()
+    if form == "svg" and caption:
+        described = f"</title>\n <desc>{escape(caption)}</desc>".encode()
+        content = content.replace(b"</title>", described, 1)
+    return content
 
 
 def _marker(marker, backend):

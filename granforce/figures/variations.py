@@ -6,14 +6,33 @@ from granforce.figures import style
 _MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
 
 
+def samplers(groups, *, backend="bokeh"):
+    """η1, η2 and 0.15 η3 against μ, one frame each, of states drawn in several ways.
+
+    groups: {name: rows}, dicts with mu and those of eta1, eta2, eta3 that it has.
+    """
+    sources = [(word, rows, "solid") for word, rows in groups.items()]
+    return _frames(sources, backend, _MEASURES, "right", columns=3)
+
+
+def effort(groups, *, backend="bokeh"):
+    """Accepted part of attempts and sweeps per state against μ, of walks by sweeps alone.
+
+    groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
+    """
+    sources = [(word, rows, "solid") for word, rows in groups.items()]
+    names = (("acceptance", "accepted part", 1.0), ("mean_sweeps", "sweeps per state", 1.0))
+    return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
+
+
 def sizes(rows, *, backend="bokeh"):
     """η1, η2 and 0.15 η3 against the number of disks, one frame for each μ.
 
     rows: dicts with n, mu, eta1, eta2, eta3.
     """
     style.ready(backend)
-    frames = []
-    for mu in sorted({row["mu"] for row in rows}):
+    frames, frictions = [], sorted({row["mu"] for row in rows})
+    for mu in frictions:
         chosen = [row for row in rows if row["mu"] == mu]
         series = [
             (statistics.means(chosen, name, "n", factor), label, style.COLOURS[k], "solid", k)
@@ -27,7 +46,7 @@ def sizes(rows, *, backend="bokeh"):
                 x="N",
                 y="η",
                 logx=True,
-                legend="top_right",
+                legend="right" if mu == frictions[-1] else None,
             )
         )
     return style.page(frames, backend, columns=2)
@@ -40,7 +59,7 @@ def opened(rows, own, *, backend="bokeh"):
     """
     sources = (("made at μ = 0", rows, "solid"), ("made at μ", own, "dashed"))
     names = (("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
-    return _frames(sources, backend, names, "top_left", logy=True)
+    return _frames(sources, backend, names, "top_left", logy=("eta2", "eta3"))
 
 
 def frozen(periodic, inner, *, backend="bokeh"):
@@ -76,12 +95,71 @@ def distances(rows, *, backend="bokeh"):
         x="μ",
         y="distance / that of uniform states",
         logx=True,
-        legend="bottom_left",
+        legend="top_right",
     )
 
 
-def _frames(sources, backend, names, legend, logy=False):
-    """One frame for each name against μ > 0, with all sources: (word, rows, dash)."""
+def stresses(rows, uniform, *, backend="bokeh"):
+    """Shear stress over pressure against μ: the largest in S and that of the original network.
+
+    Beside it the original network's and uniform states' in parts of the largest in their packing.
+    rows: dicts with mu, seed, friction (the largest) and own_shear (of the original network);
+    uniform: with mu, seed, mean_shear and largest_shear of uniform states.
+    """
+    largest = {(row["mu"], row["seed"]): row["friction"] for row in rows}
+    own, states = (
+        [
+            {"mu": row["mu"], **{n: row[n] / largest[row["mu"], row["seed"]] for n in names}}
+            for row in some
+            if largest.get((row["mu"], row["seed"]))
+        ]
+        for some, names in ((rows, ("own_shear",)), (uniform, ("mean_shear", "largest_shear")))
+    )
+    style.ready(backend)
+    panels = (
+        ("Shear stress", "shear stress / pressure", (("friction", rows), ("own_shear", rows))),
+        (
+            "in parts of the largest",
+            "shear stress / largest",
+            (("own_shear", own), ("largest_shear", states), ("mean_shear", states)),
+        ),
+    )
+    words = {
+        "friction": "largest, exact",
+        "own_shear": "original network",
+        "largest_shear": "uniform states, largest",
+        "mean_shear": "uniform states, mean",
+    }
+    frames = []
+    for title, label, drawn in panels:
+        series = [
+            (statistics.means(some, name), words[name], style.COLOURS[k], "solid", k)
+            for k, name in enumerate(words)
+            for shown, some in drawn
+            if shown == name and some
+        ]
+        # The left frame's own room is above the curves at small μ.
+        legend = "top_left" if title == "Shear stress" else style.beside("bottom_right", backend)
+        frames.append(
+            style.frame(
+                style.curves(series, backend, logx=True),
+                backend,
+                title=title,
+                x="μ",
+                y=label,
+                logx=True,
+                ylim=(0, None),
+                legend=legend,
+            )
+        )
+    return style.page(frames, backend, columns=2)
+
+
+def _frames(sources, backend, names, legend, logy=(), columns=2):
+    """One frame for each name against μ > 0, with all sources: (word, rows, dash).
+
+    logy: names that are drawn logarithmically.
+    """
     style.ready(backend)
     frames = []
     for last, (name, label, factor) in enumerate(names, 1 - len(names)):
@@ -89,8 +167,8 @@ def _frames(sources, backend, names, legend, logy=False):
             (statistics.means(rows, name, factor=factor), word, style.COLOURS[k], dash, k)
             for k, (word, rows, dash) in enumerate(sources)
         ]
-        drawn = style.curves(series, backend, logx=True, logy=logy)
+        drawn = style.curves(series, backend, logx=True, logy=name in logy)
         shown = None if last and legend == "right" else legend  # between frames is no room for one
-        axes = {"x": "μ", "y": label, "logx": True, "logy": logy}
+        axes = {"x": "μ", "y": label, "logx": True, "logy": name in logy}
         frames.append(style.frame(drawn, backend, title=label, legend=shown, **axes))
-    return style.page(frames, backend, columns=2)
+    return style.page(frames, backend, columns=columns)

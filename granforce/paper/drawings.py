@@ -1,11 +1,87 @@
 """The study's figures, each as a page and as pictures."""
 
+import numpy as np
+
 from granforce import figures
+from granforce.paper.claims import BIN, SAMPLERS, drawn
+from granforce.system.files import make_folder
 
 SHOWN = (0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
-
+LARGEST = 5.0  # ΔF_n of Figure 4, ⟨f_n⟩
+EVERY = 10**9  # contact is drawn in Figure 3
 
 FORMATS = ("html", "png", "svg")
+
+_POINTS = "points are means over packings, bars standard errors"
+_TAILS = (
+    "linear and semi-logarithmic; b is the exponent of tails exp(−(λ ΔF_n)^b), fitted beyond the "
+    "median"
+)
+# What each figure shows, kept in its file; {walk}: how the states of the walk were relaxed.
+# Figures 1 to 6 are the paper's, by its own relaxation where the study has it at every μ.
+CAPTIONS = {
+    "figure1": "Indeterminacy η1, η2 and 0.15 η3 of the random walk's states ({walk}), "
+    f"{_POINTS}; and the coordination z of the backbone, against the friction coefficient μ.",
+    "figure2": "Mean critical force and limit load of pushed contacts in ⟨f_n⟩, and exponent α of "
+    "the decay |u| ~ r^−α of the first motion, against η2 of the walk ({walk}), joined in order of "
+    "the friction coefficient μ, which is written at the points; bars are standard errors over "
+    "packings.",
+    "figure3": "Normal forces that contacts can have over those they have in the original "
+    "network: intervals (bars) and some states (points) of the random walk ({walk}), for several "
+    "friction coefficients μ; every contact, from weak to strong.",
+    "figure4": "Distribution of the extent ΔF_n of normal forces, in units of ⟨f_n⟩, that the "
+    f"random walk ({{walk}}) has seen, {_TAILS}.",
+    "figure5": "Contacts with f_n > 2⟨f_n⟩ over those with ΔF_n > ⟨ΔF_n⟩ ({walk}); grey, all "
+    "contacts. Lengths are in largest radii.",
+    "figure6": "Correlation over contacts of the original f_n with its extent ΔF_n against the "
+    "friction coefficient μ ({walk}); bars reach from the least to the largest with any other "
+    "state of the walk in place of the original network; dotted, two standard deviations of what "
+    "shuffled forces give.",
+    "samplers": "Indeterminacy η1, η2 and 0.15 η3 of states drawn in several ways, against the "
+    f"friction coefficient μ; {_POINTS}.",
+    "effort": "Accepted part of the attempts, and sweeps per accepted state, of walks by "
+    f"Gauss–Seidel sweeps alone that end at several residuals; {_POINTS}.",
+    "figure1_exact": "As Figure 1 by nearest networks; dashed, 0.15 η3 of the exact intervals.",
+    "figure1_uniform": "As Figure 1 by nearest networks; dashed, those of uniform states.",
+    "figure4_mean": "Distribution of the extent ΔF_n of normal forces, in units of its mean, that "
+    f"the random walk ({{walk}}) has seen, {_TAILS}.",
+    "figure4_exact": "Distribution of the exact extent ΔF_n of normal forces, in units of ⟨f_n⟩, "
+    f"{_TAILS}.",
+    "figure6_exact": "As Figure 6 by nearest networks, beside exact intervals and uniform states.",
+    "places": "Where the tenth of the contacts with the largest forces f_n is, and the tenth with "
+    "the largest extents ΔF_n ({walk}); grey, all contacts. Lengths are in largest radii.",
+    "sizes": "Indeterminacy η1, η2 and 0.15 η3 of the walk by nearest networks against the number "
+    f"N of disks; {_POINTS}.",
+    "opened": "η2 and 0.15 η3 of packings made without friction whose cones are opened to μ, and "
+    "of packings made with μ; bars are standard errors over packings.",
+    "frozen": "Part of the contacts without a unique force, and number of their clusters, where "
+    "only the pressure is prescribed and where the forces of the surroundings are held; bars are "
+    "standard errors over packings.",
+    "stresses": "Shear stress over pressure against the friction coefficient μ: the largest of any "
+    "network in S (exact), and that of the original network, which was made under pressure alone; "
+    "and this and that of uniform states in parts of the largest in the same packing; "
+    f"{_POINTS}.",
+    "distances": "Distance of the original network and of the walk's states from the centre of S, "
+    "in units of that of uniform states; bars are standard errors over packings.",
+}
+_SWEPT = {part: part.replace("_", " to ") for part in ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6")}
+_RELAXED = {
+    "gauss_seidel": "relaxed by Gauss–Seidel sweeps that end at 10⁻³ ⟨f_n⟩",
+    "nearest": "relaxed to nearest networks",
+}
+
+
+def paper_sampler(table):
+    """Sampler of Figures 1 to 6: the paper's, if the table has it at every μ of its plan."""
+    known = {row["mu"] for row in table.part(SAMPLERS["gauss_seidel"])}
+    wanted = set(table.plan.get("frictions", ()))
+    return "gauss_seidel" if wanted and wanted <= known else "nearest"
+
+
+def captions(table):
+    """{file name: caption} of the figures of a table."""
+    walk = _RELAXED[paper_sampler(table)]
+    return {name: caption.format(walk=walk) for name, caption in CAPTIONS.items()}
 
 
 def draw(table, folder, *, formats=FORMATS, progress=None):
@@ -13,14 +89,14 @@ def draw(table, folder, *, formats=FORMATS, progress=None):
 
     progress(figures drawn, figures in all).
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     made = all_figures(table) if formats else {}
-    paths = []
+    told, paths = captions(table), []
     for done, (name, figure) in enumerate(made.items()):
         for form in formats:
             backend = "bokeh" if form == "html" else "matplotlib"
             paths.append(folder / f"{name}.{form}")
-            figures.save(figure(backend=backend), paths[-1])
+            figures.save(figure(backend=backend), paths[-1], told[name])
         if progress is not None:
             progress(done + 1, len(made))
     return paths
@@ -28,23 +104,59 @@ def draw(table, folder, *, formats=FORMATS, progress=None):
 
 def all_figures(table):
     """{file name: figure(backend=…)} of all figures that a table has the data of."""
-    walk = table.part("walk")
-    exact, uniform = table.part("exact"), table.part("uniform")
-    beside = {word: rows for word, rows in (("exact", exact), ("uniform", uniform)) if rows}
-    made = {}
+    return _of_the_paper(table) | _beyond(table)
+
+
+def _of_the_paper(table):
+    """Figures 1 to 6, by one sampler."""
+    sampler, made = paper_sampler(table), {}
+    part = SAMPLERS[sampler]
+    walk = drawn(table, sampler)
     if walk:
-        made["figure1"] = _later(figures.indeterminacy, walk, beside={"exact": exact})
-        made["figure4"] = _later(figures.extents, _some(table.extents("walk")))
-        made["figure6"] = _later(figures.correlations, walk, beside=beside)
-    if uniform:
+        made["figure1"] = _later(figures.indeterminacy, walk)
+        made["figure6"] = _later(figures.correlations, walk, chance=_chance(walk))
+    groups = _some(_loose(table.extents(part)))
+    if groups:
+        options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
+        made["figure4"] = _later(figures.extents, groups, **options)
+    answers = [row for row in table.answers(part) if np.isfinite(row.get("decay_exponent", np.nan))]
+    if answers:
+        made["figure2"] = _later(figures.perturbation, answers)
+    forces, places = _shown_forces(table, part), _shown_places(table, part)
+    if forces:
+        made["figure3"] = _later(figures.possible_forces, forces, contacts=EVERY)
+    if places:
+        made["figure5"] = _later(figures.overlaid, places)
+    return made
+
+
+def _beyond(table):
+    """What the paper does not show."""
+    walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
+    part, made = SAMPLERS[paper_sampler(table)], {}
+    sources = {_SWEPT.get(p, name): drawn(table, name) for name, p in SAMPLERS.items()}
+    sources = {name: rows for name, rows in sources.items() if rows}
+    if len(sources) > 1:
+        made["samplers"] = _later(figures.samplers, sources)
+    efforts = {words: table.part(p) for p, words in _SWEPT.items() if table.part(p)}
+    if efforts:
+        made["effort"] = _later(figures.effort, efforts)
+    if walk and exact:
+        made["figure1_exact"] = _later(figures.indeterminacy, walk, beside={"exact": exact})
+        both = {"exact": exact} | ({"uniform": uniform} if uniform else {})
+        made["figure6_exact"] = _later(figures.correlations, walk, beside=both)
+    if walk and uniform:
         made["figure1_uniform"] = _later(figures.indeterminacy, walk, beside={"uniform": uniform})
-    if exact:
-        made["figure4_exact"] = _later(figures.extents, _some(table.extents("exact")))
-    if table.part("perturb"):
-        made["figure2"] = _later(figures.perturbation, table.answers())
-    if table.shown:
-        made["figure3"] = _later(figures.possible_forces, _shown_forces(table))
-        made["figure5"] = _later(figures.places, _shown_places(table))
+    groups = _some(_loose(table.extents(part)))
+    if groups:
+        made["figure4_mean"] = _later(figures.extents, groups)
+    groups = _some(_loose(table.extents("exact")))
+    if groups:
+        options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
+        made["figure4_exact"] = _later(figures.extents, groups, **options)
+    places = _shown_places(table, part)
+    if places:
+        made["places"] = _later(figures.places, places)
     if table.part("size"):
         made["sizes"] = _later(figures.sizes, _with_sizes(table))
     if table.part("opened"):
@@ -54,7 +166,21 @@ def all_figures(table):
         made["frozen"] = _later(figures.frozen, periodic, table.part("frozen"))
     if any("walk_ratio" in row for row in uniform):
         made["distances"] = _later(figures.distances, uniform)
+    if table.part("stress"):
+        stress = table.part("stress"), table.part("stress_uniform")
+        made["stresses"] = _later(figures.stresses, *stress)
     return made
+
+
+def _chance(rows):
+    """Two standard deviations of the correlation of shuffled forces, for the mean packing."""
+    contacts = [row["contacts"] for row in rows if row.get("contacts")]
+    return 2 / np.sqrt(np.mean(contacts) - 1) if contacts else None
+
+
+def _loose(groups):
+    """Groups of ΔF_n in which anything is undetermined."""
+    return {mu: group for mu, group in groups.items() if any(v.any() for v in group)}
 
 
 def _later(figure, *arguments, **options):
@@ -71,26 +197,26 @@ def _with_sizes(table):
     return [row for row in table.part("size", "walk") if row["mu"] in frictions]
 
 
-def _shown_contacts(table):
+def _shown_contacts(table, part):
     """(position in rows, row, contacts, f_n, least f_n, ΔF_n) of the walks that are shown."""
-    wanted = {k for k, _ in table.shown}
-    contacts = {id(row): arrays for row, *arrays in table.contacts("walk")}
-    for k in sorted(wanted):
+    contacts = {id(row): arrays for row, *arrays in table.contacts(part)}
+    for k in sorted({k for k, _ in table.shown}):
         row = table.rows[k]
-        yield k, row, *contacts[id(row)]
+        if row["part"] == part:
+            yield k, row, *contacts[id(row)]
 
 
-def _shown_forces(table):
+def _shown_forces(table, part):
     states = dict(table.shown)
     return {
         row["mu"]: (normal, states[k], least, extent)
-        for k, row, _, normal, least, extent in _shown_contacts(table)
+        for k, row, _, normal, least, extent in _shown_contacts(table, part)
     }
 
 
-def _shown_places(table):
+def _shown_places(table, part):
     return {
         row["mu"]: (table.packings[k], contacts, normal, extent)
-        for k, row, contacts, normal, _, extent in _shown_contacts(table)
+        for k, row, contacts, normal, _, extent in _shown_contacts(table, part)
         if row["mu"] in (0.1, 10)
     }

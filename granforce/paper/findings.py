@@ -7,7 +7,22 @@ packing. They tell why a claim holds or does not.
 import numpy as np
 
 from granforce import statistics
-from granforce.paper.claims import LARGE, MIDDLE, SMALL, Claim, peak, pooled, positive, slope
+from granforce.paper.claims import (
+    BIN,
+    LARGE,
+    LEAST_DYNAMIC,
+    MIDDLE,
+    OURS,
+    SAMPLERS,
+    SMALL,
+    Claim,
+    dip,
+    items,
+    peak,
+    sampled,
+    slope,
+    tail,
+)
 
 _RANGES = (("small", SMALL), ("intermediate", MIDDLE), ("large", LARGE))
 
@@ -34,46 +49,78 @@ def measure(table):
     rows = [row for row in table.part("uniform") if "walk_ratio" in row]
     for name, label in (("original_ratio", "the original network"), ("walk_ratio", "walk states")):
         yield from _by_range(
-            statistics.grouped(rows, name),
+            _values(rows, name),
             f"distance of {label} from the centre over that of uniform states",
         )
 
 
 def solver(table):
-    """Whether the paper's relaxation and the default one walk alike."""
-    for name, label in (("eta2", "η2"), ("eta3", "η3")):
-        yield from _by_range(
-            _ratios(table, name, "gauss_seidel", "walk"), f"{label} by Gauss–Seidel over default"
-        )
+    """How the paper's relaxation walks, by where its sweeps end, and against nearest networks."""
+    for sampler in ("gauss_seidel", "gauss_seidel_1e-4"):
+        part = SAMPLERS[sampler]
+        for name, label in (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3")):
+            yield from _by_range(
+                _ratios(table, name, part, "walk"), f"{label} of {sampler} over {label} of nearest"
+            )
+    for part in ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6"):
+        for name, word in (("acceptance", "acceptance"), ("mean_sweeps", "sweeps per state")):
+            yield from _by_range(_values(table.part(part), name), f"{word} of {part}")
 
 
 def exact_shape(table):
-    """Maximum, small-μ slope and tails of the exact and of the uniform indeterminacy."""
+    """Maximum and small-μ slope of the exact and of the uniform indeterminacy."""
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
-        groups = positive(statistics.grouped(table.part(part), name))
+        groups = {mu: v for mu, v in _values(table.part(part), name).items() if mu > 0}
         if len(groups) > 2:
-            yield _finding(f"μ where {label} is largest", peak(list(groups)), groups.values())
+            yield _finding(f"μ where {label} is largest", peak(list(groups)), groups)
         yield from _growth(groups, label)
-    for word, span in _RANGES:
-        items = pooled(table.extents("exact"), span)
-        if items:
+
+
+def distribution(table):
+    """How P(ΔF_n) depends on bins and units, and its tail on the range of the fit."""
+    for sampler in SAMPLERS:
+        groups = sampled(table, sampler)
+        for word, (low, high) in _RANGES:
+            chosen = [[v for _, v in g] for mu, g in groups.items() if low <= mu <= high]
+            if not chosen:
+                continue
+            own = [[v / v.mean() for v in group] for group in chosen]
+            for width, unit, drawn_in in (
+                (0.1, "⟨f_n⟩", chosen),
+                (BIN, "⟨f_n⟩", chosen),
+                (0.2, "⟨ΔF_n⟩", own),
+            ):
+                yield _finding(
+                    f"depth of P(ΔF_n) at 0, bins of {width:g} {unit}, {sampler}, {word} μ",
+                    lambda *g, width=width: np.mean([dip(values, width) for values in g]),
+                    drawn_in,
+                    resamples=99,
+                )
             yield _finding(
-                f"tail exponent b of exact P(ΔF_n), {word} μ",
-                lambda drawn: statistics.tail_exponent(np.concatenate(drawn)),
-                [items],
-                resamples=199,
+                f"width of P(ΔF_n), ⟨f_n⟩, {sampler}, {word} μ",
+                lambda *g: np.mean([np.concatenate(values).std() for values in g]),
+                chosen,
+                resamples=99,
             )
+            for quantile in (0.5, 0.75):
+                yield _finding(
+                    f"b of the tail of P(ΔF_n) beyond its quantile {quantile:g}, {sampler}, "
+                    f"{word} μ",
+                    lambda *g, quantile=quantile: tail(*g, quantile=quantile),
+                    chosen,
+                    resamples=99,
+                )
 
 
 def opened(table):
     """How η grows with the friction of the cones alone, in packings made without friction."""
-    groups = statistics.grouped(table.part("opened_exact"), "eta3")
+    groups = _values(table.part("opened_exact"), "eta3")
     yield from _growth(groups, "exact η3, packings made at μ = 0,")
 
 
 def _growth(groups, label):
     """Slopes on both sides of the crossover at 0.001."""
-    for low, high in ((0, 0.001), (0.001, SMALL[1])):
+    for low, high in ((0, LEAST_DYNAMIC), (LEAST_DYNAMIC, SMALL[1])):
         few = {mu: groups[mu] for mu in groups if low <= mu <= high and mu > 0}
         if len(few) > 1:
             ends = f"μ = {min(few):g} … {max(few):g}"
@@ -91,17 +138,77 @@ def size(table):
             )
 
 
+def preparation(table):
+    """What other time steps and more sweeps of the compaction change, in the same seeds."""
+    parts = sorted({row["part"] for row in table.rows if row["part"].startswith("prepared")})
+    for part in parts:
+        for name, label in (("dimension", "h"), ("eta2", "η2"), ("eta3", "η3")):
+            for mu, ratios in _ratios(table, name, part, "walk").items():
+                yield _finding(
+                    f"{label} of packings {part.replace('_', ' ')} over the default, μ = {mu:g}",
+                    np.mean,
+                    [ratios],
+                )
+
+
 def strength(table):
-    """How far the critical force stays below the limit load."""
+    """How far the critical force stays below the limit load, and what the protocol does to it."""
     rows = [
         row | {"part_of_load": row["critical_force"] / row["limit_load"]}
-        for row in table.part("perturb")
+        for row in table.responses()
         if row["limit_load"] > 0
     ]
-    yield from _by_range(statistics.grouped(rows, "part_of_load"), "⟨F_crit⟩ over ⟨limit load⟩")
+    yield from _by_range(_values(rows, "part_of_load"), "⟨F_crit⟩ over ⟨limit load⟩")
+    for part, word in (
+        ("response_long", "four times the implicit steps over 150"),
+        ("perturb", "loads raised by 0.4 of the way over tenths (other contacts)"),
+    ):
+        for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
+            yield from _by_range(_ratios(table, name, part, "response"), f"{label}: {word}")
+    # Counted in the pressure or not, loads differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
+    known = {(row["mu"], row["seed"]): row["contacts"] for row in table.part("walk")}
+    factors = {}
+    for row in rows:
+        contacts = known.get((row["mu"], row["seed"]))
+        if contacts:
+            load = row["critical_force"] / contacts
+            factors.setdefault(row["mu"], []).append(1 / (1 - load))
+    yield from _by_range(
+        factors, "⟨F_crit⟩ with the pair left out of the pressure over the same with it"
+    )
 
 
-FAMILIES = (sampled_part, measure, solver, exact_shape, opened, size, strength)
+def shear(table):
+    """Which shear stress the contacts can carry, and how much of it networks have."""
+    rows, uniform = table.part("stress"), table.part("stress_uniform")
+    groups = _values(rows, "friction")
+    if len(groups) > 2:
+        yield _finding("μ where the largest shear stress is largest", peak(list(groups)), groups)
+    told = "shear stress over pressure"
+    yield from _by_range(groups, f"largest {told}")
+    yield from _by_range(_values(rows, "own_shear"), f"{told} of the original network")
+    largest = {(row["mu"], row["seed"]): row["friction"] for row in rows}
+    for some, name, word in (
+        (rows, "own_shear", "of the original network"),
+        (uniform, "mean_shear", "of uniform states, mean"),
+        (uniform, "largest_shear", "of uniform states, largest"),
+    ):
+        parts = {}
+        for row in some:
+            whole = largest.get((row["mu"], row["seed"]))
+            if whole:
+                parts.setdefault(row["mu"], []).append(row[name] / whole)
+        yield from _by_range(parts, f"{told} {word}, over the largest of the packing")
+
+
+FAMILIES = (
+    *(sampled_part, measure, solver, exact_shape, distribution, opened, size, preparation),
+    *(strength, shear),
+)
+
+
+def _values(rows, name):
+    return {mu: [v for _, v in group] for mu, group in items(rows, name).items()}
 
 
 def _ratios(table, name, above, below):
@@ -110,7 +217,7 @@ def _ratios(table, name, above, below):
     ratios = {}
     for row in table.part(above):
         value = known.get((row["mu"], row["seed"]))
-        if value and row["dimension"] > 0 and name in row:
+        if value and row["dimension"] > 0 and name in row and row.get("reached_part", 1) > 0:
             ratios.setdefault(row["mu"], []).append(row[name] / value)
     return ratios
 
@@ -125,4 +232,4 @@ def _by_range(groups, statement):
 def _finding(statement, statistic, groups, **options):
     groups = list(groups.values()) if isinstance(groups, dict) else list(groups)
     value, low, high = statistics.bootstrap(statistic, groups, **options)
-    return Claim(statement, statement, value, low, high, "", "measured")
+    return Claim(statement, "", OURS, statement, value, low, high, "", "measured")

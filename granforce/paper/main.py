@@ -2,18 +2,20 @@
 
 import json
 import sys
-from pathlib import Path
 
 from granforce.paper import claims, drawings, findings, tables
 from granforce.paper import plan as plans
-from granforce.records import InputError, friction
-from granforce.store import open_store
-from granforce.terminal import Bar, table
+from granforce.records import InputError, check_memory, friction, whole
+from granforce.study import scan
+from granforce.study.store import open_store
+from granforce.system.files import make_folder, written
+from granforce.system.terminal import Bar, table
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
 _NUMBERS = (
-    *("n", "packings", "states", "gauss_seidel_packings", "exact_packings"),
-    *("uniform_packings", "perturb_packings", "perturb_contacts"),
+    *("n", "packings", "many_packings", "states", "gauss_seidel_packings", "exact_packings"),
+    *("uniform_packings", "response_packings", "response_contacts", "perturb_packings"),
+    *("perturb_contacts",),
 )
 
 
@@ -21,23 +23,31 @@ def main(arguments):
     """Run the study into a folder. Returns 1 if a cell failed.
 
     The folder gets cells.zarr (every cell), study.zarr (the reduced table), figures, and the claims
-    as claims.json.
+    as claims.json. With --reduce the cells of another store are taken as they are, and rows that
+    they lack from --table; with --table alone nothing is computed or reduced.
     """
-    folder = Path(arguments.out)
     formats = [word for word in arguments.formats.split(",") if word]
     if set(formats) - set(drawings.FORMATS):
         raise InputError(f"--formats {arguments.formats!r}: take some of html, png, svg")
+    whole(arguments.workers, "--workers", 1)
     failed = []
-    if arguments.table is None:
+    if arguments.reduce is not None:
+        reduced = tables.reduce(arguments.reduce, plan_of(arguments))
+        if arguments.table is not None:
+            reduced = tables.merged(reduced, tables.load(arguments.table))
+        folder = make_folder(arguments.out)
+        tables.save(reduced, folder / "study.zarr")
+    elif arguments.table is not None:
+        reduced = tables.load(arguments.table)
+        folder = make_folder(arguments.out)
+    else:
         plan = plan_of(arguments)
-        parts = None if arguments.parts is None else arguments.parts.split(",")
-        wanted = plans.chosen(plan, parts)
+        wanted = plans.chosen(plan, _parts(arguments))
+        folder = make_folder(arguments.out)
         store = open_store(folder / "cells.zarr")
         failed = compute(store.path, wanted, arguments)
-        reduced = tables.reduce(store.path, plan)
+        reduced = tables.reduce(store.path, plan, wanted)
         tables.save(reduced, folder / "study.zarr")
-    else:
-        reduced = tables.load(arguments.table)
     with Bar("figures", "figure") as progress:
         drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
     told = {
@@ -45,9 +55,19 @@ def main(arguments):
         "findings": [finding._asdict() for finding in findings.found(reduced)],
         "skipped": reduced.skipped,
     }
-    (folder / "claims.json").write_text(json.dumps(told, indent=1, ensure_ascii=False))
+    with written(folder / "claims.json") as file:
+        file.write(json.dumps(told, indent=1, ensure_ascii=False).encode())
     report(told, arguments.json)
     return 1 if failed else 0
+
+
+def _parts(arguments):
+    """Families of parts that are computed; None for all."""
+    if arguments.paper:
+        if arguments.parts is not None:
+            raise InputError("--paper names the parts of the paper: leave --parts out")
+        return plans.PAPER
+    return None if arguments.parts is None else arguments.parts.split(",")
 
 
 def plan_of(arguments):
@@ -57,21 +77,36 @@ def plan_of(arguments):
         value = getattr(arguments, name)
         if value is None:
             continue
-        if value < _LEAST.get(name, 0):
-            raise InputError(f"{name.replace('_', ' ')} must be at least {_LEAST.get(name, 0)}")
-        plan = plan._replace(**{name: value})
+        plan = plan._replace(**{name: whole(value, name.replace("_", " "), _LEAST.get(name, 0))})
+    if arguments.packings is not None and arguments.many_packings is None:
+        plan = plan._replace(many_packings=0)
+    if arguments.n is not None:
+        plan = plan._replace(frozen_large=4 * plan.n)
     if arguments.mu is not None:
-        plan = plan._replace(frictions=_numbers("mu", arguments.mu, friction))
+        plan = _at(plan, _numbers("mu", arguments.mu, friction))
     if arguments.sizes is not None:
         plan = plan._replace(sizes=_numbers("sizes", arguments.sizes, int))
-    if arguments.workers < 1:
-        raise InputError("--workers must be at least 1")
+    if not plan.frictions:
+        raise InputError("--mu: give at least one friction coefficient")
+    cells = plan.packings * (len(plan.frictions) + len(plan.sizes))  # at the least
+    check_memory(scan.CELL_BYTES * cells, f"a study of {cells} cells or more")
     return plan
+
+
+def _at(plan, frictions):
+    """The plan at other friction coefficients; what is added at some is added at those of them."""
+    some = {
+        name: tuple(mu for mu in getattr(plan, name) if mu in frictions)
+        for name in ("large_frictions", "frozen_large_frictions", "prepared_frictions")
+    }
+    return plan._replace(frictions=frictions, fine_frictions=(), **some)
 
 
 def _numbers(option, text, cast):
     try:
-        numbers = sorted({cast(part) for part in text.split(",") if part})
+        numbers = sorted({cast(part) for part in text.split(",")}) if text else []
+    except InputError as error:
+        raise InputError(f"--{option}: {error}") from None
     except ValueError:
         raise InputError(f"--{option} {text!r}: give numbers separated by commas") from None
     return tuple(numbers)
@@ -98,7 +133,7 @@ def compute(path, wanted, arguments):
         for each in bars:
             each.__exit__()
     for cell, message in failed:
-        print(f"granforce: {cell.kind} of {cell.parameters}: {message}", file=sys.stderr)
+        print(f"granforce: {cell.kind.name} of {cell.parameters}: {message}", file=sys.stderr)
     return failed
 
 
@@ -108,12 +143,14 @@ def report(told, as_json):
         print(json.dumps(told, indent=1))
         return
     for word, names in (
-        ("claims", ("claim", "measured", "95 %", "criterion", "verdict")),
+        ("claims", ("claim", "sampler", "from", "measured", "95 %", "criterion", "verdict")),
         ("findings", ("finding", "measured", "95 %")),
     ):
         lines = [
             {
                 names[0]: claim["statement"],
+                "sampler": claim["sampler"],
+                "from": claim["source"],
                 "measured": f"{claim['value']:.3g}",
                 "95 %": f"{claim['low']:.3g} … {claim['high']:.3g}",
                 "criterion": claim["criterion"],

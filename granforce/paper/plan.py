@@ -1,25 +1,48 @@
 """Plan of the study: which cells it is made of, and how they are computed.
 
-Parts: "packing" and "walk" (every packing), "gauss_seidel" (the paper's own relaxation, on some),
-"exact" (intervals), "uniform" (uniform states of S), "perturb" (critical forces and responses of
-some contacts), "frozen" (exact intervals of the inner part with all forces outside held), "opened"
-and "opened_exact" (packings made without friction, cones opened to μ), "size" and "size_exact"
-(other numbers of disks).
+Parts: "sweeps_1e-3", "sweeps_1e-4" and "sweeps_1e-6" (walks by Gauss–Seidel sweeps alone, as in the
+paper, which end at that residual in ⟨f_n⟩), "walk" (by nearest networks), "exact" (intervals),
+"uniform" (uniform states of S), "response" (critical forces and first motions of random contacts,
+loads raised in tenths of the way), "response_long" (some of them with four times the implicit
+steps) and "perturb" (loads raised by 0.4 of the way), "frozen" and "frozen_large" (exact intervals
+of the inner part with all forces outside held), "prepared_…" (walks in packings made with another
+time step or more sweeps), "opened" and "opened_exact" (packings made without friction, cones opened
+to μ), "size" and "size_exact" (other numbers of disks), "stress" (outlines of the stresses that
+the contacts can carry) and "stress_uniform" (uniform states, for their stresses).
 """
 
 from typing import NamedTuple
 
-from granforce import study, sweep
+from granforce.numerics.lanes import LANES
 from granforce.records import InputError
-from granforce.store import open_store
+from granforce.study import kinds, scan
+from granforce.study.cells import Cell, load
+from granforce.study.store import open_store
 
 # The smallest two lie where soft modes do not yet amplify friction beyond its linear effect.
 FRICTIONS = (0, 0.00001, 0.0001, 0.001, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1, 2, 5, 10)
-# Below this it takes minutes to follow a first motion, and bounds within a frozen surrounding end
-# uncertified: contacts are perturbed and forces frozen from here on.
+# Below this it takes minutes to follow a first motion, and bounds within frozen surroundings end
+# uncertified (in small packings also above): contacts are perturbed and forces frozen from here on.
 LEAST_FOLLOWED = 0.001
 SLICE = (0.2, 0.8, 0.2, 0.8)  # inner part whose surroundings are frozen, in parts of the box
 KEPT_STATES = 100  # of each walk, evenly spaced: measures come from all
+# The paper's walk. It does not say where its sweeps end. Most attempts end in no equilibrium at
+# large μ: a walk is kept with the states that it has after so many attempts for each.
+SWEEPS = {"sweeps_1e-3": 1e-3, "sweeps_1e-4": 1e-4}
+ATTEMPTS = 3
+# Walks that go side by side take a fifth of the time of one as long as all of them; a state has
+# forgotten where it came from after some ten others.
+CHAINS = LANES
+# The residual that most attempts do not reach at large μ: tried with fewer states.
+HARDEST, HARDEST_STATES = ("sweeps_1e-6", 1e-6), 200
+# Part of the way to the limit load by which the next load lies above the last at rest.
+RISE, LONGER = 0.1, 4
+# What else packings are made with.
+PREPARED = {
+    "prepared_dt_0.02": {"dt": 0.02},
+    "prepared_dt_0.005": {"dt": 0.005},
+    "prepared_sweeps_400": {"sweeps": 400},
+}
 
 
 class Plan(NamedTuple):
@@ -29,29 +52,59 @@ class Plan(NamedTuple):
     frictions: tuple = FRICTIONS
     packings: int = 10
     states: int = 1000
-    gauss_seidel_packings: int = 2
+    gauss_seidel_packings: int = 10
+    hardest_packings: int = 2  # with sweeps down to the smallest residual
+    # More packings where the maximum is, and where packings differ most.
+    fine_frictions: tuple = (0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
+    large_frictions: tuple = (1, 2, 5, 10)
+    many_packings: int = 30
     exact_packings: int = 3
     uniform_packings: int = 3
+    response_packings: int = 10
+    response_contacts: int = 20
     perturb_packings: int = 3
     perturb_contacts: int = 30
+    frozen_packings: int = 10
+    frozen_from: float = LEAST_FOLLOWED  # smallest μ: bounds of thinner S end uncertified
+    frozen_large: int = 1600  # disks
+    frozen_large_frictions: tuple = (0.01, 0.1, 0.5, 1, 10)
+    prepared_packings: int = 10
+    prepared_frictions: tuple = (1, 10)
     sizes: tuple = (100, 200, 800, 1600)
     size_frictions: tuple = (0.1, 1.0)
     largest_exact: int = 800  # exact intervals of other sizes up to here
+    stress_packings: int = 10
+    stress_uniform_packings: int = 3
+    stress_states: int = 300
 
 
 QUICK = Plan(
-    n=40,
-    frictions=(0, 0.01, 0.1, 0.3, 1, 10),
+    n=48,
+    frictions=(0, 0.0001, 0.001, 0.01, 0.1, 0.3, 1, 10),
     packings=3,
     states=60,
-    gauss_seidel_packings=1,
-    exact_packings=2,
-    uniform_packings=2,
+    gauss_seidel_packings=3,
+    hardest_packings=1,
+    fine_frictions=(),
+    large_frictions=(),
+    many_packings=0,
+    exact_packings=3,
+    uniform_packings=3,
+    response_packings=3,
+    response_contacts=4,
     perturb_packings=1,
     perturb_contacts=4,
+    frozen_packings=3,
+    frozen_from=0.01,
+    frozen_large=80,
+    frozen_large_frictions=(0.1, 1),
+    prepared_packings=3,
+    prepared_frictions=(1,),
     sizes=(20, 80),
     size_frictions=(0.1,),
     largest_exact=80,
+    stress_packings=3,
+    stress_states=50,
 )
 
 
@@ -59,7 +112,7 @@ class Task(NamedTuple):
     """One cell of the study and what it is for."""
 
     part: str
-    cell: sweep.Cell
+    cell: Cell
     n: int
     mu: float  # of the cones
     seed: int  # of the packing
@@ -68,7 +121,7 @@ class Task(NamedTuple):
 def tasks(plan):
     """All cells but the packings, those of the first packings first."""
     found = []
-    for seed in range(1, plan.packings + 1):
+    for seed in range(1, max(plan.packings, plan.many_packings) + 1):
         for applies in _PARTS.values():
             found += [task for task in applies(plan, seed)]
     return found
@@ -79,86 +132,125 @@ def packings(wanted):
     unique = {}
     for task in wanted:
         named = task.cell.parameters["packing"]
-        unique.setdefault(str(sorted(named.items())), sweep.Cell("packing", named))
+        unique.setdefault(str(sorted(named.items())), Cell(kinds.PACKING, named))
     return list(unique.values())
 
 
 def compute(path, wanted, *, progress=None, **options):
-    """Compute tasks into the store at path, packings first; options as for `sweep.run`.
+    """Compute tasks into the store at path, packings first; options as for `scan.run`.
 
     progress(what) gives the progress callable of the packings and of the cells. Returns what failed
     as (cell, error message); cells of failed packings are not tried.
     """
     progress = progress or (lambda what: None)
-    failed = sweep.run(path, packings(wanted), progress=progress("packings"), **options)
+    failed = scan.run(path, packings(wanted), progress=progress("packings"), **options)
     lost = [cell.parameters for cell, _ in failed]
     cells = [task.cell for task in wanted if task.cell.parameters["packing"] not in lost]
-    return failed + sweep.run(path, cells, progress=progress("cells"), **options)
+    return failed + scan.run(path, cells, progress=progress("cells"), **options)
 
 
-def _walk(part, n, seed, mu, plan, *, packing_mu=None, relax="accelerated"):
-    packing = study.packing_parameters(n, mu if packing_mu is None else packing_mu, seed)
-    keep = min(KEPT_STATES, plan.states)
-    named = study.walk_parameters(packing, plan.states, mu=mu, relax=relax, keep=keep)
-    return Task(part, sweep.Cell("walk", named), n, mu, seed)
+def _walk(part, n, seed, mu, plan, *, packing_mu=None, states=None, made=None, **how):
+    packing = kinds.PACKING.parameters(
+        n, mu if packing_mu is None else packing_mu, seed, **made or {}
+    )
+    states = plan.states if states is None else states
+    named = kinds.WALK.parameters(packing, states, mu=mu, keep=min(KEPT_STATES, states), **how)
+    return Task(part, Cell(kinds.WALK, named), n, mu, seed)
 
 
 def _exact(part, n, seed, mu, *, packing_mu=None, slice_=None):
-    packing = study.packing_parameters(n, mu if packing_mu is None else packing_mu, seed)
-    named = study.exact_parameters(packing, mu=mu, slice_=slice_)
-    return Task(part, sweep.Cell("intervals", named), n, mu, seed)
+    packing = kinds.PACKING.parameters(n, mu if packing_mu is None else packing_mu, seed)
+    named = kinds.INTERVALS.parameters(packing, mu=mu, slice_=slice_)
+    return Task(part, Cell(kinds.INTERVALS, named), n, mu, seed)
 
 
-def _walks(plan, seed):
-    return [_walk("walk", plan.n, seed, mu, plan) for mu in plan.frictions]
+def _frictions(plan, seed, packings, more=()):
+    """Those of the plan for the first packings, and some more for many."""
+    wanted = set(plan.frictions) if seed <= min(packings, plan.packings) else set()
+    return sorted(wanted | (set(more) if seed <= plan.many_packings else set()))
 
 
-def _gauss_seidel(plan, seed):
-    if seed > plan.gauss_seidel_packings:
-        return []
-    options = {"relax": "gauss_seidel"}
-    return [_walk("gauss_seidel", plan.n, seed, mu, plan, **options) for mu in plan.frictions]
-
-
-def _exacts(plan, seed):
-    if seed > plan.exact_packings:
-        return []
-    return [_exact("exact", plan.n, seed, mu) for mu in plan.frictions]
-
-
-def _uniform(plan, seed):
-    if seed > plan.uniform_packings:
-        return []
+def _sweeps(plan, seed):
     found = []
-    for mu in plan.frictions:
-        # All states are kept: their mean is the centre that distances are measured from.
-        named = study.uniform_parameters(study.packing_parameters(plan.n, mu, seed), plan.states)
-        found.append(Task("uniform", sweep.Cell("uniform", named), plan.n, mu, seed))
+    for mu in _frictions(plan, seed, plan.gauss_seidel_packings, plan.fine_frictions):
+        for part, residual in SWEEPS.items():
+            if seed <= plan.gauss_seidel_packings or residual == max(SWEEPS.values()):
+                found.append(_swept(part, residual, seed, mu, plan))
+    if seed <= min(plan.hardest_packings, plan.packings):
+        part, residual = HARDEST
+        states = min(HARDEST_STATES, plan.states)
+        found += [_swept(part, residual, seed, mu, plan, states) for mu in plan.frictions]
     return found
 
 
-def _perturb(plan, seed):
-    if seed > plan.perturb_packings:
-        return []
+def _swept(part, residual, seed, mu, plan, states=None):
+    how = {"relax": "gauss_seidel_only", "residual": residual, "attempts": ATTEMPTS}
+    how["chains"] = min(CHAINS, states or plan.states)
+    return _walk(part, plan.n, seed, mu, plan, states=states, **how)
+
+
+def _walks(plan, seed):
+    many = plan.fine_frictions + plan.large_frictions
+    frictions = _frictions(plan, seed, plan.packings, many)
+    return [_walk("walk", plan.n, seed, mu, plan) for mu in frictions]
+
+
+def _exacts(plan, seed):
+    many = plan.fine_frictions + plan.large_frictions
+    frictions = _frictions(plan, seed, plan.exact_packings, many)
+    return [_exact("exact", plan.n, seed, mu) for mu in frictions]
+
+
+def _uniform(plan, seed):
     found = []
-    for mu in plan.frictions:
-        if 0 < mu < LEAST_FOLLOWED:
-            continue
-        packing = study.packing_parameters(plan.n, mu, seed)
-        named = study.perturbation_parameters(packing, random=plan.perturb_contacts)
-        found.append(Task("perturb", sweep.Cell("perturbation", named), plan.n, mu, seed))
+    many = plan.fine_frictions if seed <= plan.packings else ()
+    for mu in _frictions(plan, seed, plan.uniform_packings, many):
+        # All states are kept: their mean is the centre that distances are measured from.
+        named = kinds.UNIFORM.parameters(kinds.PACKING.parameters(plan.n, mu, seed), plan.states)
+        found.append(Task("uniform", Cell(kinds.UNIFORM, named), plan.n, mu, seed))
+    return found
+
+
+def _responses(plan, seed):
+    longer = {"max_steps": LONGER * kinds.MOST_STEPS}
+    found = []
+    for part, packings, contacts, protocol in (
+        ("response", plan.response_packings, plan.response_contacts, {"rise": RISE}),
+        ("response_long", plan.perturb_packings, plan.response_contacts, {"rise": RISE, **longer}),
+        ("perturb", plan.perturb_packings, plan.perturb_contacts, {}),
+    ):
+        for mu in plan.frictions if seed <= min(packings, plan.packings) else ():
+            if 0 < mu < LEAST_FOLLOWED:
+                continue
+            packing = kinds.PACKING.parameters(plan.n, mu, seed)
+            named = kinds.PERTURBATION.parameters(packing, random=contacts, **protocol)
+            found.append(Task(part, Cell(kinds.PERTURBATION, named), plan.n, mu, seed))
     return found
 
 
 def _frozen(plan, seed):
-    if seed > plan.exact_packings:
+    if seed > min(plan.frozen_packings, plan.packings):
         return []
-    frictions = [mu for mu in plan.frictions if mu >= LEAST_FOLLOWED]
-    return [_exact("frozen", plan.n, seed, mu, slice_=SLICE) for mu in frictions]
+    frictions = [mu for mu in plan.frictions if mu >= plan.frozen_from]
+    found = [_exact("frozen", plan.n, seed, mu, slice_=SLICE) for mu in frictions]
+    if seed <= min(plan.exact_packings, plan.packings):
+        n, frictions = plan.frozen_large, plan.frozen_large_frictions
+        found += [_exact("frozen_large", n, seed, mu, slice_=SLICE) for mu in frictions]
+    return found
+
+
+def _prepared(plan, seed):
+    if seed > min(plan.prepared_packings, plan.packings):
+        return []
+    return [
+        _walk(part, plan.n, seed, mu, plan, made=made)
+        for part, made in PREPARED.items()
+        for mu in plan.prepared_frictions
+    ]
 
 
 def _opened(plan, seed):
-    if seed > plan.exact_packings:
+    if seed > min(plan.exact_packings, plan.packings):
         return []
     frictions = [mu for mu in plan.frictions if mu > 0]
     walks = [_walk("opened", plan.n, seed, mu, plan, packing_mu=0) for mu in frictions]
@@ -172,27 +264,47 @@ def _sizes(plan, seed):
         if seed > max(1, min(plan.packings, plan.packings * plan.n // n)):
             continue
         found += [_walk("size", n, seed, mu, plan) for mu in plan.size_frictions]
-        if n <= plan.largest_exact and seed <= plan.exact_packings:
+        few = max(plan.exact_packings, plan.exact_packings * plan.n // n)
+        if n <= plan.largest_exact and seed <= few:
             found += [_exact("size_exact", n, seed, mu) for mu in plan.size_frictions]
     return found
 
 
+def _stresses(plan, seed):
+    found = []
+    for mu in plan.frictions if seed <= min(plan.stress_packings, plan.packings) else ():
+        if mu == 0:
+            continue  # one network, one stress
+        packing = kinds.PACKING.parameters(plan.n, mu, seed)
+        cells = {"stress": Cell(kinds.STRESS, kinds.STRESS.parameters(packing))}
+        if seed <= plan.stress_uniform_packings:
+            named = kinds.UNIFORM.parameters(packing, plan.stress_states)
+            cells["stress_uniform"] = Cell(kinds.UNIFORM, named)
+        found += [Task(part, cell, plan.n, mu, seed) for part, cell in cells.items()]
+    return found
+
+
+# The parts by families, which are computed by name; those of the paper first.
 _PARTS = {
+    "sweeps": _sweeps,
+    "response": _responses,
     "walk": _walks,
     "exact": _exacts,
     "uniform": _uniform,
-    "gauss_seidel": _gauss_seidel,
     "frozen": _frozen,
-    "perturb": _perturb,
+    "prepared": _prepared,
     "opened": _opened,
     "size": _sizes,
+    "stress": _stresses,
 }
 
 PARTS = tuple(_PARTS)
+# What the paper did: its walks, and its response to local forces.
+PAPER = ("sweeps", "response")
 
 
 def chosen(plan, parts=None):
-    """The tasks of some parts (names out of PARTS), or all."""
+    """The tasks of some families of parts (names out of PARTS), or all."""
     unknown = set(parts or ()) - set(PARTS)
     if unknown:
         raise InputError(f"unknown part {min(unknown)!r}: take some of {', '.join(PARTS)}")
@@ -201,13 +313,13 @@ def chosen(plan, parts=None):
 
 
 def _family(part):
-    return part.removesuffix("_exact")
+    return "response" if part == "perturb" else part.split("_")[0]
 
 
 def finished(path, plan):
     """Yield (task, dataset) for the tasks of a plan that the store at path has."""
     store = open_store(path)
     for task in tasks(plan):
-        dataset = sweep.load(store, task.cell)
+        dataset = load(store, *task.cell)
         if dataset is not None:
             yield task, dataset

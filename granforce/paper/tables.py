@@ -5,26 +5,31 @@ import json
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.distance import pdist
 
-from granforce import measures, study, sweep
+from granforce import measures
+from granforce.explore.stress_outline import plane_of
+from granforce.forces.ensemble import stress_of
 from granforce.paper import plan as plans
 from granforce.records import InputError
-from granforce.schema import labelled
-from granforce.store import open_store
+from granforce.study import cells, kinds
+from granforce.study.schema import labelled
+from granforce.study.store import open_store
 
 VERSION = 1
 SHOWN_FRICTIONS = (0.01, 0.1, 1.0, 10.0)  # whose states and packings are kept for Figures 3 and 5
 SHOWN_STATES = 30
+SHOWN_PARTS = ("sweeps_1e-3", "walk")
 
 # Parts whose contacts are kept one by one.
-SAMPLED = ("walk", "exact", "uniform")
+SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "walk", "exact", "uniform")
 SAMPLES = ("row", "contact", "normal", "least", "extent")
 
 _SCALARS = (
     *("eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
-    *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "seconds"),
-    *("critical_force", "decay_exponent", "decay_low", "decay_high"),
+    *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "mean_sweeps", "seconds"),
+    *("critical_force", "decay_exponent", "decay_low", "decay_high", "friction"),
 )
 
 
@@ -60,36 +65,50 @@ class Table(NamedTuple):
             found.setdefault(row["mu"], []).append(extent)
         return found
 
-    def answers(self):
-        """Rows of the part "perturb", each with eta2 of the walk in the same packing."""
-        eta2 = {(row["mu"], row["seed"]): row["eta2"] for row in self.part("walk")}
-        keys = [(row, (row["mu"], row["seed"])) for row in self.part("perturb")]
-        return [row | {"eta2": eta2[key]} for row, key in keys if key in eta2]
+    def responses(self):
+        """Rows of the perturbation with loads raised in tenths of the way, else of the other."""
+        return self.part("response") or self.part("perturb")
+
+    def answers(self, part="walk", eta="eta2"):
+        """Rows of the perturbation, each with the η of a part in the same packing."""
+        known = {(row["mu"], row["seed"]): row[eta] for row in self.part(part) if eta in row}
+        keys = [(row, (row["mu"], row["seed"])) for row in self.responses()]
+        return [row | {eta: known[key]} for row, key in keys if key in known]
 
 
-def reduce(path, plan):
-    """The Table of what the store at path has of a plan. InputError where it has nothing."""
+def reduce(path, plan, wanted=None):
+    """The Table of what the store at path has of a plan. InputError where it has nothing.
+
+    wanted: the tasks whose lack is counted and told, by default all of the plan.
+    """
     store = open_store(path, readonly=True)
     rows, samples, shown, packings, centres = [], [], [], {}, {}
-    wanted = plans.tasks(plan)
+    every = plans.tasks(plan)
     for task, dataset in plans.finished(path, plan):
         k = len(rows)
         rows.append(row_of(task, dataset))
-        if task.part in SAMPLED:
+        if task.part == "stress_uniform":
+            packing, _ = kinds.get_packing(store, task.cell.parameters["packing"])
+            rows[k] |= _shears(packing, dataset)
+        if task.part in SAMPLED and _has_states(dataset):
             samples.append(_samples(k, dataset))
         if task.part == "uniform":
             centres[task.mu, task.seed] = dataset["states"].values.mean(axis=0), rows[k]
-        if task.part == "walk" and task.seed == 1 and task.mu in SHOWN_FRICTIONS:
+        first = task.part in SHOWN_PARTS and task.seed == 1 and _has_states(dataset)
+        if first and task.mu in SHOWN_FRICTIONS:
             shown.append((k, _shown(dataset)))
-            packings[k] = study.get_packing(store, task.cell.parameters["packing"])[0]
-    _compare_distances(store, wanted, centres)
+            packings[k] = kinds.get_packing(store, task.cell.parameters["packing"])[0]
+    _compare_distances(store, every, centres)
     if not rows:
         raise InputError(f"the store at {path} holds nothing of this study")
     joined = {
         name: np.concatenate([part[name] for part in samples]) if samples else np.zeros(0)
         for name in SAMPLES
     }
-    skipped = {"missing_cells": len(wanted) - len(rows)}
+    wanted = every if wanted is None else wanted
+    known = {_name(row) for row in rows}
+    missing = sum((t.part, t.n, t.mu, t.seed) not in known for t in wanted)
+    skipped = {"missing_cells": missing}
     return Table(plan._asdict(), rows, joined, shown, packings, skipped)
 
 
@@ -99,7 +118,7 @@ def _compare_distances(store, wanted, centres):
         key = task.mu, task.seed
         if task.part != "walk" or key not in centres:
             continue
-        walk = sweep.load(store, task.cell)
+        walk = cells.load(store, *task.cell)
         middle, row = centres[key]
         if walk is not None and row["dimension"] > 0:
             unit = row["mean_distance"] * walk["force_scale"].item()
@@ -114,14 +133,22 @@ def row_of(task, dataset):
     """The numbers of one cell: scalars of its dataset and what its contacts sum up to."""
     row = {"part": task.part, "n": task.n, "mu": task.mu, "seed": task.seed}
     for name in _SCALARS:
-        if name in dataset:
+        if name in dataset and dataset[name].size:
             row[name] = float(dataset[name].max())
-    if "distance_to_centre" in dataset:
+    if "attempts" in task.cell.parameters:
+        # A walk may have ended with fewer states than wanted, or none.
+        done = int(dataset["accepted"] + dataset["skipped"])
+        row["reached_part"] = done / task.cell.parameters["states"]
+    if "states" in dataset and dataset.sizes["state"] > 2:
         row["mean_distance"] = float(dataset["distance_to_centre"].mean())
+        if row["dimension"] > 0:
+            row["pair_spread"] = _pair_spread(dataset["states"].values)
+    if "stress_own" in dataset:
+        row["own_shear"] = float(np.hypot(*dataset["stress_own"].values))
     if "limit_load" in dataset:
         row["contacts"] = dataset.sizes["contact"]
         row["limit_load"] = float(dataset["limit_load"].mean() / dataset["force_scale"])
-    if "high" in dataset:
+    if "high" in dataset and _has_states(dataset):
         low, high = dataset["low"].values, dataset["high"].values
         scale = dataset["force_scale"].item()
         row["contacts"] = len(low)
@@ -133,6 +160,26 @@ def row_of(task, dataset):
         row["clusters"] = len(counts)
         row["largest_cluster"] = int(counts.max(initial=0))
     return row
+
+
+def _shears(packing, dataset):
+    """Shear stress over pressure of the states: its mean, and its largest."""
+    states = dataset["states"].values
+    forces = np.zeros((len(states), len(packing.contacts.i), 2))
+    forces[:, dataset["backbone"].values] = states
+    shear = np.hypot(*plane_of(stress_of(packing, forces)).T)
+    return {"mean_shear": float(shear.mean()), "largest_shear": float(shear.max())}
+
+
+def _has_states(dataset):
+    """Whether there are any; a walk of which no attempt succeeded has none. True of bounds."""
+    return dataset.sizes.get("state", 1) > 0
+
+
+def _pair_spread(states):
+    """Standard deviation over mean of the distances between pairs of states."""
+    apart = pdist(states.reshape(len(states), -1))
+    return float(apart.std() / apart.mean())
 
 
 def _samples(k, dataset):
@@ -153,6 +200,33 @@ def _shown(dataset):
     return states[pick]
 
 
+def merged(new, old):
+    """The Table `new` with the rows of its plan that it lacks and `old` has, after its own."""
+
+    known = {_name(row) for row in new.rows}
+    planned = {(t.part, t.n, t.mu, t.seed) for t in plans.tasks(plans.Plan(**new.plan))}
+    kept = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
+    place = {k: len(new.rows) + at for at, k in enumerate(kept)}
+    lacked = np.isin(old.samples["row"], kept)
+    samples = {
+        field: np.concatenate([new.samples[field], values[lacked]])
+        for field, values in old.samples.items()
+    }
+    moved = [place[k] for k in old.samples["row"][lacked].astype(int)]
+    samples["row"][len(new.samples["row"]) :] = moved
+    return new._replace(
+        rows=new.rows + [old.rows[k] for k in kept],
+        samples=samples,
+        shown=new.shown + [(place[k], normal) for k, normal in old.shown if k in place],
+        packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
+        skipped={"missing_cells": new.skipped["missing_cells"] - len(kept)},
+    )
+
+
+def _name(row):
+    return row["part"], row["n"], row["mu"], row["seed"]
+
+
 def save(table, path):
     """Keep a table, and the packings it shows, in a small store of its own at path."""
     store = open_store(path)
@@ -169,8 +243,8 @@ def save(table, path):
     )
     for k, packing in table.packings.items():
         row = table.rows[k]
-        named = study.packing_parameters(row["n"], row["mu"], row["seed"])
-        study.keep_packing(store, named, packing)
+        named = kinds.PACKING.parameters(row["n"], row["mu"], row["seed"])
+        kinds.keep_packing(store, named, packing)
 
 
 def load(path):
@@ -216,7 +290,7 @@ def _table(store, entry, dataset):
         for k in np.unique(dataset["shown_row"]).tolist():
             chosen = dataset["shown_row"].values == k
             shown.append((k, dataset["shown_normal"].values[:, chosen]))
-            named = study.packing_parameters(rows[k]["n"], rows[k]["mu"], rows[k]["seed"])
-            packings[k] = study.get_packing(store, named)[0]
+            named = kinds.PACKING.parameters(rows[k]["n"], rows[k]["mu"], rows[k]["seed"])
+            packings[k] = kinds.get_packing(store, named)[0]
     plan = {name: value for name, value in entry.params.items() if name != "rows"}
     return Table(plan, rows, samples, shown, packings, json.loads(dataset.attrs["skipped"]))

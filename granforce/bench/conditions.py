@@ -1,0 +1,158 @@
+"""What is prescribed and known: bounds beside HiGHS, pulls and inferences beside PIQP, in one run.
+
+Both sides of each comparison get the same programs, and rows tell how far their answers are off.
+"""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+
+from granforce.bench.exact import plain_loop
+from granforce.bench.inference import ERRORS, contact_program, piqp
+from granforce.bench.report import note
+from granforce.explore.intervals import intervals
+from granforce.explore.pull import pull
+from granforce.explore.uniform import sample_uniform
+from granforce.forces.ensemble import ensemble
+from granforce.forces.knowledge import Known
+from granforce.numerics import highs as programs
+from granforce.packing.compaction import pack
+
+# Part of the contacts that are known, and how well; values of a pull, in parts of its interval.
+KNOWN_PART, KNOWN_WITHIN = 0.1, 0.1
+VALUES = np.linspace(0.05, 0.95, 8)
+
+
+def knowledge(quick=True, *, n=None, mu=0.1, seed=1, every=None, pulled=3, repeats=3):
+    """Rows: seconds of the same programs by granforce and by the baseline, and their errors.
+
+    Bounds are those of every so-many-th contact. ratio: seconds of the baseline, HiGHS or PIQP,
+    over those of the row. gap: largest certified duality gap; off: how far a bound of the baseline
+    lies outside of the certified ones, or the largest difference between forces; residual: largest
+    unbalance, all in ⟨f_n⟩; above: part by which the sum of squares that is the least wanted lies
+    above that of the other, at most.
+    """
+    n, every = n or (100 if quick else 400), every or (1 if quick else 6)
+    packing = pack(n, mu, seed)
+    S = ensemble(packing)
+    rng = np.random.default_rng(seed)
+    cases = {
+        "bounds, pressure prescribed": S,
+        "bounds, stress prescribed": ensemble(packing, prescribed="stress"),
+        "bounds, a tenth of the forces known": ensemble(packing, known=_known(S, rng)),
+    }
+    rows = []
+    for task, one in cases.items():
+        rows += _bounds(task, one, one.index[::every])
+    contacts = rng.choice(S.index, pulled, replace=False)
+    rows += _pulls(S, contacts, repeats)
+    rows += _inferences(S, rng, seed, repeats)
+    return [{"n": n, "mu": mu, **row} for row in rows]
+
+
+def _known(S, rng):
+    """Normal forces of some contacts, within a tenth of the packing's own."""
+    count = max(1, round(KNOWN_PART * len(S.index)))
+    places = np.sort(rng.choice(len(S.index), count, replace=False))
+    own = S.original[places]
+    reach = np.full_like(own, np.inf)
+    reach[:, 0] = KNOWN_WITHIN * own[:, 0]
+    return Known(S.index[places], own - reach, own + reach)
+
+
+def _bounds(task, S, contacts):
+    note(f"knowledge: {task}")
+    intervals(S, contacts[:1])  # compiles
+    S = replace(S)  # nothing is prepared
+    ours, found = _timed(intervals, S, contacts)
+    theirs, bounds = _timed(plain_loop, S, contacts)
+    # Between the value that is attained and the one that bounds it lies the optimum.
+    beyond = np.abs([bounds[0] - found.lower, bounds[1] - found.upper]) / S.force_scale
+    outside = np.maximum(beyond - np.moveaxis(found.gap, -1, 0), 0.0)
+    common = {"task": task, "programs": found.lower.size + found.upper.size}
+    return [
+        common | _told("granforce", ours, theirs) | {"gap": found.max_gap},
+        common | _told("HiGHS", theirs, theirs) | {"off": float(outside.max())},
+    ]
+
+
+def _pulls(S, contacts, repeats):
+    note("knowledge: pulls")
+    found = intervals(S, contacts)
+    ends = zip(contacts, found.lower[:, 0], found.upper[:, 0], strict=True)
+    asked = [(int(c), low + VALUES * (high - low)) for c, low, high in ends]
+
+    def ours():
+        return np.concatenate([pull(S, c, values, S.original).states for c, values in asked])
+
+    def theirs():
+        return np.array([_pulled_by_piqp(S, c, v) for c, values in asked for v in values])
+
+    def squares(states):
+        return np.sum((states - S.original) ** 2, axis=(1, 2))
+
+    return _beside("pulls", S, ours, theirs, squares, repeats)
+
+
+def _pulled_by_piqp(S, contact, value):
+    """The network nearest to the original with this f_n."""
+    A, b, T = S.scaled_form
+    normal = T.tocsr()[S.per_contact * S.positions([contact])]
+    solver = programs.quadratic_solver(400)
+    solver.setup(
+        sparse.csc_matrix(T.T @ T),
+        -(T.T @ S.to_vector(S.original)) / S.force_scale,
+        sparse.vstack([A, normal], format="csc"),
+        np.append(b, value / S.force_scale),
+        x_l=np.zeros(A.shape[1]),
+    )
+    solver.solve()
+    return S.to_forces(T @ np.maximum(solver.result.x, 0.0) * S.force_scale)
+
+
+def _inferences(S, rng, seed, repeats):
+    note("knowledge: inference")
+    sigma = np.array(ERRORS) * S.force_scale
+    truth = sample_uniform(S, 8, seed=seed).flat[-1]
+    m = truth + sigma * rng.standard_normal(truth.shape)
+
+    def ours():
+        return contact_program(S, m, sigma)[None]
+
+    def theirs():
+        return piqp(S, m, sigma)[None]
+
+    def squares(states):
+        return np.sum(((states - m) / sigma) ** 2, axis=(1, 2))
+
+    return _beside("inference, everything measured", S, ours, theirs, squares, repeats)
+
+
+def _beside(task, S, ours, theirs, squares, repeats):
+    """Rows of two ways to find the same networks, after one run that compiles."""
+    ours()
+    taken, found = zip(*(_timed(ours) for _ in range(repeats)), strict=True)
+    taken_by, beside = zip(*(_timed(theirs) for _ in range(repeats)), strict=True)
+    off = float(np.abs(found[0] - beside[0]).max() / S.force_scale)
+    reached = np.array([squares(found[0]), squares(beside[0])])
+    above = np.max(reached / reached.min(axis=0) - 1, axis=1)
+    rows = []
+    for k, (name, times, forces) in enumerate(
+        (("granforce", taken, found[0]), ("PIQP", taken_by, beside[0]))
+    ):
+        row = {"task": task, "programs": len(forces), **_told(name, min(times), min(taken_by))}
+        errors = {"off": off, "residual": float(np.max(S.residual(forces)))}
+        rows.append(row | errors | {"above": float(above[k])})
+    return rows
+
+
+def _told(method, seconds, baseline):
+    return {"method": method, "seconds": seconds, "ratio": baseline / seconds}
+
+
+def _timed(action, *arguments):
+    begin = time.perf_counter()
+    result = action(*arguments)
+    return time.perf_counter() - begin, result

@@ -1,0 +1,138 @@
+"""The solver on S beside the machine's own limits, beside PIQP, and against the number of disks."""
+
+import os
+import resource
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+from granforce.bench.report import exponent, note
+from granforce.bench.solvers import FRICTIONS, kicked, tile
+from granforce.explore.intervals import intervals
+from granforce.forces.contact_problem import make_problem
+from granforce.forces.ensemble import ensemble
+from granforce.forces.nearest import nearest, nearest_of_many
+from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.numerics import contact_matrix, contact_program
+from granforce.numerics.lanes import LANES, MANY, ONE
+from granforce.packing.compaction import pack
+
+# Operations of one product of two 3×3 blocks that is taken from a third.
+_PRODUCT = 54
+# Dense matrices multiplied on one core: the most that double precision gets here.
+_DENSE = """
+import time
+import numpy as np
+a = np.random.default_rng(0).random((1200, 1200))
+best = 1e9
+for _ in range(5):
+    begin = time.perf_counter()
+    a @ a
+    best = min(best, time.perf_counter() - begin)
+print(2 * 1200**3 / best / 1e9)
+"""
+
+
+def kernel(quick=True, *, n=100, mu=0.1, tiles=None):
+    """Rows: Gflop/s of one factorisation alone and in lanes, and its part of a dense product's."""
+    dense = _dense_product()
+    base = ensemble(pack(n, mu, 1))
+    rows = []
+    for k in tiles or ((1, 2) if quick else (1, 2, 4, 8)):
+        problem, _ = make_problem(ensemble(tile(base, k), prune=False))
+        for lanes in (ONE, MANY):
+            seconds = _factorisation(problem, lanes)
+            below = np.diff(problem.network.layout.start) - 1
+            products = np.sum(below * (below + 1) // 2)
+            flops = _PRODUCT * int(products) * len(lanes) / seconds / 1e9
+            rows.append(
+                {
+                    "n": n * k * k,
+                    "lanes": len(lanes),
+                    "ms_per_matrix": 1e3 * seconds / len(lanes),
+                    "gflops": flops,
+                    "dense_gflops": dense,
+                    "part": flops / dense,
+                }
+            )
+    return rows
+
+
+def _dense_product():
+    single = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    called = [sys.executable, "-c", _DENSE]
+    done = subprocess.run(called, env=os.environ | single, capture_output=True, check=True)
+    return float(done.stdout)
+
+
+def _factorisation(problem, lanes):
+    """Seconds of the fastest of many factorisations."""
+    work = contact_program.make_workspace(problem, len(lanes))
+    best = np.inf
+    for _ in range(30):
+        # Any positive definite matrix: its numbers do not change the work.
+        work.factors.lower[:] = 0.0
+        work.factors.lower[contact_matrix.diagonals(problem.network).ravel()] = 1.0
+        begin = time.perf_counter()
+        contact_matrix.factor(problem.network, work.least, work.factors, work.stop, lanes)
+        best = min(best, time.perf_counter() - begin)
+    return best
+
+
+def starts(quick=True, *, n=None, frictions=FRICTIONS, repeats=None):
+    """Rows: milliseconds per nearest network by PIQP, one at a time, and 16 chains in lanes.
+
+    The same starts for all, interleaved, so that a machine that slows down slows down all of them.
+    """
+    n, repeats = n or (100 if quick else 400), repeats or (2 if quick else 5)
+    rows = []
+    for mu in frictions:
+        note(f"starts: N = {n}, μ = {mu:g}")
+        S = ensemble(pack(n, mu, 1))
+        ways = {
+            "PIQP": lambda given, S=S: [nearest_piqp(S, start) for start in given],
+            "one at a time": lambda given, S=S: [nearest(S, start) for start in given],
+            f"{LANES} lanes": lambda given, S=S: nearest_of_many(S, given),
+        }
+        spent, worst = {name: [] for name in ways}, 0.0
+        for turn in range(repeats + 1):
+            given = kicked(S, 2 * LANES, turn)
+            found = {}
+            for name, way in ways.items():
+                begin = time.perf_counter()
+                found[name] = np.stack([one.forces for one in way(given)])
+                spent[name].append((time.perf_counter() - begin) / len(given))
+            worst = max(worst, *(np.abs(one - found["PIQP"]).max() for one in found.values()))
+        piqp = np.median(spent["PIQP"][1:])
+        for name in ways:
+            each = float(np.median(spent[name][1:]))  # the first run compiles
+            row = {"n": n, "mu": mu, "solver": name, "ms_per_state": 1e3 * each}
+            rows.append(row | {"ratio_to_piqp": piqp / each, "differ": worst / S.force_scale})
+    return rows
+
+
+def growth(quick=True, *, n=100, mu=0.1, tiles=None):
+    """Rows: seconds of set-up, one relaxation and one exact bound against N, and exponents."""
+    base = ensemble(pack(n, mu, 1))
+    intervals(base, base.index[:1])  # compiles
+    rows = []
+    for k in tiles or ((1, 2, 4) if quick else (1, 2, 4, 8, 16)):
+        note(f"growth: N = {n * k * k}")
+        S = ensemble(tile(base, k), prune=False)
+        begin = time.perf_counter()
+        make_problem(S)
+        row = {"n": n * k * k, "setup": time.perf_counter() - begin}
+        start = kicked(S, 1, 0)[0]
+        nearest(S, start, max_iterations=1)
+        row["relaxation"] = nearest(S, start).seconds
+        begin = time.perf_counter()
+        found = intervals(S, S.index[:LANES])
+        row["bound"] = (time.perf_counter() - begin) / found.counts["programs"]
+        row["max_gap"] = found.max_gap
+        row["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+        rows.append(row)
+    names = ("setup", "relaxation", "bound")
+    fits = {name: exponent([(row["n"], row[name]) for row in rows]) for name in names}
+    return [*rows, {"n": "exponent", **fits}]

@@ -1,0 +1,110 @@
+"""Which measurement next: where one more known force would tell most about all others."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce import measures, notebook
+from granforce.explore.intervals import intervals
+from granforce.explore.uniform import sample_uniform
+from granforce.forces import knowledge
+from granforce.records import InputError, whole
+from granforce.system import cancelling
+from granforce.tolerances import FLAT
+
+
+class Informative(NamedTuple):
+    """Contacts whose normal force would be worth measuring, the best first."""
+
+    contacts: np.ndarray  # (k,) their numbers in the packing
+    expected: np.ndarray  # (k,) part by which the mean error of f_n falls, by covariance
+    before: float  # exact mean interval of f_n as it is, in ⟨f_n⟩; NaN where not computed
+    after: np.ndarray  # (k,) the same once f_n of that contact is known; NaN where not computed
+
+    def _repr_html_(self):
+        """The contacts as notebooks show them."""
+        lines = {"mean interval of fₙ / ⟨fₙ⟩ now": self.before}
+        for contact, after in zip(self.contacts, self.after, strict=True):
+            lines[f"with fₙ of contact {contact} known"] = float(after)
+        return notebook.table("Which measurement next", lines)
+
+
+@cancelling.cancellable
+def informative(
+    ensemble,
+    k=10,
+    *,
+    states=400,
+    seed=0,
+    check=10,
+    workers=1,
+    watch=None,
+    progress=None,
+    cancel=None,
+):
+    """The k contacts whose f_n, once known, would shorten the mean interval most; an Informative.
+
+    From `states` uniform states: were forces normally distributed, a known f_n of contact c would
+    leave √(1 − ρ²) of the standard deviation of another one, ρ their correlation. The best `check`
+    contacts are then put in order by exact bounds, with f_n held at its mean over the states.
+    workers: threads; progress(done, total) counts those. watch(Informative) is called before the
+    first of them, with the order by covariance.
+
+    Raises InputError where nothing is left to measure, and as `sample_uniform` does.
+    """
+    k, check = whole(k, "k", 1), whole(check, "check")
+    sample = sample_uniform(ensemble, states, seed=seed, workers=workers)
+    normal = sample.flat[..., 0] / ensemble.force_scale
+    expected = _expected(normal)
+    if not expected.any():
+        raise InputError("nothing is left to measure: every force is known by balance")
+    order = np.argsort(-expected, kind="stable")[: min(k, int(np.sum(expected > 0)))]
+    before, after = np.nan, np.full(len(order), np.nan)
+    best = order[:check]
+    if watch is not None:
+        watch(Informative(ensemble.index[order], expected[order], before, after.copy()))
+    if progress is not None and len(best):
+        progress(0, len(best))
+    for done, c in enumerate(best):
+        if not done:
+            before = _mean_interval(ensemble, workers)
+        value = normal[:, c].mean() * ensemble.force_scale
+        after[done] = _mean_interval(_with_normal(ensemble, c, value), workers)
+        if progress is not None:
+            progress(done + 1, len(best))
+    place = np.append(np.argsort(after[: len(best)], kind="stable"), range(len(best), len(order)))
+    order, place = order[place.astype(int)], place.astype(int)
+    return Informative(ensemble.index[order], expected[order], before, after[place])
+
+
+def _expected(normal):
+    """(N_c,) part by which the mean deviation of f_n (states, N_c) falls once one is known."""
+    off = normal - normal.mean(axis=0)
+    spread = off.std(axis=0)
+    unit = np.divide(off, spread, out=np.zeros_like(off), where=spread > FLAT)
+    correlation = np.clip(unit.T @ unit / len(unit), -1.0, 1.0)
+    left = np.sqrt(1 - correlation**2)
+    return np.where(spread > FLAT, 1 - left @ spread / max(spread.sum(), FLAT), 0.0)
+
+
+def _with_normal(ensemble, c, value):
+    """The ensemble with f_n of the contact at position c known as well."""
+    bounds = np.empty((len(ensemble.index), 2, 2))
+    bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
+    if ensemble.known is not None:
+        bounds[..., 0] = ensemble.known.low * ensemble.force_scale
+        bounds[..., 1] = ensemble.known.high * ensemble.force_scale
+    bounds[c, 0] = value
+    known = knowledge.polygons(bounds, ensemble.mu, ensemble.force_scale, ensemble.index)
+    return replace(ensemble, known=known)
+
+
+def _mean_interval(ensemble, workers):
+    """Mean exact interval of f_n, in ⟨f_n⟩."""
+    bounds = intervals(ensemble, workers=workers)
+    cancelling.check("exact bounds")
+    if not bounds.converged:
+        raise InputError(f"exact bounds not certified: largest gap {bounds.max_gap:.1e} ⟨f_n⟩")
+    extent = measures.normal_extent(bounds.lower, bounds.upper)
+    return float(extent.mean() / ensemble.force_scale)

@@ -1,0 +1,206 @@
+"""The outline of S in a plane: its exact projection between an inner and an outer polygon.
+
+The projection of S on two axes u1, u2 of force space is a convex polygon. Its support function
+h(θ) = max {(cos θ u1 + sin θ u2)·F : F in S} is one linear program a direction. Each program gives
+a state, whose projection lies on the outline, and a certified half plane that holds all of S. New
+directions are the normals of those inner edges from which the corner of the half planes beside
+them is still too far, so that the polygons close on each other from both sides (Kamenev, Comput.
+Math. Math. Phys. 32, 114, 1992).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.forces.contact_problem import cone_costs, forces_of, known_part, make_system
+from granforce.numerics.certified_values import Solver
+from granforce.numerics.linear_programs import Program
+from granforce.records import InputError, float_array
+from granforce.system import cancelling
+
+_FIRST = 16  # directions to begin with
+_MOST = 4096  # directions after which it is given up
+# Directions closer than this (in radians) are one: the corner of two half planes that are known to
+# INTERVAL_GAP is then not known better than the tolerances asked for here.
+_CLOSEST = 1e-5
+# Smallest gap that can be asked for, in units of the axes: the programs' own is 1e-8.
+_FLOOR = 1e-7
+
+
+class Outline(NamedTuple):
+    """The projection of S on two axes, in ⟨f_n⟩ times the axes' length; polygons run left about."""
+
+    inner: np.ndarray  # (k, 2) corners of a polygon inside: projections of states of S
+    outer: np.ndarray  # (m, 2) corners of a polygon outside: of certified half planes
+    gap: float  # largest distance of a corner of the outer polygon from the inner one
+    converged: bool  # the gap is within the tolerance
+    counts: dict  # directions asked for; programs, again, iterations as in `Intervals`
+
+
+class _Support(NamedTuple):
+    """Directions d and what is known of them, in order of their angles."""
+
+    d: np.ndarray  # (n, 2) unit vectors
+    point: np.ndarray  # (n, 2) projection of a state that goes farthest along d
+    bound: np.ndarray  # (n,) d·x ≤ bound for all x of the projection
+
+
+@cancelling.cancellable
+def outline(ensemble, axes, *, tolerance=1e-3, workers=1, progress=None, cancel=None):
+    """The outline of S on the axes (2, N_c, 2): points (axes[0]·F, axes[1]·F)/⟨f_n⟩ over S.
+
+    tolerance: largest distance of the outer polygon from the inner one, relative to the extent of
+    the outline. workers: threads; the result does not depend on them. progress(done, total) counts
+    directions, total being what is known to be needed. cancel() → True ends early, with
+    ``converged`` False and the polygons found so far, or Cancelled before the first program.
+
+    Raises InputError for axes of another shape or of zeros and where S is not bounded,
+    NotJammedError where it is empty.
+    """
+    axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
+    length = np.sqrt((axes**2).sum(axis=(1, 2)).max())
+    if length == 0:
+        raise InputError("the axes are zero; give two directions of force space")
+    solver = Solver(make_system(ensemble), workers=workers)
+    plane = cone_costs(ensemble, axes / length).T, known_part(ensemble, axes / length)
+    angle = 2 * np.pi * np.arange(_FIRST) / _FIRST
+    new, support = np.column_stack([np.cos(angle), np.sin(angle)]), None
+    while len(new):
+        found = _solve(solver, plane, new, 0 if support is None else len(support.d))
+        if found is None:
+            break
+        support = found if support is None else _merged(support, found)
+        corners, gap = _corners(support)
+        allowed = max(tolerance * np.ptp(support.point, axis=0).max(), _FLOOR)
+        new = _normals(support, gap > allowed)
+        if progress:
+            progress(len(support.d), len(support.d) + len(new))
+        if len(support.d) + len(new) > _MOST:
+            break
+    if support is None:
+        return Outline(np.empty((0, 2)), np.empty((0, 2)), np.inf, False, _counts(solver, 0))
+    gap = float(gap.max()) * length
+    inner, outer = _hull(support.point) * length, _hull(corners) * length
+    converged = bool(gap <= allowed * length)
+    return Outline(inner, outer, gap, converged, _counts(solver, len(support.d)))
+
+
+def supports(ensemble, axes, angles, *, workers=1):
+    """Largest cos θ u1·F + sin θ u2·F over S, F in ⟨f_n⟩, and duality gaps: (k,) for angles (k,).
+
+    axes (2, N_c, 2): u1, u2. NaN where cancelled.
+    """
+    axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
+    solver = Solver(make_system(ensemble), workers=workers)
+    plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    found = _solve(solver, plane, directions, 0)
+    if found is None:
+        return np.full((2, len(directions)), np.nan)
+    reached = (found.point * found.d).sum(axis=1)
+    return reached, np.abs(found.bound - reached)
+
+
+def extremes(ensemble, axes, directions):
+    """Networks of S (k, N_c, 2), force, that go farthest along directions (k, 2) of the axes.
+
+    axes (2, N_c, 2). Raises Cancelled, and InputError where a program fails.
+    """
+    axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
+    across = cone_costs(ensemble, axes).T
+    points = {}
+    tasks = _tasks(across, directions)
+    bounds = Solver(make_system(ensemble)).solve(list(range(len(tasks))), tasks, points)
+    cancelling.check("outline")
+    if not np.all(np.isfinite(list(bounds.values()))):
+        raise InputError("the outline cannot be certified: linear programs over S fail")
+    return np.stack([forces_of(ensemble, points[key]) for key in range(len(tasks))])
+
+
+def _counts(solver, directions):
+    return {"directions": directions, **solver.counts}
+
+
+def _solve(solver, plane, directions, first):
+    """_Support of new directions (k, 2), whose keys begin at first; None where cancelled.
+
+    plane: the axes in cone coordinates (n, 2), and what known forces add (2,).
+    """
+    across, origin = plane
+    keys = list(range(first, first + len(directions)))
+    points = {}
+    bounds = solver.solve(keys, _tasks(across, directions), points)
+    if len(bounds) < len(keys) or cancelling.cancelled():
+        return None
+    y = np.stack([points[key] for key in keys])
+    attained, bound = -np.array([bounds[key] for key in keys]).T
+    if not np.all(np.isfinite(attained) & np.isfinite(bound)):
+        raise InputError("the outline cannot be certified: linear programs over S fail")
+    return _Support(directions, y[:, : len(across)] @ across + origin, bound + directions @ origin)
+
+
+def _tasks(across, directions):
+    """The programs that go farthest along directions (k, 2) of the axes `across` (n, 2)."""
+    costs = -(across @ directions.T)
+    columns = list(range(len(costs)))
+    return [Program(columns, cost.tolist(), -1) for cost in costs.T]
+
+
+def _merged(support, new):
+    both = _Support(*(np.concatenate(pair) for pair in zip(support, new, strict=True)))
+    order = np.argsort(np.arctan2(both.d[:, 1], both.d[:, 0]), kind="stable")
+    return _Support(*(field[order] for field in both))
+
+
+def _corners(support):
+    """Corners (n, 2) of neighbouring half planes, and their distances (n,) from the edges inside.
+
+    Corner and edge k are those of directions k and k + 1.
+    """
+    d, after = support.d, np.roll(support.d, -1, axis=0)
+    h, h_after = support.bound, np.roll(support.bound, -1)
+    sine = _cross(d, after)
+    corner = np.column_stack(
+        [h * after[:, 1] - h_after * d[:, 1], h_after * d[:, 0] - h * after[:, 0]]
+    )
+    corner /= sine[:, None]
+    begin, end = support.point, np.roll(support.point, -1, axis=0)
+    edge = end - begin
+    size = np.maximum((edge**2).sum(axis=1), np.finfo(float).tiny)
+    along = np.clip(((corner - begin) * edge).sum(axis=1) / size, 0, 1)
+    return corner, np.linalg.norm(corner - begin - along[:, None] * edge, axis=1)
+
+
+def _normals(support, wide):
+    """Outward normals of the inner edges (mask wide), or the middle between their directions."""
+    d, after = support.d[wide], np.roll(support.d, -1, axis=0)[wide]
+    edge = (np.roll(support.point, -1, axis=0) - support.point)[wide]
+    normal = np.column_stack([edge[:, 1], -edge[:, 0]])
+    size = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(size, np.finfo(float).tiny)[:, None]
+    # Of an edge that is all rounding error the normal may point anywhere.
+    between = (_cross(d, normal) > _CLOSEST) & (_cross(normal, after) > _CLOSEST)
+    middle = d + after
+    middle /= np.linalg.norm(middle, axis=1)[:, None]
+    new = np.where((between & (size > _FLOOR))[:, None], normal, middle)
+    return new[_cross(d, after) > 2 * _CLOSEST]
+
+
+def _cross(a, b):
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _hull(points):
+    """Corners of the convex hull of points (n, 2), left about (Andrew's monotone chain)."""
+    chain = []
+    for ordered in (np.unique(points, axis=0), np.unique(points, axis=0)[::-1]):
+        begin = len(chain)
+        for x, y in ordered.tolist():
+            while len(chain) > begin + 1:
+                (ax, ay), (bx, by) = chain[-2:]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
+                    break
+                chain.pop()
+            chain.append((x, y))
+        chain.pop()  # the first of the way back, or of the way there
+    return np.array(chain or points[:1].tolist())

@@ -1,0 +1,176 @@
+"""Pulling a contact: the networks nearest to a given one in which its f_n has other values.
+
+The contact's f_n is pinned, and its f_t is whatever is nearest: a contact program whose polygon
+there is a segment. All values are solved side by side (`numerics.contact_program`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.explore.intervals import bound_of
+from granforce.forces.contact_problem import (
+    forces_of,
+    independent_problem_of,
+    make_system,
+    problem_of,
+)
+from granforce.forces.nearest import Search, nearest, starting_network
+from granforce.numerics.certified_values import Solver
+from granforce.numerics.contact_program import PINNED
+from granforce.numerics.lanes import LANES
+from granforce.records import InputError, UndecidedError, float_array
+from granforce.system import cancelling
+from granforce.tolerances import ADMISSIBLE, BALANCED, INTERVAL_GAP
+
+# A force of zero is approached to within this (in ⟨f_n⟩), so that its contact has an inside.
+_LEAST = 1e-13
+_MOST_STEPS = 100
+# Values at the ends of the interval are taken this part of its width before them: the first that
+# does.
+_INWARD = 1e-6, 1e-5, 1e-4
+# A contact is open, or slides, where that is so to within this (in ⟨f_n⟩).
+_AT_WALL = 1e-6
+
+
+class Pull(NamedTuple):
+    """Networks with given f_n on one contact."""
+
+    contact: int  # its number in the packing
+    values: np.ndarray  # (k,) its f_n in the states, force
+    states: np.ndarray  # (k, N_c, 2) admissible networks, force
+    residual: np.ndarray  # (k,) in ⟨f_n⟩, by Ensemble.residual
+    violation: np.ndarray  # (k,) in ⟨f_n⟩, by Ensemble.violation
+    opened: np.ndarray  # (k, N_c) bool, contacts without force
+    sliding: np.ndarray  # (k, N_c) int, sign of f_t where |f_t| = μ f_n > 0, 0 elsewhere
+
+
+class Reach(NamedTuple):
+    """How far f_n of one contact can be pulled, and what holds it there."""
+
+    contact: int  # its number in the packing
+    lower: float  # exact least f_n over S, force
+    upper: float  # exact largest f_n over S, force
+    gap: np.ndarray  # (2,) duality gaps in ⟨f_n⟩
+    states: np.ndarray  # (2, N_c, 2) a network at either end, force
+    opened: np.ndarray  # (2, N_c) bool, contacts without force in every network at that end
+    sliding: np.ndarray  # (2, N_c) int, sign of f_t where every network there has |f_t| = μ f_n
+
+
+@cancelling.cancellable
+def pull(ensemble, contact, values, state=None, *, cancel=None):
+    """The points of S nearest to `state` with f_n of one contact at the given values; a Pull.
+
+    contact: its number in the packing. values (k,), force. state (N_c, 2), force: by default the
+    original network. Nearest: the least Σ |F_c − F_state,c|² over all contacts. At the very ends of
+    the interval f_n differs from the value by 10⁻⁶ of its width (rarely more, at most 10⁻⁴).
+
+    Raises InputError for a contact that carries nothing, and for values outside the exact interval,
+    naming it; NotJammedError where S is empty.
+    """
+    (position,) = ensemble.positions([contact])
+    values = float_array(np.atleast_1d(values), (-1,), "values")
+    if state is None:
+        state = starting_network(ensemble)
+    state = float_array(state, (len(ensemble.index), 2), "state")
+    states = _pulled_all(ensemble, position, values, state)
+    missed = ~_admitted(ensemble, states)
+    if missed.any():
+        states[missed] = _near_ends(ensemble, contact, values[missed], state)
+    residual, violation = ensemble.residual(states), ensemble.violation(states)
+    opened, sliding = _at_walls(ensemble, states)
+    return Pull(int(contact), states[:, position, 0], states, residual, violation, opened, sliding)
+
+
+def _admitted(ensemble, states):
+    balanced = ensemble.residual(states) <= BALANCED
+    return balanced & (ensemble.violation(states) <= ADMISSIBLE)
+
+
+def _pulled_all(ensemble, position, values, state):
+    """The networks (k, N_c, 2) of values (k,); where S has none, what comes nearest to it."""
+    states = np.empty((len(values), *state.shape))
+    for first in range(0, len(values), LANES):
+        some = slice(first, first + LANES)
+        states[some] = _pulled(ensemble, int(position), values[some], state)
+    return states
+
+
+def _pulled(ensemble, position, values, state):
+    """The same of up to LANES values."""
+    count, scale = len(values), ensemble.force_scale
+    width = 1 if count == 1 else LANES
+    problem = problem_of(ensemble)
+    w = problem.w.copy()
+    w[2 * position] = PINNED
+    start = np.repeat(problem.start[: len(w), None], width, axis=1)  # what is known stays
+    force = np.maximum(np.resize(values, width) / scale, _LEAST)
+    start[2 * position : 2 * position + 2] = force
+    targets = np.repeat(state[..., None] / scale, width, axis=2)
+    # Near the ends of the interval multipliers are so large that a shift of the rows would show.
+    search = Search(independent_problem_of(ensemble)._replace(w=w), targets, start)
+    search.run(BALANCED / 4, _MOST_STEPS, count)
+    states = ensemble.pin(search.forces()[:count] * scale)
+    limit = ensemble.mu * np.maximum(values, 0.0)
+    states[:, position, 0] = values
+    states[:, position, 1] = np.clip(states[:, position, 1], -limit, limit)
+    return states
+
+
+def _near_ends(ensemble, contact, values, state):
+    """The networks of values that were not reached: outside the interval, or at its very ends.
+
+    At an end multipliers grow without bound: its network is taken a little before it.
+    """
+    found = reach(ensemble, contact)
+    beyond = INTERVAL_GAP * ensemble.force_scale
+    for value in values[(values < found.lower - beyond) | (values > found.upper + beyond)]:
+        raise InputError(
+            f"a normal force of {value:.9g} on contact {contact} is outside its exact interval, "
+            f"{found.lower:.9g} to {found.upper:.9g}: no admissible network has it"
+        )
+    width = found.upper - found.lower
+    if width <= _AT_WALL * ensemble.force_scale:  # every network has this f_n
+        return np.stack([nearest(ensemble, state).forces] * len(values))
+    (position,) = ensemble.positions([contact])
+    for part in _INWARD:
+        inside = found.lower + part * width, found.upper - part * width
+        states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
+        if np.all(admitted := _admitted(ensemble, states)):
+            return states
+    raise UndecidedError(
+        f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
+        f"{contact} was not reached; take a value further from the ends of its interval, "
+        f"{found.lower:.9g} to {found.upper:.9g}"
+    )
+
+
+@cancelling.cancellable
+def reach(ensemble, contact, *, cancel=None):
+    """Exact least and largest f_n of one contact (its number in the packing); a Reach.
+
+    Contacts that are open or slide at an end are those that hold f_n there.
+
+    Raises InputError for a contact that carries nothing, UndecidedError where the interval could
+    not be certified, NotJammedError where S is empty.
+    """
+    (position,) = ensemble.positions([contact])
+    tasks = [bound_of(ensemble, int(position), 0, side) for side in (0, 1)]
+    points = {}
+    bounds = Solver(make_system(ensemble)).solve([0, 1], tasks, points)
+    cancelling.check("exact interval")
+    gap = np.array([abs(bounds[side][0] - bounds[side][1]) for side in (0, 1)])
+    if not np.all(gap <= INTERVAL_GAP):
+        raise UndecidedError(f"the interval of contact {contact} could not be certified")
+    states = np.stack([forces_of(ensemble, points[side]) for side in (0, 1)])
+    lower, upper = bounds[0][0] * ensemble.force_scale, -bounds[1][0] * ensemble.force_scale
+    return Reach(int(contact), lower, upper, gap, states, *_at_walls(ensemble, states))
+
+
+def _at_walls(ensemble, states):
+    """Which contacts are open, and which slide, in states (k, N_c, 2)."""
+    normal, tangential = states[..., 0], states[..., 1]
+    least = _AT_WALL * ensemble.force_scale
+    opened = normal <= least
+    slides = ~opened & (np.abs(tangential) >= ensemble.mu * (normal - least)) & (ensemble.mu > 0)
+    return opened, np.where(slides, np.sign(tangential), 0).astype(np.int64)

@@ -1,0 +1,107 @@
+"""Which stresses a packing's contacts can carry at its pressure: an exact outline in a plane.
+
+A stress of given pressure P is a point ((σ_xx − σ_yy)/2P, σ_xy/P); its distance from the origin is
+the ratio of the largest shear stress to the pressure, whatever the directions of the box. Both are
+linear in the forces, so that the stresses of S fill a convex polygon.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce import notebook
+from granforce.explore.outline import outline, supports
+from granforce.forces.ensemble import stress_of, stress_rows
+from granforce.records import InputError, whole
+from granforce.system import cancelling
+
+# Largest gap between the polygons, relative to the extent of the outline.
+TOLERANCE = 1e-4
+
+
+class StressOutline(NamedTuple):
+    """The stresses of all networks in S, as points ((σ_xx − σ_yy)/2P, σ_xy/P)."""
+
+    angles: np.ndarray  # (k,) θ
+    support: np.ndarray  # (k,) largest cos θ · first + sin θ · second over S
+    gap: np.ndarray  # (k,) duality gaps of the supports, in the same units
+    inner: np.ndarray  # (n, 2) corners of a polygon inside: stresses of networks in S
+    outer: np.ndarray  # (m, 2) corners of a polygon outside, of certified half planes
+    friction: float  # largest shear stress over pressure of any network in S
+    friction_bound: float  # what it is certain not to exceed
+    own: np.ndarray  # (2,) the stress of the packing's own network
+    converged: bool  # the polygons are as close as asked for
+    counts: dict  # as in `Outline`
+
+    def _repr_html_(self):
+        """The outline as notebooks show it."""
+        lines = {
+            "largest shear stress / pressure": self.friction,
+            "of the packing's own network": float(np.hypot(*self.own)),
+            "certainly not above": self.friction_bound,
+            **self.counts,
+        }
+        return notebook.table("Stresses that the contacts can carry", lines)
+
+
+@cancelling.cancellable
+def stress_outline(ensemble, angles=64, *, workers=1, progress=None, cancel=None):
+    """The exact outline of the stresses that S can carry at its pressure; a StressOutline.
+
+    angles: how many, evenly spaced from 0 on, or the angles themselves (k,). workers, progress,
+    cancel: as for `outline`. `stress_plane` gives the points of any networks.
+
+    Raises InputError where the pressure is not prescribed, or the whole stress is.
+    """
+    if np.ndim(angles) == 0:
+        count = whole(angles, "the number of angles", 1, 4096)
+        angles = 2 * np.pi * np.arange(count) / count
+    axes = stress_axes(ensemble)
+    angles = np.asarray(angles, dtype=np.float64)
+    support, gap = supports(ensemble, axes, angles, workers=workers)
+    found = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
+    reached = np.hypot(*found.inner.T).max(initial=0.0)
+    bound = np.hypot(*found.outer.T).max(initial=0.0) if len(found.outer) else np.inf
+    own = stress_plane(ensemble, ensemble.original)
+    return StressOutline(
+        angles,
+        support,
+        gap,
+        found.inner,
+        found.outer,
+        float(reached),
+        float(bound),
+        own,
+        found.converged,
+        found.counts,
+    )
+
+
+def stress_plane(ensemble, states):
+    """Points (…, 2) of the stresses of networks (…, N_c, 2): ((σ_xx − σ_yy)/2P, σ_xy/P).
+
+    NaN where there are no forces.
+    """
+    return plane_of(stress_of(ensemble.packing, ensemble.expand(states)))
+
+
+def plane_of(stresses):
+    """Points (…, 2) of stresses (…, 3), σ_xx, σ_yy and σ_xy; NaN where nothing presses."""
+    xx, yy, xy = np.moveaxis(stresses, -1, 0)
+    twice = np.where(xx + yy > 0, xx + yy, np.nan)
+    return np.stack([xx - yy, 2 * xy], axis=-1) / twice[..., None]
+
+
+def stress_axes(ensemble):
+    """Axes (2, N_c, 2) of the plane of stresses, for forces in ⟨f_n⟩.
+
+    Raises InputError where the pressure is not prescribed, or the whole stress is.
+    """
+    if not ensemble.has_pressure_row:
+        raise InputError("stresses are compared at a prescribed pressure; none is prescribed here")
+    if ensemble.prescribed == "stress":
+        raise InputError("the whole stress is prescribed: prescribe the pressure for an outline")
+    packing = ensemble.packing
+    xx, yy, xy = stress_rows(ensemble.contacts)
+    scale = ensemble.force_scale / (packing.pressure * packing.volume)
+    return scale * np.stack([0.5 * (xx - yy), xy])

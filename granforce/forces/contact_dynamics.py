@@ -1,0 +1,286 @@
+"""Contact dynamics of rigid disks in a box of adjustable size: one contact, one sweep, one step.
+
+Implicit Euler with the intrinsic velocities v of the grains and the dilation rate λ of the box
+(arXiv:0803.3566, Eqs. 17–32). Velocities are rows (v_x, v_y, ω). Contact forces are found by
+Gauss–Seidel sweeps in which λ follows every single contact update, so that it is consistent with
+the forces at the end. Relaxation on a fixed geometry is one such step with all gaps zero and
+grains and box initially at rest. A sweep goes over one set of forces, or over eight side by side.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from granforce.numerics.lanes import (
+    ONE,
+    compiled,
+    larger,
+    load,
+    pick,
+    same,
+    size,
+    store,
+    vanishes,
+    within,
+)
+
+
+class StepProblem(NamedTuple):
+    """The contact problem of one time step; all arrays (N_c,) but the last two (N,)."""
+
+    i: np.ndarray
+    j: np.ndarray
+    n_x: np.ndarray
+    n_y: np.ndarray
+    length: np.ndarray
+    arm_i: np.ndarray
+    arm_j: np.ndarray
+    closing: np.ndarray  # max(gap, 0)/Δt: approach velocity that just closes the contact
+    stiff_n: np.ndarray  # Δf_n per normal velocity to be stopped
+    stiff_t: np.ndarray  # Δf_t per tangential velocity to be stopped
+    inverse_mass: np.ndarray  # Δt/m
+    inverse_inertia: np.ndarray  # Δt/I
+    box_compliance: float  # Δt/(2 V M_λ): change of λ per unit f_n ℓ
+
+
+@compiled
+def set_stiffness(problem):
+    """Fill stiff_n and stiff_t: inverses of the velocity that a unit force changes in one step."""
+    i, j = problem.i, problem.j
+    w, u = problem.inverse_mass, problem.inverse_inertia
+    for c in range(i.shape[0]):
+        common = w[i[c]] + w[j[c]]
+        box = problem.box_compliance * problem.length[c] ** 2
+        spin = problem.arm_i[c] ** 2 * u[i[c]] + problem.arm_j[c] ** 2 * u[j[c]]
+        problem.stiff_n[c] = 1.0 / (common + box)
+        problem.stiff_t[c] = 1.0 / (common + spin)
+
+
+@compiled
+def add_forces(problem, force, velocity, dilation):
+    """Velocities (N, 3) after the given contact forces acted for one step; returns the new λ."""
+    for c in range(problem.i.shape[0]):
+        if force[c, 0] != 0.0 or force[c, 1] != 0.0:
+            dilation = _push(problem, c, force[c, 0], force[c, 1], velocity, dilation, ONE)
+    return dilation
+
+
+@njit(inline="always")
+def _push(problem, c, f_n, f_t, velocity, dilation, lanes):
+    i, j = 3 * problem.i[c], 3 * problem.j[c]
+    w_i = same(lanes, problem.inverse_mass[problem.i[c]])
+    w_j = same(lanes, problem.inverse_mass[problem.j[c]])
+    u_i = same(lanes, problem.inverse_inertia[problem.i[c]] * problem.arm_i[c])
+    u_j = same(lanes, problem.inverse_inertia[problem.j[c]] * problem.arm_j[c])
+    n_x, n_y = same(lanes, problem.n_x[c]), same(lanes, problem.n_y[c])
+    f_x = f_n * n_x - f_t * n_y
+    f_y = f_n * n_y + f_t * n_x
+    store(velocity, i, lanes, load(velocity, i, lanes) - w_i * f_x)
+    store(velocity, i + 1, lanes, load(velocity, i + 1, lanes) - w_i * f_y)
+    store(velocity, j, lanes, load(velocity, j, lanes) + w_j * f_x)
+    store(velocity, j + 1, lanes, load(velocity, j + 1, lanes) + w_j * f_y)
+    store(velocity, i + 2, lanes, load(velocity, i + 2, lanes) - u_i * f_t)
+    store(velocity, j + 2, lanes, load(velocity, j + 2, lanes) - u_j * f_t)
+    return dilation + same(lanes, problem.box_compliance * problem.length[c]) * f_n
+
+
+@compiled
+def sweep(problem, order, mu, force, velocity, dilation, lanes):
+    """Update every contact once, in the given order (N_c,), in each of the lanes.
+
+    A contact whose predicted gap would be negative gets the f_n that makes it zero and the f_t
+    that stops sliding, clipped to |f_t| ≤ μ f_n; force (N_c, 2, lanes) and velocity (N, 3, lanes)
+    change in place. Returns the new λ, the sum of |Δf_n| + |Δf_t| and the sum of f_n over contacts.
+    """
+    zero = same(lanes, 0.0)
+    change = total = zero
+    for k in range(order.shape[0]):
+        c = order[k]
+        i, j = 3 * problem.i[c], 3 * problem.j[c]
+        n_x, n_y = same(lanes, problem.n_x[c]), same(lanes, problem.n_y[c])
+        v_x = load(velocity, j, lanes) - load(velocity, i, lanes)
+        v_y = load(velocity, j + 1, lanes) - load(velocity, i + 1, lanes)
+        length, closing = same(lanes, problem.length[c]), same(lanes, problem.closing[c])
+        v_n = v_x * n_x + v_y * n_y + dilation * length + closing
+        old_n, old_t = load(force, 2 * c, lanes), load(force, 2 * c + 1, lanes)
+        f_n = larger(old_n - v_n * same(lanes, problem.stiff_n[c]), zero)
+        if vanishes(f_n) and vanishes(old_n) and vanishes(old_t):
+            continue
+        v_t = (
+            v_y * n_x
+            - v_x * n_y
+            - same(lanes, problem.arm_i[c]) * load(velocity, i + 2, lanes)
+            - same(lanes, problem.arm_j[c]) * load(velocity, j + 2, lanes)
+        )
+        most = same(lanes, mu) * f_n
+        f_t = larger(old_t - v_t * same(lanes, problem.stiff_t[c]), -most)
+        f_t = pick(f_t, most, most, f_t)
+        d_n, d_t = f_n - old_n, f_t - old_t
+        store(force, 2 * c, lanes, f_n)
+        store(force, 2 * c + 1, lanes, f_t)
+        dilation = _push(problem, c, d_n, d_t, velocity, dilation, lanes)
+        change = change + (size(d_n) + size(d_t))
+        total = total + f_n
+    return dilation, change, total
+
+
+class Motion(NamedTuple):
+    """State of a moving packing; arrays change in place."""
+
+    x: np.ndarray  # (N, 2)
+    velocity: np.ndarray  # (N, 3) intrinsic v_x, v_y, ω
+    r: np.ndarray  # (N,)
+    mass: np.ndarray  # (N,) π r²
+    box: np.ndarray  # (2,)
+    dilation: np.ndarray  # (1,) λ
+    i: np.ndarray  # (P,) neighbour list
+    j: np.ndarray  # (P,)
+    shift: np.ndarray  # (P, 2)
+    force: np.ndarray  # (P, 2) of the last step, the warm start of the next
+    drift: np.ndarray  # (1,) bound on the approach of any pair since the list was built
+
+
+# What advance() tells: index of each number in its counters.
+STEPS, SWEEPS, UPDATES = range(3)
+
+
+@compiled
+def advance(motion, mu, pressure, box_mass, dt, sweeps, accuracy, moved, steps, counters, stop):
+    """Do up to `steps` time steps; stop early once two grains may have moved closer by `moved`,
+    when the neighbour list must be made anew, or once stop[0] is raised.
+
+    Returns the last step's mean overlap (in largest radii) and unbalance: the largest change of
+    momentum of a grain per step, in units of the mean contact force.
+    """
+    overlap = 0.0
+    unbalance = np.inf
+    for _ in range(steps):
+        if motion.drift[0] > moved or stop[0]:
+            break
+        overlap, unbalance = _step(
+            motion, mu, pressure, box_mass, dt, sweeps, accuracy, counters, stop
+        )
+        counters[STEPS] += 1
+    return overlap, unbalance
+
+
+@within
+def _step(motion, mu, pressure, box_mass, dt, sweeps, accuracy, counters, stop):
+    x, velocity, r, box = motion.x, motion.velocity, motion.r, motion.box
+    volume = box[0] * box[1]
+    active, problem, overlap = _near_contacts(motion, dt, box_mass * 2.0 * volume)
+    before = velocity.copy()
+    kinetic = 0.0
+    for k in range(x.shape[0]):
+        kinetic += motion.mass[k] * (velocity[k, 0] ** 2 + velocity[k, 1] ** 2)
+    free = motion.dilation[0] + (kinetic / (2.0 * volume) - pressure) * dt / box_mass
+
+    count = active.shape[0]
+    force = np.empty((count, 2))
+    for c in range(count):
+        force[c, 0], force[c, 1] = motion.force[active[c], 0], motion.force[active[c], 1]
+    set_stiffness(problem)
+    dilation = add_forces(problem, force, velocity, free)
+    order = np.arange(count)
+    for _ in range(sweeps):
+        dilation, change, total = sweep(problem, order, mu, force, velocity, dilation, ONE)
+        counters[SWEEPS] += 1
+        counters[UPDATES] += count
+        if change <= accuracy * total or stop[0]:
+            break
+    motion.force[:] = 0.0
+    for c in range(count):
+        motion.force[active[c], 0], motion.force[active[c], 1] = force[c, 0], force[c, 1]
+    motion.dilation[0] = dilation
+    _move(motion, dilation, dt)
+    return overlap / r.max(), _unbalance(motion, before, force, dt)
+
+
+@within
+def _near_contacts(motion, dt, box_inertia):
+    """The pairs that may touch during this step, as a StepProblem; and the mean overlap."""
+    x, r, box = motion.x, motion.r, motion.box
+    speed = 0.0
+    for k in range(x.shape[0]):
+        speed = max(speed, motion.velocity[k, 0] ** 2 + motion.velocity[k, 1] ** 2)
+    # Twice the fastest free approach, and a little more for grains that are pushed in this step.
+    margin = 2.0 * dt * (2.0 * np.sqrt(speed) + 2.0 * abs(motion.dilation[0]) * r.max())
+    margin += 2e-3 * r.max()
+    pairs = motion.i.shape[0]
+    active = np.empty(pairs, np.int64)
+    table = np.empty((6, pairs))
+    count = 0
+    overlap = 0.0
+    touching = 0
+    for p in range(pairs):
+        i, j = motion.i[p], motion.j[p]
+        d_x = x[j, 0] - x[i, 0] + motion.shift[p, 0] * box[0]
+        d_y = x[j, 1] - x[i, 1] + motion.shift[p, 1] * box[1]
+        reach = r[i] + r[j] + margin
+        square = d_x * d_x + d_y * d_y
+        if square >= reach * reach:
+            continue
+        length = np.sqrt(square)
+        gap = length - r[i] - r[j]
+        if motion.force[p, 0] > 0.0:
+            overlap += max(-gap, 0.0)
+            touching += 1
+        active[count] = p
+        table[0, count] = d_x / length
+        table[1, count] = d_y / length
+        table[2, count] = length
+        table[3, count] = r[i]
+        table[4, count] = r[j]
+        table[5, count] = max(gap, 0.0) / dt
+        count += 1
+    active = active[:count]
+    inertia = 0.5 * motion.mass * r**2
+    problem = StepProblem(
+        motion.i[active],
+        motion.j[active],
+        table[0, :count],
+        table[1, :count],
+        table[2, :count],
+        table[3, :count],
+        table[4, :count],
+        table[5, :count],
+        np.empty(count),
+        np.empty(count),
+        dt / motion.mass,
+        dt / inertia,
+        dt / box_inertia,
+    )
+    return active, problem, overlap / max(touching, 1)
+
+
+@within
+def _move(motion, dilation, dt):
+    growth = 1.0 + dilation * dt
+    fastest = 0.0
+    for k in range(motion.x.shape[0]):
+        v_x, v_y = motion.velocity[k, 0], motion.velocity[k, 1]
+        motion.x[k, 0] = motion.x[k, 0] * growth + v_x * dt
+        motion.x[k, 1] = motion.x[k, 1] * growth + v_y * dt
+        fastest = max(fastest, v_x * v_x + v_y * v_y)
+    for k in range(2):
+        motion.box[k] *= growth
+    # Two grains at twice the largest radius approach by at most this much.
+    motion.drift[0] += 2.0 * np.sqrt(fastest) * dt + abs(dilation * dt) * 3.0 * motion.r.max()
+
+
+@within
+def _unbalance(motion, before, force, dt):
+    total = 0.0
+    count = 0
+    for c in range(force.shape[0]):
+        if force[c, 0] > 0.0:
+            total += force[c, 0]
+            count += 1
+    if count == 0:
+        return np.inf
+    worst = 0.0
+    for k in range(motion.x.shape[0]):
+        for a in range(2):
+            worst = max(worst, motion.mass[k] * abs(motion.velocity[k, a] - before[k, a]) / dt)
+    return worst / (total / count)

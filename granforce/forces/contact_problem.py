@@ -1,0 +1,190 @@
+"""S as a contact program: from an ensemble's balance and cones to what `numerics` works on."""
+
+import threading
+import weakref
+
+import numpy as np
+from scipy import sparse
+
+from granforce.forces import knowledge
+from granforce.numerics import (
+    certified_values,
+    contact_matrix,
+    contact_program,
+    linear_programs,
+)
+from granforce.system import cancelling
+
+# Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
+# slows no step, only bounds them.
+SHIFT = 1e-11
+# Least cone coordinate (in ⟨f_n⟩) of a centre that is one for sure.
+WELL_INSIDE = 1e-5
+
+
+def balance_of(ensemble, unit=1.0):
+    """(Network, b, b of the global rows, idle, place) of an ensemble, forces in ⟨f_n⟩.
+
+    unit: of the tangential forces. place: where the ensemble's rows are among those of the network
+    and the global ones; idle (rows,): 1 for rows that the ensemble does not have: torques at μ = 0,
+    and all of grains whose balance is left open.
+    """
+    contacts, size = ensemble.contacts, 1 + ensemble.per_contact
+    grains = np.union1d(ensemble.grains, np.union1d(contacts.i, contacts.j))
+    i, j = (np.searchsorted(grains, which) for which in (contacts.i, contacts.j))
+    balanced = np.searchsorted(grains, ensemble.grains)
+    A, last = ensemble.A.tocsc(), size * len(balanced)
+    dense = np.zeros((2, len(i), 3, 2))
+    border = np.zeros((len(i), A.shape[0] - last, 2))
+    for part in range(ensemble.per_contact):
+        columns = A[:, part :: ensemble.per_contact].tocoo()
+        value = columns.data * (unit if part else 1.0)
+        whole = columns.row >= last
+        border[columns.col[whole], columns.row[whole] - last, part] = value[whole]
+        grain, row = np.divmod(columns.row, size)
+        for side, own in enumerate((i, j)):
+            here = ~whole
+            here[here] = balanced[grain[here]] == own[columns.col[here]]
+            dense[side, columns.col[here], row[here], part] = value[here]
+    network = contact_matrix.make_network(ensemble.packing.x[grains], i, j, *dense, border)
+    rows = 3 * len(grains)
+    place = (3 * network.layout.position[balanced, None] + np.arange(size)).ravel()
+    place = np.concatenate([place, rows + np.arange(border.shape[1])])
+    b, idle = np.zeros(rows + border.shape[1]), np.ones(rows)
+    b[place] = ensemble.b / ensemble.force_scale
+    idle[place[:last]] = 0.0
+    return network, b[:rows], b[rows:], idle, place
+
+
+def make_problem(ensemble):
+    """The Problem of an ensemble, tangential forces in μ ⟨f_n⟩, and its idle rows (rows,)."""
+    network, b, b_border, idle, place = balance_of(ensemble, ensemble.mu)
+    problem = contact_program.make_problem(network, b, b_border, idle, place, ensemble.mu, SHIFT)
+    return problem if ensemble.known is None else _with_known(problem, ensemble), idle
+
+
+def _with_known(problem, ensemble):
+    """The Problem with what is known; contacts known altogether stay at y = (1, 1) in it."""
+    known, mu = ensemble.known, ensemble.mu
+    first = knowledge.first_forces(known, mu)
+    pinned = known.pinned | known.wholly[:, None]
+    rows = np.zeros(len(problem.b) + len(problem.b_border))
+    rows[problem.place] = _instead(ensemble)
+    sides = known.contact, known.component, known.sign
+    slack = known.limit / knowledge.units(mu)[known.component]
+    rest = slack - known.sign * first[known.contact, known.component]
+    pairs = np.stack([first.sum(axis=1), first[:, 0] - first[:, 1]], axis=1)
+    return problem._replace(
+        b=problem.b + rows[: len(problem.b)],
+        b_border=problem.b_border + rows[len(problem.b) :],
+        w=np.where(pinned.ravel(), contact_program.PINNED, problem.w),
+        start=np.append(pairs.ravel(), np.maximum(rest, 0.1)),
+        side=2 * sides[0] + sides[1],
+        sign=sides[2],
+        limit=slack,
+    )
+
+
+def _instead(ensemble):
+    """A (f° − f) for contacts known altogether: f their force, f° = (1, 0) what stands for it."""
+    wholly = ensemble.known.wholly[:, None]
+    instead = np.where(wholly, np.array([1.0, 0.0]) - ensemble.known.value, 0.0)
+    return ensemble.A @ ensemble.to_vector(instead)
+
+
+def forces_of(ensemble, y):
+    """Forces (…, N_c, 2) of cone coordinates (…, n)."""
+    pairs = y[..., : 2 * len(ensemble.index)].reshape(*y.shape[:-1], -1, 2)
+    normal, tangential = pairs.sum(axis=-1), ensemble.mu * (pairs[..., 0] - pairs[..., 1])
+    forces = 0.5 * ensemble.force_scale * np.stack([normal, tangential], axis=-1)
+    return ensemble.pin(forces)
+
+
+_known = weakref.WeakKeyDictionary()
+_systems = weakref.WeakKeyDictionary()
+_lock = threading.Lock()
+
+
+def problem_of(ensemble):
+    """The Problem for networks nearest to others: all rows, those that others imply shifted."""
+    return _kept(ensemble)[0]
+
+
+def independent_problem_of(ensemble):
+    """The Problem for linear programs: independent rows, exactly."""
+    kept = _kept(ensemble)
+    if len(kept) == 2:
+        kept.append(contact_program.without_dependent_rows(*kept))
+    return kept[2]
+
+
+def _kept(ensemble):
+    """[Problem, idle rows, …], made on first use and kept as long as the ensemble."""
+    with _lock:
+        found = _known.get(ensemble)
+        if found is None:
+            found = _known[ensemble] = list(make_problem(ensemble))
+    return found
+
+
+def make_system(ensemble):
+    """The certified_values.System of an ensemble, in the cone coordinates of its Problem.
+
+    It is made on first use and kept as long as the ensemble. Cancelled where that was asked for;
+    errors as those of `certified_values.make_system`.
+    """
+    cancelling.check()
+    found = _systems.get(ensemble)
+    if found is None:
+        found = _systems[ensemble] = _new_system(ensemble)
+    return found
+
+
+def _new_system(ensemble):
+    count, mu, known = len(ensemble.index), ensemble.mu, ensemble.known
+    block = np.array([[0.5, 0.5], [0.5 * mu, -0.5 * mu]])[: ensemble.per_contact]
+    T = sparse.kron(sparse.identity(count), block, format="csc")
+    A, b = (ensemble.A @ T).tocsr(), ensemble.b / ensemble.force_scale
+    loads = ensemble.A.tocsc()[:, :: ensemble.per_contact]
+    bounding = ensemble.pressure_row if ensemble.has_pressure_row else None
+    if known is not None:
+        value = np.where(known.wholly[:, None], [1.0, 0.0], known.value)
+        A, b, _ = knowledge.extended(A, b + _instead(ensemble), T, known, mu, value)
+        loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
+        bounding = None
+    problem = independent_problem_of(ensemble)
+    return certified_values.make_system(problem, A.tocsr(), b, loads.tocsc(), bounding)
+
+
+def cone_costs(ensemble, forces):
+    """Costs (…, 2 N_c) of y for costs (…, N_c, 2) of the forces f_n, f_t that are not known."""
+    if ensemble.known is not None:
+        forces = np.where(ensemble.known.wholly[:, None], 0.0, forces)
+    normal, tangential = forces[..., 0], ensemble.mu * forces[..., 1]
+    pairs = np.stack([0.5 * (normal + tangential), 0.5 * (normal - tangential)], axis=-1)
+    return pairs.reshape(*forces.shape[:-2], -1)
+
+
+def known_part(ensemble, axes):
+    """What contacts known altogether add to the projections (…,) of forces on axes (…, N_c, 2)."""
+    if ensemble.known is None:
+        return np.zeros(axes.shape[:-2])
+    value = np.where(ensemble.known.wholly[:, None], ensemble.known.value, 0.0)
+    return (axes * value).sum(axis=(-2, -1))
+
+
+def inner_network(ensemble):
+    """The analytic centre of S in the coordinates of `Ensemble.scaled_form`, None without one.
+
+    S has none where some contact's force is fixed at the wall of its cone, or nearly so.
+    """
+    middle = linear_programs.centre(independent_problem_of(ensemble))
+    y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
+    if not middle.reached or not middle.y.min(initial=1.0) > WELL_INSIDE:
+        return None
+    if ensemble.known is not None:
+        forces, unit = ensemble.known.value, knowledge.units(ensemble.mu)
+        own = np.stack([forces @ (1 / unit), forces @ (np.array([1.0, -1.0]) / unit)], axis=1)
+        y = np.where(ensemble.known.wholly[:, None], np.maximum(own, 0.0), y)
+    inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
+    return np.append(inner, middle.y[y.size :])

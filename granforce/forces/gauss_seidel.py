@@ -1,0 +1,255 @@
+"""Relaxation by contact dynamics: the paper's Gauss–Seidel-like sweeps on a fixed geometry."""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.forces.contact_dynamics import StepProblem, add_forces, set_stiffness, sweep
+from granforce.forces.nearest import nearest
+from granforce.numerics.lanes import MANY, ONE, compiled, larger, load, same, size, store, within
+from granforce.records import InputError, Relaxation
+from granforce.system import cancelling
+from granforce.tolerances import AT_REST, BALANCED
+
+# Inertia M_λ of the box in masses ρ r_max²: between 1 and 100 it changes the number of sweeps by
+# less than 10 % for μ from 0.01 to 10.
+BOX_MASS = 10.0
+# Sweeps between two looks at the residual, which costs about as much as a sweep.
+LOOK_EVERY = 20
+# Forces that change by less than this part of the residual in a sweep have settled while grains
+# still move: contacts slide or open for good, and the state is no equilibrium.
+SETTLED = 1e-6
+# The same is concluded where the least residual falls by less than a third while the number of
+# sweeps doubles, at 32,000 sweeps or later: relaxations that end at rest are far faster by then.
+STALL_AFTER = 32_000
+STALLED = 0.7
+
+UNDER_WAY, SETTLED_DOWN, ENDED = range(3)  # at rest or moving steadily; ended without either
+
+
+class _Looks(NamedTuple):
+    """What is remembered of the relaxation in each lane, between two looks at its residual."""
+
+    dilation: np.ndarray  # λ
+    least: np.ndarray  # residual so far
+    earlier: np.ndarray  # the least when half the sweeps until `back` were done
+    back: np.ndarray  # number of sweeps at which progress is judged next
+    state: np.ndarray  # UNDER_WAY, SETTLED_DOWN or ENDED
+
+
+@cancelling.cancellable
+def gauss_seidel(ensemble, start, *, order="sequential", seed=0, cancel=None, **options):
+    """One step of contact dynamics from rest, with the given forces (N_c, 2) as first guess.
+
+    Options as of `SideBySide`. order: "sequential" or "random" (a fresh permutation each sweep,
+    from seed). cancel() returning True raises Cancelled.
+    """
+    alone = SideBySide(ensemble, 1, **options)
+    if order == "random":
+        alone.rng = np.random.default_rng(seed)
+    alone.begin(0, start)
+    ((_, relaxation),) = alone.ended()
+    return relaxation
+
+
+class SideBySide:
+    """Relaxations of one ensemble, each begun when another has ended; none knows of the others.
+
+    Each sweeps until the residual (in ⟨f_n⟩) is below `rest`, until grains are seen to move
+    steadily (``converged`` with a residual above the tolerance: no equilibrium), or until
+    max_iterations. Once at rest the nearest admissible network takes the last digits, down to the
+    tolerance. rest=None leaves that out and sweeps to the tolerance.
+    """
+
+    def __init__(
+        self, ensemble, count, *, tolerance=BALANCED, max_iterations=100_000, rest=AT_REST
+    ):
+        self.ensemble, self.tolerance, self.rest = ensemble, tolerance, rest
+        self.most, self.rng = max_iterations, None
+        self.problem, self.at_rest, self.dilation, self.unit = _from_rest(ensemble)
+        set_stiffness(self.problem)
+        self.lanes = ONE if count == 1 else MANY
+        width = len(self.lanes)
+        self.force = np.zeros((len(self.problem.i), 2, width))
+        self.velocity = np.zeros((*self.at_rest.shape, width))
+        # Lanes in which nothing was begun have ended.
+        self.looks = _Looks(
+            np.zeros(width),
+            np.zeros(width),
+            np.zeros(width),
+            np.zeros(width, dtype=np.int64),
+            np.full(width, ENDED),
+        )
+        self.sweeps = np.zeros(width, dtype=np.int64)
+        self.begun = np.zeros(width)
+
+    def begin(self, lane, start):
+        """Relax the given forces (N_c, 2) from now on, in a lane in which nothing goes on."""
+        self.begun[lane] = time.perf_counter()
+        force = np.ascontiguousarray(start, dtype=np.float64) / self.ensemble.force_scale
+        velocity = self.at_rest.copy()
+        self.looks.dilation[lane] = add_forces(self.problem, force, velocity, self.dilation)
+        self.force[:, :, lane], self.velocity[:, :, lane] = force, velocity
+        self.looks.least[lane] = self.looks.earlier[lane] = np.inf
+        self.looks.back[lane] = STALL_AFTER
+        self.looks.state[lane] = UNDER_WAY
+        self.sweeps[lane] = 0
+
+    def ended(self):
+        """Sweep until one relaxation or more has ended: [(lane, Relaxation)]."""
+        before = self.looks.state.copy()
+        _relax(
+            self.problem,
+            self.velocity,
+            self.unit,
+            self.ensemble.mu,
+            self.force,
+            self.tolerance if self.rest is None else self.rest,
+            self.most,
+            self.sweeps,
+            self.looks,
+            self.rng,
+            cancelling.flag(),
+            self.lanes,
+        )
+        cancelling.check("relaxation")
+        ended = np.flatnonzero((before == UNDER_WAY) & (self.looks.state != UNDER_WAY))
+        return [(int(lane), self._relaxation(lane)) for lane in ended]
+
+    def _relaxation(self, lane):
+        S, rest, tolerance = self.ensemble, self.rest, self.tolerance
+        forces = self.force[:, :, lane] * S.force_scale
+        residual = S.residual(forces)
+        if rest is not None and tolerance < residual <= rest:
+            forces = nearest(S, forces).forces
+            residual = S.residual(forces)
+        return Relaxation(
+            forces,
+            int(self.sweeps[lane]),
+            residual,
+            S.violation(forces),
+            bool(self.looks.state[lane] == SETTLED_DOWN or residual <= tolerance),
+            time.perf_counter() - self.begun[lane],
+        )
+
+
+def _from_rest(ensemble):
+    """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
+
+    The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the
+    grains and on the box besides the unknown contact forces. Δt = 1 throughout.
+    """
+    if ensemble.prescribed == "stress" or ensemble.known is not None:
+        raise InputError(
+            "contact dynamics keeps the pressure and Coulomb's law only: with a prescribed stress, "
+            "or known forces, take the nearest network"
+        )
+    contacts, grains = ensemble.contacts, ensemble.grains
+    longest = float(ensemble.packing.r.max())
+    r = ensemble.packing.r[grains] / longest
+    row_of = np.full(len(ensemble.packing.r), -1)
+    row_of[grains] = np.arange(len(grains))
+    size = 1 + ensemble.per_contact
+    count = len(contacts.i)
+    velocity = np.zeros((len(grains), 3))
+    outer = -ensemble.b[: size * len(grains)].reshape(-1, size) / ensemble.force_scale
+    mass = np.pi * r**2
+    inertia = 0.5 * mass * r**2
+    velocity[:, :2] = outer[:, :2] / mass[:, None]
+    if size == 3:
+        velocity[:, 2] = outer[:, 2] * r / inertia
+    compliance = dilation = 0.0
+    length = contacts.length / longest
+    if ensemble.has_pressure_row:
+        # 2 V in units of r_max² and P0 in ⟨f_n⟩/r_max: P0 · 2 V = Σ ℓ, by the choice of ⟨f_n⟩.
+        twice_volume = 2 * ensemble.packing.volume / longest**2
+        compliance = 1 / (twice_volume * BOX_MASS)
+        dilation = -length.sum() * compliance
+    problem = StepProblem(
+        row_of[contacts.i],
+        row_of[contacts.j],
+        contacts.normal[:, 0].copy(),
+        contacts.normal[:, 1].copy(),
+        length,
+        contacts.arm_i / longest,
+        contacts.arm_j / longest,
+        np.zeros(count),
+        np.empty(count),
+        np.empty(count),
+        1 / mass,
+        1 / inertia,
+        compliance,
+    )
+    # What turns velocities (v_x, v_y, ω) and λ back into forces in ⟨f_n⟩.
+    box_unit = 1 / (compliance * length.sum()) if compliance else 0.0
+    unit = np.append(np.column_stack([mass, mass, inertia / r]).ravel(), box_unit)
+    return problem, velocity, dilation, unit
+
+
+@compiled
+def _relax(problem, velocity, unit, mu, force, tolerance, most, sweeps, looks, rng, stop, lanes):
+    """Sweep in all lanes until a relaxation that was under way has ended."""
+    order = np.arange(problem.i.shape[0])
+    dilation = load(looks.dilation, 0, lanes)
+    change = total = same(lanes, 0.0)
+    residuals = np.empty(len(lanes))
+    changes, totals = np.empty_like(residuals), np.empty_like(residuals)
+    going_on = True
+    while going_on and not stop[0]:
+        for _ in range(_until_a_look(looks, sweeps, most)):
+            if rng is not None:
+                rng.shuffle(order)
+            dilation, change, total = sweep(problem, order, mu, force, velocity, dilation, lanes)
+            sweeps += 1
+            if stop[0]:
+                break
+        store(residuals, 0, lanes, _residual(velocity, dilation, unit, lanes))
+        store(changes, 0, lanes, change)
+        store(totals, 0, lanes, total)
+        for lane in range(sweeps.shape[0]):
+            if looks.state[lane] != UNDER_WAY:
+                continue
+            settled = changes[lane] <= SETTLED * residuals[lane] * totals[lane]
+            _look(looks, lane, sweeps[lane], residuals[lane], settled, tolerance, most)
+            going_on &= looks.state[lane] == UNDER_WAY
+    store(looks.dilation, 0, lanes, dilation)
+
+
+@within
+def _until_a_look(looks, sweeps, most):
+    """Sweeps until one of the relaxations is looked at."""
+    least = LOOK_EVERY
+    for lane in range(sweeps.shape[0]):
+        if looks.state[lane] == UNDER_WAY:
+            done = sweeps[lane]
+            least = min(least, LOOK_EVERY - done % LOOK_EVERY, most - done)
+    return least
+
+
+@within
+def _look(looks, lane, done, residual, settled, tolerance, most):
+    """Whether a relaxation has ended after so many sweeps."""
+    if done % LOOK_EVERY == 0:
+        looks.least[lane] = min(looks.least[lane], residual)
+        if residual <= tolerance or settled:
+            looks.state[lane] = SETTLED_DOWN
+            return
+    if done == looks.back[lane] // 2:
+        looks.earlier[lane] = looks.least[lane]
+    if done == looks.back[lane]:
+        if looks.least[lane] > STALLED * looks.earlier[lane]:
+            looks.state[lane] = SETTLED_DOWN
+            return
+        looks.earlier[lane] = looks.least[lane]
+        looks.back[lane] *= 2
+    if done >= most:
+        looks.state[lane] = ENDED
+
+
+@within
+def _residual(velocity, dilation, unit, lanes):
+    worst = size(dilation * same(lanes, unit[-1]))
+    for k in range(unit.shape[0] - 1):
+        worst = larger(worst, size(load(velocity, k, lanes)) * same(lanes, unit[k]))
+    return worst

@@ -1,0 +1,251 @@
+"""What is known of single contact forces, beside balance and Coulomb's law.
+
+Bounds on f_n and f_t of a contact cut its cone down to a small convex polygon. A component whose
+bounds coincide is *pinned*; every other bound is a *side*.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from granforce.numerics import certificates
+from granforce.numerics import highs as programs
+from granforce.records import InputError, NotJammedError
+from granforce.tolerances import ADMISSIBLE, BALANCED
+
+_NAMES = "f_n", "f_t"
+# Multipliers of statements that take part in a contradiction, relative to the largest.
+_WEIGHTY = 1e-6
+
+
+class Known(NamedTuple):
+    """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high."""
+
+    contacts: np.ndarray  # (k,) numbers in the packing
+    low: np.ndarray  # (k, 2) force; −inf where nothing is known
+    high: np.ndarray  # (k, 2) force; inf where nothing is known; equal to low for a pin
+
+
+class Polygons(NamedTuple):
+    """What is known of the N_c contacts of an ensemble, in ⟨f_n⟩."""
+
+    low: np.ndarray  # (N_c, 2) as given, for the judge
+    high: np.ndarray  # (N_c, 2)
+    pinned: np.ndarray  # (N_c, 2) bool
+    value: np.ndarray  # (N_c, 2) of what is pinned, 0 elsewhere
+    contact: np.ndarray  # (sides,) contact of each side
+    component: np.ndarray  # (sides,) 0 for f_n, 1 for f_t
+    sign: np.ndarray  # (sides,) 1 for a bound from above, −1 from below
+    limit: np.ndarray  # (sides,) sign · f ≤ limit
+
+    @property
+    def informed(self):
+        """(N_c,) bool: contacts of which something is known."""
+        return (np.isfinite(self.low) | np.isfinite(self.high)).any(axis=1)
+
+    @property
+    def wholly(self):
+        """(N_c,) bool: contacts whose force is known altogether."""
+        return self.pinned.all(axis=1)
+
+
+def bounds_of(known, count):
+    """Bounds (count, 2, 2) [contact, component, low or high] of all contacts, force.
+
+    known: a Known. What is said of a contact more than once holds together. Raises InputError for
+    contacts that do not exist, bounds of another shape or NaN, and low > high.
+    """
+    try:
+        contacts, low, high = known
+        numbers = np.atleast_1d(np.asarray(contacts))
+        contacts = numbers.astype(np.int64)
+        low, high = (
+            np.broadcast_to(np.asarray(side, dtype=np.float64), (len(contacts), 2))
+            for side in (low, high)
+        )
+    except (TypeError, ValueError):
+        raise InputError(
+            "known must be Known(contacts, low, high): contact numbers (k,), and bounds (k, 2) on "
+            "f_n and f_t"
+        ) from None
+    if np.any(contacts != numbers) or np.any((contacts < 0) | (contacts >= count)):
+        raise InputError(f"a known contact is none of the packing's 0 … {count - 1}")
+    if np.isnan(low).any() or np.isnan(high).any():
+        raise InputError("a bound is NaN; give −inf and inf where nothing is known")
+    bounds = np.empty((count, 2, 2))
+    bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
+    np.maximum.at(bounds[..., 0], contacts, low)
+    np.minimum.at(bounds[..., 1], contacts, high)
+    wrong = np.argwhere((bounds[..., 0] > bounds[..., 1]) | (bounds[..., 0] == np.inf))
+    wrong = wrong if len(wrong) else np.argwhere(bounds[..., 1] == -np.inf)
+    if len(wrong):
+        c, k = wrong[0]
+        raise InputError(
+            f"what is known of {_NAMES[k]} of contact {c} contradicts itself: at least "
+            f"{bounds[c, k, 0]:.6g}, at most {bounds[c, k, 1]:.6g}"
+        )
+    return bounds
+
+
+def polygons(bounds, mu, scale, index):
+    """The Polygons of bounds (N_c, 2, 2), force; None where they say nothing.
+
+    scale: ⟨f_n⟩. index (N_c,): numbers of the contacts, for messages. Raises NotJammedError where
+    what is known of one contact cannot hold together with Coulomb's law.
+    """
+    if not np.isfinite(bounds).any():
+        return None
+    low, high = bounds[..., 0] / scale, bounds[..., 1] / scale
+    least, most = low.copy(), high.copy()
+    least[:, 0] = np.maximum(least[:, 0], 0.0)
+    # What Coulomb's law makes of a contact's bounds: the smallest |f_t| needs its f_n.
+    smallest = np.maximum(0.0, np.maximum(least[:, 1], -most[:, 1]))
+    needed = np.where(smallest > 0, smallest / mu if mu > 0 else np.inf, 0.0)
+    least[:, 0] = np.maximum(least[:, 0], needed)
+    short = least[:, 0] - most[:, 0]
+    if np.any(short > ADMISSIBLE):
+        c = int(np.argmax(short))
+        raise NotJammedError(_beyond_coulomb(index[c], bounds[c], mu, needed[c], short[c] * scale))
+    pinned, value = np.zeros(low.shape, dtype=bool), np.zeros(low.shape)
+    pinned[:, 0] = most[:, 0] - least[:, 0] <= ADMISSIBLE
+    value[pinned[:, 0], 0] = np.maximum(most[pinned[:, 0], 0], 0.0)
+    cone = mu * np.where(pinned[:, 0], value[:, 0], most[:, 0]) if mu > 0 else np.zeros(len(low))
+    least[:, 1], most[:, 1] = np.maximum(least[:, 1], -cone), np.minimum(most[:, 1], cone)
+    pinned[:, 1] = most[:, 1] - least[:, 1] <= ADMISSIBLE * min(mu, 1.0)
+    pinned[:, 1] &= (mu > 0) | pinned[:, 0]
+    fixed = pinned[:, 1]
+    value[fixed, 1] = 0.5 * (least[fixed, 1] + most[fixed, 1])
+    slid = np.abs(value[:, 1]) / mu if mu > 0 else np.zeros(len(low))
+    there = np.zeros((*low.shape, 2), dtype=bool)  # [contact, component, low or high]
+    there[:, 0, 0] = low[:, 0] > np.where(pinned[:, 1], slid, 0.0)
+    there[:, 0, 1] = np.isfinite(high[:, 0])
+    there[:, 1, 0], there[:, 1, 1] = low[:, 1] > -cone, high[:, 1] < cone
+    there[:, 1] &= mu > 0
+    there &= ~pinned[..., None]
+    contact, component, above = np.nonzero(there)
+    sign = 2.0 * above - 1.0
+    limit = sign * np.stack([low, high], axis=-1)[contact, component, above]
+    return Polygons(low, high, pinned, value, contact, component, sign, limit)
+
+
+def _beyond_coulomb(contact, bounds, mu, needed, short):
+    (_, high), (t_low, t_high) = bounds
+    if high < 0:
+        return (
+            f"no network agrees with what is known of contact {contact}: f_n ≤ {high:.6g}, where "
+            f"contacts can only press; it would have to give {-high:.3g}"
+        )
+    tangential = f"f_t ≥ {t_low:.6g}" if t_low > 0 else f"f_t ≤ {t_high:.6g}"
+    return (
+        f"no network agrees with what is known of contact {contact}: f_n ≤ {high:.6g} and "
+        f"{tangential} contradict Coulomb's law at μ = {mu:g}; f_n would have to give {short:.3g}"
+    )
+
+
+def first_forces(known, mu):
+    """Forces (N_c, 2) to start programs from, f_t in units of μ ⟨f_n⟩.
+
+    Pinned components are where they are to stay, inside the cone; contacts that are known
+    altogether stay at (1, 0) instead, as their own force may lie on the cone.
+    """
+    unit = units(mu)
+    low, high, value = known.low / unit, known.high / unit, known.value / unit
+    both = np.isfinite(low) & np.isfinite(high)
+    with np.errstate(invalid="ignore"):
+        middle = np.where(both, 0.5 * (low + high), np.clip([1.0, 0.0], low, high))
+    first = np.where(known.pinned, value, middle)
+    free_n, free_t = ~known.pinned.T
+    first[free_n, 0] = np.maximum(first[free_n, 0], 0.1)
+    inside = 0.5 * first[:, 0]
+    first[free_t, 1] = np.clip(first[free_t, 1], -inside[free_t], inside[free_t])
+    stuck = free_n & ~free_t
+    first[stuck, 0] = np.maximum(first[stuck, 0], np.abs(first[stuck, 1]) + 0.5)
+    first[known.wholly] = 1.0, 0.0
+    return first
+
+
+def units(mu):
+    """Units (2,) of f_n and f_t in programs, in ⟨f_n⟩."""
+    return np.array([1.0, mu if mu > 0 else 1.0])
+
+
+def extended(A, b, T, known, mu, value):
+    """A y = b with rows and slacks of what is known: (A, b, T) in y and the slacks of the sides.
+
+    A (rows, n) and T (unknowns, n) in cone coordinates y, T y being forces in ⟨f_n⟩; value (N_c, 2)
+    of what is pinned. Rows of sides and then of pinned components, in units of the programs.
+    """
+    parts, T, unit = T.shape[0] // len(known.pinned), sparse.csr_matrix(T), units(mu)
+    at, size = parts * known.contact + known.component, unit[known.component]
+    beside = sparse.diags(known.sign / size) @ T[at]
+    contact, component = pins(known, mu)
+    held = sparse.diags(1 / unit[component]) @ T[parts * contact + component]
+    sides = len(at)
+    empty = sparse.csr_matrix((A.shape[0], sides)), sparse.csr_matrix((len(contact), sides))
+    whole = sparse.vstack(
+        [
+            sparse.hstack([sparse.csr_matrix(A), empty[0]]),
+            sparse.hstack([beside, sparse.identity(sides)]),
+            sparse.hstack([held, empty[1]]),
+        ],
+        format="csc",
+    )
+    right = [b, known.limit / size, value[contact, component] / unit[component]]
+    T = sparse.hstack([T, sparse.csr_matrix((T.shape[0], sides))], format="csc")
+    return whole, np.concatenate(right), T
+
+
+def pins(known, mu):
+    """Contact and component of each pinned unknown; without friction f_t is none."""
+    return np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
+
+
+def contradiction(A, b, T, known, mu, index, scale):
+    """The message that names what cannot hold together, with proof; None where none was found.
+
+    A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩. The statements are those
+    with a multiplier in the program that lets them give as little as possible in sum.
+    """
+    whole, right, _ = extended(A, b, T, known, mu, known.value)
+    (rows, n), sides = A.shape, len(known.contact)
+    count = len(right) - rows
+    # Sides give way upwards, pinned components both ways.
+    give = sparse.vstack([sparse.csr_matrix((rows, count)), sparse.identity(count)], format="csc")
+    relaxed = sparse.hstack([whole, -give, give[:, sides:]], format="csc")
+    cost = np.append(np.zeros(n + sides), np.ones(relaxed.shape[1] - n - sides))
+    model = programs.standard_form(relaxed, right)
+    programs.set_cost(model, cost)
+    for status, y in programs.solutions(model):
+        if status != programs.OPTIMAL:
+            continue
+        multiplier = programs.multipliers(model, relaxed, cost)
+        if certificates.proves_empty(whole, right, multiplier):
+            given = y[n + sides :][:count]
+            given[sides:] += y[n + sides + count :]
+            return _statements(known, mu, index, scale, multiplier[rows:], given)
+        if y[n + sides :].sum() <= BALANCED:
+            return None
+    return None
+
+
+def _statements(known, mu, index, scale, multiplier, given):
+    """The statements with a multiplier, heaviest first, and by how much they would have to give."""
+    contact, component = pins(known, mu)
+    contact = np.append(known.contact, contact)
+    component = np.append(known.component, component)
+    value = np.append(known.sign * known.limit, known.value[pins(known, mu)]) * scale
+    relation = ["≤" if sign > 0 else "≥" for sign in known.sign]
+    relation += ["="] * (len(contact) - len(relation))
+    size = np.abs(multiplier) / np.abs(multiplier).max()
+    given = given * units(mu)[component] * scale
+    told = []
+    for k in np.argsort(-size, kind="stable"):
+        if size[k] > _WEIGHTY:
+            c = index[contact[k]]
+            text = f"{_NAMES[component[k]]} {relation[k]} {value[k]:.6g} on contact {c}"
+            if given[k] > BALANCED * scale:
+                text += f" (would have to give {given[k]:.3g})"
+            told.append(text)
+    together = "; ".join(told)
+    return f"no network agrees with all that is known; these cannot hold together: {together}"

@@ -1,0 +1,157 @@
+"""The likeliest admissible network of a measurement: forces m with standard errors σ.
+
+It has the least χ² = Σ ((f − m)/σ)² over S, and is found as a contact program whose weights are
+1/σ² of each component (`contact_program`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from granforce.forces import knowledge
+from granforce.forces.contact_problem import forces_of, problem_of
+from granforce.numerics import certificates, contact_program
+from granforce.numerics.contact_program import OPTIMUM, PINNED
+from granforce.numerics.lanes import ONE
+from granforce.records import InputError, positive
+from granforce.system import cancelling
+from granforce.tolerances import BALANCED
+
+# What was not measured counts as 0 with a standard error of so many ⟨f_n⟩, if not told otherwise:
+# among networks that the measurement cannot tell apart, the one with the least forces is taken.
+UNMEASURED = 1e3
+# Steps of the contact program; it ends balanced, with a mean product of forces and multipliers
+# (in ⟨f_n⟩², the largest weight 1) by which forces are known to the root of it. Bounds on single
+# forces leave fewer digits: beyond, rounding drives the multipliers away.
+_MOST_STEPS, _BALANCE, _CLOSED, _CLOSED_BETWEEN_BOUNDS = 150, BALANCED / 4, 1e-24, 1e-11
+# Coordinates y (in ⟨f_n⟩) up to this lie on the wall of their cone.
+_ON_THE_WALL = 1e-6
+# Added to a diagonal of 1: more than rounding, and less than what is not.
+_SHIFTS = 1e-12, 1e-10
+
+
+class Likeliest(NamedTuple):
+    """The network that fits a measurement best, and how well."""
+
+    forces: np.ndarray  # (N_c, 2) the admissible network with the least χ², force
+    chi_square: float  # its Σ ((f − m)/σ)²
+    freedom: int  # degrees of freedom: what was measured less what the network could adapt to
+    deviation: np.ndarray  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
+
+
+def likeliest(ensemble, measured, sigma, unmeasured=UNMEASURED):
+    """The network of S with the least Σ ((f − m)/σ)²; a Likeliest.
+
+    measured, sigma: m and σ as `checked` takes them. unmeasured: standard error, in ⟨f_n⟩, with
+    which components that were not measured count as 0; they are not part of χ².
+
+    Raises InputError as `checked` does, NotJammedError where S is empty.
+    """
+    m, s = checked(ensemble, measured, sigma)
+    forces = fitted(ensemble, m, s, positive(unmeasured, "unmeasured"))
+    deviation = (forces - m) / s
+    freedom = int(np.isfinite(deviation).sum()) - _adapted(ensemble, m, forces)
+    return Likeliest(forces, float(np.nansum(deviation**2)), freedom, deviation)
+
+
+def checked(ensemble, measured, sigma):
+    """m and σ (N_c, 2), NaN in both where nothing was measured.
+
+    measured (N_c, 2), force; sigma likewise, or one number, or two for f_n and f_t. Raises
+    InputError for shapes that do not fit, infinite numbers, and σ ≤ 0.
+    """
+    shape = (len(ensemble.index), 2)
+    try:
+        m = np.array(measured, dtype=np.float64)
+        s = np.array(np.broadcast_to(np.asarray(sigma, dtype=np.float64), shape))
+    except (TypeError, ValueError):
+        raise InputError(f"measured and sigma must be numbers of shape {shape}") from None
+    if m.shape != shape:
+        raise InputError(f"measured must have shape {shape}, got {m.shape}")
+    nothing = np.isnan(m) | np.isnan(s)
+    m[nothing] = s[nothing] = np.nan
+    if np.isinf(m).any() or np.isinf(s).any():
+        raise InputError("measured forces and errors must be finite, or NaN where not measured")
+    for c, part in np.argwhere(s <= 0)[:1]:
+        raise InputError(
+            f"the error of {'f_t' if part else 'f_n'} on contact {ensemble.index[c]} is "
+            f"{s[c, part]:g}; errors must be above 0"
+        )
+    return m, s
+
+
+def fitted(ensemble, m, s, unmeasured=UNMEASURED):
+    """The forces (N_c, 2) of `likeliest`, for m and σ that were checked."""
+    problem, unit = problem_of(ensemble), ensemble.force_scale
+    # Tangential forces are kept as f_t/μ.
+    w = np.where(np.isnan(m), unmeasured, s / unit) ** -2.0 * [1.0, ensemble.mu**2]
+    scale = w.max(initial=0.0)
+    problem = problem._replace(w=np.where(problem.w < PINNED, w.ravel() / scale, PINNED))
+    target = np.nan_to_num(m / unit) / [1.0, ensemble.mu or 1.0]
+    pulls = np.where(problem.w.reshape(w.shape) < PINNED, w / scale * target, 0.0)
+    at = contact_program.make_iterate(problem, 1)
+    work = contact_program.make_workspace(problem, 1)
+    at.c[: w.size : 2, 0] = -0.5 * (pulls[:, 0] + pulls[:, 1])
+    at.c[1 : w.size : 2, 0] = -0.5 * (pulls[:, 0] - pulls[:, 1])
+    work.going[:] = 1.0
+    closed = (_CLOSED_BETWEEN_BOUNDS if len(problem.side) else _CLOSED) * len(at.y)
+    for _ in range(_MOST_STEPS):
+        cancelling.check("inference")
+        contact_program.look(problem, False, at, work, ONE)
+        if work.unbalance[0, 0] <= _BALANCE and work.product[0, 0] <= closed:
+            break
+        contact_program.advance(problem, False, OPTIMUM, at, work, ONE)
+    forces = forces_of(ensemble, at.y[:-1, 0])
+    if not ensemble.residual(forces) <= BALANCED:
+        raise certificates.why_unsolved(*ensemble.scaled_form[:2])
+    return forces
+
+
+def _adapted(ensemble, m, forces):
+    """Dimensions in which the measured part of a network could follow the measurement.
+
+    With the cone coordinates that are 0 there held, the rank of what is measured on the null space
+    of the balance.
+    """
+    normal, tangential = (forces / ensemble.force_scale).T
+    y = np.repeat(normal, ensemble.per_contact)
+    if ensemble.mu > 0:
+        y[::2] += tangential / ensemble.mu
+        y[1::2] -= tangential / ensemble.mu
+    if ensemble.known is not None:
+        known, scaled = ensemble.known, forces / ensemble.force_scale
+        slack = known.limit - known.sign * scaled[known.contact, known.component]
+        y = np.append(y, slack / knowledge.units(ensemble.mu)[known.component])
+    free = np.flatnonzero(y > _ON_THE_WALL)
+    A, _, T = ensemble.scaled_form
+    A, T = sparse.csc_matrix(A)[:, free], sparse.csr_matrix(T)[:, free]
+    T = T[np.flatnonzero(np.isfinite(ensemble.to_vector(m)))]
+    if ensemble.mu > 0:
+        T.data = np.sign(T.data)  # a rank does not depend on units
+    return _rank(sparse.vstack([A, T], format="csr")) - _rank(A)
+
+
+def _rank(rows):
+    """The rank of a sparse matrix R.
+
+    With ε added to the diagonal of R Rᵀ (in which a row that meets all contacts fills one row only)
+    its determinant grows like ε to the number of dependent rows, in any order of elimination.
+    """
+    square = rows @ rows.T
+    diagonal = square.diagonal()
+    there = np.flatnonzero(diagonal > 0)
+    if not len(there):
+        return 0
+    scale, unit = sparse.diags(1 / np.sqrt(diagonal[there])), sparse.identity(len(there))
+    square = scale @ square[there][:, there] @ scale
+    less, more = (_log_determinant(square + shift * unit) for shift in _SHIFTS)
+    return len(there) - round((more - less) / np.log(_SHIFTS[1] / _SHIFTS[0]))
+
+
+def _log_determinant(square):
+    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+    options["options"] = {"SymmetricMode": True}
+    factors = cancelling.apart(lambda: splu(sparse.csc_matrix(square), **options))
+    return np.log(np.abs(factors.U.diagonal())).sum()

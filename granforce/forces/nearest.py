@@ -1,0 +1,230 @@
+"""The admissible network nearest to given forces, by Newton's method on grain velocities.
+
+The dual of the projection onto S has one unknown per balance equation: velocities v of the grains
+and the dilation rate of the box. Contact forces follow from v contact by contact, as the
+projection of the start + Aᵀv onto the cone, and the change of the unbalance with v is a weighted
+Laplacian of the contact graph, A K Aᵀ, with one 2×2 conductance K per contact. Two phases:
+
+1. A barrier keeps forces inside their cones, so that K (between 0 and 1) changes smoothly, and is
+   lowered step by step (`contact_program`, w = 1).
+2. Once the barrier is low enough to tell which contacts stick, slide and open, Newton's method
+   without a barrier ends in the exact optimum after one to three steps. Tried too early it leaves
+   the neighbourhood at once; then the first phase goes on.
+"""
+
+import time
+
+import numpy as np
+
+from granforce.forces.contact_problem import problem_of
+from granforce.numerics import certificates, contact_program
+from granforce.numerics.contact_program import OPTIMUM, PINNED, PROJECTED
+from granforce.numerics.lanes import LANES, MANY, ONE
+from granforce.records import Relaxation
+from granforce.system import cancelling
+from granforce.tolerances import BALANCED
+
+# Distance to the nearest network itself (over all components) that ends the steps. This and INSIDE
+# are in ⟨f_n⟩, or in rms forces of the start where those are larger.
+NEAREST = 1e-6
+# First forces and multipliers lie at least this far inside their cones: with 0.3 and less steps
+# are short (three times as many at 0.1).
+INSIDE = 1.0
+# The second phase is tried when the mean of f · multiplier (in ⟨f_n⟩²) has fallen to this, and
+# each time it has fallen by LOWER since; it may take so many steps, and is given up where the
+# unbalance (in ⟨f_n⟩) exceeds LOST.
+ATTEMPT, LOWER, FINAL_STEPS, LOST = 1e-6, 1e-2, 3, 1.0
+# Steps shorter than this, so many in a row, mean that no network will be reached.
+SHORT, SHORT_IN_A_ROW = 1e-4, 8
+
+
+def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=100, cancel=None):
+    """The point of S with the least Σ |F_c − F_start,c|²; a Relaxation.
+
+    start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
+    distance to the optimum below NEAREST; ``converged`` is False where that was not reached (S is
+    empty, or max_iterations were too few): forces are the last iterate, inside the cones.
+    cancel() returning True raises Cancelled.
+    """
+    options = {"tolerance": tolerance, "max_iterations": max_iterations, "cancel": cancel}
+    return nearest_of_many(ensemble, [start], **options)[0]
+
+
+def nearest_of_many(ensemble, starts, *, tolerance=BALANCED, max_iterations=100, cancel=None):
+    """`nearest` of each start, LANES of them side by side: the same results, bit for bit."""
+    if cancel is not None:
+        with cancelling.watched(cancel):
+            return nearest_of_many(
+                ensemble, starts, tolerance=tolerance, max_iterations=max_iterations
+            )
+    found = []
+    while len(found) < len(starts):
+        left = starts[len(found) :]
+        found += _batch(ensemble, left[: LANES if len(left) > 1 else 1], tolerance, max_iterations)
+    return found
+
+
+def _batch(ensemble, starts, tolerance, max_iterations):
+    begin = time.perf_counter()
+    problem, width = problem_of(ensemble), 1 if len(starts) == 1 else LANES
+    targets = np.zeros((len(ensemble.index), 2, width))
+    targets[..., : len(starts)] = np.moveaxis(np.asarray(starts, dtype=np.float64), 0, -1)
+    search = Search(problem, targets / ensemble.force_scale)
+    search.run(min(tolerance, BALANCED) / 4, max_iterations, len(starts))
+    forces = ensemble.pin(search.forces() * ensemble.force_scale)
+    residual = ensemble.residual(forces[: len(starts)])
+    seconds = (time.perf_counter() - begin) / len(starts)
+    return [
+        Relaxation(
+            forces[k],
+            search.steps[k],
+            float(residual[k]),
+            ensemble.violation(forces[k]),
+            bool(search.ended[k] and residual[k] <= tolerance),
+            seconds,
+        )
+        for k in range(len(starts))
+    ]
+
+
+def starting_network(ensemble):
+    """The packing's own network (N_c, 2), or the nearest admissible one if that left S.
+
+    Raises NotJammedError where S is empty, UndecidedError where neither could be shown.
+    """
+    if ensemble.admits(ensemble.original):
+        return ensemble.original
+    found = nearest(ensemble, ensemble.original)
+    if not found.converged:
+        raise certificates.why_unsolved(*ensemble.scaled_form[:2])
+    return found.forces
+
+
+class Search:
+    """Up to LANES searches under way, each at its own step."""
+
+    def __init__(self, problem, targets, start=None):
+        """targets (N_c, 2, W) in ⟨f_n⟩; those of lanes that are not used are 0.
+
+        start (2 N_c, W): first y of contacts with pinned components, by default the problem's.
+        """
+        width = targets.shape[2]
+        self.problem, self.lanes = problem, ONE if width == 1 else MANY
+        self.at = contact_program.make_iterate(problem, width)
+        self.work = contact_program.make_workspace(problem, width)
+        self.count = max(1, len(targets))
+        # Starts far outside need room in proportion: a third of the steps from 10⁴ ⟨f_n⟩ away.
+        square = [np.sum(np.ascontiguousarray(targets[..., k]) ** 2) for k in range(width)]
+        self.size = np.maximum(1.0, np.sqrt(np.array(square) / self.count))
+        self._begin(targets, start)
+        self.steps, self.short = [0] * width, [0] * width
+        self.ended = [False] * width
+        self.found = self.at.y[:-1].copy()
+
+    def _begin(self, targets, start):
+        """y and z of each contact's own projection, moved inside; pinned ones stay."""
+        problem, mu, at = self.problem, self.problem.mu, self.at
+        first, second = slice(0, len(problem.w), 2), slice(1, len(problem.w), 2)
+        pinned = np.flatnonzero(np.repeat((problem.w >= PINNED).reshape(-1, 2).any(axis=1), 2))
+        if start is not None:
+            at.y[pinned] = start[pinned]
+        stay = at.y[pinned]
+        normal, tangential = targets[:, 0], mu * targets[:, 1]
+        at.c[first], at.c[second] = -0.5 * (normal + tangential), -0.5 * (normal - tangential)
+        contact_program.project(self.problem, at, self.work, self.lanes)
+        f_n, f_t = 0.5 * (at.y[first] + at.y[second]), 0.5 * (at.y[first] - at.y[second])
+        slope_n, slope_t = f_n - normal, mu * mu * f_t - tangential
+        inside = INSIDE * self.size
+        at.y[:-1] = np.maximum(at.y[:-1], 0.0) + inside
+        at.y[pinned] = stay
+        at.z[first] = np.maximum(0.5 * (slope_n + slope_t), 0.0) + inside
+        at.z[second] = np.maximum(0.5 * (slope_n - slope_t), 0.0) + inside
+        slacks = slice(len(problem.w), len(at.z) - 1)
+        at.y[slacks], at.z[slacks] = problem.start[slacks, None], 1.0
+
+    def run(self, tolerance, most, used):
+        """Step until every one of the lanes in use has ended, or will not end."""
+        near = [NEAREST * size for size in self.size.tolist()]
+        # Between sides, `project` does not know the nearest point.
+        attempt = [0.0 if len(self.problem.side) else ATTEMPT * self.count] * len(near)
+        active = list(range(used))
+        while active:
+            cancelling.check()
+            product, unbalance, slackness = self._look()
+            ready, going = [], []
+            for k in active:
+                there = unbalance[k] <= tolerance and slackness[k] <= near[k]
+                if there and product[k] <= near[k] ** 2:
+                    self._end(k, True)
+                elif product[k] <= attempt[k]:
+                    ready.append(k)
+                elif (
+                    self.steps[k] >= most
+                    or self.short[k] >= SHORT_IN_A_ROW
+                    or not product[k] < 1e200
+                ):
+                    self._end(k, False)
+                else:
+                    going.append(k)
+            active = ready + going
+            # Those that are ready wait for the others, who share the factorisation.
+            if going:
+                self._step(going)
+            elif ready:
+                for k in ready:
+                    attempt[k] = LOWER * product[k]
+                active = self._finish(ready, tolerance, most)
+
+    def forces(self):
+        """Forces (W, N_c, 2) found, in ⟨f_n⟩."""
+        pairs = self.found[: len(self.problem.w)].reshape(-1, 2, self.found.shape[1])
+        normal, tangential = 0.5 * (pairs[:, 0] + pairs[:, 1]), 0.5 * (pairs[:, 0] - pairs[:, 1])
+        return np.moveaxis(np.stack([normal, self.problem.mu * tangential], axis=1), -1, 0)
+
+    def _look(self):
+        """Products, unbalance and slackness by lane."""
+        contact_program.look(self.problem, False, self.at, self.work, self.lanes)
+        work = self.work
+        return work.product[0].tolist(), work.unbalance[0].tolist(), work.slackness[0].tolist()
+
+    def _end(self, lane, reached):
+        self.found[:, lane] = self.at.y[:-1, lane]
+        self.ended[lane] = reached
+
+    def _advance(self, going, mode):
+        """One step of the lanes `going`."""
+        self.work.going[:] = 0.0
+        for k in going:
+            self.work.going[0, k] = 1.0
+            self.steps[k] += 1
+        contact_program.advance(self.problem, False, mode, self.at, self.work, self.lanes)
+
+    def _step(self, going):
+        self._advance(going, OPTIMUM)
+        for k in going:
+            length = min(self.work.primal[0, k], self.work.dual[0, k])
+            self.short[k] = self.short[k] + 1 if length < SHORT else 0
+
+    def _finish(self, ready, tolerance, most):
+        """Newton's method without barrier, from the iterate's v; who did not end by it.
+
+        Those are put back to where they were, and go on.
+        """
+        at, trying = self.at, ready
+        kept = at.y.copy(), at.v.copy(), at.v_border.copy()
+        for attempt in range(FINAL_STEPS + 1):
+            contact_program.project(self.problem, at, self.work, self.lanes)
+            unbalance, going = self.work.unbalance[0].tolist(), []
+            for k in trying:
+                if unbalance[k] <= tolerance:
+                    self._end(k, True)
+                elif unbalance[k] < LOST and self.steps[k] < most:
+                    going.append(k)
+            trying = going
+            if attempt == FINAL_STEPS or not trying:
+                break
+            self._advance(trying, PROJECTED)
+        left = [k for k in ready if not self.ended[k]]
+        for values, before in zip((at.y, at.v, at.v_border), kept, strict=True):
+            values[:, left] = before[:, left]
+        return left

@@ -1,0 +1,151 @@
+"""How records show themselves in a notebook: a packing as a picture (SVG), others as small tables.
+
+Plain arrays and numbers in, text out: every room may use this, and it needs no plotting library.
+"""
+
+from html import escape
+
+import numpy as np
+
+from granforce.glossary import TERMS
+
+SIDE = 420  # of the picture, pixels
+LINE = 16  # height of a line of words below it, pixels
+# Beyond so many disks they are not outlined, and only so many contacts, the strongest, are drawn.
+MOST_DRAWN = 20_000
+THICKEST = 5.0  # width of a contact that carries WIDE ⟨f_n⟩ or more, in 1/100 of the picture
+WIDE = 4.0
+WIDTHS = 12  # classes of width; contacts of one width and colour are one path
+# Mobilisation f_t/(μ f_n) from −1 to 1 in classes of equal size: blue, grey, orange.
+COLOURS = ("#0072b2", "#4d8fb5", "#8a8a8a", "#cf8a4d", "#d55e00")
+
+
+def table(title, lines):
+    """A small HTML table: lines {name: value}, numbers rounded to four digits.
+
+    What a name means is told under the pointer, where the glossary has it.
+    """
+    rows = "".join(
+        f'<tr><td style="text-align:left"{_hint(name)}>{escape(name)}</td>'
+        f'<td style="text-align:right">{escape(_text(value))}</td></tr>'
+        for name, value in lines.items()
+    )
+    return f"<table><caption>{escape(title)}</caption>{rows}</table>"
+
+
+def _hint(name):
+    """The glossary's sentence for a name that ends with one of its symbols, as an attribute."""
+    for term in TERMS.values():
+        if name == term.word or (term.symbol and name.split()[-1] == term.symbol):
+            return f' title="{escape(term.sentence)}"'
+    return ""
+
+
+def _text(value):
+    if isinstance(value, (bool, np.bool_)):
+        return "yes" if value else "no"
+    if isinstance(value, (float, np.floating)):
+        return f"{value:.4g}"
+    return str(value)
+
+
+def packing_svg(packing):
+    """A packing to scale: disks, force chains (width f_n, colour f_t/(μ f_n)), and its numbers."""
+    low, sides = _window(packing)
+    scale = SIDE / max(sides)
+    width, height = sides * scale
+    x = np.where(np.isfinite(packing.box), low + np.mod(packing.x - low, packing.box), packing.x)
+
+    def place(points):
+        """Centres in pixels from the upper left corner."""
+        return (points - low) * [scale, -scale] + [0, height]
+
+    words = _words(packing)
+    drawn = [*_disks(packing, place, x, scale), *_chains(packing, place, x, scale)]
+    text = "".join(
+        f'<text x="4" y="{height + LINE * (k + 1):.0f}">{escape(line)}</text>'
+        for k, line in enumerate(words)
+    )
+    full = height + LINE * len(words) + 6
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{full:.0f}" '
+        f'viewBox="0 0 {width:.1f} {full:.1f}" font-family="sans-serif" font-size="12">'
+        f"<title>{escape(', '.join(words))}</title>"
+        f'<rect width="100%" height="100%" fill="#ffffff"/>'
+        f'<svg width="{width:.1f}" height="{height:.1f}">{"".join(drawn)}</svg>{text}</svg>'
+    )
+
+
+def _window(packing):
+    """Lower left corner (2,) and sides (2,) of what is drawn: the box, or the disks where open."""
+    if not len(packing.r):
+        return np.zeros(2), np.ones(2)
+    low = (packing.x - packing.r[:, None]).min(axis=0)
+    high = (packing.x + packing.r[:, None]).max(axis=0)
+    closed = np.isfinite(packing.box)
+    return np.where(closed, 0.0, low), np.where(closed, packing.box, high - low)
+
+
+def _images(packing, low, high):
+    """Shifts (k, 2) by which what reaches from low to high (2,) is seen in the box as well."""
+    steps = [
+        [0.0] + ([side] if a < 0 else []) + ([-side] if b > side else [])
+        if np.isfinite(side)
+        else [0.0]
+        for side, a, b in zip(packing.box, low, high, strict=True)
+    ]
+    return [(dx, dy) for dx in steps[0] for dy in steps[1]]
+
+
+def _disks(packing, place, x, scale):
+    if not len(x) or len(x) > MOST_DRAWN:
+        return
+    yield '<g fill="#eeeeee" stroke="#aaaaaa" stroke-width="0.5">'
+    for centre, radius in zip(x, packing.r, strict=True):
+        for shift in _images(packing, centre - radius, centre + radius):
+            a, b = place(centre + shift)
+            yield f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{radius * scale:.1f}"/>'
+    yield "</g>"
+
+
+def _chains(packing, place, x, scale):
+    """Contacts that press, as lines between centres: one path for each width and colour."""
+    contacts, (normal, tangential) = packing.contacts, packing.forces.T
+    pressing = np.flatnonzero(normal > 0)
+    if not len(pressing):
+        return
+    pressing = pressing[np.argsort(-normal[pressing], kind="stable")][:MOST_DRAWN]
+    force = normal[pressing] / normal[pressing].mean()
+    width = np.ceil(np.minimum(force / WIDE, 1) * WIDTHS).astype(int)
+    friction = packing.mu * normal[pressing]
+    mobilised = np.divide(tangential[pressing], friction, np.zeros_like(force), where=friction > 0)
+    colour = ((np.clip(mobilised, -1, 1) + 1) / 2 * len(COLOURS)).astype(int)
+    colour = np.minimum(colour, len(COLOURS) - 1)
+    begin = x[contacts.i[pressing]]
+    end = begin + contacts.length[pressing, None] * contacts.normal[pressing]
+    paths = {}
+    for k in range(len(pressing)):
+        path = paths.setdefault((width[k], colour[k]), [])
+        low, high = np.minimum(begin[k], end[k]), np.maximum(begin[k], end[k])
+        for shift in _images(packing, low, high):
+            (a, b), (c, d) = place(begin[k] + shift), place(end[k] + shift)
+            path.append(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}")
+    thickest = min(THICKEST * SIDE / 100, packing.r.mean() * scale)
+    yield '<g fill="none" stroke-linecap="round">'
+    for (w, c), path in sorted(paths.items()):
+        line = f'stroke="{COLOURS[c]}" stroke-width="{w / WIDTHS * thickest:.2f}"'
+        yield f'<path {line} d="{"".join(path)}"/>'
+    yield "</g>"
+
+
+def _words(packing):
+    """The numbers of a packing in two lines."""
+    normal = packing.forces[:, 0]
+    pressing = normal[normal > 0]
+    first = [f"{len(packing.r)} disks", f"μ = {packing.mu:g}"]
+    if np.isfinite(packing.volume):
+        first.append(f"φ = {packing.packing_fraction:.4f}")
+    second = [f"{len(pressing)} of {len(normal)} contacts press"]
+    if len(pressing):
+        second.append(f"⟨fₙ⟩ = {pressing.mean():.4g}")
+    return [", ".join(first), ", ".join(second)]

@@ -1,0 +1,107 @@
+"""What is known of S = {y ≥ 0 : A y = b}, by proofs that trust no solver.
+
+    S is empty       λ with Aᵀλ ≤ 0 and b·λ > 0 (Farkas)
+    S is not bounded d ≥ 0, d ≠ 0 with A d = 0
+    S is bounded     π with Aᵀπ > 0
+    g·y is small     λ with Aᵀλ ≥ g and b·λ small (duality)
+
+Solvers only propose; every proof is checked here against A and b. What one solver does not settle
+is tried by others, and what none settles is said to be undecided.
+"""
+
+import numpy as np
+from scipy import sparse
+
+from granforce.numerics import highs as programs
+from granforce.records import InputError, NotJammedError, UndecidedError
+from granforce.tolerances import BALANCED, CARRYING
+
+# Mean of y (in ⟨f_n⟩) up to which a proof of emptiness excludes networks in spite of rounding.
+_LARGEST_MEAN = 1e4
+# Largest |A d| of a direction d with Σ d = 1, rows of A of order 1.
+_BALANCED_DIRECTION = 1e-13
+# Mean of y (in ⟨f_n⟩) up to which a contact is shown to carry nothing: it is 1 in S.
+_USUAL_MEAN = 2.0
+
+
+def why_unsolved(A, b, empty="no admissible force network exists on these contacts"):
+    """The exception to raise where a program over S has no optimum, by what can be proved.
+
+    A sparse (m, n), rows of order 1; b (m,). empty: the message for an empty S.
+    """
+    if empty_ray(A, b) is not None:
+        return NotJammedError(empty)
+    if recession(A) is not None:
+        return InputError(
+            "the forces on these contacts are not bounded: prescribe a pressure or a load, or "
+            "freeze contacts all around them"
+        )
+    return UndecidedError(
+        "whether these contacts can be in balance is undecided: linear programs over their forces "
+        "ended without a result that could be checked; change a contact or the friction slightly"
+    )
+
+
+def empty_ray(A, b):
+    """λ (m,) that proves S to be empty, None where no proof was found.
+
+    From the duals of the least Σ |A y − b|, and from the least |A y − b|², whose own unbalance is
+    such a λ.
+    """
+    cost = np.concatenate([np.zeros(A.shape[1]), np.ones(2 * len(b))])
+    unit = sparse.identity(len(b))
+    slackened = sparse.csc_matrix(sparse.hstack([A, unit, -unit]))
+    for y, multiplier in _proposals(slackened, b, cost):
+        if proves_empty(A, b, multiplier):
+            return multiplier
+        if np.abs(A @ np.maximum(y[: A.shape[1]], 0.0) - b).max(initial=0.0) <= BALANCED:
+            return None
+    multiplier = -programs.least_unbalanced(A, b)[1]
+    return multiplier if proves_empty(A, b, multiplier) else None
+
+
+def proves_empty(A, b, multiplier):
+    """Whether Aᵀλ ≤ 0 < b·λ, beyond what rounding and unbalance up to BALANCED could hide."""
+    if not np.all(np.isfinite(multiplier)):
+        return False
+    wrong = (A.T @ multiplier).max(initial=0.0) * _LARGEST_MEAN * A.shape[1]
+    return bool(b @ multiplier > 2 * (wrong + BALANCED * np.abs(multiplier).sum()))
+
+
+def recession(A):
+    """d ≥ 0 (n,) with A d = 0 and Σ d = 1: S, if not empty, is not bounded along it. Or None."""
+    both, one = _with_sum(A)
+    for d, _ in _proposals(both, one, np.zeros(A.shape[1])):
+        d = np.maximum(d, 0.0)
+        if abs(d.sum() - 1) < 0.5 and np.abs(A @ d).max(initial=0.0) <= _BALANCED_DIRECTION:
+            return d
+    return None
+
+
+def bounding_rows(A):
+    """π (m,) with Aᵀπ > 0, so that Aᵀπ · y = b·π bounds every y in S. None where none was found."""
+    ray = empty_ray(*_with_sum(A))
+    if ray is None:
+        return None
+    rows = -ray[:-1] / ray[-1]
+    return rows if (A.T @ rows).min(initial=1.0) > 0 else None
+
+
+def proves_small(A, b, gains, multiplier):
+    """Whether gains · y ≤ CARRYING for every y in S of usual size, by λ with Aᵀλ ≥ gains."""
+    short = (gains - A.T @ multiplier).max(initial=0.0)
+    return bool(b @ multiplier + short * _USUAL_MEAN * A.shape[1] <= CARRYING)
+
+
+def _with_sum(A):
+    """A with a row for Σ y, and (0, …, 0, 1)."""
+    both = sparse.csc_matrix(sparse.vstack([A, np.ones((1, A.shape[1]))]))
+    return both, np.append(np.zeros(A.shape[0]), 1.0)
+
+
+def _proposals(A, b, cost):
+    """Points and multipliers of one program over {y ≥ 0 : A y = b} by one method after another."""
+    model = programs.standard_form(A, b)
+    programs.set_cost(model, cost)
+    for _, y in programs.solutions(model):
+        yield y, programs.multipliers(model, A, cost)

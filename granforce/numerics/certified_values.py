@@ -1,0 +1,202 @@
+"""Values of linear programs over S with certificates that trust no solver.
+
+A certificate is a state that attains the value, with its own unbalance, and multipliers λ that
+bound the value from the other side. For any λ and slack s = c − Aᵀλ,
+
+    c·y = b·λ + s·y ≥ b·λ − W max_k(−s_k/w_k)₊   for all y ≥ 0 in S,
+
+where w > 0 is a fixed combination of the rows of A (the pressure row, if there is one) and W the
+value it prescribes. What the interior-point method leaves open is solved from scratch by HiGHS.
+"""
+
+import threading
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from granforce.numerics import certificates, highs, linear_programs
+from granforce.numerics.contact_program import Problem
+from granforce.numerics.linear_programs import Centre, Outcome
+from granforce.records import Cancelled
+from granforce.system import cancelling
+from granforce.tolerances import BALANCED, INTERVAL_GAP
+
+
+class System(NamedTuple):
+    """A y = b in cone coordinates and units of ⟨f_n⟩, and what bounds y."""
+
+    problem: Problem
+    middle: Centre
+    A: sparse.csc_matrix  # (rows, n)
+    b: np.ndarray
+    loads: sparse.csc_matrix  # (rows, N_c) what F = 1 on each contact adds to A y
+    weight: np.ndarray  # (n,) w > 0
+    total: float  # W: w·y = W for every y in S; a load F on contact c adds F gains[c]
+    gains: np.ndarray  # (N_c,)
+
+
+def make_system(problem, A, b, loads, bounding):
+    """The System of a Problem; bounding: the row of A that bounds y > 0, None without one.
+
+    A has the rows of the Problem's balance, then those of its sides and pinned components.
+
+    Raises NotJammedError where S is empty, InputError where it is not bounded, UndecidedError where
+    neither could be shown.
+    """
+    middle = linear_programs.centre(problem)
+    if bounding is not None:
+        combination = np.zeros(len(b))
+        combination[bounding] = 1.0
+        weight, total = A[bounding].toarray().ravel(), float(b[bounding])
+    else:
+        combination = -_centre_multipliers(problem, middle, A)
+        weight = A.T @ combination
+        if not middle.reached or weight.min(initial=1.0) <= 0:
+            combination = _bounding_rows(A, b)
+            weight = A.T @ combination
+        total = float(b @ combination)
+    return System(problem, middle, A.tocsc(), b, loads, weight, total, -(loads.T @ combination))
+
+
+def _centre_multipliers(problem, middle, A):
+    balance = np.concatenate([middle.v, middle.v_border])[problem.place]
+    return linear_programs.multipliers(problem, A, np.zeros(A.shape[1]), balance, middle.z)
+
+
+def _bounding_rows(A, b):
+    """π with Aᵀπ > 0: the duals of max Σ y, which exist where S is bounded and not empty."""
+    model = highs.standard_form(A, b)
+    highs.set_cost(model, -np.ones(A.shape[1]))
+    for status, _ in highs.solutions(model):
+        rows = -np.array(model.getSolution().row_dual)
+        if status == highs.OPTIMAL and (A.T @ rows).min(initial=1.0) > 0:
+            return rows
+    rows = certificates.bounding_rows(A)
+    if rows is None:
+        raise certificates.why_unsolved(A, b)
+    return rows
+
+
+class Solver:
+    """Solves and certifies programs over one System; keeps count of what it did."""
+
+    def __init__(self, system, *, workers=1, seen=None, report=None, found=None):
+        """seen(y): called with each y (n,) of S without load at which a value is attained.
+
+        report(count): called as so many programs end. found(key, attained, bound): called as each
+        of them does. All come from one thread at a time.
+        """
+        self.system, self.workers = system, workers
+        self.seen, self.report = seen, report or (lambda count: None)
+        self.found = found or (lambda key, attained, bound: None)
+        self.counts = {"programs": 0, "again": 0, "iterations": 0}
+        self.lock = threading.Lock()
+
+    def solve(self, keys, tasks, points=None):
+        """{key: (value attained in S, value that bounds it from below)} of those reached.
+
+        points: a dict to fill with the y (n,) at which each key's value is attained. Once
+        cancelled, those that were reached are given.
+        """
+        bounds = {}
+        with suppress(Cancelled):
+            self._solve(keys, tasks, bounds, points)
+        return bounds
+
+    def _solve(self, keys, tasks, bounds, points):
+
+        def finished(outcomes):
+            attained, bound = certify(self.system, outcomes, tasks)
+            with self.lock:
+                for k, outcome in enumerate(outcomes):
+                    key = keys[outcome.number]
+                    bounds[key] = (attained[k], bound[k])
+                    self.found(key, attained[k], bound[k])
+                    if points is not None:
+                        points[key] = outcome.y
+                    self.counts["iterations"] += outcome.steps
+                    if self.seen and outcome.loaded < 0 and np.isfinite(attained[k]):
+                        self.seen(outcome.y)
+                self.counts["programs"] += len(outcomes)
+                self.report(len(outcomes))
+
+        problem, middle = self.system.problem, self.system.middle
+        if middle.reached and len(tasks):
+            linear_programs.run(problem, middle, tasks, workers=self.workers, finished=finished)
+        for number, key in enumerate(keys):
+            cancelling.check()
+            attained, bound = bounds.get(key, (np.inf, -np.inf))
+            if not attained - bound <= INTERVAL_GAP:
+                if key not in bounds:
+                    self.counts["programs"] += 1
+                    self.report(1)
+                bounds[key] = self._again(key, number, tasks, attained, bound, points)
+                self.found(key, *bounds[key])
+
+    def _again(self, key, number, tasks, attained, bound, points):
+        """Solve one program from scratch by HiGHS; keep the better of either side."""
+        outcome = from_scratch(self.system, number, tasks[number])
+        again = certify(self.system, [outcome], tasks)
+        self.counts["again"] += 1
+        if points is not None and again[0][0] < attained:
+            points[key] = outcome.y
+        return min(attained, again[0][0]), max(bound, again[1][0])
+
+
+def certify(system, outcomes, tasks):
+    """Value attained by each outcome, and a bound on the minimum from A, b and c alone (⟨f_n⟩).
+
+    The value is inf where the state is not one of S to BALANCED; the bound is −inf where the
+    multipliers bound nothing.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):  # of outcomes that are no numbers
+        return _certify(system, outcomes, tasks)
+
+
+def _certify(system, outcomes, tasks):
+    y = np.stack([outcome.y for outcome in outcomes], axis=1)
+    cost, gain = np.zeros_like(y), np.zeros(len(outcomes))
+    multiplier = np.zeros((len(system.b), len(outcomes)))
+    value, unbalance = np.zeros(len(outcomes)), system.A @ y - system.b[:, None]
+    for k, outcome in enumerate(outcomes):
+        task = tasks[outcome.number]
+        cost[task.columns, k] = task.costs
+        multiplier[:, k] = linear_programs.multipliers(
+            system.problem, system.A, cost[:, k], outcome.multiplier, outcome.z
+        )
+        value[k] = np.dot(task.costs, outcome.y[task.columns]) - outcome.load
+        if task.loaded >= 0:
+            load = system.loads[:, [task.loaded]].toarray().ravel()
+            unbalance[:, k] += outcome.load * load
+            # Scaled so that the slack of F is exactly zero: −F = b·λ + s·y then bounds F alone.
+            pull = -(load @ multiplier[:, k])
+            multiplier[:, k] *= 1 / pull if pull > 0 else np.nan
+            gain[k] = max(0.0, system.gains[task.loaded])
+    slack = cost - system.A.T @ multiplier
+    short = np.maximum(np.max(-slack / system.weight[:, None], axis=0), 0.0)
+    bound = system.b @ multiplier - system.total * short
+    # w·y may grow with the load: −F ≥ bound − short · gain · F.
+    bound = np.where(short * gain < 1, bound / (1 - short * gain), -np.inf)
+    admitted = (np.abs(unbalance).max(axis=0) <= BALANCED) & (y.min(axis=0) >= 0)
+    return np.where(admitted, value, np.inf), np.where(np.isfinite(bound), bound, -np.inf)
+
+
+def from_scratch(system, number, task):
+    """The outcome of one program by HiGHS: presolve, no start, tightest tolerances."""
+    A, cost = system.A, np.zeros(system.A.shape[1])
+    cost[task.columns] = task.costs
+    if task.loaded >= 0:
+        A = sparse.hstack([A, system.loads[:, [task.loaded]]], format="csc")
+        cost = np.append(cost, -1.0)
+    model = highs.standard_form(A, system.b)
+    highs.set_cost(model, cost)
+    _, y = highs.solve(model)
+    multiplier = np.array(model.getSolution().row_dual)
+    basis = highs.basis(model)
+    if basis is not None:
+        y, multiplier = highs.vertex(A, system.b, cost, *basis)
+    load = float(y[-1]) if task.loaded >= 0 else 0.0
+    outcome = Outcome(number, task.loaded, y[: len(system.weight)], load, multiplier, None, 0)
+    return linear_programs.balanced(system.problem, system.middle, [outcome])[0]

@@ -1,0 +1,164 @@
+"""Linear programs by HiGHS: minimise c·y subject to A y = b, y ≥ 0 (S in cone coordinates).
+
+And quadratic ones by PIQP. What a solver says of its own result proves nothing: see `certificates`.
+"""
+
+import highspy
+import numpy as np
+import piqp
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from granforce.system import cancelling
+from granforce.tolerances import PROGRAM
+
+OPTIMAL = highspy.HighsModelStatus.kOptimal
+
+# How a program is tried again where it ended without an optimum.
+_OTHER_WAYS = (
+    {"solver": "simplex"},
+    {"solver": "simplex", "presolve": "off"},
+    {"solver": "ipm", "run_crossover": "on", "presolve": "off"},
+)
+
+
+def standard_form(A, b, *, upper=np.inf, solver="choose"):
+    """A silent HiGHS model of {0 ≤ y ≤ upper, A y = b}, zero cost; A sparse (m, n), b (m,)."""
+    columns = np.zeros(A.shape[1]), np.full(A.shape[1], upper)
+    return bounded(A, (b, b), columns, np.zeros(A.shape[1]), solver=solver)
+
+
+def bounded(A, rows, columns, cost, *, solver="choose"):
+    """A silent HiGHS model: minimise cost·y with A y and y between bounds.
+
+    A sparse (m, n); rows: lower and upper bounds (m,) of A y; columns: those (n,) of y; cost (n,).
+    granforce's tolerances, one thread.
+    """
+    A = sparse.csc_matrix(A)
+    lp = highspy.HighsLp()
+    lp.num_row_, lp.num_col_ = A.shape
+    lp.col_cost_ = np.asarray(cost, dtype=np.float64)
+    lp.col_lower_, lp.col_upper_ = columns
+    lp.row_lower_, lp.row_upper_ = (np.asarray(bound, dtype=np.float64) for bound in rows)
+    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    lp.a_matrix_.start_ = A.indptr.astype(np.int32)
+    lp.a_matrix_.index_ = A.indices.astype(np.int32)
+    lp.a_matrix_.value_ = A.data
+    model = highspy.Highs()
+    for name, value in {
+        "output_flag": False,
+        "threads": 1,
+        "solver": solver,
+        "primal_feasibility_tolerance": PROGRAM,
+        "dual_feasibility_tolerance": PROGRAM,
+    }.items():
+        model.setOptionValue(name, value)
+    model.passModel(lp)
+    return model
+
+
+def set_cost(model, cost):
+    """Replace the whole cost vector (n,) of a model, which keeps its basis."""
+    columns = np.arange(len(cost), dtype=np.int32)
+    model.changeColsCost(len(cost), columns, np.asarray(cost, dtype=np.float64))
+
+
+def solve(model):
+    """Run the model; its status and the point y reached (n,)."""
+    cancelling.apart(model.run, interrupt=lambda: _interrupt(model))
+    return model.getModelStatus(), np.array(model.getSolution().col_value)
+
+
+def solutions(model):
+    """Status and point y (n,) of the model as it is set up, and then by other methods, in turn."""
+    yield solve(model)
+    own = {name: model.getOptionValue(name)[1] for options in _OTHER_WAYS for name in options}
+    try:
+        for options in _OTHER_WAYS:
+            model.clearSolver()
+            for name, value in (own | options).items():
+                model.setOptionValue(name, value)
+            yield solve(model)
+    finally:
+        for name, value in own.items():
+            model.setOptionValue(name, value)
+
+
+def optimal(model):
+    """The first point (n,) that some method calls an optimum; None where none does."""
+    return next((y for status, y in solutions(model) if status == OPTIMAL), None)
+
+
+def multipliers(model, A, cost):
+    """Multipliers λ (m,) of the rows of a solved model; from its basis, if any, to rounding."""
+    found = basis(model)
+    if found is not None:
+        try:
+            return vertex(A, np.zeros(A.shape[0]), cost, *found)[1]
+        except RuntimeError:  # the basis is singular to rounding
+            pass
+    return np.array(model.getSolution().row_dual)
+
+
+def vertex(A, b, cost, rows, columns):
+    """y and λ of a basis by its own LU factors: rounding error in place of tolerances."""
+    factors = cancelling.apart(splu, sparse.csc_matrix(A.tocsr()[rows][:, columns]))
+    y, multiplier = np.zeros(A.shape[1]), np.zeros(A.shape[0])
+    for _ in range(2):
+        y[columns] += factors.solve((b - A @ y)[rows])
+        rest = cost - A.T @ multiplier
+        multiplier[rows] += factors.solve(rest[columns], trans="T")
+    return y, multiplier
+
+
+def _interrupt(model):
+    """Have a running model end at its next step, to be called from another thread.
+
+    Only now does it call back: asked at every step it would wait for Python each time.
+    """
+    for event in (model.cbSimplexInterrupt, model.cbIpmInterrupt):
+        event.subscribe(lambda step: step.interrupt())
+
+
+def basis(model):
+    """Rows and columns (positions) of the square basis matrix of a solved model, None without.
+
+    Rows whose own logical is basic are implied by the others and left out.
+    """
+    found = model.getBasis()
+    basic = highspy.HighsBasisStatus.kBasic
+    columns = np.flatnonzero([status == basic for status in found.col_status])
+    rows = np.flatnonzero([status != basic for status in found.row_status])
+    return (rows, columns) if found.valid and len(rows) == len(columns) else None
+
+
+def least_unbalanced(A, b):
+    """y ≥ 0 with the least |A y − b|², and that residual vector, shapes (n,) and (m,)."""
+    rows, columns = A.shape
+    solver = quadratic_solver(200)
+    quadratic = sparse.block_diag([1e-10 * sparse.eye(columns), sparse.eye(rows)], format="csc")
+    lower = np.concatenate([np.zeros(columns), np.full(rows, -np.inf)])
+    solver.setup(
+        quadratic,
+        np.zeros(columns + rows),
+        sparse.hstack([A, sparse.eye(rows)], format="csc"),
+        b,
+        x_l=lower,
+    )
+    solver.solve()
+    y = np.maximum(solver.result.x[:columns], 0.0)
+    return y, A @ y - b
+
+
+def quadratic_solver(max_iterations):
+    """A silent PIQP solver with granforce's tolerances."""
+    solver = piqp.SparseSolver()
+    solver.settings.verbose = False
+    solver.settings.max_iter = max_iterations
+    solver.settings.eps_abs = 1e-12
+    solver.settings.eps_rel = 1e-13
+    # At small μ, far starts and dependent rows the regularised systems alone, or those with the
+    # default's regularisation, end short of their target.
+    solver.settings.reg_lower_limit = 1e-14
+    solver.settings.iterative_refinement_always_enabled = True
+    return solver

@@ -1,0 +1,210 @@
+"""Lanes: a number of eight doubles side by side, so that one source serves one problem or eight.
+
+A kernel written with `load`, `store` and the arithmetic below works on plain doubles where it is
+called with `ONE`, and on LANES independent problems at a time where it is called with `MANY`; every
+operation is then one vector instruction. Lanes never mix, and products are added with a single
+rounding (`fma`) in either width: a problem gives the same result, bit for bit, alone or in any
+company. Arrays hold the lanes of one number next to each other: shape (…, 1) or (…, LANES).
+
+Left to the compiler, loops over lanes spend most of their time proving that arrays do not overlap:
+a factorisation of 400 disks took 0.11 ms a matrix, with explicit lanes it takes 0.036 ms (16 lanes:
+0.049 ms, since eight factors fit into the cache and sixteen do not).
+"""
+
+import operator
+
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
+
+LANES = 8
+# Kernels that are called from Python, and those that are called by kernels only: without what the
+# former need to be called, a third of the time to compile is saved.
+compiled = njit(cache=True, nogil=True, error_model="numpy")
+within = njit(
+    cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
+# Small ones that must become part of those that call them, or their numbers pass through memory.
+inline = njit(
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    no_cpython_wrapper=True,
+    no_cfunc_wrapper=True,
+    forceinline=True,
+)
+
+# What kernels take as their last argument: its length is known to the compiler.
+ONE, MANY = (0,), (0,) * LANES
+
+_DOUBLE = ir.DoubleType()
+
+
+class Lanes(types.Type):
+    """Numba's type of `width` doubles side by side."""
+
+    def __init__(self, width):
+        self.width = width
+        super().__init__(name=f"Lanes({width})")
+
+
+@register_model(Lanes)
+class _Model(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.width))
+
+
+def _number(lanes):
+    """The type of a number in so many lanes."""
+    return types.float64 if lanes.count == 1 else Lanes(lanes.count)
+
+
+def _place(context, builder, signature, args):
+    """Pointer to the lanes of one number of an array."""
+    array = context.make_array(signature.args[0])(context, builder, args[0])
+    width = signature.args[2].count
+    kind = _DOUBLE if width == 1 else ir.VectorType(_DOUBLE, width)
+    first = builder.mul(args[1], ir.Constant(ir.IntType(64), width))
+    return builder.bitcast(builder.gep(array.data, [first]), kind.as_pointer())
+
+
+@intrinsic
+def load(typing, array, index, lanes):
+    """Number `index` of a contiguous array."""
+
+    def emit(context, builder, signature, args):
+        return builder.load(_place(context, builder, signature, args), align=8)
+
+    return _number(lanes)(array, types.int64, lanes), emit
+
+
+@intrinsic
+def store(typing, array, index, lanes, value):
+    """Set number `index` of a contiguous array."""
+
+    def emit(context, builder, signature, args):
+        builder.store(args[3], _place(context, builder, signature, args), align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.int64, lanes, _number(lanes)), emit
+
+
+@intrinsic
+def same(typing, lanes, value):
+    """One double in all lanes."""
+    kind = _number(lanes)
+
+    def emit(context, builder, signature, args):
+        if kind is types.float64:
+            return args[1]
+        index = ir.IntType(32)
+        vector = ir.Constant(ir.VectorType(_DOUBLE, kind.width), ir.Undefined)
+        vector = builder.insert_element(vector, args[1], index(0))
+        first = ir.Constant(ir.VectorType(index, kind.width), [0] * kind.width)
+        return builder.shuffle_vector(vector, vector, first)
+
+    return kind(lanes, types.float64), emit
+
+
+def _named(builder, name, args):
+    """Call one of LLVM's own functions of doubles or vectors."""
+    kind = args[0].type
+    suffix = "f64" if kind == _DOUBLE else f"v{kind.count}f64"
+    function = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(kind, [kind] * len(args)), f"{name}.{suffix}"
+    )
+    return builder.call(function, args)
+
+
+@intrinsic
+def fma(typing, a, b, c):
+    """a b + c, rounded once."""
+
+    def emit(context, builder, signature, args):
+        return _named(builder, "llvm.fma", args)
+
+    return a(a, a, a), emit
+
+
+@intrinsic
+def root(typing, a):
+    """√a."""
+
+    def emit(context, builder, signature, args):
+        return _named(builder, "llvm.sqrt", args)
+
+    return a(a), emit
+
+
+@intrinsic
+def size(typing, a):
+    """|a|."""
+
+    def emit(context, builder, signature, args):
+        return _named(builder, "llvm.fabs", args)
+
+    return a(a), emit
+
+
+@intrinsic
+def vanishes(typing, a):
+    """Whether a is 0 in every lane."""
+
+    def emit(context, builder, signature, args):
+        zero = ir.Constant(args[0].type, None)
+        equal = builder.fcmp_ordered("==", args[0], zero)
+        if args[0].type == _DOUBLE:
+            return equal
+        bits = ir.IntType(args[0].type.count)
+        return builder.icmp_unsigned("==", builder.bitcast(equal, bits), ir.Constant(bits, -1))
+
+    return types.boolean(a), emit
+
+
+@intrinsic
+def pick(typing, a, b, yes, no):
+    """`yes` in the lanes where a > b, `no` in the others."""
+
+    def emit(context, builder, signature, args):
+        return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
+
+    return a(a, a, a, a), emit
+
+
+@intrinsic
+def larger(typing, a, b):
+    """The larger of both, b where a is not a number."""
+
+    def emit(context, builder, signature, args):
+        return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[0], args[1])
+
+    return a(a, a), emit
+
+
+def _operate(operation, instruction, count):
+    """Make an operation of `count` equal Lanes one instruction; overloads are compiled apart."""
+
+    @type_callable(operation)
+    def kind(context):
+        def of_two(a, b):
+            return a if isinstance(a, Lanes) and a == b else None
+
+        def of_one(a):
+            return a if isinstance(a, Lanes) else None
+
+        return of_two if count == 2 else of_one
+
+    @lower_builtin(operation, *(Lanes,) * count)
+    def emit(context, builder, signature, args):
+        return getattr(builder, instruction)(*args)
+
+
+for _operation, _instruction, _count in (
+    (operator.add, "fadd", 2),
+    (operator.sub, "fsub", 2),
+    (operator.mul, "fmul", 2),
+    (operator.truediv, "fdiv", 2),
+    (operator.neg, "fneg", 1),
+):
+    _operate(_operation, _instruction, _count)

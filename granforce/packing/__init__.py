@@ -1,0 +1,1 @@
+"""Packings: how they are made, brought in from elsewhere and kept."""

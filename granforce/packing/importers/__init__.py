@@ -1,0 +1,23 @@
+"""Packings from files: granforce's own NPZ, LAMMPS dumps, tables, and photoelastic experiments.
+
+Whatever a file holds, these functions return a validated Packing or raise InputError.
+"""
+
+from granforce.packing.importers.known import read_known
+from granforce.packing.importers.lammps import read_lammps
+from granforce.packing.importers.measurements import read_measurement
+from granforce.packing.importers.network import report
+from granforce.packing.importers.npz import load_packing, save_packing
+from granforce.packing.importers.pegs import read_pegs
+from granforce.packing.importers.tables import read_table
+
+__all__ = [
+    "load_packing",
+    "read_known",
+    "read_lammps",
+    "read_measurement",
+    "read_pegs",
+    "read_table",
+    "report",
+    "save_packing",
+]

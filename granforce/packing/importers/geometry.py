@@ -1,0 +1,149 @@
+"""Images in the box, and the checks that contacts and positions of a file agree."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from granforce.packing.neighbours import find_pairs, separations
+from granforce.records import InputError, make_contacts, make_packing, positive
+
+# Contacts may overlap, or gape, by this part of the smaller radius before the file must be wrong.
+OVERLAP_ALLOWED = 0.2
+
+# Largest misfit, in largest radii, between a given centre distance or branch and the positions:
+# dumps with six digits pass, a wrong box or a wrong grain does not.
+MISFIT = 1e-3
+
+# Positions and box sides in largest radii: beyond, float64 cannot resolve a contact's gap.
+EXTENT = 1e7
+
+# Pairs within one largest diameter that may be looked at for overlaps: above, grains lie on top
+# of each other (or sizes differ too much), and the list of pairs would not fit into memory.
+CLOSE_PAIRS = 20_000_000
+
+
+def wrapped(x, box):
+    """Positions (N, 2) taken into [0, L) along the periodic directions of box (2,)."""
+    x = x.copy()
+    for k in np.flatnonzero(np.isfinite(box) & (box > 0)):
+        x[:, k] = np.mod(x[:, k], box[k])
+        x[x[:, k] >= box[k], k] = 0.0  # a tiny negative number plus L rounds to L
+    return x
+
+
+def branches(x, box, i, j):
+    """Vectors (P, 2) from grains i (P,) to the nearest image of grains j (P,)."""
+    branch = x[j] - x[i]
+    periodic = np.isfinite(box)
+    branch[:, periodic] -= box[periodic] * np.round(branch[:, periodic] / box[periodic])
+    return branch
+
+
+def touching(x, r, box, tolerance):
+    """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1)."""
+    tolerance = positive(tolerance, "tolerance")
+    if tolerance > 1:
+        raise InputError(f"tolerance is in largest radii and must not exceed 1, got {tolerance:g}")
+    i, j, shift = find_pairs(x, r, box, tolerance * r.max())
+    normal, length, _ = separations(x, r, box, i, j, shift)
+    return make_contacts(i, j, normal, length, r)
+
+
+def overlapping(x, r, box):
+    """Grains i, j (P,) of all pairs that overlap, and their gaps (P,) < 0; centres may coincide."""
+    i, j, shift = find_pairs(x, r, box, 0.0)
+    side = np.where(np.isfinite(box), box, 0.0)
+    return i, j, np.hypot(*(x[j] - x[i] + shift * side).T) - r[i] - r[j]
+
+
+def listed(x, r, box, i, j, place, branch=None):
+    """Contacts between grains i, j (N_c,), their branch vectors (N_c, 2) given or nearest images.
+
+    place(c) names contact c in messages. Raises InputError where a given branch does not lead
+    from i to an image of j, where disks overlap or gape too much, and for contacts given twice.
+    """
+    nearest = branches(x, box, i, j)
+    if branch is None:
+        branch = nearest
+    else:
+        _check_branches(branch - nearest, box, r.max(), place)
+    length = np.hypot(*branch.T)
+    for c in np.flatnonzero((i == j) | (length == 0)):
+        raise InputError(f"{place(c)}: {_pair(i, j, c)} join one point; correct the grains")
+    contacts = make_contacts(i, j, branch / length[:, None], length, r)
+    check_contacts(contacts, r, place)
+    return contacts
+
+
+def check_contacts(contacts, r, place, allowed=OVERLAP_ALLOWED):
+    """InputError naming a contact whose disks overlap or gape too much, or that is given twice."""
+    i, j, gap = contacts.i, contacts.j, contacts.gap
+    for c in np.flatnonzero(np.abs(gap) > allowed * np.minimum(r[i], r[j]))[:1]:
+        state = "overlap" if gap[c] < 0 else "are apart"
+        raise InputError(
+            f"{place(c)}: {_pair(i, j, c)} {state} by {abs(gap[c]):.3g}, more than "
+            f"{allowed:.0%} of a radius; check positions, radii and box"
+        )
+    _check_repeated(contacts, place)
+
+
+def check_disks(x, r, box, place, allowed=OVERLAP_ALLOWED):
+    """InputError where radii, positions or box cannot be a packing; place(g) names grain g."""
+    for g in np.flatnonzero(r <= 0)[:1]:
+        raise InputError(
+            f"{place(g)}: radius {r[g]:g} is not positive; correct or remove the grain"
+        )
+    largest = r.max()
+    if largest < 1e-100:
+        raise InputError(f"the largest radius is {largest:g}; give lengths in another unit")
+    make_packing(x, r, box, make_contacts([], [], np.empty((0, 2)), [], r), np.empty((0, 2)), 0)
+    extent = max(np.abs(x).max(), box[np.isfinite(box)].max(initial=0.0))
+    if extent > EXTENT * largest:
+        raise InputError(
+            f"positions or box reach {extent / largest:.2g} largest radii, too far to resolve a "
+            "contact; shift the origin, or check the unit of the radii"
+        )
+    _check_crowding(x, r, box)
+    i, j, gap = overlapping(x, r, box)
+    for c in np.flatnonzero(-gap > allowed * np.minimum(r[i], r[j]))[:1]:
+        raise InputError(
+            f"{place(j[c])}: {_pair(i, j, c)} overlap by {-gap[c]:.3g}, more than "
+            f"{allowed:.0%} of a radius; check positions, radii and box"
+        )
+
+
+def _check_crowding(x, r, box):
+    tree = cKDTree(wrapped(x, box), boxsize=np.where(np.isfinite(box), box, 0.0))
+    if tree.count_neighbors(tree, 2 * r.max()) > CLOSE_PAIRS:
+        raise InputError("too many grains lie within one diameter of each other; check the unit")
+
+
+def _check_branches(misfit, box, largest, place):
+    """A given branch may lead to another image than the nearest: whole box sides do not count."""
+    periodic = np.isfinite(box)
+    misfit[:, periodic] -= box[periodic] * np.round(misfit[:, periodic] / box[periodic])
+    for c in np.flatnonzero(np.hypot(*misfit.T) > MISFIT * largest)[:1]:
+        raise InputError(
+            f"{place(c)}: normal and length lead {np.hypot(*misfit[c]):.2g} past the second "
+            "grain; check positions, box, and that the normal points from i to j"
+        )
+
+
+def _check_repeated(contacts, place):
+    """Two grains touch twice only through different images, whose normals differ by 60° or more."""
+    swapped = contacts.i > contacts.j
+    low = np.minimum(contacts.i, contacts.j)
+    high = np.maximum(contacts.i, contacts.j)
+    normal = np.where(swapped[:, None], -contacts.normal, contacts.normal)
+    seen = {}
+    for c, pair in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+        for other in seen.setdefault(pair, []):
+            if normal[c] @ normal[other] > 0.75:
+                raise InputError(
+                    f"{place(c)}: {_pair(contacts.i, contacts.j, c)} were given before "
+                    f"({place(other)}); give each contact once"
+                )
+        seen[pair].append(c)
+
+
+def _pair(i, j, c):
+    return f"grains {i[c]} and {j[c]} (counted from 0)"

@@ -1,0 +1,53 @@
+"""Known forces from a table: bounds on the forces of single contacts."""
+
+import numpy as np
+
+from granforce.forces.knowledge import Known
+from granforce.packing.importers.text import read_csv
+from granforce.records import InputError
+
+_COMPONENTS = "f_n", "f_t"
+
+
+def read_known(source):
+    """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
+
+    f_n, f_t: known exactly; f_n_min, f_n_max, f_t_min, f_t_max: bounds, as `granforce intervals
+    --csv` writes them. Forces in the packing's units; empty fields say nothing, and neither do
+    other columns. source: a path or an open file. Raises InputError naming the line of what is
+    wrong.
+    """
+    table = read_csv(source)
+    contacts = table.numbers("contact")
+    wrong = np.flatnonzero((contacts != np.floor(contacts)) | (contacts < 0))
+    if len(wrong):
+        raise InputError(f"{table.place(wrong[0])}: contact must be a whole number, at least 0")
+    low, high = np.full((2, len(contacts), 2), np.inf)
+    low *= -1
+    told = False
+    for k, name in enumerate(_COMPONENTS):
+        for column, sides in (
+            (name, (low, high)),
+            (f"{name}_min", (low,)),
+            (f"{name}_max", (high,)),
+        ):
+            if column in table.header:
+                told = True
+                given, values = _numbers(table, column)
+                for side in sides:
+                    side[given, k] = values
+    if not told:
+        raise InputError(
+            f"{table.name}: no column f_n, f_t, f_n_min, f_n_max, f_t_min or f_t_max: nothing "
+            "would be known"
+        )
+    return Known(contacts.astype(np.int64), low, high)
+
+
+def _numbers(table, column):
+    """Rows with an entry in a column, and their numbers."""
+    given = [row for row, text in enumerate(table.fields(column)) if text]
+    part = table._replace(
+        rows=[table.rows[row] for row in given], lines=[table.lines[row] for row in given]
+    )
+    return given, part.numbers(column)

@@ -1,0 +1,201 @@
+"""Packings from LAMMPS: ``dump custom`` of the particles, ``dump local`` of the contacts."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.packing.importers.geometry import MISFIT, check_disks, listed, wrapped
+from granforce.packing.importers.network import adopt
+from granforce.packing.importers.text import check_grains, make_table, read_text, some_of
+from granforce.records import InputError, friction, make_packing
+
+# Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
+CONTACT_COLUMNS = ("atom1", "atom2", "distance", "fx", "fy", "px", "py")
+
+# The normal force may point this far beside the line of centres, in the mean force of a contact:
+# more, and its columns are not what they are taken for.
+SKEW = 1e-2
+
+_TITLES = ("TIMESTEP", "NUMBER OF", "BOX BOUNDS", "ATOMS", "ENTRIES", "UNITS", "TIME")
+
+
+class _Item(NamedTuple):
+    line: int  # line number of its title
+    words: list  # what follows the title on its line
+    body: list  # the lines below, as lists of words
+
+
+def read_lammps(particles, contacts, mu, *, columns=None, most_grains=None):
+    """A Packing from a particle dump and a contact dump (paths or open files), in LAMMPS' units.
+
+    particles: ``dump custom`` with id, x y (or xu yu) and radius (or diameter), in any order.
+    contacts: ``dump local`` with the two grains, their distance, normal and tangential force on
+    the first: columns named atom1 atom2 distance fx fy px py, or seven in this order, or those
+    that ``columns`` names in this order. Pairs without force are neighbours, not contacts.
+
+    The last timestep in both files is read; grains are sorted by id. Directions that are not
+    periodic are open, what grains lack to balance is their load there. packing.info holds
+    timestep, residual and violation (in ⟨f_n⟩), rattlers and contacts_skipped. most_grains: how
+    many are taken.
+
+    Raises InputError naming file and line.
+    """
+    mu = friction(mu)
+    first, second = _snapshots(particles), _snapshots(contacts)
+    steps = [step for step in first[1] if step in second[1]]
+    if not steps:
+        raise InputError(
+            f"{first[0]} and {second[0]} have no timestep in common; dump both at the same step"
+        )
+    step = steps[-1]
+    atoms = _table(first[0], first[1][step], "ATOMS")
+    check_grains(len(atoms.rows), most_grains, first[0])
+    pairs = _table(second[0], second[1][step], "ENTRIES")
+    x, r, box, index = _disks(atoms, *_box(first[0], first[1][step]))
+    joined, forces, skipped = _contacts(pairs, columns, x, r, box, index)
+    packing = make_packing(x, r, box, joined, forces, mu, info={"source": "lammps"})
+    return adopt(packing, timestep=step, contacts_skipped=skipped)
+
+
+def _snapshots(source):
+    """Name of the file and its snapshots: {timestep: {title: _Item}}, in the file's order."""
+    name, text = read_text(source)
+    snapshots, items, item = {}, {}, None
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split()
+        if line.startswith("ITEM:"):
+            title, rest = _title(line[5:].strip())
+            if title == "TIMESTEP":
+                items = {}
+            item = items[title] = _Item(number, rest, [])
+        elif item is None:
+            raise InputError(f"{name}, line {number}: no 'ITEM: TIMESTEP'; is it a LAMMPS dump?")
+        elif words:
+            item.body.append(words)
+            if item is items.get("TIMESTEP"):
+                step = _whole(words[0], name, number)
+                snapshots.pop(step, None)
+                snapshots[step] = items
+    return name, snapshots
+
+
+def _title(heading):
+    for title in _TITLES:
+        if heading == title or heading.startswith(title + " "):
+            return title, heading[len(title) :].split()
+    return heading, []
+
+
+def _whole(word, name, line):
+    if not word.isdecimal() or len(word) > 18:
+        raise InputError(f"{name}, line {line}: {word[:40]!r} is not a whole number")
+    return int(word)
+
+
+def _item(name, items, title):
+    if title not in items:
+        raise InputError(f"{name}: no 'ITEM: {title}' in the timestep; is the right file given?")
+    return items[title]
+
+
+def _table(name, items, title):
+    item, number = _item(name, items, title), _item(name, items, "NUMBER OF")
+    count = _whole(number.body[0][0] if number.body else "", name, number.line + 1)
+    if count != len(item.body):
+        raise InputError(
+            f"{name}, line {item.line}: {len(item.body)} rows where {count} are announced; "
+            "is the file cut off?"
+        )
+    if count == 0:
+        raise InputError(f"{name}, line {item.line}: the table is empty")
+    lines = list(range(item.line + 1, item.line + 1 + count))
+    return make_table(name, item.words, item.body, lines)
+
+
+def _box(name, items):
+    """Origin (2,) and sides (2,) of the box, inf along directions that are not periodic."""
+    item = _item(name, items, "BOX BOUNDS")
+    flags = item.words
+    if len(flags) > 3 or any(len(flag) != 2 or not set(flag) <= set("pfsm") for flag in flags):
+        raise InputError(f"{name}, line {item.line}: a tilted box; only rectangular ones are read")
+    if len(item.body) < 2:
+        raise InputError(f"{name}, line {item.line}: the box bounds are incomplete")
+    lines = [item.line + 1, item.line + 2]
+    bounds = make_table(name, ["lo", "hi"], [row[:2] for row in item.body[:2]], lines)
+    low, high = bounds.numbers("lo"), bounds.numbers("hi")
+    for k in np.flatnonzero(high <= low)[:1]:
+        raise InputError(f"{bounds.place(k)}: the upper bound of the box is not above the lower")
+    # Dumps of old versions have no flags, and were periodic by default.
+    is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
+    return low, np.where(is_open, np.inf, high - low)
+
+
+def _disks(table, low, box):
+    ids = table.numbers("id")
+    order = np.argsort(ids, kind="stable")
+    rank = np.argsort(order)
+    index = {label: int(rank[row]) for label, row in table.index("id").items()}
+    axes = ("xu", "yu") if "x" not in table.header and "xu" in table.header else ("x", "y")
+    x = np.column_stack([table.numbers(axis) for axis in axes]) - low
+    if "radius" not in table.header and "diameter" in table.header:
+        r = table.numbers("diameter") / 2
+    else:
+        r = table.numbers("radius")
+    x, r = wrapped(x[order], box), r[order]
+    check_disks(x, r, box, lambda g: table.place(order[g]))
+    return x, r, box, index
+
+
+def _contacts(table, columns, x, r, box, index):
+    """Contacts that carry force, their forces (N_c, 2), and how many pairs carry none."""
+    names = _force_columns(table, columns)
+    i, j = (table.lookup(names[k], index) for k in ("atom1", "atom2"))
+    distance = table.numbers(names["distance"])
+    normal_force, tangential_force = (
+        np.column_stack([table.numbers(names[k]) for k in pair])
+        for pair in (("fx", "fy"), ("px", "py"))
+    )
+    active = np.flatnonzero(normal_force.any(axis=1) | tangential_force.any(axis=1))
+    if not len(active):
+        raise InputError(f"{table.name}: no contact carries force; is the packing compressed?")
+
+    def place(c):
+        return table.place(active[c])
+
+    joined = listed(x, r, box, i[active], j[active], place)
+    _check_distances(joined.length, distance[active], r.max(), place)
+    # Forces are on atom1 = i; ours are on j.
+    forces = _components(joined.normal, -normal_force[active], -tangential_force[active], place)
+    return joined, forces, len(i) - len(active)
+
+
+def _force_columns(table, columns):
+    if columns is None:
+        columns = CONTACT_COLUMNS if set(CONTACT_COLUMNS) <= set(table.header) else table.header
+    if len(columns) != len(CONTACT_COLUMNS):
+        raise InputError(
+            f"{table.name}: {len(columns)} columns ({some_of(columns)}); name, by columns=, "
+            f"the seven that hold {', '.join(CONTACT_COLUMNS)}"
+        )
+    table.require(*columns)
+    return dict(zip(CONTACT_COLUMNS, columns, strict=True))
+
+
+def _check_distances(length, distance, largest, place):
+    for c in np.flatnonzero(np.abs(length - distance) > MISFIT * largest)[:1]:
+        raise InputError(
+            f"{place(c)}: centre distance {distance[c]:.6g}, but {length[c]:.6g} by the positions; "
+            "are both dumps of the same step and box, and the columns in order?"
+        )
+
+
+def _components(n, normal_force, tangential_force, place):
+    t = np.column_stack([-n[:, 1], n[:, 0]])
+    total = normal_force + tangential_force
+    skew = np.abs(np.sum(normal_force * t, axis=1))
+    for c in np.flatnonzero(skew > SKEW * np.hypot(*total.T).mean())[:1]:
+        raise InputError(
+            f"{place(c)}: the normal force does not point along the line of centres; "
+            "name the columns by columns="
+        )
+    return np.column_stack([np.sum(total * n, axis=1), np.sum(total * t, axis=1)])

@@ -1,0 +1,66 @@
+"""Measured forces of a packing's contacts, as tables (CSV)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.packing.importers.text import LARGEST, read_csv
+from granforce.records import InputError
+
+COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
+
+
+class Measurement(NamedTuple):
+    """Forces measured on k contacts; NaN where a component was not."""
+
+    contacts: np.ndarray  # (k,) their numbers in the packing
+    forces: np.ndarray  # (k, 2) f_n, f_t, force
+    sigma: np.ndarray  # (k, 2) their standard errors
+
+    def on(self, count):
+        """Forces and σ (count, 2) of all contacts of a packing; InputError for others."""
+        if self.contacts.max(initial=0) >= count:
+            raise InputError(
+                f"contact {self.contacts.max()} was measured, and the packing's contacts are "
+                f"numbered 0 … {count - 1}; is it the right packing?"
+            )
+        forces, sigma = np.full((2, count, 2), np.nan)
+        forces[self.contacts], sigma[self.contacts] = self.forces, self.sigma
+        return forces, sigma
+
+
+def read_measurement(source):
+    """The Measurement in a CSV file (a path or an open file).
+
+    Columns: contact (its number in the packing), f_n, f_t, sigma_n, sigma_t; empty or nan where a
+    component was not measured. Contacts without a line were not measured.
+
+    Raises InputError naming file and line.
+    """
+    table = read_csv(source)
+    contacts = table.numbers("contact")
+    for row in table.index("contact").values():
+        if not (contacts[row].is_integer() and contacts[row] >= 0):
+            raise InputError(f"{table.place(row)}: {contacts[row]:g} is no number of a contact")
+    values = np.empty((len(contacts), 4))
+    for k, name in enumerate(COLUMNS):
+        for row, text in enumerate(table.fields(name)):
+            values[row, k] = _value(text, name, table.place(row))
+    forces, sigma = values[:, :2], values[:, 2:]
+    if not np.isfinite(forces + sigma).any():
+        raise InputError(f"{table.name}: no component has both a force and a standard error")
+    for row in np.flatnonzero((sigma <= 0).any(axis=1))[:1]:
+        raise InputError(f"{table.place(row)}: a standard error is not above 0")
+    return Measurement(contacts.astype(np.int64), forces, sigma)
+
+
+def _value(text, name, place):
+    """One number, NaN where nothing was measured."""
+    try:
+        value = float(text or "nan")
+    except ValueError:
+        value = math.inf
+    if abs(value) > LARGEST:
+        raise InputError(f"{place}: {name} is {text[:40]!r}, not a finite number")
+    return value

@@ -1,0 +1,175 @@
+"""The force network of an imported packing: taken as given or found, judged, and reported."""
+
+import numpy as np
+
+from granforce.forces.ensemble import ensemble
+from granforce.forces.nearest import nearest
+from granforce.numerics.highs import least_unbalanced
+from granforce.packing.importers.geometry import overlapping
+from granforce.records import InputError, NotJammedError, UndecidedError
+from granforce.tolerances import CARRYING
+
+# The loads of an open set may miss balance by this part of ⟨f_n⟩ (digits lost in the file); the
+# difference is then taken off them, since S would be empty otherwise.
+LOAD_MISFIT = 1e-3
+
+
+def adopt(packing, **info):
+    """The packing with the pressure (or, in an open box, the boundary loads) its forces carry.
+
+    P = Σ f_n ℓ / (2V); a grain's load is what its contact forces leave over, unless loads were
+    given. Residual, violation and rattlers go to packing.info, beside the given entries.
+    Raises InputError where the forces do not press.
+    """
+    normal = packing.forces[:, 0]
+    if not np.any(normal > 0):
+        raise InputError("no contact presses; check the sign of the normal forces")
+    if np.isfinite(packing.volume):
+        virial = float(normal @ packing.contacts.length)
+        if virial <= 0:
+            raise InputError(f"the forces pull (Σ f_n ℓ = {virial:.3g}); check their sign")
+        packing = packing._replace(pressure=virial / (2 * packing.volume))
+    elif not packing.load.any():
+        packing = packing._replace(load=_left_over(packing))
+    return packing._replace(info={**packing.info, **info, **judged(packing)})
+
+
+def find(packing, **info):
+    """The packing with the admissible force network nearest to equal normal forces.
+
+    Needs a pressure, or loads in an open box; loads that miss balance by rounding are corrected
+    (info["load_change"]). Raises NotJammedError where no network exists.
+    """
+    if not len(packing.contacts.i):
+        raise NotJammedError("no grains touch; check the radii, or raise the tolerance")
+    if np.isnan(packing.pressure):
+        packing, S = _under_loads(packing)
+    else:
+        S = ensemble(packing)
+    start = np.zeros_like(S.original)
+    start[:, 0] = S.force_scale
+    relaxed = nearest(S, start)
+    if not relaxed.converged:
+        raise NotJammedError(
+            f"no force network was found: residual {relaxed.residual:.2g} ⟨f_n⟩ after "
+            f"{relaxed.iterations} iterations; check that the packing is at rest"
+        )
+    packing = packing._replace(forces=S.expand(relaxed.forces))
+    return packing._replace(info={**packing.info, **info, **judged(packing)})
+
+
+def report(packing, ens=None):
+    """What a packing is, as a dict of plain numbers (None where a quantity is not defined).
+
+    ens: the packing's ensemble if known. Lengths in largest radii, residual and violation of the
+    packing's own network in ⟨f_n⟩, mean normal force (over the backbone) and pressure in the
+    packing's units. Raises NotJammedError where no admissible network exists.
+    """
+    ens = ensemble(packing) if ens is None else ens
+    loaded = bool(packing.forces.any())
+    verdict = judged(packing) if loaded else {"residual": None, "violation": None}
+    closed = np.isfinite(packing.volume)
+    return {
+        "grains": len(packing.r),
+        "contacts": len(packing.contacts.i),
+        "backbone_grains": len(ens.grains),
+        "backbone_contacts": len(ens.index),
+        "rattlers": ens.skipped["rattlers"],
+        "friction": packing.mu,
+        "pressure": None if np.isnan(packing.pressure) else packing.pressure,
+        "packing_fraction": packing.packing_fraction if closed else None,
+        "coordination": float(ens.coordination),
+        "dimension": int(ens.dimension),
+        "mean_normal_force": float(ens.original[:, 0].mean()) if loaded else None,
+        "residual": verdict["residual"],
+        "violation": verdict["violation"],
+        "largest_overlap": _largest_overlap(packing),
+    }
+
+
+def judged(packing):
+    """Residual and violation of the packing's own forces, and the grains they leave without load.
+
+    Without pruning, so that it can be said of any network, also where S is empty.
+    """
+    whole = ensemble(packing, prune=False)
+    return {
+        "residual": whole.residual(packing.forces),
+        "violation": whole.violation(packing.forces),
+        "rattlers": len(packing.r) - len(_held(whole)),
+    }
+
+
+def _held(whole):
+    """Grains on which the packing's own network presses by more than its noise."""
+    pressing = whole.original[:, 0] > CARRYING * whole.force_scale
+    return np.union1d(whole.contacts.i[pressing], whole.contacts.j[pressing])
+
+
+def _largest_overlap(packing):
+    gap = overlapping(packing.x, packing.r, packing.box)[2]
+    return float(-gap.min(initial=0.0) / packing.r.max())
+
+
+def _left_over(packing):
+    """Loads (N, 3) that balance every grain under the packing's own contact forces.
+
+    All that carry force, not only those with a large rest: then the network lies in S to rounding,
+    and what rigid lever arms lack of the centre distance stays consistent. Rattlers get none: what
+    noise leaves on them need not lie in any cone.
+    """
+    whole = ensemble(packing, prune=False)
+    rest = (whole.A @ whole.to_vector(packing.forces)).reshape(len(whole.grains), -1)
+    load = np.zeros((len(packing.r), 3))
+    load[whole.grains, : rest.shape[1]] = -rest
+    load[:, 2] *= packing.r
+    load[np.setdiff1d(whole.grains, _held(whole))] = 0.0
+    return load
+
+
+def _under_loads(packing):
+    """The packing of an open set, its loads in balance to rounding, and its ensemble.
+
+    Lever arms meet midway: with a_i + a_j = ℓ the balance of all grains implies that of the loads,
+    while arms that miss ℓ by a gap would demand one particular Σ gap f_t.
+    """
+    if not packing.load.any():
+        raise InputError(
+            "an open set needs loads (columns fx, fy, torque of the grains) or forces "
+            "(columns fn, ft of the contacts); a periodic one its box"
+        )
+    contacts, r = packing.contacts, packing.r
+    arms = {"arm_i": r[contacts.i] + contacts.gap / 2, "arm_j": r[contacts.j] + contacts.gap / 2}
+    force = np.abs(packing.load / [1.0, 1.0, r.max()]).max(axis=1)
+    forces = np.zeros_like(packing.forces)
+    forces[:, 0] = force[force > 0].mean()  # the scale that tolerances are relative to
+    packing = packing._replace(contacts=contacts._replace(**arms), forces=forces)
+    settled = _settled(packing)
+    try:
+        return packing, ensemble(packing)
+    except (NotJammedError, UndecidedError):
+        return settled, ensemble(settled)
+
+
+def _settled(packing):
+    """The packing with the loads nearest to its own that contact forces can balance.
+
+    info["load_change"] is the largest change, in ⟨f_n⟩.
+    """
+    whole = ensemble(packing, prune=False)
+    rest = least_unbalanced(whole.cone_form[0], whole.b / whole.force_scale)[1]
+    rest = rest.reshape(len(whole.grains), -1)
+    unbalanced = np.abs(rest).max(axis=1)
+    if unbalanced.max() > LOAD_MISFIT:
+        named = ", ".join(str(whole.grains[k]) for k in np.argsort(-unbalanced, kind="stable")[:5])
+        total = ", ".join(f"{value:.3g}" for value in packing.load[:, :2].sum(axis=0))
+        raise NotJammedError(
+            f"no forces balance the loads, whose sum is ({total}); correct loads or contacts: "
+            f"most is left over at grains {named} (counted from 0)"
+        )
+    load = packing.load.copy()
+    unit = np.column_stack([np.ones((len(whole.grains), 2)), packing.r[whole.grains]])
+    width = rest.shape[1]
+    load[whole.grains, :width] -= whole.force_scale * rest * unit[:, :width]
+    change = {"load_change": float(unbalanced.max())}
+    return packing._replace(load=load, info={**packing.info, **change})

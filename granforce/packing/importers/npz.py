@@ -1,0 +1,174 @@
+"""granforce's own file of one packing: an NPZ of plain arrays, never pickled."""
+
+import json
+from contextlib import nullcontext
+
+import numpy as np
+
+from granforce.packing.importers.geometry import OVERLAP_ALLOWED, check_contacts
+from granforce.packing.importers.text import check_grains
+from granforce.records import InputError, float_array, make_contacts, make_packing
+from granforce.system.files import written
+
+_GRAINS = ("x", "r", "P", "mu")
+_CONTACTS = ("i", "j", "nx", "ny", "branch", "fn", "ft")
+
+# Bytes of the unpacked arrays: a small archive may announce far more than memory holds.
+_UNPACKED = 10**9
+
+
+def load_packing(source, *, unpacked=_UNPACKED, most_grains=None):
+    """The Packing in an NPZ file (a path or an open binary file), its contacts as they are.
+
+    Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if none), mu, i, j, nx, ny, branch, fn, ft;
+    seed, load, arm_i, arm_j and info (JSON) if there. unpacked: most bytes of all arrays together;
+    most_grains: how many are taken. Raises InputError naming what is wrong.
+    """
+    name = str(getattr(source, "name", "the given file") if hasattr(source, "read") else source)
+    arrays = _arrays(source, name, unpacked, most_grains)
+    missing = [key for key in (*_GRAINS, *_CONTACTS) if key not in arrays]
+    if missing or not ("L" in arrays or {"Lx", "Ly"} <= set(arrays)):
+        missing = ", ".join([*missing, *([] if "L" in arrays else ["L (or Lx, Ly)"])])
+        raise InputError(f"{name}: no array {missing}; is it a packing of granforce?")
+    try:
+        return _packing(arrays)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def save_packing(packing, target):
+    """Write a packing as NPZ to be read by load_packing, exactly, to a path or an open binary file.
+
+    A path gets the whole file or none, see `granforce.system.files.written`.
+
+    Raises InputError where info is not plain numbers and strings, or the path cannot be written.
+    """
+    try:
+        info = json.dumps(packing.info, default=lambda value: value.item())
+    except (TypeError, ValueError, AttributeError):
+        raise InputError("packing.info must hold plain numbers and strings") from None
+    contacts, (width, height) = packing.contacts, packing.box
+    arrays = {
+        "x": packing.x,
+        "r": packing.r,
+        **({"L": width} if width == height else {"Lx": width, "Ly": height}),
+        "P": packing.pressure,
+        "mu": packing.mu,
+        "i": contacts.i,
+        "j": contacts.j,
+        "nx": contacts.normal[:, 0],
+        "ny": contacts.normal[:, 1],
+        "branch": contacts.length,
+        "gap": contacts.gap,
+        "arm_i": contacts.arm_i,
+        "arm_j": contacts.arm_j,
+        "fn": packing.forces[:, 0],
+        "ft": packing.forces[:, 1],
+        "load": packing.load,
+        "info": np.array(info),
+        **_seed(packing.info),
+    }
+    if hasattr(target, "write"):
+        np.savez_compressed(target, allow_pickle=False, **arrays)
+    else:
+        with written(target) as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+
+
+def _seed(info):
+    """The seed as an array of its own, for other readers; one that int64 cannot hold is in info."""
+    seed = np.array(info.get("seed"))
+    return {"seed": seed} if seed.dtype.kind in "iu" else {}
+
+
+def _arrays(source, name, unpacked, most_grains):
+    """The archive's arrays but those that loading ignores, {name: array}."""
+    ignored = {"lo", "hi", "fcrit", "gap"}
+    try:
+        # Opened here: of an archive that it cannot read, numpy would leave the file open.
+        with (
+            nullcontext(source) if hasattr(source, "read") else open(source, "rb") as file,
+            np.load(file, allow_pickle=False) as archive,
+        ):
+            if sum(member.file_size for member in archive.zip.infolist()) > unpacked:
+                raise InputError(
+                    f"{name}: more than {unpacked / 1e6:g} MB unpacked; too large for a packing"
+                )
+            if "r" in archive.files:
+                check_grains(archive["r"].size, most_grains, name)
+            return {key: archive[key] for key in archive.files if key not in ignored}
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read ({error.strerror or error})") from None
+    except Exception:
+        # A damaged archive fails anywhere: in zipfile, zlib, or numpy's header parser.
+        raise InputError(f"{name}: not an NPZ archive of plain arrays, or damaged") from None
+
+
+def _packing(arrays):
+    for key, array in arrays.items():
+        kind = "iu" if key in ("i", "j") else "U" if key == "info" else "iuf"
+        if array.dtype.kind not in kind:
+            raise InputError(f"array {key} has type {array.dtype}; store plain numbers")
+    r = float_array(arrays["r"], (-1,), "r")
+    if not len(r):
+        raise InputError("it holds no grains")
+    if np.any(r <= 0):
+        raise InputError(f"radius of grain {int(np.argmax(r <= 0))} is not positive")
+    info = _info(arrays)
+    contacts = _contacts(arrays, r, info)
+    forces = [float_array(arrays[key], contacts.i.shape, key) for key in ("fn", "ft")]
+    return make_packing(
+        arrays["x"],
+        r,
+        [_scalar(arrays, key) for key in (("L", "L") if "L" in arrays else ("Lx", "Ly"))],
+        contacts,
+        np.column_stack(forces),
+        _scalar(arrays, "mu"),
+        _scalar(arrays, "P"),
+        arrays.get("load"),
+        info,
+    )
+
+
+def _contacts(arrays, r, info):
+    i, j = arrays["i"], arrays["j"]
+    normal = [float_array(arrays[key], i.shape[:1], key) for key in ("nx", "ny")]
+    normal = np.column_stack(normal)
+    contacts = make_contacts(i, j, normal, arrays["branch"], r)
+    check_contacts(contacts, r, "contact {}".format, _gap_allowed(info))
+    if not {"arm_i", "arm_j"} <= set(arrays):
+        return contacts
+    arms = {}
+    for key, grain in (("arm_i", contacts.i), ("arm_j", contacts.j)):
+        arms[key] = float_array(arrays[key], grain.shape, key)
+        # From the rigid disk's radius to the middle of the overlap, and no farther.
+        if np.any(np.abs(arms[key] - r[grain]) > np.abs(contacts.gap) / 2 + 1e-9 * r[grain]):
+            raise InputError(f"lever arms {key} do not fit the radii; remove them")
+    # A file written by save_packing: its normals have been divided by their length before.
+    return contacts._replace(normal=normal, **arms)
+
+
+def _gap_allowed(info):
+    """Where radii were measured only roughly, the importer noted how far contacts gape."""
+    noted = info.get("largest_gap")
+    return max(OVERLAP_ALLOWED, noted) if isinstance(noted, float) else OVERLAP_ALLOWED
+
+
+def _scalar(arrays, key):
+    if arrays[key].shape != ():
+        raise InputError(f"array {key} must be one number, got shape {arrays[key].shape}")
+    return float(arrays[key])
+
+
+def _info(arrays):
+    if "info" not in arrays:
+        return {"seed": int(_scalar(arrays, "seed"))} if "seed" in arrays else {}
+    try:
+        info = json.loads(str(arrays["info"]))
+    except (ValueError, RecursionError):
+        info = None
+    if not isinstance(info, dict):
+        raise InputError("info is not a JSON object")
+    return info

@@ -1,0 +1,128 @@
+"""Packings from tables of grains and contacts (CSV)."""
+
+import numpy as np
+
+from granforce.packing.importers.geometry import check_disks, listed, touching, wrapped
+from granforce.packing.importers.network import adopt, find
+from granforce.packing.importers.text import check_grains, read_csv
+from granforce.records import InputError, friction, make_packing, positive
+from granforce.tolerances import TOUCHING
+
+
+def read_table(
+    grains,
+    contacts=None,
+    *,
+    mu,
+    box=None,
+    forces=None,
+    pressure=1.0,
+    tolerance=TOUCHING,
+    most_grains=None,
+):
+    """A Packing from a CSV of grains and, if there is one, a CSV of contacts (paths or open files).
+
+    grains: columns x, y, r; optionally id, and fx, fy, torque (external load in an open set).
+    contacts: columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny,
+    length (else the nearest images are joined) and fn, ft. Without it, grains closer than
+    tolerance (in largest radii) touch. box: (L_x, L_y), inf for an open direction; None: open.
+    forces: whether to take fn, ft, by default if they are there; the pressure is then what they
+    carry (in an open set: the loads). Otherwise the network nearest to equal normal forces at the
+    given pressure (or the given loads) is found; pressure is not used with fn, ft. most_grains:
+    how many are taken.
+
+    Raises InputError naming file and line, NotJammedError where no network exists.
+    """
+    mu, box = friction(mu), _sides(box)
+    pressure = positive(pressure, "pressure")
+    table = read_csv(grains)
+    check_grains(len(table.rows), most_grains, table.name)
+    x, r = _disks(table, box)
+    load = _loads(table, box)
+    if contacts is None:
+        if forces:
+            raise InputError("forces need a table of contacts with columns i, j, fn, ft")
+        joined, given = touching(x, r, box, tolerance), None
+    else:
+        joined, given = _joined(read_csv(contacts), table, x, r, box, forces, mu)
+    closed = bool(np.all(np.isfinite(box)))
+    zero = np.zeros((len(joined.i), 2))
+    packing = make_packing(
+        x,
+        r,
+        box,
+        joined,
+        zero if given is None else given,
+        mu,
+        pressure if closed else np.nan,
+        load,
+        {"source": "table"},
+    )
+    if given is None:
+        return find(packing, forces="found")
+    return adopt(packing, forces="given")
+
+
+def _disks(table, box):
+    r = table.numbers("r")
+    x = np.column_stack([table.numbers("x"), table.numbers("y")])
+    x = wrapped(x, box)
+    check_disks(x, r, box, table.place)
+    return x, r
+
+
+def _sides(box):
+    if box is None:
+        return np.full(2, np.inf)
+    try:
+        sides = np.array(box, dtype=np.float64)
+    except (TypeError, ValueError):
+        sides = np.empty(0)
+    if sides.shape != (2,) or not np.all(sides > 0):
+        raise InputError(f"box must be two sides L_x, L_y > 0, got {box}")
+    return sides
+
+
+def _loads(table, box):
+    load = np.zeros((len(table.rows), 3))
+    for k, column in enumerate(("fx", "fy", "torque")):
+        if column in table.header:
+            load[:, k] = table.numbers(column)
+    loaded = np.flatnonzero(load.any(axis=1))
+    if len(loaded) and np.all(np.isfinite(box)):
+        raise InputError(
+            f"{table.place(loaded[0])}: a load in a periodic box; "
+            "remove fx, fy, torque, or leave out the box"
+        )
+    return load
+
+
+def _joined(table, grains, x, r, box, forces, mu):
+    """Contacts of a table and their forces (N_c, 2), or None without."""
+    count = len(grains.rows)
+    index = grains.index("id") if "id" in grains.header else {row: row for row in range(count)}
+    i, j = table.lookup("i", index), table.lookup("j", index)
+    joined = listed(x, r, box, i, j, table.place, _given_branches(table))
+    if forces is None:
+        forces = "fn" in table.header or "ft" in table.header
+    if not forces:
+        return joined, None
+    normal = table.numbers("fn")
+    without_friction = mu == 0 and "ft" not in table.header
+    tangential = np.zeros(len(normal)) if without_friction else table.numbers("ft")
+    return joined, np.column_stack([normal, tangential])
+
+
+def _given_branches(table):
+    """Branch vectors (N_c, 2) from columns nx, ny, length, or None where there is none of them."""
+    if not {"nx", "ny", "length"} & set(table.header):
+        return None
+    normal = np.column_stack([table.numbers("nx"), table.numbers("ny")])
+    length = table.numbers("length")
+    norm = np.hypot(*normal.T)
+    for c in np.flatnonzero((np.abs(norm - 1) > 1e-3) | (length <= 0))[:1]:
+        raise InputError(
+            f"{table.place(c)}: the normal must have length 1 and the centre distance be > 0, "
+            f"got {norm[c]:.4g} and {length[c]:.4g}"
+        )
+    return normal * (length / norm)[:, None]

@@ -1,0 +1,178 @@
+"""Text from a path or an open file, and tables of it whose errors name file and line."""
+
+import csv
+import math
+import os
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.records import InputError
+
+# Numbers beyond this size cannot be lengths or forces, and their squares would overflow.
+LARGEST = 1e100
+
+
+class Table(NamedTuple):
+    """Rows of text fields under named columns."""
+
+    name: str  # of the file, for messages
+    header: tuple  # column names
+    rows: list  # of lists of fields, as many as columns
+    lines: list  # line number of each row in the file
+
+    def place(self, row):
+        """'file, line n' of a row."""
+        return f"{self.name}, line {self.lines[row]}"
+
+    def require(self, *columns):
+        """InputError unless all these columns are there."""
+        missing = [column for column in columns if column not in self.header]
+        if missing:
+            raise InputError(
+                f"{self.name}: no column {', '.join(missing)}; "
+                f"the columns are {some_of(self.header)}"
+            )
+
+    def fields(self, column):
+        """The text of one column, a list."""
+        self.require(column)
+        position = self.header.index(column)
+        return [row[position] for row in self.rows]
+
+    def numbers(self, column):
+        """One column as float64 (rows,); InputError names the line of what is not a number."""
+        values = np.empty(len(self.rows))
+        for row, text in enumerate(self.fields(column)):
+            try:
+                values[row] = float(text)
+            except ValueError:
+                values[row] = math.nan
+            if not abs(values[row]) <= LARGEST:
+                raise InputError(
+                    f"{self.place(row)}: {column} is {_shown(text)}, not a finite number; "
+                    "repair or remove the row"
+                )
+        return values
+
+    def index(self, column):
+        """Row number of each label in a column, a dict; InputError for a label given twice."""
+        rows = {}
+        for row, text in enumerate(self.fields(column)):
+            first = rows.setdefault(_label(text), row)
+            if first != row:
+                raise InputError(
+                    f"{self.place(row)}: {column} {_shown(text)} was given in line "
+                    f"{self.lines[first]} already; give each grain once"
+                )
+        return rows
+
+    def lookup(self, column, index):
+        """Row numbers (rows,) int64 of the labels in a column; InputError for an unknown one."""
+        found = np.empty(len(self.rows), dtype=np.int64)
+        for row, text in enumerate(self.fields(column)):
+            position = index.get(_label(text))
+            if position is None:
+                raise InputError(
+                    f"{self.place(row)}: {column} names grain {_shown(text)}, which is not "
+                    "among the grains; correct it or add the grain"
+                )
+            found[row] = position
+        return found
+
+
+def make_table(name, header, rows, lines):
+    """A Table, once every row is seen to have as many fields as there are column names.
+
+    Raises InputError naming the row that has not, or the column name that is there twice.
+    """
+    for column, times in Counter(header).items():
+        if column and times > 1:
+            raise InputError(
+                f"{name}: column {some_of([column])} is there twice; rename or remove one"
+            )
+    table = Table(name, tuple(header), rows, lines)
+    for row, fields in enumerate(rows):
+        if len(fields) != len(header):
+            raise InputError(
+                f"{table.place(row)}: {len(fields)} fields for {len(header)} columns; "
+                "fill or remove the row"
+            )
+    return table
+
+
+def some_of(columns):
+    """The names of columns for a message, the first where there are many."""
+    names = [name if len(name) <= 40 else name[:37] + "…" for name in columns[:12]]
+    return ", ".join([*names, *(["…"] if len(columns) > len(names) else [])])
+
+
+def check_grains(count, most, name):
+    """InputError for a file of more grains than are taken (most; None: any number)."""
+    if most is not None and count > most:
+        raise InputError(f"{name}: {count} grains, where at most {most} are taken")
+
+
+def read_text(source):
+    """Name and text (UTF-8) of a path or of an open text or bytes file; InputError otherwise."""
+    if hasattr(source, "read"):
+        name, content = str(getattr(source, "name", "the given file")), source.read()
+    else:
+        name, content = os.fspath(source), _bytes(source)
+    name = os.path.basename(name) or name
+    try:
+        text = content if isinstance(content, str) else bytes(content).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{name}: not a text file; give plain text in UTF-8") from None
+    if not text.strip():
+        raise InputError(f"{name}: the file is empty")
+    return name, text
+
+
+def read_csv(source):
+    """A Table from comma-, semicolon- or tab-separated text with a header line.
+
+    Column names are taken in lower case; blank lines are skipped. Raises InputError.
+    """
+    name, text = read_text(source)
+    lines = text.splitlines()
+    head = next(line for line in lines if line.strip())
+    delimiter = next((mark for mark in ",;\t" if mark in head), ",")
+    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+    rows, numbers = [], []
+    try:
+        for fields in reader:
+            if any(field.strip() for field in fields):
+                rows.append([field.strip() for field in fields])
+                numbers.append(reader.line_num)
+    except csv.Error as error:
+        raise InputError(f"{name}, line {reader.line_num}: {error}; repair the line") from None
+    if len(rows) < 2:
+        raise InputError(f"{name}: a header line and at least one row are needed")
+    return make_table(name, [column.lower() for column in rows[0]], rows[1:], numbers[1:])
+
+
+def _bytes(path):
+    try:
+        with open(path, "rb") as file:
+            return file.read()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
+
+
+def _label(text):
+    """Grain names compare as whole numbers where they are ('7', '7.0', '+7'), else as text."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    if not number.is_integer():
+        return text
+    # Past 2⁵³ a float no longer tells neighbouring numbers apart.
+    return int(number) if abs(number) < 2**53 else text
+
+
+def _shown(text):
+    return repr(text if len(text) <= 40 else text[:37] + "…")

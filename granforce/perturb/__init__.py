@@ -1,0 +1,1 @@
+"""What a packing does when two grains in contact are pushed apart."""

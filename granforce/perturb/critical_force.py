@@ -1,0 +1,223 @@
+"""Local perturbation: a pair of forces ±F pushes the two grains of one contact apart.
+
+Protocol. The geometry is fixed and grains are rigid. From the packing's own force network F is
+raised step by step; each step starts from the last equilibrium and follows the flow of contact
+dynamics (`exact_step`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps
+found no equilibrium. As long as grains come to rest, each load lies RISE of the way to the static
+limit load, beyond which no equilibrium exists; after the first motion, F is halved in from the
+last equilibrium. Motion above the bracket that was not steady yet is followed for STEADY_STEPS;
+if it comes to rest, the rise goes on from there. The critical force F_crit is the largest load at
+rest, known to `precision` ⟨f_n⟩. The pair counts in the balance of the grains and in the pressure
+like a force of the contact itself, but not in its Coulomb cone, and the box may dilate at constant
+pressure.
+
+F_crit ≤ limit load. They are not equal: sliding contacts do not dilate (the law is not
+associated), so grains can set off although an equilibrium exists.
+"""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.explore.intervals import limit_load_bounds
+from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.nearest import starting_network
+from granforce.perturb import flow as exact_step
+from granforce.records import InputError, positive
+from granforce.system import cancelling
+
+# Part of the way from the last load at rest to the limit load that the next load goes.
+RISE = 0.4
+# Implicit steps after which no equilibrium is said to be found.
+MOST_STEPS = 150
+# What steady motion may still breach Coulomb's law by, relative to the fastest contact, and the
+# steps spent on that.
+STEADY, STEADY_STEPS = 1e-3, 500
+
+# How loads ended, implicit steps of the flow, and linear systems solved for them.
+COUNTS = ("loads_at_rest", "loads_moving", "loads_undecided", "flow_steps", "linear_systems")
+
+
+class CriticalForce(NamedTuple):
+    """Largest force pair on one contact under which grains come to rest, and the motion above."""
+
+    contact: int  # its number in the packing
+    low: float  # F_crit, force: largest load that ended at rest
+    high: float  # least load above that did not, or the limit load if none was tried
+    limit_load: float  # force
+    forces: np.ndarray  # (N_c, 2) equilibrium under `low`, on the ensemble's contacts
+    residual: float  # its unbalance with the load, ⟨f_n⟩, by Ensemble.residual
+    violation: float  # ⟨f_n⟩, by Ensemble.violation
+    moving: exact_step.Outcome | None  # the end under `high`; None where that was not tried
+    converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
+    counts: dict  # COUNTS
+    seconds: float
+
+
+class Response(NamedTuple):
+    """First motion above the critical force, scaled so that rms |u| of the backbone is 1."""
+
+    contact: int
+    force: float  # the load
+    displacement: np.ndarray  # (N, 2) u, intrinsic (without dilation); NaN for rattlers
+    rotation: np.ndarray  # (N,) rotation times radius; NaN for rattlers
+    dilation: float  # of the box, ΔL/L per unit of u, 1/length
+    opening: np.ndarray  # (N_c,) normal relative displacement of the ensemble's contacts
+    opened: np.ndarray  # (N_c,) bool, contacts without force
+    slid: np.ndarray  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
+    kept: np.ndarray  # (N_c,) bool, all others
+    breach: float  # of Coulomb's law, relative to the fastest relative velocity
+    fastest: float  # largest relative displacement at a contact
+    converged: bool  # breach ≤ STEADY
+
+
+@cancelling.cancellable
+def critical_force(
+    packing,
+    contact,
+    *,
+    mu=None,
+    limit_load=None,
+    precision=0.01,
+    rise=RISE,
+    max_steps=MOST_STEPS,
+    cancel=None,
+):
+    """F_crit of one contact (its number in the packing) with its bracket.
+
+    packing: a Packing, or its Ensemble. mu: friction coefficient, by default the packing's.
+    limit_load: force, computed if not given. precision: of the bracket, ⟨f_n⟩. rise: part of the
+    way from the last load at rest to the limit load that the next load goes. max_steps: of the flow
+    per load. cancel() returning True raises Cancelled.
+
+    Raises InputError for a contact that carries nothing in any state of S.
+    """
+    begin = time.perf_counter()
+    precision = positive(precision, "precision")
+    S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
+    (position,) = S.positions([contact])
+    if limit_load is None:
+        limit_load = limit_load_bounds(S, [contact]).load[0]
+    limit = float(limit_load) / S.force_scale
+    step = exact_step.make_step(S)
+    forces, low, high = starting_network(S) / S.force_scale, 0.0, limit
+    counts = dict.fromkeys(COUNTS, 0)
+    while True:
+        low, high, forces, moving = _bracket(
+            step, position, low, high, forces, precision, rise, max_steps, counts
+        )
+        if moving is None or moving.breach <= STEADY:
+            break
+        # What was taken for motion is followed on: it may come to rest after all.
+        followed = _relax(step, moving.forces, position, high, counts, STEADY_STEPS, STEADY)
+        if not followed.at_rest:
+            moving = followed
+            break
+        low, high, forces = high, limit, followed.forces
+    loaded = forces.copy()
+    loaded[position, 0] += low
+    return CriticalForce(
+        int(contact),
+        low * S.force_scale,
+        high * S.force_scale,
+        limit * S.force_scale,
+        forces * S.force_scale,
+        S.residual(loaded * S.force_scale),
+        S.violation(forces * S.force_scale),
+        moving,
+        bool(moving is None or moving.converged),
+        counts,
+        time.perf_counter() - begin,
+    )
+
+
+def _bracket(step, position, low, high, forces, precision, rise, max_steps, counts):
+    """Loads raised from `low` until rest and motion are `precision` apart, or rest reaches `high`.
+
+    Returns the bracket, the last equilibrium and the motion above it, None where there was none.
+    """
+    moving = None
+    while high - low > precision:
+        cancelling.check("critical force")
+        load = low + (rise if moving is None else 0.5) * (high - low)
+        load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
+        outcome = _relax(step, forces, position, load, counts, max_steps)
+        if outcome.at_rest:
+            low, forces = load, outcome.forces
+        else:
+            high, moving = load, outcome
+    return low, high, forces, moving
+
+
+def _relax(step, forces, position, load, counts, max_steps, steady=exact_step.STEADY):
+    outcome = exact_step.relax(step, forces, position, load, steady=steady, max_steps=max_steps)
+    counts["flow_steps"] += outcome.steps
+    counts["linear_systems"] += outcome.iterations
+    if outcome.at_rest:
+        counts["loads_at_rest"] += 1
+    else:
+        counts["loads_moving" if outcome.converged else "loads_undecided"] += 1
+    return outcome
+
+
+@cancelling.cancellable
+def response(packing, contact, force=None, *, mu=None, critical=None, precision=0.01, cancel=None):
+    """The first motion under a force pair on one contact, beyond its critical force.
+
+    force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩
+    above the limit load where the bracket ends there). critical: the CriticalForce, computed if not
+    given. The motion is that of one step of contact dynamics from rest, followed until Coulomb's
+    law is breached by at most STEADY of the fastest relative velocity. cancel() returning True
+    raises Cancelled.
+
+    Raises InputError where the grains come to rest under this load.
+    """
+    S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
+    if critical is None:
+        critical = critical_force(S, contact, precision=precision)
+    (position,), scale = S.positions([contact]), S.force_scale
+    step = exact_step.make_step(S)
+    moving = critical.moving
+    load = critical.high / scale + (precision if moving is None else 0.0)
+    if force is not None:
+        load, moving = float(force) / scale, None
+    if moving is None:
+        start = critical.forces / scale
+        moving = exact_step.relax(
+            step, start, position, load, steady=STEADY, max_steps=STEADY_STEPS
+        )
+    if moving.at_rest:
+        raise InputError(
+            f"the grains stay at rest under a force of {load * scale:.6g} on contact {contact}: "
+            "the critical force lies above"
+        )
+    return _response(S, step, int(contact), position, load * scale, moving)
+
+
+def _response(S, step, contact, position, load, moving):
+    velocity = exact_step.grain_velocities(S, moving.velocity)
+    unit = np.sqrt(np.mean(np.sum(velocity[:, :2] ** 2, axis=1)))
+    relative = exact_step.relative_velocities(step, moving.velocity) / unit
+    count = len(S.packing.r)
+    displacement, rotation = np.full((count, 2), np.nan), np.full(count, np.nan)
+    displacement[S.grains] = velocity[:, :2] / unit
+    rotation[S.grains] = velocity[:, 2] / unit
+    box = moving.velocity[S.pressure_row] if S.has_pressure_row else 0.0
+    normal, tangential = moving.forces.T
+    opened = normal <= 0
+    slid = ~opened & (np.abs(tangential) >= S.mu * normal)
+    return Response(
+        contact,
+        float(load),
+        displacement,
+        rotation,
+        float(box / unit / S.contacts.length.sum()),
+        relative[:, 0],
+        opened,
+        slid,
+        ~opened & ~slid,
+        moving.breach,
+        float(np.abs(relative).max()),
+        bool(moving.breach <= STEADY),
+    )

@@ -1,0 +1,91 @@
+"""How the motion under a force pair decays with distance: |u|(r) and its exponent α.
+
+|u|(r) is averaged over the grains of each shell, then over contacts, each field scaled to rms 1.
+α is the slope of −log⟨|u|⟩ against log r by least squares over the shells whose middle lies in the
+fit range, FIT_INNER mean diameters to FIT_OUTER of the shorter box side; its interval comes from
+contacts drawn anew, and exponents of all FIT_RANGES are kept beside it.
+"""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce import statistics
+
+FIT_INNER, FIT_OUTER = 1.5, 0.4
+FIT_RANGES = tuple(itertools.product((1.0, 1.5, 2.0, 3.0), (0.3, 0.4, 0.5)))
+
+
+class Decay(NamedTuple):
+    """The exponent of ⟨|u|⟩ ~ r^−α, and how sure it is."""
+
+    exponent: float  # α
+    low: float  # 95 % interval of α, from contacts drawn anew
+    high: float
+    fit: tuple  # smallest and largest r of the fit, length
+    ranges: np.ndarray  # (fits, 2) the same of other fits
+    exponents: np.ndarray  # (fits,) α of those
+
+
+def distances(packing, contact):
+    """Distance (N,) of every grain from the point of contact, by the nearest periodic image."""
+    c = packing.contacts
+    centre = packing.x[c.i[contact]] + c.arm_i[contact] * c.normal[contact]
+    apart = packing.x - centre
+    periodic = np.isfinite(packing.box)
+    side = np.where(periodic, packing.box, 1.0)
+    apart -= np.where(periodic, side * np.round(apart / side), 0.0)
+    return np.linalg.norm(apart, axis=1)
+
+
+def shells(packing):
+    """Edges of shells half a mean diameter wide, out to half the shorter side of the box."""
+    width = float(packing.r.mean())
+    return width * np.arange(int(_side(packing) / 2 / width) + 1)
+
+
+def _side(packing):
+    extent = np.where(np.isfinite(packing.box), packing.box, np.ptp(packing.x, axis=0))
+    return float(extent.min())
+
+
+def profile(packing, displacement, contact, edges):
+    """Mean |u| of the grains in shells around a contact, (shells,); NaN where there are none.
+
+    displacement (N, 2), NaN for grains that do not count; edges (shells + 1,): `distances`.
+    """
+    size = np.linalg.norm(displacement, axis=1)
+    known = np.isfinite(size)
+    shell = np.searchsorted(edges, distances(packing, contact), side="right") - 1
+    known &= (shell >= 0) & (shell < len(edges) - 1)
+    total = np.bincount(shell[known], size[known], len(edges) - 1)
+    grains = np.bincount(shell[known], minlength=len(edges) - 1)
+    return np.where(grains > 0, total / np.maximum(grains, 1), np.nan)
+
+
+def decay(packing, radius, profiles):
+    """The Decay of profiles (contacts, shells) with the middles (shells,) of their shells."""
+    diameter, side = 2 * float(packing.r.mean()), _side(packing)
+    ranges = np.array([(a * diameter, b * side) for a, b in FIT_RANGES])
+    fit = FIT_INNER * diameter, FIT_OUTER * side
+
+    def exponent(*rows):
+        return decay_exponent(radius, np.array(rows), *fit)
+
+    alpha, low, high = statistics.bootstrap(lambda rows: exponent(*rows), [profiles])
+    others = np.array([decay_exponent(radius, profiles, *other) for other in ranges])
+    return Decay(alpha, low, high, fit, ranges, others)
+
+
+def decay_exponent(radius, profiles, inner, outer):
+    """α of ⟨|u|⟩ ~ r^−α over inner ≤ r ≤ outer; radius (shells,), profiles (contacts, shells).
+
+    NaN where fewer than three shells hold grains.
+    """
+    profiles = np.asarray(profiles)
+    known = np.isfinite(profiles).any(axis=0) & (radius >= inner) & (radius <= outer)
+    if known.sum() < 3:
+        return float("nan")
+    mean = np.nanmean(profiles[:, known], axis=0)
+    return float(-np.polyfit(np.log(radius[known]), np.log(mean), 1)[0])

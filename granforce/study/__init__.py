@@ -1,0 +1,1 @@
+"""Results that are kept: kinds, cells, schema, store, scans."""

@@ -1,0 +1,107 @@
+"""Exact bounds, limit loads and outlines, of S and of its stresses, as datasets."""
+
+import json
+
+from granforce import measures
+from granforce.study.schema import labelled
+
+# Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
+UNDETERMINED = 1e-6
+
+
+def intervals_dataset(S, bounds, *, seconds=0.0):
+    """Intervals as a dataset, with their measures and the clusters of undetermined contacts."""
+    low, high = bounds.lower, bounds.upper
+    place = S.positions(bounds.contacts)
+    original = S.original[place]
+    tolerance = UNDETERMINED * S.force_scale
+    i, j = S.contacts.i[place], S.contacts.j[place]
+    cluster, _ = measures.undetermined_clusters(i, j, high - low, tolerance)
+    extent = measures.normal_extent(low, high)
+    return labelled(
+        {
+            "backbone": bounds.contacts,
+            "original": original,
+            "low": low,
+            "high": high,
+            "interval_gap": bounds.gap,
+            "max_gap": bounds.max_gap,
+            "position": measures.position_in_interval(original[:, 0], low, high),
+            "cluster": cluster,
+            "eta3": measures.eta3(low, high),
+            "correlation": measures.correlation(original[:, 0], extent),
+            "dimension": S.dimension,
+            "coordination": S.coordination,
+            "force_scale": S.force_scale,
+            **S.skipped,
+            "seconds": seconds,
+        },
+        {"counts": json.dumps(bounds.counts)},
+    )
+
+
+def informative_dataset(S, found, *, seconds=0.0):
+    """An Informative as a dataset; its contacts are its backbone, the best first."""
+    return labelled(
+        {
+            "backbone": found.contacts,
+            "part_expected": found.expected,
+            "mean_before": found.before,
+            "mean_after": found.after,
+            "dimension": S.dimension,
+            "force_scale": S.force_scale,
+            "seconds": seconds,
+        }
+    )
+
+
+def limit_loads_dataset(S, loads, *, seconds=0.0):
+    """LimitLoads as a dataset."""
+    return labelled(
+        {
+            "backbone": loads.contacts,
+            "original": S.original[S.positions(loads.contacts)],
+            "limit_load": loads.load,
+            "load_gap": loads.gap,
+            "max_gap": loads.max_gap,
+            "force_scale": S.force_scale,
+            "seconds": seconds,
+        },
+        {"counts": json.dumps(loads.counts)},
+    )
+
+
+def stress_dataset(S, found, *, seconds=0.0):
+    """A StressOutline as a dataset."""
+    return labelled(
+        {
+            "stress_angle": found.angles,
+            "stress_support": found.support,
+            "stress_gap": found.gap,
+            "stress_inner": found.inner,
+            "stress_outer": found.outer,
+            "stress_own": found.own,
+            "friction": found.friction,
+            "friction_bound": found.friction_bound,
+            "dimension": S.dimension,
+            "seconds": seconds,
+        },
+        {"counts": json.dumps(found.counts)},
+    )
+
+
+def outline_dataset(S, axes, found, *, seconds=0.0):
+    """An Outline in the plane of these axes (2, N_c, 2) as a dataset."""
+    return labelled(
+        {
+            "backbone": S.index,
+            "axes": axes,
+            "inner": found.inner,
+            "outer": found.outer,
+            "outline_gap": found.gap,
+            "programs": found.counts["programs"],
+            "force_scale": S.force_scale,
+            "seconds": seconds,
+        },
+        {"counts": json.dumps(found.counts)},
+    )

@@ -1,0 +1,56 @@
+"""What is prescribed and known, as parameters of entries: plain, and absent where it is usual."""
+
+import numpy as np
+
+from granforce.forces.knowledge import Known
+from granforce.records import InputError, float_array, whole
+
+PRESCRIBED = "pressure", "stress", "none"
+
+
+def conditions(prescribed="pressure", stress=None, known=None):
+    """The parameters of conditions other than the pressure alone.
+
+    known: a Known, or rows [contact, least f_n, largest f_n, least f_t, largest f_t] with None
+    where nothing is known. Raises InputError for what no packing could be asked.
+    """
+    if prescribed not in PRESCRIBED:
+        raise InputError(f"prescribed must be pressure, stress or none, got {prescribed!r:.40}")
+    if stress is not None and prescribed != "stress":
+        raise InputError("a stress is given, but not prescribed: prescribe the stress")
+    named = {} if prescribed == "pressure" else {"prescribed": prescribed}
+    if stress is not None:
+        named["stress"] = float_array(stress, (3,), "stress").tolist()
+    rows = [] if known is None else _rows(known)
+    return named | ({"known": rows} if rows else {})
+
+
+def _rows(known):
+    """Rows of bounds, sorted by contact."""
+    if isinstance(known, Known):
+        contacts, low, high = known
+        bounds = np.stack([low, high], axis=-1).reshape(-1, 4)
+        known = [[c, *row] for c, row in zip(contacts, bounds.tolist(), strict=True)]
+    try:
+        rows = [[contact, *bounds] for contact, *bounds in known]
+    except (TypeError, ValueError):
+        rows = [[]]
+    if any(len(row) != 5 for row in rows):
+        raise InputError("known forces are rows of a contact and four bounds: f_n, then f_t")
+    named = []
+    for contact, *bounds in rows:
+        bounds = [None if b is None or np.isinf(b) else float(b) for b in bounds]
+        named.append([whole(contact, "the number of a contact"), *bounds])
+    return sorted(named, key=lambda row: row[0])
+
+
+def of(parameters):
+    """Arguments of `ensemble` for the conditions among the parameters of an entry."""
+    given = {name: parameters[name] for name in ("prescribed", "stress") if name in parameters}
+    if "known" in parameters:
+        rows = np.array(parameters["known"], dtype=np.float64)  # None becomes NaN
+        bounds = rows[:, 1:].reshape(-1, 2, 2)
+        low, high = bounds[..., 0], bounds[..., 1]
+        low, high = np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
+        given["known"] = Known(rows[:, 0].astype(np.int64), low, high)
+    return given

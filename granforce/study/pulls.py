@@ -1,0 +1,129 @@
+"""Networks for whoever pulls: along the interval of a contact's f_n, or over a plane of S.
+
+Nothing is kept in a store: a rail or a fan takes some tenths of a second at 400 disks.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from granforce.explore.outline import extremes
+from granforce.explore.pull import pull, reach
+from granforce.forces.ensemble import ensemble
+from granforce.forces.nearest import nearest
+from granforce.records import InputError
+from granforce.study import conditions
+
+STOPS = 17  # networks along a rail
+RIBS = 48  # directions of a fan
+
+
+class Rail(NamedTuple):
+    """Networks of S in which f_n of one contact goes from its least to its largest value."""
+
+    lower: float  # exact bounds, force
+    upper: float
+    values: np.ndarray  # (k,) f_n of the contact in the states, force, ascending
+    states: np.ndarray  # (k, N_c, 2) the networks nearest to the one pulled, force
+    residual: np.ndarray  # (k,) in ⟨f_n⟩
+    opened: np.ndarray  # (2, N_c) bool, contacts without force at the lower and the upper end
+    sliding: np.ndarray  # (2, N_c) bool, contacts at the limit of friction there
+
+
+class Fan(NamedTuple):
+    """Networks of S at the corners of a convex polygon, almost the outline of S in a plane."""
+
+    points: np.ndarray  # (k, 2) corners, left about: (axes[0]·F, axes[1]·F)/⟨f_n⟩
+    states: np.ndarray  # (k, N_c, 2) networks that lie there, force
+    residual: np.ndarray  # (k,) in ⟨f_n⟩
+
+
+class Puller:
+    """Pulls contacts of one packing at one friction; keeps what all pulls have in common."""
+
+    def __init__(self, packing, mu, known=None):
+        """known: forces that no pull changes, as for `conditions.conditions`."""
+        self._S = ensemble(packing, mu, **conditions.of(conditions.conditions(known=known)))
+
+    def rail(self, contact, state, stops=STOPS):
+        """The Rail of a contact (its number in the packing) for the network `state` (N_c, 2).
+
+        Raises what `pull` and `reach` raise.
+        """
+        ends = reach(self._S, contact)
+        (position,) = self._S.positions([contact])
+        here = np.clip(state[position, 0], ends.lower, ends.upper)
+        # The network itself is among them, so that nothing jumps when it is taken in hand.
+        values = np.union1d(np.linspace(ends.lower, ends.upper, stops), here)
+        found = pull(self._S, contact, values, state)
+        sliding = ends.sliding != 0
+        bounds = ends.lower, ends.upper
+        return Rail(*bounds, found.values, found.states, found.residual, ends.opened, sliding)
+
+    def at(self, contact, value, state):
+        """The network (N_c, 2) nearest to `state` with f_n = value on a contact, and its residual.
+
+        Raises what `pull` raises.
+        """
+        found = pull(self._S, contact, [value], state)
+        return found.states[0], float(found.residual[0])
+
+    def fan(self, axes):
+        """The Fan of the plane of two axes (2, N_c, 2).
+
+        Raises InputError where S is a line or a point in this plane, and what `outline` raises.
+        """
+        S = self._S
+        ends = extremes(S, axes, np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]))
+        width = np.ptp(self._points(axes, ends), axis=0)
+        angle = 2 * np.pi * np.arange(RIBS) / RIBS
+        around = np.column_stack([np.cos(angle), np.sin(angle)]) / np.maximum(width, 1e-9)
+        states = np.concatenate([ends, extremes(S, axes, around)])
+        points = self._points(axes, states)
+        try:
+            corners = ConvexHull(points).vertices
+        except QhullError:
+            raise InputError("S is no area in this plane: the point cannot be pulled") from None
+        return Fan(points[corners], states[corners], S.residual(states[corners]))
+
+    def _points(self, axes, states):
+        return np.tensordot(states, axes, ((1, 2), (1, 2))) / self._S.force_scale
+
+    def mixed(self, fan, axes, point, state):
+        """The network (N_c, 2) at a point (2,) of a fan, and its residual.
+
+        On a straight line with `state` and a network of the polygon's edge behind it, all of which
+        is in S; of a point outside the polygon, the nearest one of its edge is meant. `state` may
+        be rounded: the network of S nearest to it is taken.
+        """
+        state = nearest(self._S, state).forces
+        (here,) = self._points(axes, state[None])
+        k, (a, b) = _triangle(fan.points, here, _inside(fan.points, np.asarray(point, float)))
+        after = (k + 1) % len(fan.points)
+        forces = (1 - a - b) * state + a * fan.states[k] + b * fan.states[after]
+        return forces, float(self._S.residual(forces[None])[0])
+
+
+def _inside(corners, point):
+    """The point, or the nearest one of the polygon's edge where it lies outside."""
+    edge = np.roll(corners, -1, axis=0) - corners
+    away = point - corners
+    if np.all(edge[:, 0] * away[:, 1] >= edge[:, 1] * away[:, 0]):
+        return point
+    along = np.clip((edge * away).sum(axis=1) / (edge**2).sum(axis=1), 0, 1)
+    nearest = corners + along[:, None] * edge
+    return nearest[np.argmin(((nearest - point) ** 2).sum(axis=1))]
+
+
+def _triangle(corners, here, point):
+    """(k, weights (2,)): in which triangle of `here` and corners k, k + 1 a point lies, and how."""
+    first, second, away = corners - here, np.roll(corners, -1, axis=0) - here, point - here
+    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a = (away[0] * second[:, 1] - away[1] * second[:, 0]) / area
+        b = (first[:, 0] * away[1] - first[:, 1] * away[0]) / area
+    short = np.minimum(np.minimum(a, b), 1 - a - b)
+    k = int(np.argmax(np.where(np.isfinite(short), short, -np.inf)))
+    weights = np.clip([a[k], b[k]], 0, 1)
+    return k, weights / max(1.0, weights.sum())

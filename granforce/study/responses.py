@@ -1,0 +1,74 @@
+"""What perturbed contacts say, as datasets: critical forces, first motions, |u|(r) and α."""
+
+import json
+
+import numpy as np
+import xarray as xr
+
+from granforce.perturb import critical_force as perturb
+from granforce.perturb import decay
+from granforce.study.schema import labelled
+
+
+def contact_dataset(S, contact, limit_load, *, precision, **protocol):
+    """One perturbed contact (its number in the packing) as a dataset.
+
+    limit_load: force, or None to compute it. precision, protocol: as for `critical_force`.
+    """
+    critical = perturb.critical_force(
+        S, contact, limit_load=limit_load, precision=precision, **protocol
+    )
+    moved = perturb.response(S, contact, critical=critical, precision=precision)
+    edges = decay.shells(S.packing)
+    (position,) = S.positions([contact])
+    return labelled(
+        {
+            "backbone": [contact],
+            "limit_load": [critical.limit_load],
+            "critical_low": [critical.low],
+            "critical_high": [critical.high],
+            "load_residual": [critical.residual],
+            "load_violation": [critical.violation],
+            "motion_breach": [moved.breach],
+            "pair_opening": [moved.opening[position]],
+            "opened": [moved.opened.sum()],
+            "slid": [moved.slid.sum()],
+            "kept": [moved.kept.sum()],
+            "displacement": moved.displacement[None],
+            "shell_radius": (edges[1:] + edges[:-1]) / 2,
+            "profile": decay.profile(S.packing, moved.displacement, contact, edges)[None],
+            **{name: [count] for name, count in critical.counts.items()},
+            "contact_seconds": [critical.seconds],
+        }
+    )
+
+
+def perturbation_dataset(S, parts):
+    """The datasets of single contacts as one, with ⟨F_crit⟩, ⟨|u|⟩(r) and α."""
+    whole = xr.concat(parts, "contact", data_vars="minimal", coords="minimal", compat="override")
+    found = decay.decay(S.packing, whole["shell_radius"].values, whole["profile"].values)
+    scalars = labelled(
+        {
+            "critical_force": float(whole["critical_low"].mean()) / S.force_scale,
+            "decay_exponent": found.exponent,
+            "decay_low": found.low,
+            "decay_high": found.high,
+            "fit_inner": found.ranges[:, 0],
+            "fit_outer": found.ranges[:, 1],
+            "fit_exponent": found.exponents,
+            "dimension": S.dimension,
+            "force_scale": S.force_scale,
+            **S.skipped,
+            "seconds": float(whole["contact_seconds"].sum()),
+        },
+        {"fit_range": json.dumps(found.fit)},
+    )
+    return whole.merge(scalars, combine_attrs="drop_conflicts")
+
+
+def moved_grains(packing, dataset):
+    """Distance (k,) from the first contact's point, and |u| (k,), of the grains that count."""
+    u = dataset["displacement"].values[0]
+    counts = np.isfinite(u).all(axis=1)
+    distance = decay.distances(packing, dataset["backbone"].values[0])
+    return distance[counts], np.linalg.norm(u[counts], axis=1)

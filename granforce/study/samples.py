@@ -1,0 +1,134 @@
+"""States of S, from whatever sampler, as datasets with all their measures."""
+
+import numpy as np
+
+from granforce import measures
+from granforce.study.schema import labelled
+
+
+def walk_dataset(S, done, *, keep=None, seconds=0.0):
+    """A Walk with its measures as a dataset; `keep` evenly spaced states are kept, or all."""
+    pick = _picked(len(done.states), keep)
+    return labelled(
+        {
+            **_measured(S, done.states, pick),
+            "residual": done.residual[pick],
+            "violation": done.violation[pick],
+            "sweeps": done.sweeps[pick],
+            "attempts": done.attempts[pick],
+            "mean_sweeps": done.sweeps.mean() if len(done.sweeps) else np.nan,
+            "acceptance": done.acceptance,
+            **done.counts,
+            **S.skipped,
+            "seconds": seconds,
+        }
+    )
+
+
+def uniform_dataset(S, drawn, *, keep=None, seconds=0.0):
+    """A UniformSample with its measures as a dataset; states kept as in `walk_dataset`."""
+    pick = _picked(len(drawn.flat), keep)
+    mixing = drawn.mixing
+    return labelled(
+        {
+            **_measured(S, drawn.flat, pick),
+            "residual": drawn.residual.ravel()[pick],
+            "violation": drawn.violation.ravel()[pick],
+            "chain": drawn.chain[pick],
+            "r_hat": mixing.r_hat,
+            "bulk_size": mixing.bulk,
+            "tail_size": mixing.tail,
+            "worst_r_hat": mixing.worst_r_hat,
+            "least_bulk_size": mixing.least_bulk,
+            "least_tail_size": mixing.least_tail,
+            "reached": drawn.reached,
+            **drawn.counts,
+            **S.skipped,
+            "setup_seconds": drawn.setup_seconds,
+            "sampling_seconds": drawn.sampling_seconds,
+            "seconds": seconds,
+        }
+    )
+
+
+def inference_dataset(S, found, measured, sigma, sure=None, *, keep=None, seconds=0.0):
+    """An Inference and what it came from as a dataset; draws kept as in `walk_dataset`.
+
+    sure: a Carrying of contacts that were not measured, if it was asked for.
+    """
+    arrays = {
+        "backbone": S.index,
+        "original": S.original,
+        "measured": measured,
+        "sigma": sigma,
+        "inferred": found.forces,
+        "deviation": found.deviation,
+        "suspect": found.suspects,
+        "chi_square": found.chi_square,
+        "freedom": found.freedom,
+        "force_scale": S.force_scale,
+        "dimension": S.dimension,
+        **S.skipped,
+        "seconds": seconds,
+    }
+    if sure is not None:
+        arrays["least_normal"] = np.full(len(S.index), np.nan)
+        arrays["least_normal"][S.positions(sure.contacts)] = sure.least
+    if found.draws is not None:
+        drawn, worth = found.draws, found.draws.mixing
+        pick = _picked(len(drawn.flat), keep)
+        arrays |= {
+            "states": drawn.flat[pick],
+            "residual": drawn.residual.ravel()[pick],
+            "violation": drawn.violation.ravel()[pick],
+            "chain": drawn.chain[pick],
+            "expected": found.mean,
+            "standard_error": found.error,
+            "worst_r_hat": worth.worst_r_hat,
+            "least_bulk_size": worth.least_bulk,
+            "least_tail_size": worth.least_tail,
+            "reached": drawn.reached,
+            **drawn.counts,
+            "setup_seconds": drawn.setup_seconds,
+            "sampling_seconds": drawn.sampling_seconds,
+        }
+    return labelled(arrays)
+
+
+def _picked(count, keep):
+    if keep is None or keep >= count:
+        return slice(None)
+    return np.linspace(0, count - 1, keep).astype(int)
+
+
+def _measured(S, states, pick):
+    """What any states say: measures of all, and those that are picked; NaN where there are none."""
+    known = {
+        "states": states[pick],
+        "backbone": S.index,
+        "original": S.original,
+        "packing_fraction": S.packing.packing_fraction,
+        "coordination": S.coordination,
+        "dimension": S.dimension,
+        "force_scale": S.force_scale,
+    }
+    if not len(states):
+        unknown = np.full(S.original.shape, np.nan)
+        return known | {"distance_to_centre": [], "low": unknown, "high": unknown}
+    centre = measures.mean_network(states)
+    low, high = measures.intervals_seen(states)
+    extent = measures.normal_extent(low, high)
+    in_error = measures.correlation_range(states, extent)
+    distance = measures.distances(states, centre) / S.force_scale
+    return known | {
+        "distance_to_centre": distance[pick],
+        "low": low,
+        "high": high,
+        "eta1": measures.eta1(states),
+        "eta2": measures.eta2(states),
+        "eta3": measures.eta3(low, high),
+        "correlation": measures.correlation(S.original[:, 0], extent),
+        "correlation_low": in_error[0],
+        "correlation_high": in_error[1],
+        "original_distance": measures.distances(S.original[None], centre)[0] / S.force_scale,
+    }

@@ -1,0 +1,229 @@
+"""Scans: many cells computed over processes or over a dask cluster, each kept as it ends.
+
+Cells are independent and seeded, so a scan gives the same result for any number of workers, and
+one that was cut short, or lost a worker, goes on where it was.
+"""
+
+import multiprocessing
+import os
+import signal
+import socket
+import threading
+import warnings
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from pathlib import Path
+
+from granforce.explore.intervals import intervals
+from granforce.explore.random_walk import walk
+from granforce.explore.uniform import sample_uniform
+from granforce.forces.ensemble import ensemble
+from granforce.packing.compaction import pack
+from granforce.perturb.critical_force import critical_force
+from granforce.records import InputError
+from granforce.study import kinds
+from granforce.study.cells import Cell, get, load, row
+from granforce.study.store import open_store
+from granforce.system.terminal import one_line
+
+CELL_BYTES = 2000  # of memory, that a cell takes until it is computed
+
+TRIES = 3  # a cell under way when a worker died is begun anew so often: it may have been its fault
+
+_SINGLE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def scan(path, cells, *, on_row=None, **options):
+    """Run walks (their parameters); see `run` for the options.
+
+    on_row(row) after each walk. Returns the rows in the order of the cells and a list of (walk
+    parameters, error message).
+    """
+    store, rows = open_store(path), {}
+    named = [Cell(kinds.WALK, parameters) for parameters in cells]
+
+    def done(k, cached):
+        rows[k] = row(cells[k], load(store, *named[k]), cached)
+        if on_row is not None:
+            on_row(rows[k])
+
+    failed = run(path, named, on_done=done, **options)
+    return [rows[k] for k in sorted(rows)], [(cell.parameters, text) for cell, text in failed]
+
+
+def run(path, cells, *, workers=2, scheduler=None, dtypes=None, progress=None, on_done=None):
+    """Compute cells into the store at path, on one processor each; finished ones are found.
+
+    workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
+    the same folder, in place of processes. dtypes: as for Store.save, for the states.
+    progress(cells done, cells in all) counts quarters of cells and never goes back;
+    on_done(position in cells, whether it was found) after each. Returns a list of (cell, error
+    message). Interrupted, it loses the cells under way only, and workers end with this process.
+    Raises InputError where the scheduler cannot be reached.
+    """
+    store = open_store(path)
+    todo = []
+    for k, cell in enumerate(cells):
+        if load(store, *cell) is None:
+            todo.append(k)
+        elif on_done is not None:
+            on_done(k, True)
+    failed = {}
+    ended, reached = 0, 0.0
+
+    def tell(parts):
+        # Cells may be counted as ended before they are seen to be, and anew where a worker died:
+        # progress goes forward only, in quarters of cells, which add up exactly.
+        nonlocal reached
+        reached = max(reached, min(int(4 * parts) / 4, len(todo)))
+        if progress is not None:
+            progress(reached, len(todo))
+
+    def finished(k, get_result):
+        nonlocal ended
+        try:
+            cached = get_result()
+        except InputError as error:
+            failed[k] = str(error)
+        else:
+            if on_done is not None:
+                on_done(k, cached)
+        ended += 1
+        tell(ended)
+
+    if todo:
+        tasks = {k: (str(store.path), cells[k], dtypes) for k in todo}
+        if scheduler is None:
+            _over_processes(tasks, workers, finished, tell)
+        else:
+            _over_dask(tasks, scheduler, finished)
+    return [(cells[k], failed[k]) for k in sorted(failed)]
+
+
+def _over_processes(tasks, workers, finished, advanced):
+    warm_up()
+    count = len(tasks)
+    for _ in range(TRIES):
+        before = count - len(tasks)
+        tasks = _one_pool(tasks, workers, finished, advanced, before)
+        if not tasks:
+            return
+    for k in tasks:
+        finished(k, _lost)
+
+
+def _lost():
+    raise InputError(f"worker processes died {TRIES} times at it, or at cells beside it")
+
+
+def _one_pool(tasks, workers, finished, advanced, before):
+    """Run tasks over processes, `before` have ended; those that a dead worker left are returned."""
+    context = multiprocessing.get_context("spawn")
+    counter = context.Value("d", 0.0)
+    left = dict(tasks)
+    workers = min(workers, len(tasks))
+    pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
+    try:
+        with _single_threaded():
+            waiting = {pool.submit(run_cell, *task): k for k, task in tasks.items()}
+        while waiting:
+            ended, _ = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
+            for future in ended:
+                k = waiting.pop(future)
+                if not isinstance(future.exception(), BrokenProcessPool):
+                    finished(k, future.result)
+                    del left[k]
+            advanced(before + counter.value)
+    except BaseException:
+        # Workers would go on with the cell under way: what they hold is lost either way.
+        for process in list(pool._processes.values()):
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+    return left
+
+
+@contextmanager
+def _single_threaded():
+    """Processes started meanwhile use one thread in linear algebra: cells, not rows, are shared."""
+    before = {name: os.environ.get(name) for name in _SINGLE}
+    os.environ.update(dict.fromkeys(_SINGLE, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+_counter = None
+
+
+def _share(counter):
+    global _counter
+    _counter = counter
+    # Ctrl-C goes to the whole process group: the parent ends the workers, each without a word.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    warnings.formatwarning = one_line
+
+
+def _end_with_parent():
+    """A worker whose parent was killed has nobody to compute for."""
+    multiprocessing.parent_process().join()
+    os._exit(1)
+
+
+def run_cell(path, cell, dtypes=None):
+    """Compute one cell into the store at path; whether it was there. Runs in a worker process."""
+    if not Path(path, "zarr.json").exists():
+        raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
+    seen = 0.0
+
+    def count(done, total):
+        nonlocal seen
+        if _counter is not None and total:
+            part = min(done / total, 1.0)
+            with _counter.get_lock():
+                _counter.value += part - seen
+            seen = part
+
+    # The steps of a compaction are not known beforehand.
+    progress = None if cell.kind == kinds.PACKING else count
+    _, cached = get(open_store(path), *cell, workers=1, dtypes=dtypes, progress=progress)
+    count(1, 1)
+    return cached
+
+
+def _over_dask(tasks, scheduler, finished):
+    """Run tasks over the workers of a dask scheduler, which begins those of lost workers anew."""
+    try:
+        from dask.distributed import Client, KilledWorker, as_completed
+    except ImportError:
+        raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
+    try:
+        client = Client(scheduler, timeout=10)
+    except (OSError, ValueError) as error:
+        raise InputError(f"no dask scheduler at {scheduler}: {error}") from None
+    with client:
+        waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
+        try:
+            for future in as_completed(list(waiting)):
+                dead = isinstance(future.exception(), KilledWorker)
+                finished(waiting[future], _lost if dead else future.result)
+        except BaseException:
+            client.cancel(list(waiting))
+            raise
+
+
+def warm_up():
+    """Compile (or load from numba's cache) every kernel once, before workers do it each."""
+    S = ensemble(pack(12, 0.5, 0))
+    walk(S, 2, 0)
+    intervals(S, S.index[:1])
+    sample_uniform(S, 4)
+    critical_force(S, int(S.index[0]))

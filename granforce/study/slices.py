@@ -1,0 +1,35 @@
+"""The inner part of a packing, whose surroundings are frozen at their original forces."""
+
+import numpy as np
+
+from granforce.records import InputError
+
+
+def edges(given):
+    """x0, x1, y0, y1 of a slice as floats; InputError unless 0 ≤ x0 < x1 ≤ 1, y alike."""
+    try:
+        x0, x1, y0, y1 = (float(edge) for edge in given)
+    except (TypeError, ValueError):
+        raise InputError("a slice is given by four numbers x0,x1,y0,y1") from None
+    if not (0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1):
+        raise InputError(
+            f"slice {x0:g},{x1:g},{y0:g},{y1:g} must satisfy 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1"
+        )
+    return [x0, x1, y0, y1]
+
+
+def outside(packing, slice_):
+    """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (parts of the box).
+
+    Raises InputError unless 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1.
+    """
+    x0, x1, y0, y1 = edges(slice_)
+    place = np.mod(packing.x, packing.box) / packing.box
+    inside = np.all((place >= (x0, y0)) & (place <= (x1, y1)), axis=1)
+    contacts = packing.contacts
+    # A contact that reaches across the box's edge leaves the slice even if both grains are in it.
+    step = (
+        packing.x[contacts.j] - packing.x[contacts.i] - contacts.normal * contacts.length[:, None]
+    )
+    crossing = np.any(np.abs(step) > 0.5 * packing.box, axis=1)
+    return ~(inside[contacts.i] & inside[contacts.j]) | crossing

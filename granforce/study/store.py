@@ -1,0 +1,577 @@
+"""The store: a content-addressed cache of datasets in Zarr.
+
+A store is a folder and a Zarr v3 group; each entry is a sub-group `<kind>-<key>` that zarr and
+xarray open too. The key is a hash of kind, parameters (seed among them), algorithm and schema
+version, so an entry is never changed: it is there and whole, or it is not there.
+"""
+
+import functools
+import hashlib
+import json
+import math
+import os
+import re
+import secrets
+import shutil
+import socket
+import stat
+import time
+import warnings
+from collections.abc import Mapping
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import platformdirs
+import xarray as xr
+import zarr
+from zarr.codecs import ZstdCodec
+from zarr.core.metadata import ArrayV3Metadata
+
+from granforce.records import InputError
+from granforce.study.schema import VARIABLES, declared, to_builtin
+from granforce.system.files import expanded
+from granforce.tolerances import MU_DIGITS
+
+# Raised when the meaning of a stored array changes; entries of another schema are never found.
+SCHEMA_VERSION = 1
+
+LOCATION_VARIABLE = "GRANFORCE_CACHE"  # environment variable naming the store's folder
+KEY_DIGITS = 20  # 80 bits: no collision among any number of entries that fits a disk
+STATES_PER_CHUNK = 100  # frames are read one by one; 100 × 700 contacts are 1.1 MB
+STALE_SECONDS = 3600.0  # a temporary untouched for this long has lost its writer
+
+_ENTRY = re.compile(rf"[a-z][a-z0-9_]*-[0-9a-f]{{{KEY_DIGITS}}}")
+_LIBRARIES = ("granforce", "numpy", "numba", "xarray", "zarr")
+_IDENTITY = ("kind", "parameters", "seed", "algorithm_version", "schema_version")
+_PROVENANCE = ("created", "checksum", *(f"{library}_version" for library in _LIBRARIES))
+
+
+class Entry(NamedTuple):
+    """What the store knows of one entry without reading its arrays."""
+
+    name: str  # folder in the store: <kind>-<key>
+    kind: str
+    params: dict  # as they entered the key: floats to 9 significant digits
+    version: int | str  # of the algorithm
+    bytes: int  # on disk
+    created: str  # UTC, ISO 8601
+
+
+class Verdict(NamedTuple):
+    """Whether one entry is whole; if not, the reason in words."""
+
+    name: str
+    ok: bool
+    reason: str
+
+
+def canonical(value):
+    """Canonical JSON of parameters: equal values give equal text.
+
+    Floats are rounded to 9 significant digits and 1.0 is 1; numpy scalars, tuples and nested
+    dicts are taken. Raises TypeError for anything else, non-finite numbers included.
+    """
+    return json.dumps(_plain(value, "parameters"), sort_keys=True, separators=(",", ":"))
+
+
+def _plain(value, where):
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return _quantised(value, where)
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, f"{where}[{k}]") for k, item in enumerate(value)]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain(item, f"{where}[{key!r}]") for key, item in value.items()}
+    raise TypeError(
+        f"{where} cannot enter a key: {type(value).__name__} {value!r:.60} "
+        "(use numbers, strings, None, lists, or dicts with string keys)"
+    )
+
+
+def _quantised(value, where):
+    # The shortest text first: a float32 0.1 means 0.1, not 0.100000001.
+    number = float(str(value)) if isinstance(value, np.floating) else value
+    if not math.isfinite(number):
+        raise TypeError(f"{where} cannot enter a key: {value} is not finite")
+    number = float(f"{number:.{MU_DIGITS}g}")
+    return int(number) if number.is_integer() and abs(number) < 2**53 else number
+
+
+def default_path():
+    """$GRANFORCE_CACHE if set, else the user's cache folder for granforce."""
+    location = os.environ.get(LOCATION_VARIABLE) or platformdirs.user_cache_dir("granforce")
+    return Path(location)
+
+
+def open_store(path=None, *, readonly=False):
+    """The store in a folder (by default `default_path()`), made if missing unless readonly.
+
+    A folder that cannot be written is opened all the same; saving to it raises InputError.
+
+    Raises InputError for a file, for a folder that holds something else, for one that cannot be
+    made, for a store of a newer schema, unless readonly, and, if readonly, for a missing store.
+    """
+    path = _located(path)
+    if not path.is_dir() and readonly:
+        raise InputError(f"there is no store at {path}; check the path or open it for writing")
+    store = Store(path, readonly=readonly)
+    if not readonly:
+        _refuse_newer(path)
+    if _schema(path) is None:
+        _refuse_foreign(path)
+        if not store._names():  # entries without a root are readable, and saving makes it anew
+            if readonly:
+                raise InputError(f"{path} is empty, not a store; check the path")
+            with store._writing():
+                _create_root(path)
+    if not readonly:
+        with suppress(InputError):  # a folder that cannot be written can still be read
+            store.clean()
+    return store
+
+
+def _located(path):
+    """The absolute path of a store; InputError for a file and for what cannot be a path."""
+    path = expanded(default_path() if path is None else path).absolute()
+    try:
+        is_file = not stat.S_ISDIR(path.stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        return path
+    except OSError as error:
+        raise InputError(f"{path} cannot be a store: {error.strerror}") from None
+    if is_file:
+        raise InputError(f"{path} is a file, not a store; give a folder")
+    return path
+
+
+def _schema(path):
+    """The schema version of the store in a folder, or None where it holds no root of a store."""
+    try:
+        version = json.loads((path / "zarr.json").read_bytes())["attributes"]["granforce_store"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    return version if isinstance(version, int) else None
+
+
+def _refuse_newer(path):
+    """Raise InputError for a store of a newer schema: what it may hold is not known here."""
+    schema = _schema(path)
+    if schema is not None and schema > SCHEMA_VERSION:
+        raise InputError(
+            f"the store {path} was made by a newer granforce (schema {schema}, here "
+            f"{SCHEMA_VERSION}): update granforce, or give another folder"
+        )
+
+
+def _refuse_foreign(path):
+    """Raise InputError if the folder holds anything that is neither hidden nor an entry.
+
+    A damaged zarr.json among nothing but entries is ours.
+    """
+    if not path.is_dir():
+        return
+    try:
+        visible = [item.name for item in path.iterdir() if not item.name.startswith(".")]
+    except OSError as error:
+        raise InputError(f"the folder {path} cannot be read: {error.strerror}") from None
+    entries = [name for name in visible if _ENTRY.fullmatch(name)]
+    others = set(visible) - set(entries) - ({"zarr.json"} if entries else set())
+    if others:
+        raise InputError(
+            f"{path} is not a store: it holds {min(others)!r}; give an empty or a new folder"
+        )
+
+
+def _create_root(path):
+    path.mkdir(parents=True, exist_ok=True)
+    root = {
+        "zarr_format": 3,
+        "node_type": "group",
+        "attributes": {"granforce_store": SCHEMA_VERSION},
+    }
+    temporary = path / _temporary_name()
+    temporary.write_text(json.dumps(root, indent=2))
+    os.replace(temporary, path / "zarr.json")
+
+
+class Store(Mapping):
+    """A folder of entries as a mapping from entry name to lazily opened xr.Dataset.
+
+    Made by `open_store`. Entries whose metadata cannot be read are left out.
+    """
+
+    def __init__(self, path, *, readonly=False):
+        self.path = path
+        self.readonly = readonly
+
+    def __repr__(self):
+        return f"Store({str(self.path)!r}, readonly={self.readonly})"
+
+    def __iter__(self):
+        return (name for name in self._names() if self._attrs(name) is not None)
+
+    def __len__(self):
+        return sum(1 for _ in self)
+
+    def __contains__(self, name):
+        return isinstance(name, str) and _ENTRY.fullmatch(name) and self._attrs(name) is not None
+
+    def __getitem__(self, name):
+        if name not in self:
+            raise KeyError(name)
+        return self._open(name)
+
+    def name(self, kind, params, *, version):
+        """Name of the entry for these parameters: <kind>-<20 hexadecimal digits>.
+
+        Raises TypeError for parameters that have no canonical form (see `canonical`).
+        """
+        return _entry_name(kind, params, version, SCHEMA_VERSION)
+
+    def load(self, kind, params, *, version):
+        """The entry's dataset, read and checked in full, or None where there is none.
+
+        A damaged entry is reported as a warning and counts as missing; saving replaces it.
+        Arrays have the dtype they were stored with.
+        """
+        name = self.name(kind, params, version=version)
+        if not (self.path / name).is_dir():
+            return None
+        dataset, reason = self._checked(name)
+        if reason:
+            self._warn(name, reason)
+        return dataset
+
+    def save(self, kind, params, dataset, *, version, dtypes=None):
+        """Store a dataset under its parameters and return the entry's name.
+
+        An intact entry of that name is kept as it is. dtypes: {variable: dtype} to store floats
+        with fewer bits, for stores that have to be small.
+
+        Raises ValueError where the dataset departs from VARIABLES, TypeError for parameters or
+        attributes that are not plain values, InputError if the store cannot be written.
+        """
+        name = self.name(kind, params, version=version)
+        variables = _conforming(dataset, dtypes or {})
+        attrs = _attributes(kind, params, version, dataset.attrs)
+        attrs["checksum"] = _checksum(variables, attrs)
+        with self._writing():
+            if _schema(self.path) is None:
+                _create_root(self.path)
+            if not (self.path / name).is_dir() or self._checked(name)[1]:
+                self._publish(name, variables, attrs)
+        return name
+
+    def entry(self, name):
+        """The `Entry` of this name, or None if there is none that can be read; reads no arrays."""
+        attrs = self._attrs(name) if _ENTRY.fullmatch(name) else None
+        if attrs is None:
+            return None
+        params = json.loads(attrs["parameters"])
+        size = _folder_bytes(self.path / name)
+        return Entry(
+            name, attrs["kind"], params, attrs["algorithm_version"], size, attrs["created"]
+        )
+
+    def entries(self):
+        """A list of `Entry`, one for each readable entry; arrays are not read."""
+        found = []
+        for name in self._names():
+            entry = self.entry(name)
+            if entry is None:
+                self._warn(name, "its metadata cannot be read")
+            else:
+                found.append(entry)
+        return found
+
+    def find(self, kind=None, **params):
+        """The entries of a kind whose parameters include the given ones (compared as in keys)."""
+        wanted = {key: canonical(value) for key, value in params.items()}
+        return [
+            entry
+            for entry in self.entries()
+            if kind in (None, entry.kind)
+            and all(
+                key in entry.params and canonical(entry.params[key]) == value
+                for key, value in wanted.items()
+            )
+        ]
+
+    def size(self):
+        """Bytes on disk, temporaries of running writers included."""
+        return _folder_bytes(self.path)
+
+    def clear(self, kind=None):
+        """Remove all entries, or those of one kind; returns how many.
+
+        Raises InputError if the store cannot be written.
+        """
+        names = [name for name in self._names() if kind in (None, name.rpartition("-")[0])]
+        with self._writing():
+            for name in names:
+                self._retire(name)
+        return len(names)
+
+    def clean(self):
+        """Remove temporaries that killed writers left behind; returns how many.
+
+        Raises InputError if the store cannot be written.
+        """
+        with self._writing():
+            stale = [item for item in self.path.glob(".tmp-*") if _is_stale(item)]
+            for item in stale:
+                _remove(item)
+        return len(stale)
+
+    def verify(self):
+        """A list of `Verdict`: every entry read in full and compared with its checksum."""
+        verdicts = []
+        for name in self._names():
+            reason = self._checked(name)[1]
+            verdicts.append(Verdict(name, not reason, reason))
+        return verdicts
+
+    def _names(self):
+        """Folders that are named like entries, readable or not, sorted."""
+        if not self.path.is_dir():
+            return []
+        with os.scandir(self.path) as items:
+            return sorted(i.name for i in items if _ENTRY.fullmatch(i.name) and i.is_dir())
+
+    def _attrs(self, name):
+        """An entry's attributes, or None where they are unreadable or belong to another name."""
+        try:
+            attrs = json.loads((self.path / name / "zarr.json").read_bytes())["attributes"]
+            params = json.loads(attrs["parameters"])
+            versions = attrs["algorithm_version"], attrs["schema_version"]
+            ours = name == _entry_name(attrs["kind"], params, *versions)
+            return attrs if ours and {"created", "checksum"} <= attrs.keys() else None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def _open(self, name):
+        damaged = _damaged_array(self.path / name)
+        if damaged:
+            raise InputError(f"entry {name} in {self.path} is damaged ({damaged})")
+        # Not decoded: what was saved are plain numbers, and "units" must not turn them into times.
+        return xr.open_zarr(self.path / name, consolidated=False, chunks=None, decode_cf=False)
+
+    def _checked(self, name):
+        """(dataset in memory, "") if the entry is whole, else (None, reason)."""
+        if self._attrs(name) is None:
+            return None, "its metadata cannot be read"
+        damaged = _damaged_array(self.path / name)
+        if damaged:
+            return None, damaged
+        try:
+            dataset = self._open(name).load()
+        except Exception as error:  # what damage raises depends on codec, zarr and xarray
+            return None, f"an array cannot be read: {type(error).__name__}"
+        if _checksum(dataset.variables, dataset.attrs) != dataset.attrs["checksum"]:
+            return None, "its data do not match its checksum"
+        return dataset, ""
+
+    def _warn(self, name, reason):
+        message = f"entry {name} in {self.path} is damaged ({reason}) and counts as missing"
+        warnings.warn(message, stacklevel=3)
+
+    def _publish(self, name, variables, attrs):
+        """Write under a temporary name, then rename: at no moment is a part of it visible."""
+        temporary = self.path / _temporary_name()
+        try:
+            _write(temporary, variables, attrs)
+            while True:
+                try:
+                    os.rename(temporary, self.path / name)
+                    return
+                except OSError:
+                    if not (self.path / name).is_dir():
+                        raise
+                # Someone was faster. An intact copy is as good as ours; a damaged one goes.
+                if not self._checked(name)[1]:
+                    return
+                self._retire(name)
+        finally:
+            _remove(temporary)
+
+    def _retire(self, name):
+        """Remove an entry: renamed first, so that it vanishes as a whole."""
+        temporary = self.path / _temporary_name()
+        try:
+            os.rename(self.path / name, temporary)
+        except FileNotFoundError:
+            return  # another process has done it
+        _remove(temporary)
+
+    @contextmanager
+    def _writing(self):
+        if self.readonly:
+            raise InputError(f"the store {self.path} was opened read-only")
+        _refuse_newer(self.path)
+        try:
+            yield
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(
+                f"cannot write to the store {self.path}: {reason}; "
+                f"give another folder or set {LOCATION_VARIABLE}"
+            ) from error
+
+
+def _damaged_array(folder):
+    """Which array's metadata is damaged, in words, or "" if none is seen to be.
+
+    Asked before zarr reads them all at once: of several that fail it tells one, and asyncio prints
+    the tracebacks of the others.
+    """
+    with os.scandir(folder) as items:
+        names = sorted(item.name for item in items if item.is_dir())
+    for name in names:
+        try:
+            ArrayV3Metadata.from_dict(json.loads((folder / name / "zarr.json").read_bytes()))
+        except Exception:  # what damage raises depends on zarr
+            return f"the metadata of its array {name} cannot be read"
+    return ""
+
+
+def _entry_name(kind, params, version, schema):
+    content = canonical({"kind": kind, "params": params, "version": version, "schema": schema})
+    name = f"{kind}-{hashlib.sha256(content.encode()).hexdigest()[:KEY_DIGITS]}"
+    if not _ENTRY.fullmatch(name):
+        raise ValueError(f"kind must be a lower-case word, got {kind!r}")
+    return name
+
+
+def _conforming(dataset, dtypes):
+    """The dataset's variables as they will be stored; ValueError where VARIABLES says otherwise."""
+    stored = {}
+    for name, variable in dataset.variables.items():
+        row = declared(name)
+        dtype = np.dtype(dtypes.get(name, row.dtype))
+        if variable.dims != row.dims:
+            raise ValueError(f"{name!r} must have dims {row.dims}, got {variable.dims}")
+        if dtype != row.dtype and (dtype.kind, np.dtype(row.dtype).kind) != ("f", "f"):
+            raise ValueError(f"{name!r} is {row.dtype} and cannot be stored as {dtype}")
+        if variable.dtype not in (dtype, np.dtype(row.dtype)):
+            raise ValueError(f"{name!r} must be {row.dtype}, got {variable.dtype}")
+        stored[name] = xr.Variable(variable.dims, np.asarray(variable.values, dtype, order="C"))
+    return stored
+
+
+def _attributes(kind, params, version, given):
+    """Attributes of an entry: the caller's own, what it is, and what made it when."""
+    attrs = {key: value for key, value in given.items() if key not in (*_IDENTITY, *_PROVENANCE)}
+    attrs |= {"kind": kind, "parameters": canonical(params)}
+    if "seed" in params:
+        attrs["seed"] = params["seed"]
+    attrs |= {"algorithm_version": version, "schema_version": SCHEMA_VERSION}
+    attrs |= {"created": datetime.now(UTC).isoformat(timespec="seconds"), **_library_versions()}
+    # What comes back from JSON is what the checksum must see.
+    return json.loads(json.dumps(attrs, default=to_builtin))
+
+
+@functools.cache
+def _library_versions():
+    return {f"{library}_version": metadata.version(library) for library in _LIBRARIES}
+
+
+def _checksum(variables, attrs):
+    """sha256 over arrays and attributes; the same for the same result made elsewhere or later."""
+    lasting = {key: value for key, value in attrs.items() if key not in _PROVENANCE}
+    digest = hashlib.sha256(json.dumps(lasting, sort_keys=True).encode())
+    for name in sorted(variables):
+        variable = variables[name]
+        header = [name, variable.dims, variable.dtype.str, variable.shape]
+        digest.update(json.dumps(header).encode())
+        digest.update(np.ascontiguousarray(variable.values))
+    return digest.hexdigest()
+
+
+def _write(folder, variables, attrs):
+    group = zarr.create_group(folder, zarr_format=3, attributes=attrs)
+    for name, variable in variables.items():
+        array = group.create_array(
+            name,
+            shape=variable.shape,
+            dtype=variable.dtype,
+            chunks=_chunks(variable),
+            compressors=(ZstdCodec(level=3),),
+            dimension_names=variable.dims,
+            attributes={"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
+            config={"write_empty_chunks": True},  # else Zarr 3.0 loses a chunk of −0.0
+        )
+        array[...] = variable.values
+
+
+def _chunks(variable):
+    """Whole arrays, but a hundred states at a time."""
+    chunks = [max(1, size) for size in variable.shape]
+    if variable.ndim > 1 and variable.dims[0] == "state":
+        chunks[0] = min(chunks[0], STATES_PER_CHUNK)
+    return tuple(chunks)
+
+
+def _host():
+    return re.sub(r"\W", "_", socket.gethostname())
+
+
+def _temporary_name():
+    return f".tmp-{_host()}-{os.getpid()}-{secrets.token_hex(4)}"
+
+
+def _is_stale(temporary):
+    """Whether its writer is dead: known on this host, judged by age elsewhere."""
+    try:
+        age = time.time() - temporary.stat().st_mtime
+    except FileNotFoundError:
+        return False  # renamed or removed meanwhile
+    host, _, pid = temporary.name.removeprefix(".tmp-").rpartition("-")[0].rpartition("-")
+    here = host == _host() and pid.isdigit() and os.name == "posix"
+    return age > STALE_SECONDS or (here and not _is_alive(int(pid)))
+
+
+def _is_alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        pass  # it exists and belongs to someone else
+    return not _is_zombie(pid)
+
+
+def _is_zombie(pid):
+    """Whether the process has ended but was not yet collected by its parent (Linux)."""
+    try:
+        told = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return told.rpartition(")")[2].split()[:1] == ["Z"]
+
+
+def _remove(path):
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _folder_bytes(path):
+    """Bytes of all files below a folder; those that vanish meanwhile count nothing."""
+    total = 0
+    for parent, _, files in os.walk(path):
+        for name in files:
+            try:
+                total += os.stat(os.path.join(parent, name)).st_size
+            except FileNotFoundError:
+                continue
+    return total

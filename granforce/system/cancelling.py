@@ -1,0 +1,166 @@
+"""Cancelling: one flag for all that is under way, which kernels read in their own loops.
+
+A thread asks cancel() ten times a second and raises the flag, and so does Ctrl-C in the main
+thread, where no signal handler of Python's own can run before a kernel ends.
+"""
+
+import contextvars
+import functools
+import select
+import signal
+import socket
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.records import Cancelled
+
+# Seconds between two askings of cancel().
+_ASK_EVERY = 0.1
+# Seconds that a call of another library gets to end by itself before it is left behind.
+_GRACE = 0.3
+
+
+class _Scope(NamedTuple):
+    flag: np.ndarray  # (1,) bool
+    cancel: Callable | None
+
+
+# Set once the process is about to end.
+_ending = threading.Event()
+_NEVER = _Scope(np.zeros(1, dtype=bool), None)
+_scope = contextvars.ContextVar("scope", default=_NEVER)
+
+
+@contextmanager
+def watched(cancel=None):
+    """Within, all work ends soon after cancel() → True, or after Ctrl-C in the main thread.
+
+    Kernels return early and `check` raises Cancelled. Scopes nest: the outer ones count as well.
+    """
+    outer = _scope.get()
+    main = threading.current_thread() is threading.main_thread()
+    if cancel is None and (outer.cancel is not None or not main):
+        yield
+        return
+    scope = _Scope(np.zeros(1, dtype=bool), _either(outer, cancel))
+    ears, mouth = socket.socketpair()
+    mouth.setblocking(False)
+    ours = main and _wake_by_signals(mouth)
+    thread = threading.Thread(
+        target=_watch, args=(scope, ears, cancel is not None), name="granforce-cancel", daemon=True
+    )
+    thread.start()
+    token = _scope.set(scope)
+    try:
+        yield
+    finally:
+        _scope.reset(token)
+        if ours:
+            signal.set_wakeup_fd(-1)
+        with suppress(BlockingIOError):
+            mouth.send(b"\0")
+        thread.join()
+        ears.close()
+        mouth.close()
+
+
+def cancellable(function):
+    """The function `watched` with its own keyword argument `cancel`."""
+
+    @functools.wraps(function)
+    def inside(*arguments, cancel=None, **options):
+        with watched(cancel):
+            return function(*arguments, **options)
+
+    return inside
+
+
+def _either(outer, cancel):
+    asked = [one for one in (outer.cancel, cancel) if one is not None]
+    return lambda: bool(outer.flag[0]) or _ending.is_set() or any(ask() for ask in asked)
+
+
+def end_everything():
+    """All work that can be cancelled ends, now and later: for a process that is about to end."""
+    _ending.set()
+
+
+def _wake_by_signals(mouth):
+    """Have signals write their number to the socket, unless an event loop has them already."""
+    before = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
+    if before != -1:
+        signal.set_wakeup_fd(before)
+    return before == -1
+
+
+def _watch(scope, ears, asks):
+    while not scope.flag[0]:
+        heard, _, _ = select.select([ears], [], [], _ASK_EVERY if asks else None)
+        numbers = ears.recv(64) if heard else b""
+        if signal.SIGINT in numbers:
+            scope.flag[0] = True
+        if 0 in numbers:
+            return
+        try:
+            cancelled_now = scope.cancel()
+        except Exception:
+            return  # the working thread, which asks it too, meets the same error
+        if cancelled_now:
+            scope.flag[0] = True
+
+
+def flag():
+    """The flag (1,) of the work under way, for kernels: they return early once it is True."""
+    return _scope.get().flag
+
+
+def cancelled():
+    """Whether the work under way was asked to end."""
+    scope = _scope.get()
+    if not scope.flag[0] and scope.cancel is not None and scope.cancel():
+        scope.flag[0] = True
+    return bool(scope.flag[0])
+
+
+def check(what="work"):
+    """Raise Cancelled if the work under way was asked to end."""
+    if cancelled():
+        raise Cancelled(f"{what} cancelled")
+
+
+def threads(workers):
+    """A ThreadPoolExecutor whose work is cancelled with the caller's."""
+    return ThreadPoolExecutor(workers, initializer=_scope.set, initargs=(_scope.get(),))
+
+
+def apart(call, *arguments, interrupt=None):
+    """call(*arguments), which cannot read the flag, in a thread that is left behind if need be.
+
+    interrupt(): asks it to end, where that is possible.
+    """
+    if _scope.get().cancel is None:
+        return call(*arguments)
+    result, context = Future(), contextvars.copy_context()
+
+    def work():
+        try:
+            result.set_result(context.run(call, *arguments))
+        except BaseException as error:
+            result.set_exception(error)
+
+    check()
+    threading.Thread(target=work, daemon=True, name="granforce-apart").start()
+    while True:
+        with suppress(TimeoutError):
+            return result.result(_ASK_EVERY)
+        if cancelled():
+            if interrupt is not None:
+                interrupt()
+            with suppress(TimeoutError):
+                result.exception(_GRACE)
+            check()

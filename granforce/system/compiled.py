@@ -1,0 +1,96 @@
+"""Compiled kernels: where numba keeps them, saying that it compiles, and doing so ahead of time.
+
+Where they are kept must be told before numba is imported.
+"""
+
+import atexit
+import os
+import stat
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+
+def find_a_place():
+    """Name a temporary folder to numba where it could write neither beside us nor at home.
+
+    Without one numba refuses to compile for keeping, and so every module with kernels.
+    """
+    if os.environ.get("NUMBA_CACHE_DIR") or any(map(_writable, _usual_places())):
+        return
+    place = _temporary_place()
+    os.environ["NUMBA_CACHE_DIR"] = place  # workers get it from here
+    if "numba" in sys.modules:
+        sys.modules["numba"].config.CACHE_DIR = place
+    print(
+        f"granforce: compiled kernels are kept in {place}, since neither the installation nor the "
+        "home folder can be written; set NUMBA_CACHE_DIR to keep them elsewhere",
+        file=sys.stderr,
+    )
+
+
+def tell_when_compiling(say):
+    """Call say() once, as soon as a kernel is compiled that is not kept from an earlier run."""
+    from numba.core import event
+
+    class Listener(event.Listener):
+        def on_start(self, happening):
+            event.unregister("numba:compile", self)
+            say()
+
+        def on_end(self, happening):
+            pass
+
+    event.register("numba:compile", Listener())
+
+
+def compile_ahead(statement, last):
+    """Run a statement that compiles kernels in a process of its own, where none are kept yet.
+
+    last: "module.kernel" that is compiled last. The process ends with this one at the latest.
+    Returns whether there was nothing to do.
+    """
+    places = [os.environ.get("NUMBA_CACHE_DIR"), Path(__file__).parents[1], *_usual_places()]
+    if any(next(Path(place).rglob(f"{last}-*.nbi"), None) for place in places if place):
+        return True
+    called = [sys.executable, "-c", f"import os; getattr(os, 'nice', int)(10); {statement}"]
+    process = subprocess.Popen(called, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    atexit.register(process.terminate)
+    return False
+
+
+def _usual_places():
+    """Where numba looks first: beside the sources, then the user's folder of caches."""
+    yield Path(__file__).parent / "__pycache__"
+    if os.name == "nt":
+        yield Path(os.environ.get("LOCALAPPDATA", "~")).expanduser()
+    elif sys.platform == "darwin":
+        yield Path("~/Library/Caches/numba").expanduser()
+    else:
+        yield Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser() / "numba"
+
+
+def _writable(folder):
+    """Whether files can be made in a folder, or in the first one above it that there is."""
+    while not folder.exists():
+        if folder == folder.parent:
+            return False
+        folder = folder.parent
+    return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
+
+
+def _temporary_place():
+    """The same folder each time, so that kernels are compiled once; a new one if it is not ours."""
+    if not hasattr(os, "getuid"):
+        return tempfile.mkdtemp(prefix="granforce-")
+    place = Path(tempfile.gettempdir()) / f"granforce-kernels-{os.getuid()}"
+    try:
+        place.mkdir(mode=0o700, exist_ok=True)
+        found = place.lstat()
+        ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
+        if ours and not found.st_mode & 0o077:
+            return str(place)
+    except OSError:
+        pass
+    return tempfile.mkdtemp(prefix="granforce-kernels-")

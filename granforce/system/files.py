@@ -1,0 +1,109 @@
+"""Files for the user: whole or not at all, and never in place of what is no file."""
+
+import errno
+import os
+import re
+import secrets
+import stat
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from granforce.records import InputError
+
+# What is open already, by any of its names.
+_OPEN_FILE = re.compile(r"/dev/(stdin|stdout|stderr|fd/.*)|/proc/[^/]+/fd/.*")
+
+
+@contextmanager
+def written(path):
+    """An open binary file; what was written to it stands at path when the block ends, or nothing.
+
+    A new file gets the mode that the umask leaves, an existing one keeps its own; links are
+    followed. Devices, pipes and open files (/dev/stdout) cannot be replaced: they are written to.
+    Raises InputError where that is not possible.
+    """
+    path = expanded(path)
+    with _refusing(path):
+        kept = _regular(path)
+        if kept is None:
+            with open(path, "wb") as file:
+                yield file
+            return
+        target, mode = kept
+        # A name of its own: one made from the file's could be too long.
+        aside = target.with_name(f".granforce-{secrets.token_hex(8)}.part")
+        try:
+            with open(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
+                yield file
+            if mode is not None:
+                os.chmod(aside, mode)
+            os.replace(aside, target)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(aside)
+            raise
+
+
+def check_file(path):
+    """InputError unless a file can be written at path; nothing is opened or changed."""
+    path = expanded(path)
+    with _refusing(path):
+        kept = _regular(path)
+        if kept is not None and not _may_write(kept[0].parent):
+            raise PermissionError(errno.EACCES, f"the folder {kept[0].parent} is not writable")
+
+
+def make_folder(path):
+    """The folder at path, made with its parents if missing; InputError unless it can be written."""
+    path = expanded(path)
+    with _refusing(path):
+        path.mkdir(parents=True, exist_ok=True)
+        if not _may_write(path):
+            raise PermissionError(errno.EACCES, "Permission denied")
+    return path
+
+
+def expanded(path):
+    """The path with ~ and ~user replaced; InputError where it cannot be a path."""
+    try:
+        found = Path(path).expanduser()
+    except RuntimeError:
+        raise InputError(f"{path}: there is no such user, or none with a home folder") from None
+    if "\0" in str(found):
+        raise InputError(f"{str(found)!r} cannot be a path: it holds a null character")
+    return found
+
+
+def _regular(path):
+    """(file that path leads to, its mode or None if missing), or None for what is no file."""
+    path = os.path.abspath(path)
+    if _OPEN_FILE.fullmatch(path):
+        return None  # also where it leads to a file: what writes there beside us has it open
+    target = Path(os.path.realpath(path))
+    try:
+        found = target.stat()
+    except FileNotFoundError:
+        target.parent.stat()  # tells a missing folder
+        return target, None
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder")
+    if not stat.S_ISREG(found.st_mode):
+        return None
+    if not _may_write(target):
+        raise PermissionError(errno.EACCES, "Permission denied")
+    return target, stat.S_IMODE(found.st_mode)
+
+
+def _may_write(path):
+    return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
+
+
+@contextmanager
+def _refusing(path):
+    """Errors of the operating system become one line; a reader who has gone is no error."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror or error}") from None

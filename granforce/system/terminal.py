@@ -1,0 +1,77 @@
+"""What commands print: reports and tables on stdout, progress on stderr."""
+
+import json
+import math
+import sys
+
+from tqdm import tqdm
+
+
+def print_list(rows, names, as_json):
+    if as_json:
+        print(json.dumps(rows, indent=1))
+    else:
+        table(rows, names, {})
+
+
+def report(lines, as_json):
+    """A report on stdout: names and numbers in two columns, or JSON."""
+    if as_json:
+        print(json.dumps(lines, indent=1))
+        return
+    width = max(len(name) for name in lines)
+    for name, value in lines.items():
+        print(f"{name.replace('_', ' '):<{width}}  {text(value)}")
+
+
+def table(rows, names, heads):
+    cells = [[heads.get(name, name) for name in names]]
+    cells += [[text(line[name]) for name in names] for line in rows]
+    widths = [max(len(line[k]) for line in cells) for k in range(len(names))]
+    for line in cells:
+        print("  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)))
+
+
+def text(value):
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (list, tuple)):
+        return " ".join(text(part) for part in value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def one_line(message, category, filename, lineno, line=None):
+    """A warning as one line without the place in the code, for warnings.formatwarning."""
+    return f"granforce: {' '.join(str(message).split())}\n"
+
+
+class Bar:
+    """A tqdm bar on stderr that a progress(done, total) callable drives; unseen when not used."""
+
+    def __init__(self, label, unit):
+        # Made at once, so that its rate counts from the beginning, and shown from the first call.
+        self.bar = tqdm(desc=label, unit=f" {unit}", file=sys.stderr, delay=math.inf)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.bar.close()
+
+    def __call__(self, done, total):
+        self.bar.delay, self.bar.total = 0, total
+        # Set, not added: quarters of cells would leave whole numbers as 2.0.
+        self.bar.n = int(done) if done == int(done) else done
+        self.bar.update(0)
+
+    def note(self, text):
+        """What stands behind the bar when it is next drawn."""
+        self.bar.set_postfix_str(text, refresh=False)
+
+
+class Steps(Bar):
+    """The same for work whose end is not known: progress(step, message)."""
+
+    def __call__(self, step, message):
+        self.note(message)
+        super().__call__(step, None)

@@ -1,0 +1,221 @@
+"""The benchmark's parts on tiny sizes: promised fields, honest rows, and what is written."""
+
+import json
+
+import numpy as np
+import pytest
+from packings import packed
+
+from granforce import bench
+from granforce.bench import conditions, packings, report, siconos, solvers, states
+from granforce.forces.ensemble import ensemble
+from granforce.records import NotJammedError
+
+SMALL = {"n": 30, "frictions": (0.3,)}
+
+
+@pytest.fixture(autouse=True)
+def one_packing(monkeypatch):
+    """Packings of the benchmark come from the shared ones."""
+    for module in (conditions, solvers, states):
+        monkeypatch.setattr(module, "pack", lambda n, mu, seed, **_: packed(n, mu, seed))
+
+
+def named(rows, key, value):
+    (row,) = [row for row in rows if row[key] == value]
+    return row
+
+
+def test_relaxation_compares_all_solvers_on_the_same_starts():
+    rows = bench.relaxation(True, repeats=2, **SMALL)
+    assert [row["solver"] for row in rows] == list(solvers.solvers())
+    for row in rows:
+        assert row["runs"] == 2
+        assert 0 < row["fastest"] <= row["seconds"] <= row["slowest"]
+        assert row["reached"] == 2 and row["worst_residual"] <= solvers.GOAL
+        assert row["note"] == "" and not row["ratio_is_lower_bound"]
+    assert named(rows, "solver", solvers.BASELINE)["ratio"] == 1
+
+
+def test_a_baseline_cut_short_says_so_and_bounds_the_ratio():
+    rows = bench.relaxation(True, repeats=2, sweeps=50, **SMALL)
+    base = named(rows, "solver", solvers.BASELINE)
+    assert base["reached"] == 0 and base["no_equilibrium"] == 0
+    assert base["note"].startswith("2 not converged after ")
+    assert not base["ratio_is_lower_bound"]
+    assert named(rows, "solver", "nearest")["ratio_is_lower_bound"]
+
+
+def test_ending_in_motion_is_not_called_converged():
+    S = ensemble(packed(30, 0.3))
+    run = [
+        S_run._replace(residual=1e-3, converged=True)
+        for S_run in solvers._run(S, [S.original], *solvers.solvers()["nearest"])
+    ]
+    told = solvers._summary(run)
+    assert told["reached"] == 0 and told["no_equilibrium"] == 1
+    assert told["note"] == "1 ended in motion"
+
+
+def test_contact_updates_tell_whether_siconos_is_there():
+    rows = bench.contact_updates(True, n=30, mu=0.3, sweeps=40)
+    assert rows[0]["solver"] == "granforce sweep" and rows[0]["ns_per_update"] > 0
+    assert rows[-1]["solver"] == "Siconos NSGS"
+    assert ("absent" in rows[-1]["note"]) == (siconos.interpreter() is None)
+
+
+@pytest.mark.skipif(siconos.interpreter() is None, reason=siconos.ABSENT)
+def test_a_sweep_is_that_of_siconos():
+    S = ensemble(packed(30, 0.3))
+    found = siconos.against_siconos(S, solvers.kicked(S, 1, 0)[0], 1e-4)
+    assert found["sweeps"] > 10
+    assert found["difference"] < 1e-10
+
+
+def test_scaling_gives_an_exponent_per_solver():
+    rows = bench.scaling(True, n=30, mu=0.3, tiles=(1, 2), repeats=1)
+    sizes = [row["n"] for row in rows if row["solver"] == "nearest"]
+    assert sizes == [30, 120, "fit"]
+    fits = [row for row in rows if row["n"] == "fit"]
+    assert [row["solver"] for row in fits] == list(solvers.solvers())
+    assert all(np.isfinite(row["exponent"]) for row in fits if row["exponent"] is not None)
+
+
+def test_a_solver_out_of_patience_is_left_out_of_larger_sizes():
+    rows = bench.scaling(True, n=30, mu=0.3, tiles=(1, 2), repeats=1, patience=1e-9)
+    assert {row["n"] for row in rows} == {30, "fit"}
+    assert all(row["exponent"] is None for row in rows if row["n"] == "fit")
+
+
+def test_an_exponent_is_the_slope_of_the_sizes_that_were_reached():
+    rows = [
+        {"n": n, "seconds": 1e-3 * n**1.25, "solver": "nearest", "reached": 1, "runs": 1}
+        for n in (100, 400, 1600)
+    ]
+    rows.append({**rows[-1], "n": 6400, "seconds": 1e9, "reached": 0})
+    fit = named(solvers._exponents(rows, 0.1), "solver", "nearest")
+    assert fit["exponent"] == pytest.approx(1.25)
+    assert fit["note"] == "N = 100 … 1600"
+
+
+def test_compaction_rows(monkeypatch):
+    def half(n, mu, seed, **options):
+        if options["dt"] > 0.015:
+            raise NotJammedError("not jammed")
+        return packed(30, 0.3)
+
+    monkeypatch.setattr(packings, "pack", half)
+    rows = bench.compaction(True, n=30, mu=0.3, steps=(0.01, 0.02), sweeps=(100,), seeds=2)
+    assert [row["failed"] for row in rows] == [0, 2]
+    S = ensemble(packed(30, 0.3))
+    assert rows[0]["z"] == pytest.approx(S.coordination)
+    assert rows[0]["h"] == S.dimension
+    assert rows[0]["phi"] == pytest.approx(S.packing.packing_fraction)
+    assert {"seconds", "steps", "contact_updates", "overlap"} <= rows[0].keys()
+    assert "phi" not in rows[1]
+
+
+def test_compaction_at_each_friction_and_size():
+    rows = bench.compaction_frictions(True, n=30, frictions=(0.3, 1.0), seeds=2)
+    assert [row["mu"] for row in rows] == [0.3, 1.0]
+    assert all(0 < row["seconds"] <= row["slowest"] for row in rows)
+    rows = bench.compaction_growth(True, mu=0.3, sizes=(20, 30), seeds=1)
+    assert [row["n"] for row in rows] == [20, 30, "fit"]
+    assert np.isfinite(rows[-1]["exponent"])
+
+
+def test_chains_on_two_threads():
+    (row,) = bench.batches(True, states=6, **SMALL)
+    assert min(row["per_second"], row["per_second_2"], row["ceiling"]) > 0
+    assert row["ratio"] == pytest.approx(row["per_second_2"] / row["per_second"])
+
+
+def test_walks_of_one_optimum_agree_and_others_need_not():
+    rows = bench.walks(True, packings=2, states=4, **SMALL)
+    assert [row["solver"] for row in rows] == list(states.WALKS)
+    piqp, ours = (named(rows, "solver", s) for s in ("nearest (PIQP)", "nearest"))
+    for row in rows:
+        assert row["failed"] == 0 and 0 < row["acceptance"] <= 1
+        assert row["eta3_error"] >= 0 and row["distance"] > 0 and row["original"] > 0
+    for key in ("eta1", "eta2", "eta3", "distance"):
+        assert ours[key] == pytest.approx(piqp[key], rel=1e-4)
+
+
+def test_a_walk_that_fails_is_counted(monkeypatch):
+    monkeypatch.setitem(states.WALKS["Gauss–Seidel alone"], "max_iterations", 2)
+    rows = bench.walks(True, packings=1, states=2, **SMALL)
+    assert [row["failed"] for row in rows] == [1, 0, 0, 0]
+    assert "eta3" not in rows[0]
+
+
+def test_intervals_of_walks_grow_towards_the_exact_ones():
+    rows = bench.intervals(True, n=30, frictions=(0.3,), states=(5, 20))
+    exact = named(rows, "method", "exact")
+    for method in ("Gauss–Seidel, exact finish", "nearest (PIQP)"):
+        few, many = [row for row in rows if row["method"] == method]
+        assert (few["states"], many["states"]) == (5, 20)
+        assert few["mean_extent"] <= many["mean_extent"] <= exact["mean_extent"] * (1 + 1e-6)
+        assert many["extent_part"] == pytest.approx(many["mean_extent"] / exact["mean_extent"])
+        assert 0 < few["seconds"] <= many["seconds"]
+
+
+def test_missing_references_are_told(tmp_path):
+    (row,) = bench.interval_methods(True, folder=tmp_path)
+    assert "not found" in row["note"]
+
+
+@pytest.fixture
+def two_parts(monkeypatch):
+    parts = {
+        "one": (lambda quick: [{"seconds": 1.5, "quick": quick, "note": ""}], "The first"),
+        "two": (lambda quick: [{"solver": "a", "ratio": None}, {"solver": "b"}], "The second"),
+    }
+    monkeypatch.setattr(bench, "PARTS", parts)
+
+
+def test_run_writes_what_it_returns(two_parts, tmp_path, capsys):
+    found = bench.run(tmp_path / "new", quick=True)
+    assert json.loads((tmp_path / "new" / "bench.json").read_text()) == found
+    assert not list((tmp_path / "new").glob("*.part"))
+    assert found["one"] == [{"seconds": 1.5, "quick": True, "note": ""}]
+    told = capsys.readouterr()
+    assert "The first" in told.out and "The second" in told.out
+    assert "two: " in told.err and "two: " not in told.out
+    assert set(bench.run(None, parts=["two"])) == {"environment", "quick", "seconds", "two"}
+
+
+def test_main_prints_json_only_when_asked(two_parts, capsys):
+    assert bench.main(None, True, True) == 0
+    assert json.loads(capsys.readouterr().out)["quick"] is True
+    assert bench.main(None, True, False) == 0
+    assert "Environment" in capsys.readouterr().out
+
+
+def test_environment_names_machine_and_versions():
+    found = report.environment()
+    assert found["cores"] >= 1 and found["cpu"] and found["python"]
+    assert found["libraries"]["numba"] and "siconos" in found["libraries"]
+
+
+def test_table_aligns_and_leaves_out_empty_columns():
+    text = report.table("T", [{"a": 1.23456, "b": None, "c": True}, {"a": 10, "b": "", "c": False}])
+    assert text.splitlines() == ["T", "-", "a     c", "1.23  yes", "10"]
+
+
+def test_knowledge_compares_the_same_programs():
+    rows = bench.knowledge(True, n=30, mu=0.3, pulled=1, repeats=1)
+    tasks = list(dict.fromkeys(row["task"] for row in rows))
+    assert len(tasks) == 5 and len(rows) == 10
+    for task in tasks:
+        ours, baseline = (row for row in rows if row["task"] == task)
+        assert ours["method"] == "granforce"
+        assert baseline["method"] == ("HiGHS" if "bounds" in task else "PIQP")
+        assert ours["ratio"] == pytest.approx(baseline["seconds"] / ours["seconds"])
+        assert baseline["ratio"] == 1
+        assert ours["programs"] == baseline["programs"]
+        if "bounds" in task:
+            assert ours["gap"] <= 1e-8 and baseline["off"] <= 1e-7
+        else:
+            assert max(ours["residual"], baseline["residual"]) <= 1e-9
+            assert 0 <= ours["above"] < 1e-6 and baseline["off"] < 1e-4
+    assert rows[0]["programs"] == 4 * len(ensemble(packed(30, 0.3)).index)

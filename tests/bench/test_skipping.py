@@ -1,0 +1,53 @@
+"""What is left out changes nothing: each skip switched off gives the same answer.
+
+Rattlers and unloaded contacts: test_polytope. Programs: test_bounds. Cells: test_study. Walks where
+S is one point: test_random_walk.
+"""
+
+import importlib
+
+import numpy as np
+from packings import lattice, packed
+
+from granforce.explore.intervals import intervals
+from granforce.forces.ensemble import ensemble
+from granforce.packing import compaction
+from granforce.packing.compaction import pack
+
+
+def test_neighbour_lists_made_in_every_step_give_the_same_packing(monkeypatch):
+    kept = pack(60, 0.3, 1)
+    monkeypatch.setattr(compaction, "MOVED", 0.0)
+    anew = pack(60, 0.3, 1)
+    assert anew.info["list_rebuilds"] > 5 * kept.info["list_rebuilds"]
+    assert np.array_equal(anew.x, kept.x)
+    assert np.array_equal(anew.forces, kept.forces)
+
+
+def test_tangential_unknowns_left_out_are_zero_without_friction():
+    # A square lattice has many frictionless networks: rows carry independent loads.
+    packing = lattice(4, 4, 0.0)
+    without, vanishing = ensemble(packing), ensemble(packing, mu=1e-7)
+    assert without.skipped["tangential_unknowns"] == len(without.index)
+    one, other = (
+        intervals(without, without.index[[0, 5]]),
+        intervals(vanishing, vanishing.index[[0, 5]]),
+    )
+    assert np.ptp([one.lower[0, 0], one.upper[0, 0]]) > 0.1
+    assert np.abs(one.lower - other.lower).max() < 1e-5 * without.force_scale
+    assert np.abs(one.upper - other.upper).max() < 1e-5 * without.force_scale
+
+
+def test_a_network_not_found_is_no_packing(monkeypatch):
+    """Networks looked for in 60 steps jam the same packing as those that go on to 200."""
+    short = pack(60, 0.5, 2)
+    monkeypatch.setattr(compaction, "NETWORK_ITERATIONS", 200)
+    assert np.array_equal(pack(60, 0.5, 2).forces, short.forces)
+
+
+def test_the_benchmark_counts_every_skip(monkeypatch):
+    module = importlib.import_module("granforce.bench.skips")
+    monkeypatch.setattr(module, "pack", lambda n, mu, seed: packed(n, mu, seed))
+    rows = module.skips(True, n=40, mu=0.3)
+    assert len(rows) == 6
+    assert all(row["count"] >= 0 and row["ratio"] > 0 for row in rows)

@@ -1,0 +1,309 @@
+"""The command line as a user meets it: reports, exit codes, one-line errors, no heavy start."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from granforce.cli.parser import main
+
+SMALL = ["-n", "20", "--mu", "0.3", "--relax", "nearest", "--states", "5"]
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Run a command on a store of this test alone; returns exit code, stdout, stderr."""
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+
+    def call(*words):
+        try:
+            code = main([str(word) for word in words])
+        except SystemExit as stop:
+            code = stop.code
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return call
+
+
+def test_help_needs_no_heavy_import():
+    code = (
+        "import sys\nfrom granforce.cli import main\n"
+        "try: main(['--help'])\nexcept SystemExit: pass\n"
+        "print([m for m in ('numpy','numba','xarray','highspy','panel') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "pack",
+        "walk",
+        "measure",
+        "scan",
+        "intervals",
+        "limit-loads",
+        "stress",
+        "app",
+        "import",
+        "cache",
+    ],
+)
+def test_every_command_has_help_with_an_example(run, command):
+    code, out, _ = run(command, "--help")
+    assert code == 0
+    assert f"Example:\n  granforce {command}" in out
+
+
+def test_scan_answers_to_its_name_before(run):
+    code, out, _ = run("sweep", "--help")
+    assert code == 0 and "granforce scan" in out
+    assert "sweep" not in run("--help")[1]
+
+
+def test_pack_reports_and_saves(run, tmp_path):
+    file = tmp_path / "p.npz"
+    code, out, err = run("pack", "-n", 20, "--mu", 0.3, "--out", file, "--json")
+    report = json.loads(out)
+    assert code == 0
+    assert report["grains"] == 20
+    assert report["residual"] < 1e-10
+    assert report["cached"] is False
+    assert "step" in err
+    assert json.loads(run("pack", "-n", 20, "--mu", 0.3, "--json")[1])["cached"] is True
+    code, out, _ = run("walk", "--packing", file, "--states", 4, "--relax", "nearest", "--json")
+    assert json.loads(out)["accepted"] == 4
+
+
+def test_walk_and_measure_agree(run, tmp_path):
+    file = tmp_path / "contacts.csv"
+    walked = json.loads(run("walk", *SMALL, "--json")[1])
+    measured = json.loads(run("measure", *SMALL, "--contacts", file, "--json")[1])
+    assert walked["eta2"] == measured["eta2"] > 0
+    lines = file.read_text().splitlines()
+    assert lines[0] == "contact,f_n,f_n_min,f_n_max"
+    assert len(lines) > 20
+
+
+def test_scan_table_and_resume(run, tmp_path):
+    words = ["scan", "--mu", "0,0.3", "-n", 20, "--states", 4, "--relax", "nearest"]
+    words += ["--out", tmp_path / "s.zarr"]
+    code, out, err = run(*words)
+    assert code == 0
+    assert len(out.splitlines()) == 3
+    assert "2 cells: 0 found in the store, 2 computed" in err
+    assert "2 found in the store, 0 computed" in run(*words)[2]
+    rows = json.loads(run(*words, "--json")[1])["rows"]
+    assert [line["mu"] for line in rows] == [0, 0.3]
+    assert rows[0]["eta2"] < 1e-6 < rows[1]["eta2"]
+    assert rows[0]["skipped"] == 4
+
+
+def test_intervals_hold_the_walk(run, tmp_path):
+    exact, seen = tmp_path / "exact.csv", tmp_path / "seen.csv"
+    words = SMALL[:4]
+    report = json.loads(run("intervals", *words, "--csv", exact, "--json")[1])
+    assert report["largest_duality_gap"] <= 1e-8
+    assert report["exact_eta3"] > json.loads(run("measure", *SMALL, "--json")[1])["eta3"]
+    run("measure", *SMALL, "--contacts", seen)
+    bounds = np.genfromtxt(exact, delimiter=",", names=True)
+    walked = np.genfromtxt(seen, delimiter=",", names=True)
+    assert np.array_equal(bounds["contact"], walked["contact"])
+    for name in ("f_n", "f_n_min", "f_n_max"):
+        assert np.all(walked[name] >= bounds["f_n_min"] - 1e-7)
+        assert np.all(walked[name] <= bounds["f_n_max"] + 1e-7)
+    assert json.loads(run("intervals", *words, "--json")[1])["cached"] is True
+    # A subset gives the same bounds for what was asked.
+    part = tmp_path / "part.csv"
+    run("intervals", *words, "--contacts", f"{bounds['contact'][3]:.0f}", "--csv", part)
+    one = np.genfromtxt(part, delimiter=",", names=True)
+    assert one["f_n_max"] == pytest.approx(bounds["f_n_max"][3], rel=1e-7)
+
+
+def test_what_is_known_can_be_what_intervals_wrote(run, tmp_path):
+    words = ["intervals", *SMALL[:4], "--json"]
+    bounds, known, after = (tmp_path / f"{name}.csv" for name in ("bounds", "known", "after"))
+    free = json.loads(run(*words, "--csv", bounds)[1])
+    # The bounds of all contacts, of which three have become half as wide.
+    table = np.genfromtxt(bounds, delimiter=",", names=True)
+    middle = 0.5 * (table["f_n_min"] + table["f_n_max"])
+    table["f_n_max"][[2, 9, 20]] = middle[[2, 9, 20]]
+    names = table.dtype.names
+    np.savetxt(known, table, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
+    code, out, _ = run(*words, "--known", known, "--csv", after)
+    report = json.loads(out)
+    assert code == 0 and report["largest_duality_gap"] <= 1e-8
+    assert report["mean_extent_of_f_n"] < free["mean_extent_of_f_n"]
+    shrunk = np.genfromtxt(after, delimiter=",", names=True)
+    assert np.all(shrunk["f_n_max"] <= table["f_n_max"] + 1e-7)
+    assert json.loads(run(*words, "--known", known)[1])["cached"] is True
+    assert json.loads(run(*words)[1])["mean_extent_of_f_n"] == free["mean_extent_of_f_n"]
+
+
+def test_forces_known_exactly_and_contradictions(run, tmp_path):
+    known = tmp_path / "known.csv"
+    known.write_text("contact;f_n;f_t\n0;1000;\n")
+    code, out, err = run("intervals", *SMALL[:4], "--known", known)
+    assert code == 2 and not out
+    assert "cannot hold together: f_n = 1000 on contact 0 (would have to give" in err
+    known.write_text("contact,f_n\n0,1\n0.5,1\n")
+    assert "known.csv, line 3" in run("intervals", *SMALL[:4], "--known", known)[2]
+
+
+def test_prescribed_stress_is_kept_by_every_command(run):
+    stress = ["--prescribe", "stress", "--json"]
+    free = json.loads(run("intervals", *SMALL[:4], "--json")[1])
+    bound = json.loads(run("intervals", *SMALL[:4], *stress)[1])
+    assert bound["dimension"] == free["dimension"] - 2
+    drawn = json.loads(run("uniform", *SMALL[:4], "--states", 16, *stress)[1])
+    assert drawn["dimension"] == bound["dimension"] and drawn["largest_residual"] < 1e-10
+    assert json.loads(run("walk", *SMALL, *stress)[1])["largest_residual"] < 1e-10
+    loads = json.loads(run("limit-loads", *SMALL[:4], *stress)[1])
+    pushed = json.loads(run("perturb", *SMALL[:4], "--random", 2, *stress)[1])
+    assert loads["largest_duality_gap"] <= 1e-8
+    assert pushed["critical_force"] <= pushed["limit_load"]
+
+
+def test_the_outline_of_stresses(run, tmp_path):
+    table = tmp_path / "stress.csv"
+    words = ["stress", *SMALL[:4], "--angles", 8, "--json"]
+    report = json.loads(run(*words, "--csv", table)[1])
+    assert report["own_shear_over_pressure"] <= report["largest_shear_over_pressure"]
+    assert report["largest_shear_over_pressure"] <= report["certainly_not_above"]
+    rows = np.genfromtxt(table, delimiter=",", names=True)
+    assert len(rows) == 8 and rows["largest"].max() <= report["certainly_not_above"]
+    assert json.loads(run(*words)[1])["cached"] is True
+
+
+def test_a_frozen_frame_determines_more(run):
+    words = ["intervals", "-n", "60", "--mu", "0.3", "--json"]
+    free = json.loads(run(*words)[1])
+    held = json.loads(run(*words, "--slice", "0.1,0.9,0.1,0.9")[1])
+    assert held["contacts"] < free["contacts"]
+    assert held["dimension"] < free["dimension"]
+    assert free["undetermined_clusters"] == 1
+
+
+def test_perturbation_of_chosen_contacts(run, tmp_path):
+    table = tmp_path / "contacts.csv"
+    words = ["perturb", *SMALL[:4], "--json", "--csv", table]
+    code, out, _ = run(*words, "--random", 3)
+    assert code == 0
+    report = json.loads(out)
+    assert report["contacts"] == 3
+    assert 0 <= report["critical_force"] <= report["limit_load"]
+    rows = np.genfromtxt(table, delimiter=",", names=True)
+    assert np.all(rows["critical_low"] <= rows["limit_load"])
+    chosen = ",".join(str(int(c)) for c in rows["contact"])
+    again = json.loads(run(*words, "--contacts", chosen)[1])
+    assert again["critical_force"] == report["critical_force"]
+    code, _, err = run(*words, "--contacts", "9999")
+    assert code == 2
+    assert len(err.splitlines()[-1:]) == 1 and "9999" in err
+
+
+def test_limit_loads_of_chosen_contacts(run, tmp_path):
+    bounds = tmp_path / "loads.csv"
+    words = ["limit-loads", *SMALL[:4], "--json", "--csv", bounds]
+    report = json.loads(run(*words)[1])
+    assert report["least_limit_load"] >= 0
+    assert report["largest_duality_gap"] <= 1e-8
+    assert bounds.read_text().startswith("contact,limit_load\n")
+
+
+def test_import_keeps_what_was_read(run, tmp_path):
+    folder = Path(__file__).parents[1] / "lammps"
+    dumps = [folder / f"lammps_n400_mu0.3.{kind}.dump" for kind in ("particles", "contacts")]
+    file = tmp_path / "p.npz"
+    code, out, _ = run("import", "lammps", *dumps, "--mu", 0.3, "--out", file, "--json")
+    report = json.loads(out)
+    assert code == 0
+    assert report["grains"] == 400
+    assert report["residual"] < 1e-9
+    assert report["violation"] < 1e-9
+    words = ["intervals", "--packing", file, "--contacts", "0,1,2", "--json"]
+    found = json.loads(run(*words)[1])
+    assert found["contacts"] == 3
+    # The elastic network is one point of S: inside every exact interval.
+    assert sum(found["position_of_f_n_in_tenths"]) == 3
+
+
+def test_cache_commands(run):
+    run("walk", *SMALL)
+    entries = json.loads(run("cache", "list", "--json")[1])
+    assert sorted(entry["kind"] for entry in entries) == ["packing", "walk"]
+    assert json.loads(run("cache", "size", "--json")[1])["bytes"] > 1000
+    assert run("cache", "verify")[0] == 0
+    assert json.loads(run("cache", "clear", "--kind", "walk", "--json")[1])["removed"] == 1
+    assert len(json.loads(run("cache", "list", "--json")[1])) == 1
+
+
+@pytest.mark.parametrize(
+    "words, what",
+    [
+        (["pack"], "--mu"),
+        (["pack", "--mu", "-1"], "friction coefficient"),
+        (["pack", "--mu", "nan"], "friction coefficient"),
+        (["pack", "--mu", "0.1", "-n", "1"], "at least 3 disks"),
+        (["pack", "--mu", "0.1", "--radii", "no-such-file"], "no-such-file"),
+        (["pack", "--mu", "0.1", "--radii", "uniform:2,1"], "radii"),
+        (["pack", "-n", "40", "--mu", "0.3", "--max-steps", "100"], "not jammed"),
+        (["walk", "--packing", "no-such-file.npz"], "no-such-file.npz"),
+        (["intervals", "-n", "20", "--mu", "0.3", "--contacts", "0,999"], "contact 999"),
+        (["intervals", "-n", "20", "--mu", "0.3", "--contacts", "a"], "--contacts"),
+        (["intervals", "-n", "20", "--mu", "0.3", "--slice", "0.5,0.2,0,1"], "slice"),
+        (["limit-loads", "-n", "20", "--mu", "0.3", "--slice", "0,1"], "four numbers"),
+        (["import", "lammps", "no-such.dump", "nor-this.dump", "--mu", "0.3"], "no-such.dump"),
+        (["import", "lammps", "one.dump", "--mu", "0.3"], "two dumps"),
+        (["import", "table", "no-such.csv", "--mu", "-1"], ""),
+        (["walk", "--mu", "0.1", "--states", "0"], "states"),
+        (["scan", "--mu", "0.1;1"], "--mu"),
+        (["scan", "--mu", "0.1", "--seeds", "0"], "--seeds"),
+        (["cache", "list", "--cache", __file__], "test_cli.py"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(run, words, what):
+    code, out, err = run(*words)
+    assert code == 2
+    assert out == ""
+    last = err.strip().splitlines()[-1]
+    assert last.startswith("granforce: ")
+    assert what in last
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("words", [["fly"], ["pack", "--colour"], ["pack", "-n", "many"], []])
+def test_unknown_words_are_code_2(run, words):
+    code, out, err = run(*words)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1 and err.startswith("granforce: ")
+    assert "see granforce" in err and "--help" in err
+
+
+def test_interrupt_ends_quietly_and_keeps_what_is_finished(tmp_path):
+    words = ["scan", "--mu", "0.3", "--seeds", "400", "-n", "20", "--states", "40"]
+    words += ["--out", str(tmp_path / "s.zarr")]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "granforce.cli", *words],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.time() + 120
+    while not list((tmp_path / "s.zarr").glob("walk-*")) and time.time() < deadline:
+        time.sleep(0.02)
+    os.killpg(running.pid, signal.SIGINT)  # as a terminal does: workers get it too
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert out == ""
+    assert "Traceback" not in err
+    assert "finished entries are kept" in err

@@ -1,0 +1,89 @@
+"""Bad command lines: one line on stderr, exit code 2, nothing half written, never a traceback."""
+
+import contextlib
+import io
+import warnings
+from pathlib import Path
+
+import command_lines
+import pytest
+
+from granforce.cli.parser import LONGEST, main
+
+PACKING = Path(__file__).parents[1] / "reference" / "n100_mu0.1_s11.npz"
+LINES = command_lines.lines()
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder to work in, with files of every kind, and a store of its own."""
+    command_lines.prepare(tmp_path, PACKING)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    return tmp_path
+
+
+def called(words):
+    """Exit code, stdout and the lines on stderr that are not progress, warnings among them."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        warnings.catch_warnings(record=True) as told,
+    ):
+        warnings.simplefilter("always")
+        try:
+            code = main(words)
+        except SystemExit as stop:
+            code = stop.code
+    said = [line for line in err.getvalue().split("\n") if line and "\r" not in line]
+    return code, out.getvalue(), [*said, *(str(warning.message) for warning in told)]
+
+
+def files(folder):
+    """All files of the folder but those of the store, and what a killed writer would leave."""
+    listed = {
+        path.relative_to(folder)
+        for path in folder.rglob("*")
+        if "cache" not in path.relative_to(folder).parts
+    }
+    return listed, [path for path in folder.rglob(".*") if path.name.startswith((".tmp", ".gran"))]
+
+
+def faults(folder, words):
+    """What is wrong with how a bad command line ended, in words; empty where nothing is."""
+    before = files(folder)
+    try:
+        code, out, said = called(words)
+    except BaseException as error:
+        return [f"{type(error).__name__}: {error}"]
+    found = []
+    if code != 2:
+        found.append(f"exit code {code}")
+    if out:
+        found.append("something on stdout")
+    if len(said) != 1 or not said[0].startswith("granforce: ") or len(said[0]) > LONGEST + 20:
+        found.append(f"told {said}")
+    if files(folder) != before:
+        found.append("files were left")
+    return found
+
+
+def judged(folder, chosen):
+    """{words: faults} of those command lines that have any."""
+    return {str(words): wrong for words in chosen if (wrong := faults(folder, words))}
+
+
+def test_some_bad_command_lines(folder):
+    """One in twelve, of every command: 125 lines tried, all survived."""
+    ordered = sorted(LINES, key=lambda words: words[:1])
+    chosen = ordered[::12]
+    assert len(chosen) >= 60
+    assert judged(folder, chosen) == {}
+
+
+@pytest.mark.stress
+def test_all_bad_command_lines(folder):
+    """Every wrong word for every option: 1493 lines tried, all survived, in 50 s."""
+    assert len(LINES) >= 500
+    assert judged(folder, LINES) == {}

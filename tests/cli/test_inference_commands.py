@@ -1,0 +1,60 @@
+"""From a photoelastic frame to inferred forces, by the command line alone."""
+
+import json
+
+import frames
+import numpy as np
+import pytest
+
+from granforce.cli.parser import main
+from granforce.packing.importers import load_packing
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1)
+    frames.write(tmp_path, grains, rows)
+    return tmp_path
+
+
+def told(words, capsys):
+    assert main([*words.split(), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_frame_becomes_a_packing_and_its_forces_are_inferred(folder, capsys):
+    frame = told(
+        "import pegs positions.txt adjacency.txt --mu 0.3 --reach 0.1 --out frame.npz "
+        "--measured frame.csv",
+        capsys,
+    )
+    packing = load_packing(folder / "frame.npz")
+    assert frame["contacts_listed"] + frame["candidates"] == len(packing.contacts.i)
+    infer = "infer --packing frame.npz --measured frame.csv --unmeasured 1 --states 40 --certain"
+    found = told(f"{infer} --csv inferred.csv", capsys)
+    assert not found["cached"] and found["states"] == 40
+    assert found["measured_components"] == 2 * frame["contacts_listed"]
+    assert found["measured_where_nothing_can_carry"] == 0
+    columns = np.genfromtxt(folder / "inferred.csv", delimiter=",", names=True)
+    assert len(columns) == found["contacts"]
+    assert np.all(columns["f_n"] >= 0) and np.all(columns["error_f_n"] > 0)
+    sure = columns["contact"][columns["least_f_n"] > 1e-6 * columns["f_n"].mean()].astype(int)
+    assert set(found["carry_for_certain"]) == set(sure.tolist())
+    assert told(infer, capsys)["cached"]
+    other = told(f"{infer} --sample-seed 1", capsys)
+    assert not other["cached"] and other["chi_square"] == found["chi_square"]
+
+
+def test_without_draws_there_are_no_error_bars(folder, capsys):
+    (folder / "some.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n3,1.5,,0.1,\n4,,0.1,,0.1\n")
+    found = told("infer -n 20 --mu 0.3 --measured some.csv --states 0", capsys)
+    assert found["measured_components"] == 2 and "mean_standard_error" not in found
+    assert found["chi_square"] >= 0
+
+
+def test_a_measurement_of_another_packing_is_told(folder, capsys):
+    (folder / "some.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n5000,1.5,,0.1,\n")
+    assert main("infer -n 20 --mu 0.3 --measured some.csv".split()) == 2
+    assert "right packing" in capsys.readouterr().err

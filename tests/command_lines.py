@@ -1,0 +1,257 @@
+"""Bad words for every option of every command: what the fuzz of the command line is made of."""
+
+import json
+import os
+
+import numpy as np
+
+LONG = "9" * 23
+SEEDS = ["-1", f"-{LONG}", "1.5", "nan", "inf", "", "one", "0x1", "1e3", "−1"]
+WHOLE = ["0", "-1", f"-{LONG}", "1.5", "nan", "inf", "", "many"]
+POSITIVE = ["0", "-1", "nan", "inf", "-inf", "1e999", "", "wide", "1,5"]
+FRICTION = ["-1", "nan", "inf", "-inf", "1e999", "", "much", "0.1,0.2"]
+MEMORY = ["1000000000000", LONG, "9" * 400]
+CONTACTS = ["", ",", "0,", "a", "0;1", "-1", "nan", "1.5", LONG, "9" * 5000, "99999"]
+SLICES = ["", "0,1", "nan,1,0,1", "0,inf,0,1", "0.5,0.2,0,1", "0,1,0,1,0", "a,b,c,d", "-1,2,0,1"]
+FRICTIONS = ["", ",", "a", "0.1;1", "-1", "nan", "0.1,inf", "0.1,,1"]
+
+# Names in the folder that `prepare` makes.
+OUTPUTS = ["none/x", "folder", "file/x", "loop", "x" * 300, "y/" * 3000, "a\0b", "", "/proc/none"]
+CACHES = [
+    *("~nouser/x", "file", "foreign", "newer", "loop", "x" * 300, "y/" * 3000, "a\0b", "file/x"),
+    *("/proc/none", "/dev/null"),
+]
+FILES = ["none", "folder", "loop", "empty", "noise", "cut.npz", "x" * 300, "a\0b", "", "/dev/null"]
+RADII = [
+    *("", "none", "folder", "nan.txt", "inf.txt", "noise", "empty", "words.txt", "few.txt"),
+    *(":", "uniform:", "uniform:1", "uniform:nan,1", "uniform:0.5,inf", "uniform:2,1"),
+    *("uniform:0,1", "uniform:-1,1", "bidisperse:1,2", "bidisperse:1,2,3", "bidisperse:0,1,0.5"),
+    *("bidisperse:nan,1,0.5", "bidisperse:1,1e999,0.5", "gauss:1,2", "x" * 300, "a\0b"),
+]
+
+PACKING = {
+    "-n": [*WHOLE, "2", *MEMORY],
+    "--radii": RADII,
+    "--pressure": POSITIVE,
+    "--dt": POSITIVE,
+    "--box-mass": POSITIVE,
+    "--sweeps": [*WHOLE, LONG],
+}
+ONE_PACKING = PACKING | {"--mu": FRICTION, "--seed": SEEDS}
+ANY_PACKING = ONE_PACKING | {"--packing": FILES, "--cache": CACHES, "--workers": WHOLE}
+WALK = {
+    "--states": [*WHOLE, *MEMORY],
+    "--walk-seed": SEEDS,
+    "--ensemble-mu": FRICTION,
+    "--relax": ["", "magic"],
+    "--chains": [*WHOLE, "1000", LONG],
+}
+KNOWN = {"--known": [*FILES, "grains.csv", "file", "nothing.csv", "letters.csv", "beyond.csv"]}
+CONDITIONS = {
+    "--prescribe": ["", "strain"],
+    "--stress": ["", "1,1,0", "a,b,c", "nan,1,0"],
+}
+WALK |= CONDITIONS | KNOWN
+EXACT = {
+    "--ensemble-mu": FRICTION,
+    "--contacts": CONTACTS,
+    "--slice": SLICES,
+    "--csv": OUTPUTS,
+    **CONDITIONS,
+    **KNOWN,
+}
+
+MEASURED = ["grains.csv", "twice.csv", "other.csv", "exact.csv", "unmeasured.csv", "words.csv"]
+
+SCHEDULERS = ["", "nonsense", "tcp://", "tcp://:x", "ftp://here:1"]
+
+# Command → (words that are right, {option: words that are wrong for it}).
+COMMANDS = {
+    "pack": (
+        ["-n", "8", "--mu", "0.3"],
+        ONE_PACKING | {"--max-steps": WHOLE, "--out": OUTPUTS, "--cache": CACHES},
+    ),
+    "walk": (["-n", "8", "--mu", "0.3", "--states", "3"], ANY_PACKING | WALK),
+    "measure": (
+        ["-n", "8", "--mu", "0.3", "--states", "3"],
+        ANY_PACKING | WALK | {"--contacts": OUTPUTS},
+    ),
+    "uniform": (
+        ["-n", "8", "--mu", "0.3", "--states", "8"],
+        ANY_PACKING
+        | {
+            "--states": [*WHOLE, *MEMORY],
+            "--sample-seed": SEEDS,
+            "--ensemble-mu": FRICTION,
+            "--chains": [*WHOLE, "1000000000000", LONG],
+            "--effective": [*POSITIVE, "1e18", "1e300"],
+            **CONDITIONS,
+            **KNOWN,
+        },
+    ),
+    "infer": (
+        ["-n", "8", "--mu", "0.3", "--measured", "measured.csv", "--states", "8"],
+        ANY_PACKING
+        | {
+            "--measured": [name for name in FILES if name != "cut.npz"] + MEASURED,
+            "--states": ["-1", "1.5", "nan", "many", *MEMORY],
+            "--unmeasured": POSITIVE,
+            **CONDITIONS,
+            **KNOWN,
+            "--sample-seed": SEEDS,
+            "--ensemble-mu": FRICTION,
+            "--chains": [*WHOLE, "1000000000000", LONG],
+            "--csv": OUTPUTS,
+        },
+    ),
+    "intervals": (["-n", "8", "--mu", "0.3"], ANY_PACKING | EXACT),
+    "limit-loads": (["-n", "8", "--mu", "0.3"], ANY_PACKING | EXACT),
+    "stress": (
+        ["-n", "8", "--mu", "0.3"],
+        ANY_PACKING
+        | {
+            "--ensemble-mu": FRICTION,
+            "--angles": [*WHOLE, "5000", LONG],
+            "--csv": OUTPUTS,
+            **KNOWN,
+        },
+    ),
+    "perturb": (
+        ["-n", "8", "--mu", "0.3"],
+        ANY_PACKING
+        | CONDITIONS
+        | {
+            "--random": [*WHOLE, LONG],
+            "--contacts": CONTACTS,
+            "--draw-seed": SEEDS,
+            "--ensemble-mu": FRICTION,
+            "--precision": POSITIVE,
+            "--csv": OUTPUTS,
+        },
+    ),
+    "scan": (
+        ["-n", "8", "--mu", "0.3", "--states", "3"],
+        PACKING
+        | {option: words for option, words in WALK.items() if option not in CONDITIONS | KNOWN}
+        | {
+            "--mu": FRICTIONS,
+            "--seeds": [*WHOLE, *MEMORY],
+            "--out": CACHES,
+            "--cache": CACHES,
+            "--keep": WHOLE,
+            "--workers": WHOLE,
+        },
+    ),
+    "study": (
+        ["--quick"],
+        {
+            "-n": [*WHOLE, "2", *MEMORY],
+            "--mu": FRICTIONS,
+            "--packings": [*WHOLE, *MEMORY],
+            "--states": [*WHOLE, "1", *MEMORY],
+            "--gauss-seidel-packings": ["-1", "some"],
+            "--exact-packings": ["-1", "some"],
+            "--uniform-packings": ["-1", "some"],
+            "--perturb-packings": ["-1", "some"],
+            "--perturb-contacts": ["-1", "0", "some"],
+            "--sizes": [",a", "2", "-5", "nan", "100,1.5", *MEMORY],
+            "--parts": ["", "none", "walk,"],
+            "--formats": ["gif", "html,,pdf"],
+            "--table": CACHES,
+            "--out": [name for name in CACHES if name not in ("foreign", "newer")],
+            "--workers": WHOLE,
+        },
+    ),
+    "app": (
+        ["--no-show"],
+        {
+            "--port": ["-1", "65536", "1.5", "nan", "", "many", LONG],
+            "--address": ["", " ", "192.0.2.1", "x" * 300, "a\0b"],
+            "--allow-websocket-origin": ["", "a b", "http://here", "here:port", "a,b"],
+        },
+    ),
+    "bench": ([], {"--out": ["file", "file/x", "loop", "x" * 300, "a\0b", "/proc/none"]}),
+    "cache": (
+        ["list"],
+        {"--cache": CACHES},
+    ),
+}
+IMPORTS = [
+    *(["table", name, "--mu", "0.3"] for name in FILES),
+    *(["lammps", name, name, "--mu", "0.3"] for name in FILES),
+    *(["pegs", name, "adjacency.txt", "--mu", "0.3"] for name in [*FILES, "grains.csv"]),
+    *(["pegs", "positions.txt", name, "--mu", "0.3"] for name in [*FILES, "grains.csv"]),
+    *(
+        ["pegs", "positions.txt", "adjacency.txt", "--mu", "0.3", f"{option}={word}"]
+        for option, words in {
+            "--frame": ["7", "nan", "inf", "", "first"],
+            "--reach": ["-1", "nan", "inf", "3", "", "far"],
+            "--scale": POSITIVE,
+            "--error": POSITIVE,
+            "--out": OUTPUTS,
+            "--measured": OUTPUTS,
+        }.items()
+        for word in words
+    ),
+    *(["table", "grains.csv", name, "--mu", "0.3"] for name in FILES),
+    *(["table", "grains.csv", "--mu", mu] for mu in FRICTION),
+    *(["table", "grains.csv", "--mu", "0.3", "--box", side, "9"] for side in POSITIVE),
+    *(["table", "grains.csv", "--mu", "0.3", "--pressure", p] for p in POSITIVE),
+    *(["table", "grains.csv", "--mu", "0.3", "--out", out] for out in OUTPUTS),
+    *(["lammps", "one.dump", "--mu", "0.3"], ["ovito", "a", "--mu", "1"], ["table"], []),
+    ["table", "grains.csv", "--mu", "0.3", "--forces"],
+]
+
+
+def lines():
+    """All bad command lines, lists of words: one wrong word in each."""
+    found = [["import", *words] for words in IMPORTS]
+    cell = ["scan", "-n", "8", "--mu", "0.3", "--states", "4"]
+    found += [[*cell, f"--scheduler={word}"] for word in SCHEDULERS]
+    for command, (right, options) in COMMANDS.items():
+        for option, wrong in options.items():
+            found += [
+                [command, *right, *([f"{option}={word}"] if option != "-n" else [option, word])]
+                for word in wrong
+            ]
+        found += [[command, *right, "--colour"], [command, *right, "extra", "words"]]
+    return [*found, [], ["fly"], ["--", "pack"], ["pack", "walk"], ["\0"]]
+
+
+def prepare(folder, packing):
+    """Files of every kind that a word may name, in a folder; packing: an NPZ file."""
+    noise = np.random.default_rng(0).bytes(500)
+    (folder / "file").write_text("text\n")
+    (folder / "empty").write_text("")
+    (folder / "noise").write_bytes(noise)
+    (folder / "folder").mkdir()
+    (folder / "folder" / "inside").write_text("")
+    (folder / "foreign").mkdir()
+    (folder / "foreign" / "thesis.tex").write_text("")
+    (folder / "newer").mkdir()
+    root = {"zarr_format": 3, "node_type": "group", "attributes": {"granforce_store": 1000}}
+    (folder / "newer" / "zarr.json").write_text(json.dumps(root))
+    os.symlink("loop", folder / "loop")
+    (folder / "cut.npz").write_bytes(packing.read_bytes()[:2000])
+    (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
+    (folder / "nothing.csv").write_text("contact,comment\n1,strong\n")
+    (folder / "letters.csv").write_text("contact,f_n\n1,strong\n")
+    (folder / "beyond.csv").write_text("contact,f_n\n1000000,1\n")
+    (folder / "positions.txt").write_text("1,1,0,0,1,0\n1,2,2,0,1,1\n1,3,0,2,1,1\n")
+    (folder / "adjacency.txt").write_text("1,1,2,0,1\n1,1,3,0,1\n")
+    for name, line in {
+        "measured": "0,1,0,0.1,0.1",
+        "twice": "0,1,0,0.1,0.1\n0,1,0,0.1,0.1",
+        "other": "99999,1,0,0.1,0.1",
+        "exact": "0,1,0,0,0.1",
+        "unmeasured": "0,1,0,,",
+        "words": "0,one,0,0.1,0.1",
+    }.items():
+        (folder / f"{name}.csv").write_text(f"contact,f_n,f_t,sigma_n,sigma_t\n{line}\n")
+    for name, words in {
+        "nan": ["nan"] * 8,
+        "inf": ["inf"] * 8,
+        "words": ["wide"] * 8,
+        "few": ["1"] * 3,
+    }.items():
+        (folder / f"{name}.txt").write_text("\n".join(words))

@@ -1,0 +1,85 @@
+"""Which measurement next, and which contacts carry for certain."""
+
+import numpy as np
+import pytest
+from packings import packed, reference, two_disks
+
+from granforce.explore.carrying import carrying
+from granforce.explore.informative import informative
+from granforce.explore.intervals import intervals
+from granforce.forces.ensemble import ensemble
+from granforce.forces.knowledge import Known
+from granforce.records import Cancelled, InputError
+
+
+@pytest.fixture(scope="module")
+def S():
+    return ensemble(packed(40, 0.3))
+
+
+def extent(body):
+    found = intervals(body)
+    return np.mean(found.upper[:, 0] - found.lower[:, 0]) / body.force_scale
+
+
+def test_the_best_measurement_shortens_the_exact_intervals_most(S):
+    """Against each contact held in turn: what is proposed is among the best tenth."""
+    found = informative(S, 5, check=5)
+    assert len(found.contacts) == 5 and np.all(np.diff(found.after) >= 0)
+    assert found.before == pytest.approx(extent(S)) and found.after[0] < found.before
+    states = intervals(S)
+    middle = 0.5 * (states.lower[:, 0] + states.upper[:, 0])
+    after = []
+    for c, value in zip(S.index[::3], middle[::3], strict=True):
+        low, high = [[value, -np.inf]], [[value, np.inf]]
+        after.append(extent(ensemble(S.packing, known=Known([c], low, high))))
+    assert np.mean(np.array(after) < found.after[0]) < 0.1
+
+
+def test_expectation_alone_takes_no_program(S):
+    found = informative(S, 8, check=0)
+    assert np.isnan(found.before) and np.isnan(found.after).all()
+    assert np.all(np.diff(found.expected) <= 0)
+    assert np.all((0 < found.expected) & (found.expected < 1))
+    twice = informative(S, 8, check=0, workers=2)
+    assert np.array_equal(twice.contacts, found.contacts)
+
+
+def test_nothing_is_left_to_measure_where_all_is_determined():
+    with pytest.raises(InputError, match="nothing is left"):
+        informative(ensemble(two_disks()))
+
+
+def test_bad_questions_are_told(S):
+    for options in ({"k": 0}, {"check": -1}, {"states": 0}):
+        with pytest.raises(InputError):
+            informative(S, **options)
+    with pytest.raises(Cancelled):
+        informative(S, cancel=lambda: True)
+
+
+def test_what_carries_for_certain_is_what_exact_bounds_say():
+    """Of contacts not measured: the lower bound over all networks within 3 σ of the others."""
+    S = ensemble(reference("n100_mu0.1_s11"))
+    m, sigma = S.original.copy(), np.array([0.2, 0.1]) * S.force_scale
+    m[::5] = np.nan
+    found = carrying(S, m, sigma)
+    assert found.contacts.tolist() == S.index[::5].tolist() and found.widened == 0
+    seen = ~np.isnan(m)
+    low, high = np.full((2, *m.shape), np.nan)
+    low[:], high[:] = -np.inf, np.inf
+    low[seen], high[seen] = (m - 3 * sigma)[seen], (m + 3 * sigma)[seen]
+    exact = intervals(ensemble(S.packing, known=Known(S.index, low, high)), found.contacts)
+    assert np.abs(found.least - exact.lower[:, 0]).max() < 1e-6 * S.force_scale
+    assert np.array_equal(found.carries, found.least > 1e-7 * S.force_scale)
+    assert 0 < found.carries.sum() < len(found.carries)
+    assert np.all(found.least <= S.original[::5, 0] + 1e-9)
+
+
+def test_bounds_give_way_where_no_network_agrees():
+    S = ensemble(reference("n100_mu0.1_s11"))
+    m, sigma = S.original.copy(), 0.05 * S.force_scale
+    m[40, 0] += 3 * S.force_scale
+    m[1] = np.nan
+    found = carrying(S, m, sigma)
+    assert found.widened > 0 and np.isfinite(found.least).all()

@@ -1,0 +1,281 @@
+"""Exact bounds and limit loads: references, certificates, symmetries, limit cases."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from packings import packed
+
+from granforce.bench.exact import read_reference
+from granforce.explore import intervals as module
+from granforce.explore.intervals import intervals, limit_load_bounds, limit_loads
+from granforce.forces.contact_problem import make_system
+from granforce.forces.ensemble import ensemble
+from granforce.numerics import certified_values
+from granforce.numerics import highs as programs
+from granforce.records import InputError, make_contacts, make_packing
+from granforce.tolerances import INTERVAL_GAP
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+SMALL = ["n100_mu0.1_s11", "n100_mu1_s12"]
+
+
+@pytest.fixture(scope="module", params=SMALL)
+def small(request):
+    system, data = read_reference(REFERENCE / f"{request.param}.npz")
+    return system, data, intervals(system)
+
+
+@pytest.fixture(scope="module")
+def first():
+    system, _ = read_reference(REFERENCE / f"{SMALL[0]}.npz")
+    return system, intervals(system)
+
+
+def agree(system, found, lower, upper, tolerance=1e-6):
+    assert np.abs(found.lower - lower).max() <= tolerance * system.force_scale
+    assert np.abs(found.upper - upper).max() <= tolerance * system.force_scale
+
+
+def square_lattice(side, mu):
+    grid = np.arange(side)
+    i, j, normal = [], [], []
+    for a in grid:
+        for b in grid:
+            for step in ((1, 0), (0, 1)):
+                i.append(a * side + b)
+                j.append((a + step[0]) % side * side + (b + step[1]) % side)
+                normal.append(step)
+    x = np.stack(np.meshgrid(grid + 0.5, grid + 0.5, indexing="ij"), axis=-1).reshape(-1, 2)
+    r = np.full(side * side, 0.5)
+    contacts = make_contacts(i, j, np.array(normal, float), np.ones(len(i)), r)
+    forces = np.zeros((len(i), 2))
+    forces[:, 0] = 1.0
+    return make_packing(x, r, [side, side], contacts, forces, mu, 1.0)
+
+
+def test_bounds_agree_with_the_reference(small):
+    system, data, found = small
+    agree(system, found, data["lo"][system.index], data["hi"][system.index])
+    assert found.converged
+    assert found.max_gap <= INTERVAL_GAP
+    assert found.backbone.all()
+
+
+def test_bounds_of_400_disks_agree_with_the_reference():
+    system, data = read_reference(REFERENCE / "n400_mu0.1_s13.npz")
+    found = intervals(system, workers=2)
+    assert found.converged
+    agree(system, found, data["lo"][system.index], data["hi"][system.index])
+
+
+def test_limit_loads_agree_with_the_reference(small):
+    system, data, _ = small
+    found = limit_load_bounds(system)
+    assert found.converged
+    off = np.abs(found.load - data["fcrit"][system.index])
+    assert off.max() <= 1e-6 * system.force_scale
+
+
+def test_every_known_state_lies_inside_its_bounds(small):
+    system, _, found = small
+    slack = 1e-7 * system.force_scale
+    assert np.all(system.original >= found.lower - slack)
+    assert np.all(system.original <= found.upper + slack)
+
+
+def test_without_skipping_the_answers_are_the_same(first):
+    system, found = first
+    known = intervals(system, states=system.original[None])
+    every = intervals(system, skip=False)
+    assert every.counts["f_n = 0 seen in a known state"] == 0
+    assert found.counts["f_n = 0 seen in a known state"] > 0
+    assert every.counts["programs"] == 4 * len(system.index)
+    for other in (known, every):
+        agree(system, other, found.lower, found.upper, 2 * INTERVAL_GAP)
+
+
+def test_threads_and_company_do_not_change_a_bit(first):
+    system, found = first
+    threaded = intervals(system, workers=3)
+    np.testing.assert_array_equal(threaded.upper, found.upper)
+    np.testing.assert_array_equal(threaded.lower[:, 1], found.lower[:, 1])
+    few = intervals(system, system.index[[40, 3, 41]])
+    np.testing.assert_array_equal(few.upper, found.upper[[40, 3, 41]])
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_bounds_are_told_as_they_are_found_the_widest_first_and_stay_the_same(first, workers):
+    system, found = first
+    widths, told = (found.upper - found.lower)[:, 0], []
+    again = intervals(system, workers=workers, widths=widths, watch=told.append)
+    for one, other in zip(found, again, strict=True):
+        if isinstance(one, np.ndarray):
+            np.testing.assert_array_equal(one, other)
+    assert again.counts == found.counts and again.max_gap == found.max_gap
+    sides = {0: again.lower, 1: again.upper}
+    place = {int(c): k for k, c in enumerate(again.contacts)}
+    last = {(bound.contact, bound.component, bound.side): bound.value for bound in told}
+    assert len(last) == 4 * len(place)
+    for (contact, component, side), value in last.items():
+        assert value == sides[side][place[contact], component]
+    for bound in told:  # what was told before differs by no more than what is certified
+        said_last = last[bound.contact, bound.component, bound.side]
+        assert abs(bound.value - said_last) <= INTERVAL_GAP * system.force_scale
+    assert len(told) - len(last) <= again.counts["f_n = 0 seen in a known state"]
+    # Programs side by side end within some places of their turn.
+    upper = [k for k, bound in enumerate(told) if bound.component == 0 and bound.side == 1]
+    assert upper[len(place) // 2] < len(place) and upper[-1] < 1.5 * len(place)
+    rank = np.argsort(np.argsort(-widths, kind="stable"))
+    first_told = [rank[place[told[k].contact]] for k in upper[: len(place) // 4]]
+    assert max(first_told) < 0.6 * len(place)
+    # Lower ones come with them: few wait until all tangential bounds are there.
+    normal, tangential = (
+        [k for k, bound in enumerate(told) if bound.component == component] for component in (0, 1)
+    )
+    early = [k for k in normal if k < np.median(tangential)]
+    assert len(early) > 2 * len(place) - 1.5 * again.counts["f_n = 0 seen in a known state"]
+
+
+def test_certificates_see_a_wrong_optimum(first):
+    system, _ = first
+    cones = make_system(system)
+    task = module.bound_of(system, 0, 0, 1)
+    outcome = certified_values.from_scratch(cones, 0, task)
+    attained, bound = certified_values.certify(cones, [outcome], [task])
+    assert abs(attained[0] - bound[0]) <= INTERVAL_GAP
+    unbalanced = outcome._replace(y=outcome.y * (1 + 1e-6))
+    assert certified_values.certify(cones, [unbalanced], [task])[0][0] == np.inf
+    elsewhere = outcome._replace(y=cones.middle.y)
+    attained, bound = certified_values.certify(cones, [elsewhere], [task])
+    assert attained[0] - bound[0] > 1e-3
+    loose = outcome._replace(multiplier=outcome.multiplier * (1 + 1e-4))
+    attained, bound = certified_values.certify(cones, [loose], [task])
+    assert bound[0] <= attained[0]
+    assert attained[0] - bound[0] > INTERVAL_GAP
+
+
+@pytest.mark.parametrize("mu", [0.5, 10.0])
+def test_bounds_and_loads_agree_with_highs(mu):
+    system, _ = read_reference(REFERENCE / f"{SMALL[0]}.npz")
+    system = ensemble(system.packing, mu)
+    found = intervals(system)
+    assert found.converged
+    A, T = system.cone_form
+    model = programs.standard_form(A, system.b / system.force_scale)
+    for k in range(0, A.shape[1], 17):
+        for side, bound in ((1.0, found.lower), (-1.0, found.upper)):
+            row = T.tocsr()[k].toarray().ravel()
+            programs.set_cost(model, side * row)
+            value = row @ programs.solve(model)[1] * system.force_scale
+            assert abs(value - bound[k // 2, k % 2]) <= 1e-7 * system.force_scale
+
+
+@pytest.mark.parametrize("factor", [1e-12, 1e12])
+def test_forces_scale_with_the_pressure(first, factor):
+    system, found = first
+    packing = system.packing
+    scaled = packing._replace(pressure=packing.pressure * factor, forces=packing.forces * factor)
+    other = intervals(ensemble(scaled))
+    np.testing.assert_allclose(other.upper / factor, found.upper, atol=1e-7 * system.force_scale)
+    np.testing.assert_allclose(other.lower / factor, found.lower, atol=1e-7 * system.force_scale)
+
+
+def test_a_square_lattice_without_friction_loads_one_line():
+    """At μ = 0 the force on each line of contacts is constant; one line may carry everything."""
+    side = 5
+    system = ensemble(square_lattice(side, 0.0))
+    found = intervals(system)
+    assert found.converged
+    line = 2 * side * side / side
+    np.testing.assert_allclose(found.upper[:, 0], line, rtol=1e-8)
+    np.testing.assert_allclose(found.lower, 0.0, atol=1e-7)
+    np.testing.assert_array_equal(found.upper[:, 1], 0.0)
+    # F itself is part of the line's force: it may take all of it.
+    np.testing.assert_allclose(limit_loads(system), line, rtol=1e-8)
+
+
+def test_a_square_lattice_with_friction_is_certified():
+    system = ensemble(square_lattice(6, 0.3))
+    found, loads = intervals(system), limit_load_bounds(system)
+    assert found.converged and loads.converged
+    # All contacts of a direction are alike.
+    np.testing.assert_allclose(found.upper[:, 0], found.upper[0, 0], atol=1e-6)
+    np.testing.assert_allclose(found.lower[:, 1], -found.upper[:, 1], atol=1e-6)
+
+
+def test_freezing_a_contact_holds_it_and_narrows_the_others(first):
+    system, found = first
+    strong = int(np.argmax(found.lower[:, 0]))
+    frozen = ensemble(system.packing, frozen=[system.index[strong]])
+    narrowed = intervals(frozen)
+    assert narrowed.converged
+    assert len(narrowed.upper) == len(system.index) - 1
+    assert np.all(narrowed.lower <= frozen.original + 1e-7 * frozen.force_scale)
+    assert np.all(narrowed.upper >= frozen.original - 1e-7 * frozen.force_scale)
+
+
+def test_forces_without_bounds_are_reported(first):
+    system, found = first
+    weak = int(np.argmin(found.lower[:, 0]))
+    frozen = ensemble(system.packing, frozen=[system.index[weak]], prune=False)
+    with pytest.raises(InputError, match="not bounded"):
+        intervals(frozen, frozen.index[:1])
+
+
+def test_progress_counts_up_and_cancelling_leaves_the_rest_open(first):
+    system, found = first
+    seen = []
+    cancelled = intervals(
+        system,
+        progress=lambda done, total: seen.append((done, total)),
+        cancel=lambda: bool(seen) and seen[-1][0] > 60,
+    )
+    done = [number for number, _ in seen]
+    assert done == sorted(done) and seen[0][1] == 4 * len(system.index)
+    assert not cancelled.converged
+    reached = ~np.isnan(cancelled.upper)
+    assert 0 < reached.sum() < reached.size
+    np.testing.assert_array_equal(cancelled.upper[reached], found.upper[reached])
+
+
+def test_contacts_outside_the_ensemble_are_refused(first):
+    system, _ = first
+    for beyond in (-1, len(system.packing.contacts.i)):
+        with pytest.raises(InputError, match=f"contact {beyond} is none of"):
+            intervals(system, [beyond])
+    with pytest.raises(InputError, match="twice"):
+        limit_loads(system, [system.index[1], system.index[1]])
+
+
+def test_contacts_are_named_by_their_number_in_the_packing(first):
+    """Results for contacts that a frozen one displaces in the ensemble are those of the same."""
+    system, _ = first
+    frozen = ensemble(system.packing, frozen=[system.index[4]])
+    whole, loads = intervals(frozen), limit_load_bounds(frozen)
+    np.testing.assert_array_equal(whole.contacts, frozen.index)
+    np.testing.assert_array_equal(loads.contacts, frozen.index)
+    for contact in (system.index[3], system.index[9]):
+        (k,) = np.flatnonzero(whole.contacts == contact)
+        one, load = intervals(frozen, [contact]), limit_load_bounds(frozen, [contact])
+        assert one.contacts == load.contacts == [contact]
+        np.testing.assert_allclose(one.upper[0], whole.upper[k], atol=1e-7 * frozen.force_scale)
+        assert load.load[0] == pytest.approx(loads.load[k], rel=1e-6)
+    for result in (intervals, limit_loads):
+        with pytest.raises(InputError, match=f"contact {system.index[4]} is none of"):
+            result(frozen, [system.index[4]])
+
+
+def test_what_is_not_certified_is_not_handed_out():
+    # At μ = 10⁷ rounding of the torques is larger than the unbalance that a state may have.
+    S = ensemble(packed(30, 10.0), 1e7)
+    found = intervals(S)
+    limits = limit_load_bounds(S)
+    assert not found.converged and not limits.converged
+    unsure = ~(found.gap <= INTERVAL_GAP)
+    assert unsure.any()
+    assert np.array_equal(np.isnan(found.lower), unsure[..., 0])
+    assert np.array_equal(np.isnan(found.upper), unsure[..., 1])
+    assert np.array_equal(np.isnan(limits.load), ~(limits.gap <= INTERVAL_GAP))
+    sure = np.isfinite(found.lower) & np.isfinite(found.upper)
+    assert np.all(found.lower[sure] <= found.upper[sure] + 2e-8 * S.force_scale)

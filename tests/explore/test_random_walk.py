@@ -1,0 +1,151 @@
+"""The random walk: states in S, seeds, chains, and honest counts."""
+
+import numpy as np
+import pytest
+from packings import packed, two_disks
+
+from granforce.explore import random_walk
+from granforce.explore.random_walk import init, judge, step, walk
+from granforce.forces.ensemble import ensemble
+from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.nearest import nearest
+from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.records import Cancelled, InputError, NotJammedError, Relaxation
+
+
+@pytest.fixture(scope="module")
+def S():
+    return ensemble(packed(40, 0.3))
+
+
+def test_every_state_is_in_s(S):
+    done = walk(S, 20, 3)
+    assert done.states.shape == (20, len(S.index), 2)
+    assert done.residual.max() < 1e-10
+    assert done.residual == pytest.approx(S.residual(done.states))
+    assert S.violation(done.states).max() < 1e-9
+    assert done.counts["accepted"] == 20
+    assert done.attempts.sum() <= sum(done.counts.values())
+    assert np.all(done.sweeps > 0)
+
+
+def test_the_walk_moves(S):
+    done = walk(S, 10, 3)
+    moved = np.linalg.norm(np.diff(done.states, axis=0), axis=(1, 2))
+    assert np.all(moved > 1e-3 * S.force_scale)
+
+
+@pytest.mark.parametrize("relax", [gauss_seidel, nearest_piqp, nearest])
+def test_same_seed_same_states_for_any_number_of_workers(S, relax):
+    options = {"relax": relax}
+    one = walk(S, 9, 5, chains=3, workers=1, **options)
+    two = walk(S, 9, 5, chains=3, workers=3, **options)
+    other = walk(S, 9, 6, chains=3, workers=1, **options)
+    assert np.array_equal(one.states, two.states)
+    assert not np.array_equal(one.states, other.states)
+
+
+@pytest.mark.parametrize("relax", [gauss_seidel, nearest])
+def test_chains_in_lanes_are_those_that_go_alone(S, relax, monkeypatch):
+    """The same states, bit for bit, whether they step in lanes or one after the other."""
+    options = {"rest": None, "tolerance": 1e-3} if relax is gauss_seidel else {}
+    lanes = walk(S, 21, 5, chains=5, relax=relax, **options)
+    monkeypatch.setattr(random_walk, "WORTH_LANES", 6)
+    alone = walk(S, 21, 5, chains=5, relax=relax, **options)
+    assert np.array_equal(lanes.states, alone.states)
+    assert np.array_equal(lanes.sweeps, alone.sweeps)
+    assert lanes.counts == alone.counts
+
+
+def test_a_walk_that_is_watched_is_the_same_and_seen_whole(S):
+    seen = []
+    alone, watched = walk(S, 9, 5, chains=3), walk(S, 9, 5, chains=3, workers=3, watch=seen.append)
+    assert np.array_equal(alone.states, watched.states)
+    seen.sort(key=lambda found: (found.chain, found.number))
+    assert [(found.chain, found.number) for found in seen] == [(k // 3, k % 3) for k in range(9)]
+    assert np.array_equal([found.forces for found in seen], alone.states)
+    assert np.array_equal([found.residual for found in seen], alone.residual)
+    assert np.array_equal([found.attempts for found in seen], alone.attempts)
+
+
+def test_chains_are_independent_walks(S):
+    three = walk(S, 9, 5, chains=3).states.reshape(3, 3, -1)
+    assert not np.allclose(three[0], three[1])
+
+
+def test_a_single_point_needs_no_relaxation():
+    for packing in (packed(40, 0.0), two_disks()):
+        point = ensemble(packing)
+        done = walk(point, 5, 0)
+        assert done.counts == {"accepted": 0, "rejected": 0, "unconverged": 0, "skipped": 5}
+        assert np.ptp(done.states, axis=0).max() == 0
+        assert done.residual.max() < 1e-10
+        # What was skipped would have led to the same point.
+        state = init(point, 0)
+        again, info = step(point, state, relax=nearest_piqp)
+        assert info.outcome == "accepted"
+        assert np.abs(again.forces - state.forces).max() < 1e-7 * point.force_scale
+
+
+def test_rejection_and_lack_of_convergence_are_told_apart():
+    def reached(residual, violation, converged):
+        return judge(Relaxation(None, 1, residual, violation, converged, 0.0))
+
+    assert reached(1e-12, 0.0, True) == "accepted"
+    assert reached(1e-2, 0.0, True) == "rejected"
+    assert reached(1e-12, 1e-2, True) == "rejected"
+    assert reached(1e-2, 0.0, False) == "unconverged"
+    assert reached(np.nan, 0.0, False) == "unconverged"
+
+
+def test_a_walk_that_gets_nowhere_says_so(S):
+    with pytest.raises(NotJammedError, match="only 0 of 4 states after 6 attempts"):
+        walk(S, 4, 0, max_attempts=6, max_iterations=2)
+
+
+def test_a_walk_may_end_with_the_states_it_has(S):
+    """Sweeps that end at 10⁻³ reach most attempts; after so many the walk ends, the same states."""
+    options = {"relax": gauss_seidel, "rest": None, "tolerance": 1e-3}
+    all_ten = walk(S, 10, 0, **options)
+    some = walk(S, 10, 0, max_attempts=4, whole=False, **options)
+    count = some.counts["accepted"]
+    assert 0 < count < 10
+    assert sum(some.counts.values()) == 4
+    assert np.array_equal(some.states, all_ten.states[:count])
+    assert some.residual.max() <= 1e-3
+    assert some.residual.max() > 1e-6  # nothing but sweeps: no exact finish
+    none = walk(S, 4, 0, max_attempts=6, whole=False, max_iterations=2)
+    assert none.states.shape == (0, len(S.index), 2)
+    assert none.acceptance == 0
+
+
+def test_a_rejected_attempt_stays_where_it_was(S):
+    state = init(S, 0)
+    again, info = step(S, state, max_iterations=2)
+    assert info.outcome == "unconverged"
+    assert np.array_equal(again.forces, state.forces)
+
+
+def test_a_step_leaves_its_state_as_it_was(S):
+    state = init(S, 0)
+    one, two = (step(S, state)[0].forces for _ in range(2))
+    assert np.array_equal(one, two)
+    assert not np.array_equal(one, state.forces)
+
+
+def test_a_walk_can_be_cancelled(S):
+    seen = []
+    with pytest.raises(Cancelled):
+        walk(S, 50, 0, progress=lambda *a: seen.append(a), cancel=lambda: len(seen) >= 3)
+    assert seen == [(1, 50), (2, 50), (3, 50)]
+
+
+def test_an_original_outside_the_cones_is_replaced_by_the_nearest():
+    S = ensemble(packed(40, 0.3), mu=0.28)
+    assert S.admits(init(S, 0).forces)
+
+
+@pytest.mark.parametrize("sizes", [{"states": 0}, {"states": 2, "chains": 3}])
+def test_sizes_below_one_are_refused(S, sizes):
+    with pytest.raises(InputError):
+        walk(S, seed=0, **sizes)

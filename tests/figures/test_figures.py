@@ -1,0 +1,312 @@
+"""Figures hold what they were given; pages need no network, pictures no browser."""
+
+import pathlib
+import re
+import subprocess
+import sys
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import holoviews as hv
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.path import Path
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+from packings import packed
+from PIL import Image
+
+from granforce import figures
+from granforce.figures import style
+from granforce.paper import drawings, tables
+from granforce.records import InputError
+
+ROOT = pathlib.Path(__file__).parents[2]
+
+
+def curves(frame):
+    """{label: (x, y)} of the lines of one frame."""
+    return {
+        e.label: (e.dimension_values(0), e.dimension_values(1))
+        for e in frame.traverse(lambda e: e, [hv.Curve])
+    }
+
+
+def frames(figure):
+    return figure.values()
+
+
+def test_the_benchmark_has_a_frame_for_each_part():
+    rows = [
+        {"mu": mu, "method": method, "seconds": seconds, "extent_part": part}
+        for mu in (0.1, 1.0)
+        for method, seconds, part in (("exact", 4, 1.0), ("walk", 9, 0.5), ("walk", 1, 0.3))
+    ]
+    sizes = [{"n": n, "solver": "ours", "seconds": n / 100} for n in (100, 400)]
+    results = {"intervals": rows, "scaling": [*sizes, {"n": "fit", "solver": "ours"}]}
+    figure = figures.benchmark(results)
+    scaling, first, second = (curves(frame) for frame in frames(figure))
+    np.testing.assert_allclose(scaling["ours"], ([100, 400], [1, 4]))
+    np.testing.assert_allclose(first["walk"], ([1, 9], [0.3, 0.5]))
+    np.testing.assert_allclose(second["exact"], ([4], [1.0]))
+
+
+def test_pages_need_no_network(tmp_path):
+    # In a process of its own, as the command line's: Panel, where loaded, adds links to its styles.
+    path = tmp_path / "figure.html"
+    code = (
+        "from granforce import figures\n"
+        "rows = [{'n': n, 'solver': 'ours', 'seconds': n / 100} for n in (100, 400)]\n"
+        f"figures.save(figures.benchmark({{'scaling': rows}}), {str(path)!r})\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    # Scripts and styles are in the page: it needs no network.
+    assert not re.search(r"<script[^>]+src=|<link[^>]+stylesheet", path.read_text())
+
+
+ROWS = [
+    {"mu": mu, "eta1": k * mu, "eta2": 2 * k * mu, "eta3": 20 * k * mu, "coordination": 4 - mu}
+    for mu in (0, 0.1, 1)
+    for k in (1, 3)
+]
+
+
+@pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
+def test_indeterminacy_averages_over_packings(backend):
+    exact = [{"mu": 0.1, "eta3": 9.0}]
+    figure = figures.indeterminacy(ROWS, beside={"exact": exact}, backend=backend)
+    if backend == "matplotlib":  # the logarithmic frame is an inset
+        contacts, linear = (curves(frame) for frame in frames(figure))
+        (inner,) = style.rendered(figure).axes[1].child_axes
+        assert inner.get_xscale() == inner.get_yscale() == "log"
+        log = {line.get_label(): line.get_data() for line in inner.get_lines()}
+    else:
+        linear, log, contacts = (curves(frame) for frame in frames(figure))
+    assert list(linear) == ["η1", "η2", "0.15 η3", "0.15 η3, exact"]
+    np.testing.assert_allclose(linear["η2"], ([0, 0.1, 1], [0, 0.4, 4]))
+    np.testing.assert_allclose(log["0.15 η3"], ([0.1, 1], [0.6, 6]))
+    np.testing.assert_allclose(linear["0.15 η3, exact"], ([0.1], [1.35]))
+    np.testing.assert_allclose(contacts["z"], ([0.1, 1], [3.9, 3]))
+    bars = frames(figure)[backend == "matplotlib"].traverse(lambda e: e, [hv.ErrorBars])[0]
+    np.testing.assert_allclose(bars.dimension_values("above"), [0.1, 1])  # standard error of 1, 3
+
+
+def test_extents_are_densities_with_their_tails(rng):
+    groups = {0.1: [rng.exponential(2.0, 4000) for _ in range(2)], 1.0: [np.zeros(5)]}
+    linear, log = (curves(frame) for frame in frames(figures.extents(groups)))
+    (label,) = linear  # nothing is drawn of a packing without indeterminacy
+    b = float(label.partition("b = ")[2])
+    assert b == pytest.approx(1, abs=0.1)
+    x, height = linear[label]
+    assert np.sum(height) * (x[1] - x[0]) == pytest.approx(1 - np.exp(-4), abs=0.01)
+    np.testing.assert_allclose(height, np.exp(-x), atol=0.1)
+    assert np.all(log[label][1] > 0)
+    few = frames(figures.extents({0.1: [np.array([0.0, 0.0, 1.0])]}))[0]
+    assert list(curves(few)) == ["μ = 0.1"]  # too few for a tail
+
+
+def test_correlations_carry_the_range_over_networks():
+    rows = [
+        {"mu": mu, "correlation": c, "correlation_low": c - 0.1, "correlation_high": c + 0.3}
+        for mu in (0, 0.1, 1)
+        for c in (mu, mu + 0.2)
+    ]
+    figure = figures.correlations(rows, beside={"exact": [{"mu": 0.1, "correlation": 0.5}]})
+    drawn = curves(figure)
+    np.testing.assert_allclose(drawn["walk"], ([0.1, 1], [0.2, 1.1]))
+    np.testing.assert_allclose(drawn["exact"], ([0.1], [0.5]))
+    bars = figure.traverse(lambda e: e, [hv.ErrorBars])[0]
+    np.testing.assert_allclose(bars.dimension_values("below"), [0.1, 0.1])
+    np.testing.assert_allclose(bars.dimension_values("above"), [0.3, 0.3])
+
+
+def test_pictures_need_no_browser(tmp_path):
+    figure = figures.indeterminacy(ROWS, backend="matplotlib")
+    for name in ("a.png", "a.svg", "b.svg"):
+        figures.save(figure, tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+    with pytest.raises(InputError, match=r"not '\.gif'"):
+        figures.save(figure, tmp_path / "a.gif")
+
+
+def test_one_backend_does_not_displace_the_other():
+    figures.indeterminacy(ROWS, backend="bokeh")
+    current = hv.Store.current_backend
+    figures.indeterminacy(ROWS, backend="matplotlib")
+    assert hv.Store.current_backend == current
+    with pytest.raises(InputError, match="take bokeh or matplotlib"):
+        figures.indeterminacy(ROWS, backend="plotly")
+
+
+@pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
+def test_perturbation_is_joined_in_order_of_friction(backend):
+    rows = [
+        {"mu": mu, "eta2": eta + k, "critical_force": 2 + k, "decay_exponent": mu, "limit_load": 5}
+        for mu, eta in ((0.1, 3), (0, 0), (10, 1))
+        for k in (0, 2)
+    ]
+    rows.append({"mu": 1, "eta2": 2.0, "critical_force": 1.0, "decay_exponent": np.nan})
+    force, decay = frames(figures.perturbation(rows, backend=backend))
+    np.testing.assert_allclose(curves(force)["critical force"], ([1, 4, 2, 2], [3, 3, 1, 3]))
+    np.testing.assert_allclose(curves(force)["limit load"], ([1, 4, 2], [5, 5, 5]))
+    np.testing.assert_allclose(curves(decay)["α"], ([1, 4, 2], [0, 0.1, 10]))
+    words = force.traverse(lambda e: e, [hv.Labels])[0].dimension_values(2)
+    assert [word.strip() for word in words] == ["0", "0.1", "1", "10"]
+
+
+def test_possible_forces_are_relative_to_the_original(rng):
+    original = np.array([4.0, 0.0, 1.0, 2.0])
+    states = original * np.array([[0.5], [1.5]]) + [0, 0, 0, 9]
+    least, extent = original / 2, original
+    figure = figures.possible_forces({0.1: (original, states, least, extent)})
+    (frame,) = frames(figure)
+    dots = frame.traverse(lambda e: e, [hv.Scatter])[0]
+    # Weak to strong; no ratio to a force that is 0, none drawn beyond the frame.
+    assert sorted(zip(*(dots.dimension_values(k) for k in (0, 1)), strict=True)) == [
+        *((1, 0.5), (1, 1.5), (3, 0.5), (3, 1.5))
+    ]
+    bars = frame.traverse(lambda e: e, [hv.ErrorBars])[0]
+    middle, reach = (bars.dimension_values(name) for name in ("y", "below"))
+    np.testing.assert_allclose(middle - reach, 0.5)
+    np.testing.assert_allclose(middle + bars.dimension_values("above"), 1.5)
+    # Intervals that lie beyond the frame altogether are left out.
+    beyond = figures.possible_forces({0.1: (original, states, 9 * original, extent)})
+    bars = beyond.traverse(lambda e: e, [hv.ErrorBars])[0]
+    assert len(bars) == 0
+
+
+def test_places_mark_the_largest_at_their_points_of_contact():
+    packing = packed(30, 0.3)
+    contacts = np.arange(0, len(packing.contacts.i), 2)
+    normal, extent = np.arange(len(contacts)), -np.arange(len(contacts))
+    figure = figures.places({0.3: (packing, contacts, normal, extent)}, part=0.1)
+    count = round(0.1 * len(contacts))
+    for frame, chosen in zip(frames(figure), (contacts[-count:], contacts[:count]), strict=True):
+        marked = frame.traverse(lambda e: e, [hv.Scatter])[1]
+        at = np.column_stack([marked.dimension_values(k) for k in (0, 1)])
+        assert np.all((at >= 0) & (at <= packing.box))
+        # Every mark lies on the rims of both disks of one of the contacts chosen.
+        for point in at:
+            reach = []
+            for c in chosen:
+                ends = packing.contacts.i[c], packing.contacts.j[c]
+                step = np.array([point - packing.x[g] for g in ends])
+                step -= packing.box * np.round(step / packing.box)
+                reach.append(np.abs(np.linalg.norm(step, axis=1) - packing.r[list(ends)]).max())
+            assert min(reach) < 1e-6
+
+
+def test_variations_show_what_the_rows_hold():
+    rows = [{"mu": mu, "n": n, "eta2": n * mu, "eta3": 1} for mu in (0.1, 1) for n in (100, 400)]
+    small, large = frames(figures.sizes(rows))
+    np.testing.assert_allclose(curves(small)["η2"], ([100, 400], [10, 40]))
+    np.testing.assert_allclose(curves(large)["0.15 η3"], ([100, 400], [0.15, 0.15]))
+    eta2, _ = frames(figures.opened(rows, rows[:1]))
+    np.testing.assert_allclose(curves(eta2)["made at μ = 0"], ([0.1, 1], [25, 250]))
+    np.testing.assert_allclose(curves(eta2)["made at μ"], ([0.1], [10]))
+    inner = [{"mu": 0.1, "undetermined_part": 0.0, "clusters": 3}]
+    part, clusters = frames(figures.frozen([], inner))
+    np.testing.assert_allclose(curves(part)["frozen surroundings"], ([0.1], [0]))
+    np.testing.assert_allclose(curves(clusters)["frozen surroundings"], ([0.1], [3]))
+    walks = [{"mu": mu, "acceptance": mu, "mean_sweeps": 1e4 * mu} for mu in (0.1, 1)]
+    walks.append({"mu": 10, "acceptance": 0.0})  # out of reach: told, and without sweeps
+    part, sweeps = frames(figures.effort({"to 1e-3": walks}))
+    np.testing.assert_allclose(curves(part)["to 1e-3"], ([0.1, 1, 10], [0.1, 1, 0]))
+    np.testing.assert_allclose(curves(sweeps)["to 1e-3"], ([0.1, 1], [1e3, 1e4]))
+    *_, eta3 = frames(figures.samplers({"some": [{"mu": 0.1, "eta3": 2.0}]}))
+    np.testing.assert_allclose(curves(eta3)["some"], ([0.1], [0.3]))
+    carried = [{"mu": mu, "seed": 1, "friction": mu, "own_shear": mu / 4} for mu in (0.1, 2)]
+    drawn = [{"mu": 2, "seed": 1, "mean_shear": 0.2, "largest_shear": 0.3}]
+    whole, parts = (curves(frame) for frame in frames(figures.stresses(carried, drawn)))
+    np.testing.assert_allclose(whole["largest, exact"], ([0.1, 2], [0.1, 2]))
+    np.testing.assert_allclose(whole["original network"], ([0.1, 2], [0.025, 0.5]))
+    np.testing.assert_allclose(parts["original network"], ([0.1, 2], [0.25, 0.25]))
+    np.testing.assert_allclose(parts["uniform states, largest"], ([2], [0.15]))
+    _, parts = frames(figures.stresses(carried, []))
+    assert "uniform states, mean" not in curves(parts)
+    far = figures.distances([{"mu": 0.1, "original_ratio": 0.5, "walk_ratio": 1.5}])
+    assert {label: y.tolist() for label, (_, y) in curves(far).items()} == {
+        "original": [0.5],
+        "walk": [1.5],
+        "uniform": [1.0],
+    }
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    """All figures of the shipped study."""
+    return drawings.all_figures(tables.load(ROOT / "data" / "study.zarr"))
+
+
+def test_every_figure_of_the_study_has_a_caption(shipped):
+    assert {f"figure{k}" for k in range(1, 7)} <= set(shipped) <= set(drawings.CAPTIONS)
+
+
+def test_words_are_clear_of_what_is_drawn():
+    """A zigzag with a word at each turn: each beside its own point, none over a line or another."""
+    turns = [(k, 30.0 * (-1) ** k) for k in range(6)]
+    strokes = [(*a, *b) for a, b in pairwise(turns)]
+    leaders, labels = style.words([(*p, f"{k}.{k}") for k, p in enumerate(turns)], strokes, "bokeh")
+    places = np.column_stack([labels.dimension_values(k) for k in (0, 1)])
+    far = np.abs(places - turns) / [5, 60]  # in parts of the frame
+    assert np.all(np.hypot(*far.T) < 0.2)
+    ends = [leaders.dimension_values(k) for k in (0, 1)]
+    np.testing.assert_allclose(np.column_stack(ends), turns)
+    width, height = 5 * 0.06, 60 * 0.04
+    boxes = [Bbox.from_bounds(x - width / 2, y - height / 2, width, height) for x, y in places]
+    for k, box in enumerate(boxes):
+        assert not any(Path([s[:2], s[2:]]).intersects_bbox(box, False) for s in strokes)
+        assert not any(box.overlaps(other) for other in boxes[:k])
+
+
+def test_pictures_are_typeset_and_no_legend_lies_over_data(shipped):
+    """Symbols are mathematical, and no point or line of any frame is under its legend or inset."""
+    for name, figure in shipped.items():
+        drawn = style.rendered(figure(backend="matplotlib"))
+        drawn.canvas.draw()
+        for text in drawn.findobj(Text):
+            bare = re.sub(r"\$[^$]*\$", "", text.get_text())
+            assert not re.search(r"_|[ημαΔ]|\w\^", bare), (name, text.get_text())
+        for axes in drawn.axes:
+            boxes = [inset.get_tightbbox() for inset in axes.child_axes]
+            if axes.get_legend() is not None:
+                boxes.append(axes.get_legend().get_window_extent())
+            for box in boxes:
+                assert not [line for line in _lines(axes) if line.intersects_bbox(box, False)], name
+
+
+def _lines(axes):
+    """What is drawn in a frame as paths in pixels: lines, bars, points."""
+    for line in axes.get_lines():
+        yield line.get_transform().transform_path(line.get_path())
+    for many in axes.collections:
+        if isinstance(many, LineCollection):
+            yield from (many.get_transform().transform_path(path) for path in many.get_paths())
+        elif len(many.get_offsets()) > 1:
+            yield Path(many.get_offset_transform().transform(many.get_offsets()))
+
+
+def test_symbols_are_typeset_for_pictures_and_pages():
+    assert style.typeset("ΔF_n / ⟨ΔF_n⟩", "matplotlib") == r"$\Delta F_n$ / ⟨$\Delta F_n$⟩"
+    assert style.typeset("ΔF_n / ⟨ΔF_n⟩", "bokeh") == "ΔFₙ / ⟨ΔFₙ⟩"
+    assert style.typeset("μ = 0.1, b = 2", "matplotlib") == r"$\mu$ = 0.1, $b$ = 2"
+    assert style.typeset("N", "matplotlib") == "$N$"
+    for words in ("the same, log–log", "time / s"):
+        assert style.typeset(words, "matplotlib") == words
+
+
+def test_files_carry_their_caption(tmp_path):
+    caption = "η against μ, 1 < 2"
+    figure = figures.indeterminacy(ROWS, backend="matplotlib")
+    for form in ("png", "svg"):
+        figures.save(figure, tmp_path / f"figure.{form}", caption)
+    assert Image.open(tmp_path / "figure.png").text["Description"] == caption
+    picture = ElementTree.parse(tmp_path / "figure.svg").getroot()
+    assert [
+        picture.find(f"{{http://www.w3.org/2000/svg}}{name}").text for name in ("title", "desc")
+    ] == [*("granforce", caption)]
+    page = tmp_path / "figure.html"
+    figures.save(figures.indeterminacy(ROWS), page, caption)
+    assert "<title>η against μ, 1 &lt; 2</title>" in page.read_text()

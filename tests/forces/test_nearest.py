@@ -1,0 +1,238 @@
+"""The fast nearest network: same optimum as the quadratic program, exact cones, honest ends."""
+
+import gc
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from packings import lattice, packed, reference, two_disks
+
+from granforce.bench import tile
+from granforce.explore.random_walk import walk
+from granforce.forces import contact_problem as module
+from granforce.forces.ensemble import ensemble
+from granforce.forces.nearest import nearest, nearest_of_many
+from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.numerics import contact_matrix, contact_program
+from granforce.numerics.lanes import ONE
+from granforce.records import Relaxation
+from granforce.tolerances import ADMISSIBLE, BALANCED
+
+
+def kicked(S, seed, size=1.0):
+    rng = np.random.default_rng(seed)
+    kick = size * S.force_scale * rng.uniform(-1, 1, S.original.shape)
+    if S.mu == 0:
+        kick[:, 1] = 0
+    return S.original + kick
+
+
+def assert_nearest(S, start):
+    ours, theirs = nearest(S, start), nearest_piqp(S, start)
+    assert ours.converged and theirs.converged
+    assert S.admits(ours.forces, BALANCED, ADMISSIBLE)
+    assert ours.residual == S.residual(ours.forces)
+    assert ours.violation == S.violation(ours.forces)
+    assert np.abs(ours.forces - theirs.forces).max() < 1e-6 * S.force_scale
+    # Two optima of one strictly convex program: neither is nearer by more than rounding.
+    ours, theirs = (np.linalg.norm(r.forces - start) for r in (ours, theirs))
+    assert ours <= theirs * (1 + 1e-8) + 1e-8 * S.force_scale
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.01, 0.1, 0.3, 1.0, 10.0])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 30.0])
+def test_agrees_with_the_quadratic_program(mu, size):
+    S = ensemble(packed(40, mu))
+    for seed in range(3):
+        assert_nearest(S, kicked(S, seed, size))
+
+
+def test_comes_back_from_far_outside():
+    S = ensemble(packed(40, 0.3))
+    start = kicked(S, 1, 1e4)
+    found = nearest(S, start)
+    assert found.converged and S.admits(found.forces)
+    # No state of S on the way to the nearest by the quadratic program is nearer.
+    ahead = ((start - found.forces) * (nearest_piqp(S, start).forces - found.forces)).sum()
+    assert ahead <= 1e-9 * (start**2).sum()
+
+
+@pytest.mark.parametrize("name", ["n100_mu0.1_s11", "n100_mu1_s12", "n400_mu0.1_s13"])
+def test_agrees_on_the_reference_packings(name):
+    S = ensemble(reference(name))
+    assert_nearest(S, kicked(S, 5))
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.5])
+def test_agrees_where_packing_and_ensemble_differ_in_friction(mu):
+    S = ensemble(packed(40, 0.0), mu=mu)
+    assert_nearest(S, kicked(S, 2))
+
+
+@pytest.mark.parametrize("triangular", [False, True])
+def test_agrees_on_crystals_with_redundant_rows(triangular):
+    S = ensemble(lattice(6, 6, 0.4, triangular))
+    assert_nearest(S, kicked(S, 1) + S.force_scale)
+    assert_nearest(S, np.zeros(S.original.shape))
+
+
+def test_agrees_on_two_disks_that_touch_twice():
+    S = ensemble(two_disks())
+    assert_nearest(S, np.array([[3.0, 1.0], [0.5, -2.0]]))
+
+
+def test_agrees_with_frozen_contacts_and_no_pressure_row():
+    packing = packed(40, 0.3)
+    S = ensemble(packing, frozen=np.arange(0, len(packing.contacts.i), 9))
+    assert not S.has_pressure_row
+    assert_nearest(S, kicked(S, 3))
+
+
+def test_contacts_that_carry_nothing_may_stay():
+    S = ensemble(packed(40, 0.3), prune=False)
+    assert_nearest(S, kicked(S, 3))
+
+
+def test_an_admissible_start_stays():
+    S = ensemble(packed(40, 0.3))
+    found = nearest(S, S.original)
+    assert np.abs(found.forces - S.original).max() < 1e-9 * S.force_scale
+
+
+@pytest.mark.parametrize("pressure", [1e-9, 1e7])
+def test_scales_with_the_pressure(pressure):
+    packing = packed(40, 0.3)
+    scaled = packing._replace(pressure=pressure, forces=packing.forces * pressure)
+    S, T = ensemble(packing), ensemble(scaled)
+    start = kicked(S, 4)
+    one, two = nearest(S, start), nearest(T, start * pressure)
+    assert np.abs(two.forces / pressure - one.forces).max() < 1e-9 * S.force_scale
+    assert two.converged
+
+
+def test_same_start_same_forces_whatever_was_solved_before_and_in_any_thread():
+    S = ensemble(packed(40, 0.3))
+    starts = [kicked(S, seed) for seed in range(4)]
+    once = [nearest(S, start).forces for start in starts]
+    with ThreadPoolExecutor(4) as pool:
+        again = list(pool.map(lambda k: nearest(S, starts[k % 4]).forces, range(15, -1, -1)))
+    for k, forces in zip(range(15, -1, -1), again, strict=True):
+        assert np.array_equal(forces, once[k % 4])
+    fresh = ensemble(packed(40, 0.3))
+    assert np.array_equal(nearest(fresh, starts[2]).forces, once[2])
+
+
+def test_lanes_do_not_know_their_company():
+    S = ensemble(packed(40, 0.3))
+    starts = [kicked(S, seed) for seed in range(11)]
+    alone = [nearest(S, start) for start in starts]
+    for order in (range(11), (3, 7), range(8, 2, -1)):
+        together = nearest_of_many(S, [starts[k] for k in order])
+        for k, found in zip(order, together, strict=True):
+            assert np.array_equal(found.forces, alone[k].forces)
+            assert found.iterations == alone[k].iterations
+            assert found.residual == alone[k].residual
+
+
+def test_the_plan_goes_with_its_ensemble():
+    S = ensemble(packed(40, 0.3))
+    nearest(S, S.original)
+    known, gone = len(module._known), weakref.ref(S)
+    del S
+    gc.collect()
+    assert gone() is None
+    assert len(module._known) < known
+
+
+def test_too_few_steps_are_told():
+    S = ensemble(packed(40, 0.1))
+    found = nearest(S, kicked(S, 0), max_iterations=2)
+    assert isinstance(found, Relaxation)
+    assert not found.converged
+    assert found.iterations == 2
+    assert found.residual == S.residual(found.forces) > BALANCED
+    assert found.violation == 0
+
+
+def test_starts_that_are_no_numbers_are_told():
+    S = ensemble(packed(40, 0.3))
+    found = nearest(S, np.full(S.original.shape, np.nan))
+    assert not found.converged and np.isnan(found.residual)
+
+
+def test_an_empty_s_is_told():
+    packing = packed(40, 0.3)
+    # Without friction the same contacts cannot balance.
+    S = ensemble(packing, mu=1e-6, prune=False)
+    found = nearest(S, S.original)
+    assert not found.converged
+    assert found.residual > 1e-6
+    assert np.all(np.isfinite(found.forces))
+
+
+def test_a_walk_by_it_stays_in_s_and_visits_what_the_quadratic_program_does():
+    S = ensemble(packed(40, 0.3))
+    ours = walk(S, 5, 3, relax=nearest)
+    theirs = walk(S, 5, 3, relax=nearest_piqp)
+    assert ours.residual.max() < BALANCED
+    assert np.abs(ours.states - theirs.states).max() < 1e-5 * S.force_scale
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_tiled_packing_balances_and_its_nearest_network_is_tiled(mu):
+    one = ensemble(packed(40, mu))
+    packing = tile(one, 3)
+    many = ensemble(packing, prune=False)
+    assert len(many.index) == 9 * len(one.index)
+    assert many.force_scale == pytest.approx(one.force_scale)
+    assert many.residual(many.original) < BALANCED
+    start = kicked(one, 1)
+    small = nearest(one, start).forces
+    large = nearest(many, np.tile(start, (9, 1))).forces
+    assert np.abs(large - np.tile(small, (9, 1))).max() < 1e-6 * one.force_scale
+
+
+force = st.floats(-1e3, 1e3)
+friction = st.one_of(st.just(0.0), st.floats(1e-6, 1e3))
+
+
+def project(normal, tangential, mu):
+    """The point of the cone |f_t| ≤ μ f_n nearest to (normal, tangential)."""
+    nothing = np.zeros((1, 3, 2))
+    network = contact_matrix.make_network(
+        np.zeros((2, 2)), np.array([0]), np.array([1]), nothing, nothing, np.zeros((1, 0, 2))
+    )
+    rows = np.zeros(6)
+    problem = contact_program.make_problem(network, rows, rows[:0], rows, np.arange(6), mu, 0.0)
+    at = contact_program.make_iterate(problem, 1)
+    work = contact_program.make_workspace(problem, 1)
+    at.c[0], at.c[1] = -0.5 * (normal + mu * tangential), -0.5 * (normal - mu * tangential)
+    contact_program.project(problem, at, work, ONE)
+    f_n, f_t = 0.5 * (at.y[0, 0] + at.y[1, 0]), mu * 0.5 * (at.y[0, 0] - at.y[1, 0])
+    return f_n, f_t
+
+
+@given(force, force, friction, force, force)
+def test_projection_is_the_nearest_point_of_the_cone(normal, tangential, mu, f_n, f_t):
+    p, t = project(normal, tangential, mu)
+    size = 1 + abs(normal) + abs(tangential)
+    assert p >= 0 and abs(t) <= mu * p * (1 + 1e-12)
+    # A point of the cone is the nearest one where no other of the cone lies ahead of it.
+    f_n = abs(f_n)
+    f_t = np.clip(f_t, -mu * f_n, mu * f_n)
+    ahead = (normal - p) * (f_n - p) + (tangential - t) * (f_t - t)
+    assert ahead <= 1e-9 * size * (size + abs(f_n) + abs(f_t))
+
+
+@given(force, force, friction)
+def test_projection_twice_is_projection_once(normal, tangential, mu):
+    once = project(normal, tangential, mu)
+    # Cone coordinates are as large as f_n + μ f_t, and f_t is μ or 1/μ times their difference.
+    size = 1 + abs(normal) + mu * abs(tangential)
+    rounding = 1e-14 * size * max(mu, 1.0 / max(mu, 1e-6))
+    assert project(*once, mu) == pytest.approx(once, rel=1e-12, abs=rounding)
+    inside = normal >= 0 and abs(tangential) <= mu * normal
+    assert not inside or once == pytest.approx((normal, tangential), rel=1e-12, abs=rounding)

@@ -1,0 +1,176 @@
+"""Compaction: packings that are jammed, balanced, free of overlap and reproducible."""
+
+import numpy as np
+import pytest
+from packings import packed
+
+from granforce.forces.ensemble import ensemble
+from granforce.packing.compaction import WATCH_EVERY, draw_radii, pack
+from granforce.packing.neighbours import find_pairs, separations
+from granforce.records import Cancelled, InputError, NotJammedError
+from granforce.tolerances import LARGEST_FRICTION
+
+
+def check(packing):
+    """What every finished packing must show; returns its ensemble."""
+    unit = packing.r.max()
+    i, j, shift = find_pairs(packing.x, packing.r, packing.box, 0.01 * unit)
+    gap = separations(packing.x, packing.r, packing.box, i, j, shift)[2]
+    assert gap.min() > -1e-7 * unit
+    assert np.abs(packing.contacts.gap).max() < 1e-6 * unit
+    S = ensemble(packing)
+    assert S.residual(S.original) < 1e-10
+    assert S.violation(S.original) < 1e-9
+    assert np.all(S.original[:, 0] > 0)
+    # Rattlers carry nothing, the backbone does.
+    outside = np.setdiff1d(np.arange(len(packing.r)), S.grains)
+    assert S.skipped["rattlers"] == len(outside)
+    off = np.setdiff1d(np.arange(len(packing.contacts.i)), S.index)
+    assert np.abs(packing.forces[off]).max(initial=0) == 0
+    return S
+
+
+@pytest.mark.parametrize("mu", [0.001, 0.1, 1.0, 10.0])
+def test_packings_are_jammed_at_every_friction(mu):
+    S = check(packed(60, mu))
+    assert 3 <= S.coordination < 4.1
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_frictionless_packings_are_isostatic(seed):
+    S = check(packed(60, 0.0, seed))
+    assert len(S.index) == 2 * len(S.grains) - 1
+    assert S.dimension == 0
+
+
+def test_contacts_are_closed_exactly():
+    for mu in (0.0, 0.3):
+        S = ensemble(packed(60, mu))
+        assert np.abs(S.contacts.gap).max() < 1e-10
+
+
+def test_the_same_seed_gives_the_same_packing():
+    one, two, other = pack(20, 0.3, 7), pack(20, 0.3, 7), pack(20, 0.3, 8)
+    assert np.array_equal(one.x, two.x)
+    assert np.array_equal(one.forces, two.forces)
+    assert not np.array_equal(one.r, other.r)
+
+
+def test_pressure_and_radii_only_set_the_units():
+    one = pack(20, 0.3, 7)
+    # Powers of two, so that rounding is the same: the dynamics is chaotic.
+    two = pack(20, 0.3, 7, pressure=2.0**20, radii=f"uniform:{2.0**-11},{2.0**-10}")
+    assert np.array_equal(two.box, 2.0**-10 * one.box)
+    assert np.array_equal(two.forces, 2.0**10 * one.forces)
+    check(two)
+
+
+def test_ten_disks_and_very_unequal_ones():
+    check(pack(10, 0.5, 2))
+    check(pack(60, 0.3, 2, radii="bidisperse:0.2,1,0.5"))
+
+
+def test_radii_are_drawn_as_asked(rng):
+    r = draw_radii("bidisperse:1,1.4,0.25", 40, rng)
+    assert sorted(set(r)) == [1.0, 1.4]
+    assert np.sum(r == 1.4) == 10
+    r = draw_radii("uniform:0.5,1", 4000, rng)
+    assert 0.5 <= r.min() < 0.51
+    assert 0.99 < r.max() <= 1
+    given = np.linspace(1, 2, 9)
+    assert np.array_equal(draw_radii(given, 9, rng), given)
+
+
+@pytest.mark.parametrize(
+    "options, what",
+    [
+        ({"n": 2}, "at least 3 disks"),
+        ({"mu": -0.1}, "friction coefficient"),
+        ({"mu": np.nan}, "friction coefficient"),
+        ({"mu": "much"}, "friction coefficient"),
+        ({"radii": "uniform:1,0.5"}, "radii"),
+        ({"radii": "gaussian:1,0.5"}, "radii"),
+        ({"radii": [1.0, -1.0] * 10}, "radii"),
+        ({"radii": [1.0] * 3}, "radii"),
+        ({"pressure": 0}, "pressure"),
+        ({"pressure": 1e300}, "pressure"),
+        ({"pressure": 1e-300}, "pressure"),
+        ({"radii": [1e200] * 20}, "radii"),
+        ({"mu": 1e6}, "take at most 10000"),
+        ({"dt": -1}, "dt"),
+        ({"sweeps": 0}, "sweeps"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(options, what):
+    with pytest.raises(InputError, match=what) as caught:
+        pack(**{"n": 20, "mu": 0.3, "seed": 0} | options)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_budget_too_small_tells_the_state_reached():
+    with pytest.raises(NotJammedError, match=r"not jammed after 200 steps: φ = 0\.\d+"):
+        pack(40, 0.3, 0, max_steps=200)
+
+
+def test_compaction_reports_and_can_be_cancelled():
+    seen = []
+    with pytest.raises(Cancelled):
+        pack(40, 0.3, 0, progress=lambda *a: seen.append(a), cancel=lambda: len(seen) == 2)
+    assert [step for step, _ in seen] == [100, 200]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mu", [0, 0.001, 0.01, 0.03, 0.1, 0.3, 1, 3, 10])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+def test_four_hundred_disks_at_every_friction(mu, seed):
+    S = check(pack(400, mu, seed))
+    if mu == 0:
+        assert len(S.index) == 2 * len(S.grains) - 1
+
+
+@pytest.mark.slow
+def test_ten_thousand_disks():
+    check(pack(10_000, 0.1, 1))
+
+
+@pytest.mark.parametrize("pressure, unit", [(-190, 190), (190, 190), (0, -190)])
+def test_units_may_be_extreme(pressure, unit):
+    pressure, unit = 2.0**pressure, 2.0**unit  # powers of two change no rounding
+    radii = np.linspace(0.5, 1.0, 20)
+    ours = pack(20, 0.3, 0, radii=radii)
+    theirs = pack(20, 0.3, 0, radii=radii * unit, pressure=pressure)
+    np.testing.assert_allclose(theirs.forces, ours.forces * pressure * unit, rtol=1e-6, atol=0)
+    check(theirs)
+
+
+def test_the_largest_friction_that_is_taken_works():
+    check(pack(30, LARGEST_FRICTION, 1))
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_compaction_that_is_watched_gives_the_same_bits(mu):
+    """From the gas on, grains inside a box that shrinks, contacts where disks touch."""
+    seen = []
+    alone, watched = pack(20, mu, 7), pack(20, mu, 7, watch=seen.append)
+    assert np.array_equal(alone.x, watched.x) and np.array_equal(alone.forces, watched.forces)
+    assert alone.info == watched.info
+    first, last = seen[0], seen[-1]
+    assert first.step == 0 and last.step == watched.info["steps"]
+    assert set(np.diff([one.step for one in seen])) <= set(range(1, WATCH_EVERY + 1))
+    assert np.all(last.box < first.box) and last.packing_fraction > first.packing_fraction + 0.2
+    assert mu == 0 or last.unbalance < 1e-2 * seen[len(seen) // 4].unbalance
+    for one in seen:
+        assert np.all((one.x >= 0) & (one.x <= one.box))
+        apart = one.x[one.j] - one.x[one.i] - one.reach  # a whole number of boxes
+        assert np.allclose(apart / one.box, np.round(apart / one.box), atol=1e-9)
+        assert np.all(one.forces[:, 0] > 0)
+    touching = np.linalg.norm(last.reach, axis=1) - last.r[last.i] - last.r[last.j]
+    assert np.abs(touching).max() < 1e-2
+
+
+def test_what_is_watched_has_the_users_units():
+    one, two = [], []
+    pack(20, 0.3, 7, watch=one.append)
+    pack(20, 0.3, 7, pressure=2.0**20, radii=f"uniform:{2.0**-11},{2.0**-10}", watch=two.append)
+    assert np.array_equal(two[40].x, 2.0**-10 * one[40].x)
+    assert np.array_equal(two[-1].forces, 2.0**10 * one[-1].forces)

@@ -1,0 +1,284 @@
+"""Critical forces and first motions of local perturbations, judged by what they must obey."""
+
+import numpy as np
+import pytest
+from packings import lattice, packed
+
+from granforce.explore.intervals import limit_loads
+from granforce.forces import contact_dynamics as dynamics
+from granforce.forces.ensemble import ensemble
+from granforce.forces.gauss_seidel import _from_rest
+from granforce.numerics.lanes import ONE
+from granforce.perturb import critical_force as perturb
+from granforce.perturb import decay
+from granforce.perturb import flow as exact_step
+from granforce.perturb.critical_force import critical_force, response
+from granforce.records import Cancelled, InputError
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.store import open_store
+
+# Far above the rounding error of a solution, far below any wrong one.
+ROUNDING = 1e-7
+
+
+@pytest.mark.parametrize("mu", [0, 0.05, 0.1, 0.3, 1, 10])
+def test_no_equilibrium_beyond_the_limit_load_and_one_below_the_critical_force(mu):
+    S = ensemble(packed(30, mu))
+    limit = limit_loads(S)
+    for k in range(0, len(S.index), 9):
+        found = critical_force(S, S.index[k], limit_load=limit[k])
+        assert 0 <= found.low < found.high <= limit[k] * (1 + 1e-12)
+        assert found.high - found.low <= 0.01 * S.force_scale * (1 + 1e-9)
+        loaded = found.forces.copy()
+        loaded[k, 0] += found.low
+        assert S.residual(loaded) <= 1e-10
+        assert S.violation(found.forces) <= 1e-9
+
+
+def test_without_friction_the_limit_load_is_reached():
+    # The law is associated at μ = 0: what can be at rest comes to rest.
+    S = ensemble(packed(30, 0))
+    limit = limit_loads(S)
+    for k in range(0, len(S.index), 3):
+        found = critical_force(S, S.index[k], limit_load=limit[k])
+        assert limit[k] - found.low <= 0.01 * S.force_scale
+
+
+def test_a_limit_load_that_is_too_large_brings_no_rest_beyond_the_true_one():
+    S = ensemble(packed(30, 0.3))
+    limit = limit_loads(S)
+    for k in range(0, len(S.index), 12):
+        far = critical_force(S, S.index[k], limit_load=3 * limit[k])
+        assert far.low <= limit[k] * (1 + 1e-9)
+
+
+def test_loads_rise_by_the_part_of_the_way_that_is_asked_for():
+    S = ensemble(packed(30, 0.1))
+    limit = limit_loads(S)
+    for k in range(0, len(S.index), 25):
+        coarse, fine = (
+            critical_force(S, S.index[k], limit_load=limit[k], rise=rise) for rise in (0.4, 0.1)
+        )
+        assert fine.counts["loads_at_rest"] > coarse.counts["loads_at_rest"]
+        assert 0 <= fine.low < fine.high <= limit[k] * (1 + 1e-12)
+
+
+def test_sliding_lets_grains_set_off_below_the_limit_load():
+    S = ensemble(packed(60, 0.1))
+    limit = limit_loads(S)
+    part = [critical_force(S, S.index[k], limit_load=limit[k]).low / limit[k] for k in (17, 34)]
+    assert min(part) < 0.8
+
+
+def test_what_is_given_up_too_early_is_followed_before_it_counts_as_motion():
+    S = ensemble(packed(60, 0.1))
+    for contact in S.index[:60:12]:
+        found = critical_force(S, contact, max_steps=2)
+        assert found.moving is None or found.moving.breach <= perturb.STEADY
+        # Two steps decide next to nothing: without following F_crit would be far too low.
+        usual = critical_force(S, contact)
+        assert found.low == pytest.approx(usual.low, rel=0.1, abs=0.02 * S.force_scale)
+        assert response(S, contact, critical=found).converged
+
+
+def swept(S, forces, position, load, sweeps):
+    """Gauss–Seidel sweeps under a pair: forces and unbalance, in ⟨f_n⟩."""
+    problem, velocity, dilation, _ = _from_rest(S)
+    force, pair = forces.copy(), np.zeros_like(forces)
+    pair[position, 0] = load
+    dynamics.set_stiffness(problem)
+    dilation = dynamics.add_forces(problem, force + pair, velocity, dilation)
+    order = np.arange(len(force))
+    for _ in range(sweeps):
+        dilation, _, _ = dynamics.sweep(problem, order, S.mu, force, velocity, dilation, ONE)
+    return force, S.residual((force + pair) * S.force_scale)
+
+
+def test_sweeps_of_contact_dynamics_decide_alike():
+    S = ensemble(packed(20, 0.3))
+    limit = limit_loads(S)
+    for k in range(0, len(S.index), 8):
+        found = critical_force(S, S.index[k], limit_load=limit[k])
+        start = S.original / S.force_scale
+        _, below = swept(S, start, k, 0.5 * found.low / S.force_scale, 20_000)
+        assert below < 1e-6
+        above = 1.02 * found.high / S.force_scale
+        _, above = swept(S, found.forces / S.force_scale, k, above, 20_000)
+        assert above > 1e-4
+
+
+def first_motion(mu=0.1, n=60, k=17):
+    S = ensemble(packed(n, mu))
+    return S, k, critical_force(S, S.index[k])
+
+
+def test_motion_obeys_momentum_balance_and_coulombs_law():
+    S, k, critical = first_motion()
+    step, moving = exact_step.make_step(S), critical.moving
+    assert critical.converged
+    f, U = moving.forces, moving.velocity
+    mass = np.concatenate([step.mass, step.mass_border])[step.place]
+    loaded = f.copy()
+    loaded[k, 0] += critical.high / S.force_scale
+    unbalance = S.A @ S.to_vector(loaded) - S.b / S.force_scale
+    assert np.abs(unbalance - mass * U).max() <= ROUNDING * np.abs(unbalance).max()
+    w_n, w_t = (S.A.T @ U).reshape(-1, 2).T
+    w_n, w_t = (w / np.abs(w_n).max() for w in (w_n, w_t))
+    small = 10 * exact_step.STEADY
+    assert w_n.min() >= -small
+    assert np.abs(w_n[f[:, 0] > 0]).max() <= small
+    assert S.violation(f * S.force_scale) <= 1e-12
+    inside = np.abs(f[:, 1]) < S.mu * f[:, 0]
+    assert np.abs(w_t[inside]).max() <= small
+    slides = np.abs(w_t) > 10 * small
+    assert slides.any()
+    assert np.all(f[slides, 1] * w_t[slides] <= 0)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.5])
+def test_first_motion_does_not_penetrate(mu):
+    S = ensemble(packed(40, mu))
+    for contact in S.index[::12]:
+        moved = response(S, contact)
+        assert moved.converged
+        assert moved.opening.min() >= -moved.breach * moved.fastest * (1 + 1e-9)
+        pressed = ~moved.opened
+        assert np.abs(moved.opening[pressed]).max() <= 2 * moved.breach * moved.fastest
+        assert np.all(moved.opened.astype(int) + moved.slid + moved.kept == 1)
+        u = moved.displacement[S.grains]
+        assert np.mean(np.sum(u**2, axis=1)) == pytest.approx(1)
+        assert np.isnan(np.delete(moved.displacement, S.grains, axis=0)).all()
+        # Forces are internal: the centre of mass stays.
+        mass = S.packing.r[S.grains] ** 2
+        assert np.abs(mass @ u / mass.sum()).max() <= 1e-6
+        # The gaps open as displaced centres say, to first order.
+        c = S.contacts
+        apart = moved.displacement[c.j] - moved.displacement[c.i]
+        opening = np.sum(apart * c.normal, axis=1) + moved.dilation * c.length
+        assert np.allclose(opening, moved.opening, atol=1e-9 * moved.fastest)
+
+
+def turned(packing):
+    """The packing turned by a quarter to the left."""
+
+    def turn(a):
+        return np.column_stack([-a[:, 1], a[:, 0]])
+
+    return packing._replace(
+        x=turn(packing.x) + np.array([packing.box[1], 0.0]),
+        box=packing.box[::-1].copy(),
+        contacts=packing.contacts._replace(normal=turn(packing.contacts.normal)),
+    )
+
+
+def reversed_contacts(packing):
+    c = packing.contacts
+    return packing._replace(
+        contacts=c._replace(i=c.j, j=c.i, normal=-c.normal, arm_i=c.arm_j, arm_j=c.arm_i)
+    )
+
+
+def relabelled(packing, grains, order):
+    """Grain k becomes grain grains[k]; contacts come in the given order."""
+    place = np.argsort(grains)
+    contacts = type(packing.contacts)(*(field[order] for field in packing.contacts))
+    return packing._replace(
+        x=packing.x[place],
+        r=packing.r[place],
+        load=packing.load[place],
+        forces=packing.forces[order],
+        contacts=contacts._replace(i=grains[contacts.i], j=grains[contacts.j]),
+    )
+
+
+def test_orientation_of_contacts_labels_and_quarter_turns_change_nothing():
+    packing = packed(30, 0.3)
+    S, rng = ensemble(packing), np.random.default_rng(0)
+    grains, order = rng.permutation(len(packing.r)), rng.permutation(len(packing.forces))
+    contact = int(S.index[11])
+    known = response(S, contact)
+    load = critical_force(S, contact)
+    for other, moved_to, same, turn in (
+        (reversed_contacts(packing), contact, np.arange(len(packing.r)), np.eye(2)),
+        (relabelled(packing, grains, order), int(np.flatnonzero(order == contact)[0]), grains,
+         np.eye(2)),
+        (turned(packing), contact, np.arange(len(packing.r)), np.array([[0, 1.0], [-1, 0]])),
+    ):  # fmt: skip
+        again = critical_force(other, moved_to)
+        assert again.low == pytest.approx(load.low, abs=1e-6 * S.force_scale)
+        assert again.high == pytest.approx(load.high, abs=1e-6 * S.force_scale)
+        moved = response(other, moved_to, critical=again)
+        field = moved.displacement[same]
+        assert np.allclose(field, known.displacement @ turn, atol=1e-4, equal_nan=True)
+
+
+def test_crystal_answers_with_the_symmetry_of_the_pair():
+    # Inversion about the point of contact maps a triangular crystal and the pair onto themselves.
+    packing = lattice(6, 6, 0.3, triangular=True)
+    moved = response(packing, 0)
+    c = packing.contacts
+    centre = packing.x[c.i[0]] + c.arm_i[0] * c.normal[0]
+    across = np.mod(2 * centre - packing.x, packing.box)
+    apart = np.abs(across[:, None] - packing.x[None])
+    apart = np.minimum(apart, packing.box - apart)
+    partner = np.argmin(np.linalg.norm(apart, axis=2), axis=1)
+    assert np.allclose(np.linalg.norm(apart[np.arange(36), partner], axis=1), 0, atol=1e-9)
+    assert np.allclose(moved.displacement[partner], -moved.displacement, atol=1e-5)
+    # The pair parts along its axis, further than any other contact opens.
+    assert np.argmax(moved.opening) == 0
+    assert moved.displacement[c.j[0]] @ c.normal[0] > 0
+    assert abs(moved.displacement[c.j[0]] @ [-c.normal[0, 1], c.normal[0, 0]]) < 1e-5
+    # As in an elastic body the answer is strongest beside the pair.
+    near, far = decay.profile(packing, moved.displacement, 0, np.array([0, 1.0, 2.0, 3.0]))[[0, 2]]
+    assert near > 2 * far
+
+
+def test_what_cannot_be_perturbed_is_told():
+    packing = packed(40, 0.5)
+    S = ensemble(packing)
+    with pytest.raises(InputError, match="none of the"):
+        critical_force(packing, len(packing.contacts.i))
+    with pytest.raises(InputError, match="precision"):
+        critical_force(S, S.index[0], precision=0)
+    with pytest.raises(InputError, match="stay at rest"):
+        response(S, S.index[0], 1e-3 * S.force_scale)
+    with pytest.raises(Cancelled):
+        critical_force(S, S.index[0], cancel=lambda: True)
+
+
+def parameters(**options):
+    return kinds.PERTURBATION.parameters(kinds.PACKING.parameters(20, 0.3, 1), **options)
+
+
+def test_perturbations_do_not_depend_on_workers_and_go_on_where_they_were(tmp_path):
+    one, two = open_store(tmp_path / "one"), open_store(tmp_path / "two")
+    whole, cached = study.get(one, kinds.PERTURBATION, parameters(random=4), workers=1)
+    assert not cached
+    seen = []
+
+    def stop(done, total):
+        seen.append((done, total))
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study.get(two, kinds.PERTURBATION, parameters(random=4), workers=2, progress=stop)
+    assert seen == [(1, 4), (2, 4)]
+    kept = sum(entry.kind == "perturbed_contact" for entry in two.entries())
+    assert 2 <= kept <= 4
+    again, _ = study.get(two, kinds.PERTURBATION, parameters(random=4), workers=2)
+    for name in whole:
+        if "seconds" not in name:
+            assert np.array_equal(whole[name], again[name], equal_nan=True), name
+    found, cached = study.get(two, kinds.PERTURBATION, parameters(random=4))
+    assert cached
+    assert found.equals(again)
+    assert whole["decay_low"] <= whole["decay_high"] or np.isnan(whole["decay_low"])
+
+
+def test_perturbation_parameters_are_checked():
+    with pytest.raises(InputError, match="not both"):
+        parameters(random=5, contacts=[1])
+    with pytest.raises(InputError, match="at least 1"):
+        parameters(random=0)

@@ -1,0 +1,60 @@
+"""Rails: networks between the exact bounds of one contact's force."""
+
+import numpy as np
+import pytest
+from packings import packed
+
+from granforce.explore.intervals import intervals
+from granforce.forces.ensemble import ensemble
+from granforce.records import InputError
+from granforce.study.pulls import Puller
+from granforce.tolerances import ADMISSIBLE, BALANCED
+
+
+@pytest.fixture(scope="module")
+def S():
+    return ensemble(packed(40, 0.3))
+
+
+@pytest.fixture(scope="module")
+def puller(S):
+    return Puller(S.packing, S.mu)
+
+
+def test_a_rail_goes_from_bound_to_bound_through_admissible_networks(S, puller):
+    contact = int(S.index[7])
+    rail, bounds = puller.rail(contact, S.original), intervals(S, [contact])
+    assert rail.lower == pytest.approx(bounds.lower[0, 0], abs=1e-7 * S.force_scale)
+    assert rail.upper == pytest.approx(bounds.upper[0, 0], abs=1e-7 * S.force_scale)
+    assert np.all(np.diff(rail.values) > 0)
+    np.testing.assert_array_equal(rail.states[:, 7, 0], rail.values)
+    halfway = (rail.states[1:] + rail.states[:-1]) / 2  # what a page shows in between
+    for states in (rail.states, halfway):
+        assert S.residual(states).max() <= BALANCED and S.violation(states).max() <= ADMISSIBLE
+
+
+def test_the_network_itself_is_on_its_rail(S, puller):
+    rail = puller.rail(int(S.index[7]), S.original)
+    here = np.abs(rail.values - S.original[7, 0]).argmin()
+    assert np.abs(rail.states[here] - S.original).max() < 1e-7 * S.force_scale
+
+
+def test_what_holds_a_force_at_its_bound_is_named(S, puller):
+    rail = puller.rail(int(S.index[7]), S.original)
+    for end in (0, 1):
+        state = rail.states[-end]
+        assert np.all(state[rail.opened[end], 0] < 1e-3 * S.force_scale)
+        assert rail.opened[end].any() or rail.sliding[end].any()
+
+
+def test_pulls_one_after_the_other_start_where_the_last_one_ended(S, puller):
+    first, residual = puller.at(int(S.index[7]), S.original[7, 0] * 1.05, S.original)
+    assert residual <= BALANCED and first[7, 0] == pytest.approx(1.05 * S.original[7, 0])
+    rail = puller.rail(int(S.index[3]), first)
+    here = np.abs(rail.values - first[3, 0]).argmin()
+    assert np.abs(rail.states[here] - first).max() < 1e-7 * S.force_scale
+
+
+def test_a_force_that_cannot_be_is_refused_with_its_interval(S, puller):
+    with pytest.raises(InputError, match="outside its exact interval"):
+        puller.at(int(S.index[7]), 1e3 * S.force_scale, S.original)

@@ -1,0 +1,287 @@
+"""Scans over processes and over dask workers: the same results, and what a kill costs."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from test_cells import cell
+
+from granforce.records import InputError
+from granforce.study import kinds, scan
+from granforce.study.cells import Cell, load
+from granforce.study.store import open_store
+
+
+def test_a_scan_gives_the_same_for_any_number_of_workers(tmp_path):
+    cells = [cell(mu, seed) for mu in (0, 0.3) for seed in (1, 2)]
+    seen = []
+    one, failed = scan.scan(tmp_path / "one", cells, workers=1, on_row=seen.append)
+    two, _ = scan.scan(tmp_path / "two", cells, workers=2)
+    assert not failed
+    assert one == two
+    assert sorted(map(str, seen)) == sorted(map(str, one))
+    stores = [open_store(tmp_path / name) for name in ("one", "two")]
+    for name in stores[0]:
+        a, b = (store[name].drop_vars("seconds", errors="ignore") for store in stores)
+        assert a.equals(b)
+    found, _ = scan.scan(tmp_path / "one", cells, workers=2)
+    assert [line["cached"] for line in found] == [True] * 4
+
+
+def test_a_failed_cell_leaves_the_others(tmp_path):
+    # Three disks do not always jam: whatever happens to them, the other cell is there.
+    hopeless = cell()
+    hopeless["packing"] = {**hopeless["packing"], "radii": [1.0] * 3}
+    rows, failed = scan.scan(tmp_path / "s", [hopeless, cell()], workers=2)
+    assert len(rows) == 1
+    assert "radii" in failed[0][1]
+
+
+def test_a_killed_scan_loses_only_the_cells_under_way(tmp_path):
+    path = tmp_path / "s"
+    cells = [cell(seed=seed, states=60) for seed in range(1, 9)]
+    code = (
+        "from granforce.study import scan\n"
+        "if __name__ == '__main__':\n"
+        f"    scan.scan({str(path)!r}, {cells!r}, workers=2)\n"
+    )
+    script = tmp_path / "run.py"
+    script.write_text(code)
+    running = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
+    deadline = time.time() + 120
+    while len(list(path.glob("walk-*"))) < 2 and time.time() < deadline:
+        time.sleep(0.02)
+    os.killpg(running.pid, signal.SIGKILL)
+    running.wait()
+    store = open_store(path)
+    done = len(store.find("walk"))
+    assert 2 <= done
+    assert all(verdict.ok for verdict in store.verify())
+    rows, failed = scan.scan(path, cells, workers=2)
+    assert not failed
+    assert sum(line["cached"] for line in rows) == done
+    assert not list(path.glob(".tmp-*"))
+
+
+def workers_of(parent):
+    """Process numbers of the worker processes of a scan (Linux)."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            told, words = (folder / "stat").read_text(), (folder / "cmdline").read_bytes()
+        except OSError:
+            continue  # it has ended meanwhile
+        state, above = told.rpartition(")")[2].split()[:2]
+        if int(above) == parent and state != "Z" and b"spawn_main" in words:
+            found.append(int(folder.name))
+    return found
+
+
+def is_running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def kill_parent_alone(path, seeds):
+    """Start a scan, kill its parent once a cell is kept; seconds until its workers have ended."""
+    cells = [cell(seed=seed, states=400) for seed in seeds]
+    script = path.with_suffix(".py")
+    script.write_text(
+        "from granforce.study import scan\n"
+        "if __name__ == '__main__':\n"
+        f"    scan.scan({str(path)!r}, {cells!r}, workers=2)\n"
+    )
+    parent = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
+    deadline = time.monotonic() + 120
+    while not list(path.glob("packing-*")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    workers = workers_of(parent.pid)
+    assert len(workers) == 2
+    os.kill(parent.pid, signal.SIGKILL)
+    parent.wait()
+    begin = time.monotonic()
+    while any(map(is_running, workers)) and time.monotonic() < begin + 60:
+        time.sleep(0.02)
+    seconds = time.monotonic() - begin
+    assert not any(map(is_running, workers))
+    assert all(verdict.ok for verdict in open_store(path).verify())
+    assert not list(path.glob(".tmp-*"))
+    return seconds
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc")
+def test_workers_end_when_their_parent_alone_is_killed(tmp_path):
+    """A busy machine may take its time; left alone, they would compute for minutes."""
+    kill_parent_alone(tmp_path / "s", range(1, 9))
+
+
+@pytest.mark.stress
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc")
+@pytest.mark.parametrize("first", range(1, 160, 8))
+def test_twenty_parents_are_killed_alone(tmp_path, first):
+    """20 faults tried."""
+    kill_parent_alone(tmp_path / "s", range(first, first + 8))
+
+
+def test_progress_of_cells_never_goes_back(tmp_path, monkeypatch):
+    """However late the end of a cell is seen, and however often cells are begun anew."""
+    told = []
+
+    def pool(tasks, workers, finished, advanced, before):
+        advanced(before + 1.26)  # the first cell has ended, the second is under way
+        finished(next(iter(tasks)), lambda: False)
+        advanced(before + 1.9)
+        rest = dict(list(tasks.items())[1:])
+        if before:
+            advanced(before + 5)  # counted twice
+            for k in rest:
+                finished(k, lambda: False)
+            return {}
+        return rest  # a worker died
+
+    monkeypatch.setattr(scan, "warm_up", lambda: None)
+    monkeypatch.setattr(scan, "_one_pool", pool)
+    failed = scan.run(
+        tmp_path / "s", small_cells(), progress=lambda done, total: told.append((done, total))
+    )
+    assert not failed
+    assert told == sorted(told) and told[-1] == (6, 6)
+    assert {done % 0.25 for done, _ in told} == {0}
+
+
+def small_cells(seeds=(1, 2)):
+    cells = []
+    for seed in seeds:
+        packing = cell(seed=seed)["packing"]
+        cells += [
+            Cell(kinds.WALK, cell(seed=seed, states=40)),
+            Cell(kinds.INTERVALS, kinds.INTERVALS.parameters(packing)),
+            Cell(kinds.LIMIT_LOADS, kinds.LIMIT_LOADS.parameters(packing, mu=0.5)),
+        ]
+    return cells
+
+
+def assert_same(one, two):
+    """Two stores hold the same entries, bit by bit but for the run times."""
+    one, two = open_store(one), open_store(two)
+    assert list(one) == list(two)
+    for name in one:
+        a, b = (store[name].drop_vars("seconds", errors="ignore") for store in (one, two))
+        assert a.identical(b.assign_attrs(created=a.attrs["created"], checksum=a.attrs["checksum"]))
+
+
+def test_cells_of_every_kind_are_counted_and_kept(tmp_path):
+    seen, done = [], []
+    failed = scan.run(
+        tmp_path / "s",
+        small_cells(),
+        workers=2,
+        dtypes={"states": "float32"},
+        progress=lambda *counts: seen.append(counts),
+        on_done=lambda k, cached: done.append((k, cached)),
+    )
+    assert not failed
+    assert sorted(done) == [(k, False) for k in range(6)]
+    assert seen[-1] == (6, 6)
+    assert seen == sorted(seen)
+    store = open_store(tmp_path / "s")
+    for one in small_cells():
+        assert load(store, *one) is not None
+    assert load(store, *small_cells()[0])["states"].dtype == "float32"
+    assert load(store, *small_cells()[2])["limit_load"].dtype == "float64"
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Two dask workers, each a process of its own."""
+    distributed = pytest.importorskip("dask.distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
+    ) as cluster:
+        yield cluster
+
+
+def test_dask_workers_give_the_same_as_processes(tmp_path, cluster):
+    cells = small_cells()
+    assert not scan.run(tmp_path / "one", cells, workers=2)
+    done = []
+    failed = scan.run(
+        tmp_path / "two",
+        [*cells, Cell(kinds.WALK, {**cells[0].parameters, "packing": {"imported": "0"}})],
+        scheduler=cluster.scheduler_address,
+        on_done=lambda k, cached: done.append(cached),
+    )
+    assert [text for _, text in failed] == [
+        "the imported packing is not in this store: import it again"
+    ]
+    assert done == [False] * 6
+    assert_same(tmp_path / "one", tmp_path / "two")
+
+
+def kill_one(processes):
+    """SIGKILL a worker process once the first cell is done, in the midst of its next."""
+    victim = processes()[0]
+    os.kill(victim, signal.SIGKILL)
+    return victim
+
+
+@pytest.mark.slow
+def test_a_killed_dask_worker_costs_nothing_but_time(tmp_path, cluster):
+    cells = [Cell(kinds.WALK, cell(seed=seed, states=60)) for seed in range(1, 7)]
+    killed = []
+
+    def kill(k, cached):
+        if not killed:
+            killed.append(kill_one(lambda: [w.pid for w in cluster.workers.values()]))
+
+    assert not scan.run(tmp_path / "one", cells, scheduler=cluster.scheduler_address, on_done=kill)
+    assert killed
+    assert not scan.run(tmp_path / "two", cells)
+    assert_same(tmp_path / "one", tmp_path / "two")
+
+
+@pytest.mark.slow
+def test_a_killed_worker_process_costs_nothing_but_time(tmp_path):
+    cells = [Cell(kinds.WALK, cell(seed=seed, states=60)) for seed in range(1, 7)]
+    killed = []
+
+    def kill(k, cached):
+        if not killed:
+            children = multiprocessing.active_children
+            killed.append(kill_one(lambda: [child.pid for child in children()]))
+
+    assert not scan.run(tmp_path / "one", cells, on_done=kill)
+    assert killed
+    assert not scan.run(tmp_path / "two", cells)
+    assert_same(tmp_path / "one", tmp_path / "two")
+
+
+def die(*task):
+    os._exit(1)
+
+
+@pytest.mark.slow
+def test_a_cell_that_kills_its_worker_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setattr(scan, "run_cell", die)
+    monkeypatch.setattr(scan, "warm_up", lambda: None)
+    failed = scan.run(tmp_path / "s", small_cells()[:1])
+    assert "died 3 times" in failed[0][1]
+
+
+def test_a_worker_that_does_not_see_the_store_says_so(tmp_path):
+    with pytest.raises(InputError, match="must be shared"):
+        scan.run_cell(tmp_path / "elsewhere", small_cells()[0])
+    assert not (tmp_path / "elsewhere").exists()
+
+
+def test_no_scheduler_is_one_line(tmp_path):
+    pytest.importorskip("dask.distributed")
+    with pytest.raises(InputError, match="no dask scheduler at"):
+        scan.run(tmp_path / "s", small_cells()[:1], scheduler="tcp://127.0.0.1:9")

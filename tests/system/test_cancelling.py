@@ -1,0 +1,202 @@
+"""Whatever is under way ends soon after it is asked to, and leaves nothing behind.
+
+No test measures a second: the work here would take hours (or for ever), and has ended long before.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from packings import packed
+from scipy import sparse
+
+import granforce as gf
+from granforce.explore import billiard
+from granforce.explore.chart import chart
+from granforce.numerics import elimination
+from granforce.numerics import highs as programs
+from granforce.perturb import flow as exact_step
+from granforce.system import cancelling
+
+# What is a second on an idle machine; hours are what the work would take.
+SOON = 60.0
+
+
+@pytest.fixture(scope="module")
+def S():
+    return gf.ensemble(packed(40, 0.3))
+
+
+def endless_steps():
+    gf.pack(40, 0.3, 0, sweeps=10**9, accuracy=1e-300)
+
+
+def endless_insertion():
+    gf.pack(10**6, 0.3, 0)
+
+
+def endless_sweeps(S):
+    # Forces that are not numbers neither come to rest nor stall.
+    gf.gauss_seidel(S, np.full_like(S.original, np.nan), max_iterations=10**12, rest=None)
+
+
+def endless_walk(S):
+    gf.walk(S, 10**6, 0, chains=2, workers=2)
+
+
+def endless_paths(S):
+    made = chart(*S.scaled_form[:2])
+    walls = made.G, made.columns, made.K, made.turn
+    place, out = np.zeros(made.dimension), np.ones((1, len(made.G)))
+    path = 1.0, 10**9, 10**12
+    billiard.billiard(*walls, place, np.random.default_rng(0), *path, out, cancelling.flag())
+    cancelling.check()
+
+
+def one_endless_path(S):
+    made = chart(*S.scaled_form[:2])
+    walls = made.G, made.columns, made.K, made.turn
+    place, out = np.zeros(made.dimension), np.ones((1, len(made.G)))
+    path = 1e12, 10**12, 1
+    billiard.billiard(*walls, place, np.random.default_rng(0), *path, out, cancelling.flag())
+    cancelling.check()
+
+
+def endless_hits(S):
+    made = chart(*S.scaled_form[:2])
+    place, out = np.zeros(made.dimension), np.ones((1, len(made.G)))
+    rng = np.random.default_rng(0)
+    billiard.hit_and_run(made.columns, place, rng, 10**12, out, cancelling.flag())
+    cancelling.check()
+
+
+def endless_motion(S):
+    # Under 100 ⟨f_n⟩ grains move for good, and no breach of Coulomb's law is below zero.
+    step, start = exact_step.make_step(S), S.original / S.force_scale
+    exact_step.relax(step, start, 0, 100.0, max_steps=10**9, steady=0.0)
+
+
+def long_program(solver):
+    n = 20_000
+    A = sparse.random(n, 2 * n, 6 / n, format="csc", rng=np.random.default_rng(1))
+    A = sparse.csc_matrix(A + sparse.eye(n, 2 * n))
+    model = programs.standard_form(A, A @ np.ones(2 * n), solver=solver)
+    programs.set_cost(model, 1 + np.random.default_rng(0).standard_normal(2 * n))
+    programs.optimal(model)
+
+
+def endless_call():
+    cancelling.apart(time.sleep, 1e5)
+
+
+def long_elimination():
+    pairs = np.random.default_rng(0).integers(50_000, size=(150_000, 2))
+    elimination.pattern(np.random.default_rng(1).random((50_000, 2)), *pairs.T)
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        endless_steps, endless_insertion, endless_sweeps, endless_walk, endless_paths,
+        one_endless_path, endless_hits, endless_motion, endless_call, long_elimination,
+        lambda: long_program("simplex"), lambda: long_program("ipm"),
+    ],
+)  # fmt: skip
+def test_what_would_take_hours_ends_when_cancelled(work, S):
+    arguments = (S,) if work.__code__.co_argcount else ()
+    work_ended, asked, ends = threading.Event(), threading.Event(), []
+
+    def run():
+        try:
+            with cancelling.watched(asked.is_set):
+                work(*arguments)
+        except BaseException as error:
+            ends.append(error)
+        work_ended.set()
+
+    threading.Thread(target=run, daemon=True).start()
+    assert not work_ended.wait(1.0), ends
+    asked.set()
+    assert work_ended.wait(SOON)
+    assert isinstance(ends[0], gf.Cancelled)
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda S: gf.pack(40, 0.3, 0),
+        lambda S: gf.pack(20, 0.0, 0),
+        lambda S: gf.walk(S, 3, 0),
+        lambda S: gf.sample_uniform(S, 8),
+        lambda S: gf.intervals(S, workers=2),
+        lambda S: gf.limit_loads(S),
+        lambda S: gf.outline(S, np.stack([S.original, S.original[::-1]])),
+        lambda S: gf.critical_force(S, S.index[0]),
+        lambda S: gf.response(S, S.index[0]),
+        lambda S: gf.nearest(S, 2 * S.original),
+        lambda S: gf.gauss_seidel(S, 2 * S.original),
+    ],
+)  # fmt: skip
+def test_nothing_is_handed_out_once_cancelled(work, S):
+    with cancelling.watched(lambda: True), pytest.raises(gf.Cancelled):
+        work(S)
+
+
+def test_a_cancel_that_never_comes_changes_no_number(S):
+    kick = S.original + 0.1 * S.force_scale
+    for relax in (gf.nearest, gf.gauss_seidel):
+        watched = relax(S, kick, cancel=lambda: False)
+        assert np.array_equal(watched.forces, relax(S, kick).forces)
+    plain, watched = gf.pack(20, 0.3, 1), gf.pack(20, 0.3, 1, cancel=lambda: False)
+    assert np.array_equal(plain.forces, watched.forces)
+
+
+def test_scopes_nest_and_leave_nothing_behind():
+    asked = []
+    with cancelling.watched(lambda: bool(asked)):
+        with cancelling.watched(lambda: False):
+            cancelling.check()
+            with cancelling.threads(1) as pool:
+                assert not pool.submit(cancelling.cancelled).result()
+                asked.append(True)
+                assert pool.submit(cancelling.cancelled).result()
+            with pytest.raises(gf.Cancelled):
+                cancelling.check()
+        assert cancelling.cancelled()
+    assert not cancelling.cancelled()
+    assert not [one for one in threading.enumerate() if one.name == "granforce-cancel"]
+    assert signal.set_wakeup_fd(-1) == -1
+
+
+def test_an_error_in_cancel_is_told(S):
+    def broken():
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        gf.walk(S, 3, 0, cancel=broken)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
+def test_ctrl_c_ends_a_kernel_in_the_main_thread():
+    script = (
+        "import granforce as gf\n"
+        "gf.pack(20, 0.3, 0)\n"
+        "print('begun', flush=True)\n"
+        "gf.pack(40, 0.3, 0, sweeps=10**9, accuracy=1e-300)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as child:
+        try:
+            assert child.stdout.readline() == "begun\n"
+            time.sleep(1.0)
+            child.send_signal(signal.SIGINT)
+            _, errors = child.communicate(timeout=SOON)
+        finally:
+            child.kill()
+    assert errors.rstrip().endswith("KeyboardInterrupt")

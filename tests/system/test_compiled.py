@@ -1,0 +1,85 @@
+"""Where kernels are kept when neither the installation nor the home folder can be written."""
+
+import os
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import granforce
+from granforce.system import compiled
+
+PACKAGE = Path(granforce.__file__).parent
+
+
+@pytest.fixture
+def installed(tmp_path):
+    """A copy of the package beside which nothing can be written, by root either."""
+    shutil.copytree(PACKAGE, tmp_path / "granforce", ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in [tmp_path / "granforce", *(tmp_path / "granforce").rglob("*/")]:
+        (folder / "__pycache__").write_text("")
+    return tmp_path
+
+
+IMPORT = "import granforce.packing.neighbours\nprint(granforce.__file__)\n"
+USE = (
+    "import numpy as np\n"
+    "x, r = np.array([[0.0, 0.0], [2.0, 0.0]]), np.ones(2)\n"
+    "pairs = granforce.packing.neighbours.find_pairs(x, r, np.full(2, np.inf), 0.1)\n"
+    "assert len(pairs[0]) == 1\n"
+)
+
+
+def run(installed, code=IMPORT, **environment):
+    """Import kernels from the copy in a process of its own; what it said on stderr."""
+    usual = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", code],
+        env=usual | {"PYTHONPATH": str(installed), "TMPDIR": str(installed)} | environment,
+        cwd=installed,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == str(installed / "granforce" / "__init__.py")
+    return done.stderr
+
+
+def test_a_temporary_folder_serves_where_nothing_else_can_be_written(installed):
+    """The second time there is nothing left to compile."""
+    nowhere = str(installed / "granforce" / "__pycache__" / "home")  # below a file
+    kept = installed / f"granforce-kernels-{os.getuid()}"
+    made = []
+    for _ in range(2):
+        said = run(installed, IMPORT + USE, HOME=nowhere)
+        assert len(said.splitlines()) == 1
+        assert "NUMBA_CACHE_DIR" in said and str(kept) in said
+        made.append({path.stat().st_mtime_ns for path in kept.rglob("*.nbc")})
+    assert made[0] and made[0] == made[1]
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o700
+
+
+def test_nothing_is_said_where_a_home_or_a_setting_serves(installed):
+    home = installed / "home"
+    home.mkdir()
+    assert run(installed, HOME=str(home)) == ""
+    nowhere = str(installed / "granforce" / "__pycache__" / "home")
+    assert run(installed, HOME=nowhere, NUMBA_CACHE_DIR=str(home / "own")) == ""
+    assert not list(installed.glob("granforce-kernels-*"))
+
+
+def test_a_folder_of_somebody_else_is_not_taken(tmp_path, monkeypatch):
+    """Kernels are code: who can write them can run anything."""
+    monkeypatch.setattr(compiled.tempfile, "tempdir", str(tmp_path))
+    usual = tmp_path / f"granforce-kernels-{os.getuid()}"
+    assert compiled._temporary_place() == str(usual)
+    usual.chmod(0o777)
+    other = compiled._temporary_place()
+    assert other != str(usual) and stat.S_IMODE(os.stat(other).st_mode) == 0o700
+    usual.rmdir()
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    usual.symlink_to(tmp_path / "elsewhere")
+    assert compiled._temporary_place() != str(usual)

@@ -1,0 +1,46 @@
+"""What commands print besides their results."""
+
+import re
+
+from granforce.system.terminal import Bar, Steps, one_line
+
+
+def shown(capsys):
+    """The states of a bar that were seen, one after the other."""
+    return [state.strip() for state in re.split(r"[\r\n]", capsys.readouterr().err) if state]
+
+
+def test_a_bar_that_is_not_used_is_not_seen(capsys):
+    with Bar("cells", "cell"), Steps("compaction", "step"):
+        pass
+    assert shown(capsys) == []
+
+
+def test_rates_count_from_the_beginning(capsys):
+    """A hundred steps are told at once, two seconds after the work began."""
+    with Steps("compaction", "step") as progress:
+        progress.bar.start_t -= 2.0
+        progress.bar.last_print_t -= 2.0
+        progress(100, "φ = 0.5")
+    last = shown(capsys)[-1]
+    told = re.fullmatch(r"compaction: 100 step \[00:02, +([\d.]+) step/s, φ = 0\.5\]", last)
+    assert told and 30 < float(told[1]) <= 50.1
+
+
+def test_a_bar_knows_its_end(capsys):
+    with Bar("cells", "cell") as progress:
+        progress(0.25, 2)
+        progress(2, 2)
+    assert "2/2" in shown(capsys)[-1]
+
+
+def test_a_note_stands_behind_the_bar(capsys):
+    with Bar("random walk", "state") as progress:
+        progress.note("η1 = 0.2104")
+        progress(2, 2)
+    assert shown(capsys)[-1].endswith("η1 = 0.2104]")
+
+
+def test_a_warning_is_one_line():
+    told = one_line(UserWarning("two\nlines"), UserWarning, "file.py", 3)
+    assert told == "granforce: two lines\n"

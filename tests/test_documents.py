@@ -1,0 +1,188 @@
+"""What the READMEs tell to run runs, and what they name is there."""
+
+import ast
+import importlib.util
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import frames
+import numpy as np
+import pytest
+from packings import packed
+
+from granforce.cli.parser import _parser, main
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = ["README.md", "granforce/README.md", "data/README.md", "app/README.md"]
+LAMMPS = ROOT / "tests" / "lammps" / "lammps_n400_mu0.3"
+
+# The same at a size that takes no time: texts of commands and snippets, and what replaces them.
+SMALL = {
+    r"(?<=-n )400|(?<=pack\()400": "30",
+    r"(?<=--states )\d+|(?<=states=)\d+": "8",
+    r"(?<=--keep )\d+": "5",
+    r"(?<=--random )\d+": "1",
+    r"(?<=--mu )[\d.]+,[\d.,]+": "0,0.3",
+}
+# Commands that take minutes, or stay: they are parsed only.
+LONG = ("study", "bench", "app")
+
+
+def text(document):
+    return (ROOT / document).read_text()
+
+
+def blocks(document):
+    """(language, code) of every fenced block."""
+    return re.findall(r"^```(\w*)\n(.*?)^```$", text(document), re.M | re.S)
+
+
+def small(code):
+    for pattern, less in SMALL.items():
+        code = re.sub(pattern, less, code)
+    return code
+
+
+def known():
+    """The command line's own list of its commands, former names left out."""
+    (subparsers,) = (a for a in _parser()._actions if hasattr(a, "choices") and a.choices)
+    return {name for name, parser in subparsers.choices.items() if parser.prog.endswith(f" {name}")}
+
+
+def named_today(words):
+    """`scan` by its former name as long as the command line knows no other."""
+    return ["sweep", *words[1:]] if words[0] == "scan" and "scan" not in known() else words
+
+
+def commands(document):
+    """Words of every `granforce …` in the text and in blocks."""
+    lines = [line for _, code in blocks(document) for line in code.replace("\\\n", " ").split("\n")]
+    quoted = re.findall(
+        r"`(granforce [^`\n]+)`", re.sub(r"^```.*?^```$", "", text(document), flags=re.M | re.S)
+    )
+    found = []
+    for line in [*lines, *quoted]:
+        words = shlex.split(line.partition("&&")[0]) if "granforce " in line else []
+        while words and "=" in words[0]:
+            words.pop(0)  # variables
+        if words[:1] == ["granforce"] and words[1:] and words[1].islower():
+            found.append(named_today(words[1:]))
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the files that the commands name, and a store of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    for name in ("particles", "contacts"):
+        shutil.copy(f"{LAMMPS}.{name}.dump", tmp_path / f"{name}.dump")
+    packing = packed(30, 0.3)
+    rows = np.column_stack([packing.x, packing.r])
+    size = 30 / packing.box[0]  # the box that the command names
+    np.savetxt("grains.csv", size * rows, delimiter=",", header="x,y,r", comments="")
+    pairs = np.column_stack([packing.contacts.i, packing.contacts.j])
+    np.savetxt("contacts.csv", pairs, fmt="%d", delimiter=",", header="i,j", comments="")
+    grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1)
+    frames.write(tmp_path, grains, rows)
+    (tmp_path / "data").mkdir()
+    return tmp_path
+
+
+def test_the_readme_is_short_and_gives_the_commands_that_install():
+    lines = text("README.md").splitlines()
+    assert len(lines) <= 180
+    for ends in ("panel serve app --show", "-m pytest"):
+        assert any(
+            line.startswith("python3 -m venv .venv") and line.endswith(ends) for line in lines
+        )
+
+
+def test_the_readme_tells_every_command():
+    told = {words[0] for words in commands("README.md")}
+    assert told == known()
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_command_is_understood(document):
+    for words in commands(document):
+        if words[1:]:
+            _parser().parse_args(words)
+        else:
+            assert words[0] in known()
+
+
+@pytest.mark.parametrize("document", ["README.md", "data/README.md"])
+def test_every_short_command_runs(document, folder, capsys):
+    ran = 0
+    for words in commands(document):
+        if words[0] in LONG or not words[1:]:
+            continue
+        words = shlex.split(small(shlex.join(words)))
+        assert main(words) == 0, (words, capsys.readouterr().err)
+        ran += 1
+    assert ran >= 4
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_snippet_runs(document, folder):
+    for language, code in blocks(document):
+        if language == "python":
+            run = subprocess.run(
+                [sys.executable, "-c", small(code)], capture_output=True, text=True
+            )
+            assert run.returncode == 0, run.stderr
+            assert run.stdout
+        else:
+            assert not language or language == "sh"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_link_leads_somewhere(document):
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text(document)):
+        if "://" not in target:
+            assert (ROOT / document).parent.joinpath(target).exists(), target
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_file_named_is_there(document):
+    for name in re.findall(r"`((?:app|granforce|tests)/[\w/.]+)`", text(document)):
+        assert (ROOT / name).exists(), name
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_module_to_run_is_there(document):
+    for name in re.findall(r"python -m (granforce[\w.]*)", text(document)):
+        assert importlib.util.find_spec(name) is not None, name
+
+
+def test_the_map_shows_every_room():
+    (layout,) = (code for _, code in blocks("granforce/README.md") if code.startswith("cli/"))
+    rooms, room = {}, ""
+    for line in layout.splitlines():
+        name = line.split(" ")[0]
+        room = name if name.endswith("/") else room if not name else ""
+        rooms.setdefault(room, []).extend(re.findall(r"[\w/]+(?:\.py|/)(?=\W|$)", line))
+    folders = {f"{init.parent.name}/" for init in (ROOT / "granforce").glob("*/__init__.py")}
+    assert set(rooms) - {""} == folders
+    for room, names in rooms.items():
+        for name in names:
+            assert (ROOT / "granforce" / room / name.removeprefix(room)).exists(), (room, name)
+    beside = {path.name for path in (ROOT / "granforce").glob("*.py")} - {"__init__.py"}
+    assert set(rooms[""]) == beside
+
+
+def test_every_look_up_finds_its_function():
+    rows = re.findall(
+        r"^\| ([^|]+) \| `([\w/]+\.py)` \| `([\w.]+)` \|$", text("granforce/README.md"), re.M
+    )
+    assert len(rows) == 12
+    for _, file, name in rows:
+        scope = ast.parse((ROOT / file).read_text())
+        for part in name.split("."):
+            scope = {node.name: node for node in scope.body if hasattr(node, "name")}[part]
+        assert ast.get_docstring(scope) or name.split(".")[-1].startswith("_"), name

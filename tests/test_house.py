@@ -1,0 +1,58 @@
+"""The house: few files side by side, every room with its purpose, every kernel under a rule."""
+
+import ast
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+HOUSE = ROOT / "granforce"
+MOST_FILES = 8  # beside the rooms
+
+
+def rooms():
+    return [path for path in HOUSE.rglob("*") if path.is_dir() and any(path.glob("*.py"))]
+
+
+def imports(path):
+    """Names of the modules that a file imports at its top."""
+    found = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add(node.module)
+    return found
+
+
+def test_few_files_stand_beside_the_rooms():
+    files = [path.name for path in HOUSE.iterdir() if path.is_file()]
+    assert len(files) <= MOST_FILES, files
+
+
+def test_every_room_says_what_it_is_for():
+    assert len(rooms()) > 8
+    for room in rooms():
+        assert ast.get_docstring(ast.parse((room / "__init__.py").read_text())), room
+
+
+def test_every_kernel_is_under_a_rule():
+    """Each file that compiles something is named by a contract on kernels, or its room is."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    ruled = [
+        module
+        for contract in contracts["contracts"]
+        if contract["name"].startswith("kernels")
+        for module in contract["source_modules"]
+    ]
+    compiled = [
+        path
+        for path in HOUSE.rglob("*.py")
+        if "numba" in imports(path) or "\n@compiled\n" in path.read_text()
+    ]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in compiled]
+    assert len(names) > 8
+    unruled = [name for name in names if not any(f"{name}.".startswith(f"{m}.") for m in ruled)]
+    assert unruled == []
+    for module in ruled:
+        path = ROOT / module.replace(".", "/")
+        assert path.is_dir() or path.with_suffix(".py").exists(), f"{module} has gone"
