@@ -1,94 +1,88 @@
 """What the page computes on demand, as work for jobs.Task; all goes through study and the cache."""
 
-import threading
-from contextlib import contextmanager
-from weakref import WeakValueDictionary
+from granforce.study import cells as study
+from granforce.study import kinds
 
-from granforce import study
-from granforce.records import Cancelled
-
+from . import live
 from .data import SOURCES, Shown
+from .turns import in_turn
 
 # A compaction's part of the bar; it never seems to be at its end.
 PACKING_SHARE, NEARLY = 0.5, 0.95
-# How often a job that waits for another one asks whether it was cancelled, s.
-_ASK = 0.2
-
-_turns, _turns_lock = WeakValueDictionary(), threading.Lock()
 
 
-@contextmanager
-def in_turn(job, *named):
-    """One job at a time of those named alike: the next finds in the cache what the first made.
+def found_or_made(library, job, stage, kind, params, **options):
+    """The dataset of a kind and parameters from a store, or computed in this stage.
 
-    Raises Cancelled where the job is cancelled while it waits.
+    options: as the kind's compute takes them.
     """
-    with _turns_lock:
-        turn = _turns.setdefault(repr(named), threading.Lock())
-    stage = job.stage
-    while not turn.acquire(timeout=_ASK):
-        job.stage = "being computed for another page"
-        if job.cancelled():
-            raise Cancelled
-    job.stage = stage
-    try:
-        yield
-    finally:
-        turn.release()
-
-
-def found_or_made(library, job, stage, kind, params, version, get):
-    """The dataset of these parameters from a store, or from get(cache, params) in this stage."""
-    found = library.stored(kind, params, version)
+    found = library.stored(kind, params)
     if found is None:
-        with in_turn(job, kind, params):
+        with in_turn(job, kind.name, params):
             library.lend_packing(params["packing"])
             job.begin(stage)
-            found, _ = get(library.cache, params, progress=job.tell, cancel=job.cancelled)
+            found, _ = study.get(library.cache, kind, params, progress=job.tell, **options)
     return found
 
 
 def states(library, selection):
     """Work that finds or computes the states of a Selection; results in their Shown."""
 
+    params = selection.parameters()
+
     def work(job):
-        params = selection.parameters()
         with in_turn(job, selection.kind, params):
             cell = library.find(selection.kind, params)
             if cell is None:
                 _make_packing(job, library, selection.packing)
                 job.begin("states")
-                SOURCES[selection.kind][1](
+                study.get(
                     library.cache,
+                    SOURCES[selection.kind],
                     params,
                     progress=lambda done, total: _tell_states(job, done, total),
-                    cancel=job.cancelled,
+                    **_watched(selection, params),
                 )
                 cell = library.find(selection.kind, params)
         return library.shown(cell)
 
+    work.wants = (selection.kind, params), ("packing", selection.packing)
     return work
+
+
+def _watched(selection, params):
+    """Options of the computation of states that have it seen by those who follow it."""
+    if selection.kind != "walk":
+        return {}
+    walking = live.shared(live.Walking, params)
+
+    def begun(S):
+        walking.restart(live.first_replay(S, params["states"]))
+
+    return {"begun": begun, "watch": walking.add}
+
+
+def exact_parameters(selection):
+    """As a store names the exact intervals of a Selection."""
+    return kinds.INTERVALS.parameters(selection.packing, mu=selection.mu)
 
 
 def exact(library, shown):
     """Work that computes the exact intervals beside what is shown; results in a new Shown."""
+    params = exact_parameters(shown.cell.selection)
 
     def work(job):
-        selection = shown.cell.selection
-        params = study.exact_parameters(selection.packing, mu=selection.mu)
+        replay = shown.replay
+        bounding = live.shared(live.Bounding, params)
         dataset = found_or_made(
-            library,
-            job,
-            "exact intervals",
-            "intervals",
-            params,
-            study.INTERVALS_VERSION,
-            study.get_intervals,
-        )
+            library, job, "exact intervals, the widest first", kinds.INTERVALS, params,
+            begun=bounding.restart, watch=bounding.add, widths=replay.high[:, 0] - replay.low[:, 0],
+        )  # fmt: skip
         found = Shown(shown.cell, shown.replay, dataset)
         library.keep_in_memory(found)
         return found
 
+    work.wants = ((kinds.INTERVALS.name, params),)
     return work
 
 
@@ -109,7 +103,9 @@ def _compact(job, library, packing):
             job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
 
     job.begin("compaction")
-    study.get_packing(library.cache, packing, progress=tell, cancel=job.cancelled)
+    seen = live.shared(live.Compaction, packing)
+    seen.restart()
+    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=seen.add)
 
 
 def _tell_states(job, done, total):

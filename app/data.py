@@ -3,17 +3,22 @@
 The only module of the app, with those that compute for single tabs, that knows stores and studies.
 """
 
+import json
 import os
 import threading
 from collections import OrderedDict
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from granforce import study
+from granforce import measures
 from granforce.records import InputError
-from granforce.store import open_store
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.schema import dataset_packing
+from granforce.study.store import open_store
 
 from . import geometry
 from .selection import Selection, selected, series
@@ -22,11 +27,8 @@ from .selection import Selection, selected, series
 SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 
-# Kinds of entries that hold states: (version, function that finds or computes).
-SOURCES = {
-    "walk": (study.WALK_VERSION, study.get_walk),
-    "uniform": (study.UNIFORM_VERSION, study.get_uniform),
-}
+# Where states come from.
+SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states}
 
 OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
 FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
@@ -38,7 +40,7 @@ class Cell(NamedTuple):
 
     selection: Selection
     series: str  # everything but μ, in words; cells of one series form one η(μ)
-    params: dict  # as for study.get_walk or study.get_uniform
+    params: dict  # as its kind names it
     store: object  # the store that holds them
     name: str  # of the entry
 
@@ -68,6 +70,7 @@ class Replay(NamedTuple):
     distance: np.ndarray  # (F,) from the centre of the states
     residual: np.ndarray  # (F,) NaN for the original
     attempts: np.ndarray  # (F,) spent on each state; NaN for the original and where none are made
+    growth: dict  # {"eta1", "eta2", "eta3": (F,)} of the states shown so far, NaN for the original
     low: np.ndarray  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
     high: np.ndarray  # (N_c, 2) float32 largest
     order: np.ndarray  # (N_c,) contacts by original f_n, ascending
@@ -96,6 +99,7 @@ class Library:
         self.cache = self._open(cache, readonly=False)
         self.catalogue = []  # as last read
         self._known = {}  # (path, entry's name) → Cell or None; entries never change
+        self._damaged = set()  # the same of those that could not be read
         self._rows = {}
         self._shown = OrderedDict()
         self._lock = threading.Lock()
@@ -120,23 +124,30 @@ class Library:
                 key = store.path, name
                 if key not in self._known:
                     self._known[key] = _cell(store, name)
-                if self._known[key] is not None:
+                if self._known[key] is not None and key not in self._damaged:
                     found.setdefault(name, self._known[key])
         self.catalogue = sorted(found.values(), key=lambda cell: (cell.series, cell.mu))
         return self.catalogue
 
     def find(self, kind, params):
         """The cell of these parameters, or None."""
-        version, _ = SOURCES[kind]
         for store in self.stores:
-            name = store.name(kind, params, version=version)
+            name = study.entry_name(store, SOURCES[kind], params)
+            if (store.path, name) in self._damaged:
+                if study.load(store, SOURCES[kind], params) is None:
+                    continue
+                self._damaged.discard((store.path, name))  # it was computed anew
             if name in store:
                 return _cell(store, name)
         return None
 
     def dataset(self, cell):
-        """The dataset of one cell."""
-        return SOURCES[cell.kind][1](cell.store, cell.params)[0]
+        """The dataset of one cell; InputError if it is damaged, and then it is no longer listed."""
+        found = study.load(cell.store, SOURCES[cell.kind], cell.params)
+        if found is None:
+            self._damaged.add((cell.store.path, cell.name))
+            raise _damage(cell.store, cell.name)
+        return found
 
     def shown(self, cell):
         """Shown of one cell; the last few are kept. InputError if its packing is nowhere."""
@@ -164,9 +175,9 @@ class Library:
 
     def packing(self, params):
         """The packing of these parameters from the first store that has it. InputError if none."""
-        for store in self.stores:
-            if store.name("packing", params, version=study.PACKING_VERSION) in store:
-                return study.get_packing(store, params)[0]
+        found = self.stored(kinds.PACKING, params)
+        if found is not None:
+            return dataset_packing(found)
         raise InputError("the packing of these states is in no store that is open here")
 
     def table(self, cells):
@@ -179,13 +190,13 @@ class Library:
 
     def exact(self, selection):
         """The exact intervals of a selection's packing at its μ as a dataset, or None."""
-        params = study.exact_parameters(selection.packing, mu=selection.mu)
-        return self.stored("intervals", params, study.INTERVALS_VERSION)
+        params = kinds.INTERVALS.parameters(selection.packing, mu=selection.mu)
+        return self.stored(kinds.INTERVALS, params)
 
-    def stored(self, kind, params, version):
-        """The dataset of these parameters from the first store that has it, or None."""
+    def stored(self, kind, params):
+        """The dataset of this kind and parameters from the first store that has it, or None."""
         for store in self.stores:
-            found = store.load(kind, params, version=version)
+            found = study.load(store, kind, params)
             if found is not None:
                 return found
         return None
@@ -194,29 +205,43 @@ class Library:
         """Copy a packing that only the shipped store has to the cache: it need not be made anew."""
         if self.cache is None:
             raise InputError("no cache folder can be written, so nothing can be computed")
-        if self.shipped is not None and (
-            self.shipped.name("packing", params, version=study.PACKING_VERSION) in self.shipped
-        ):
-            study.keep_packing(self.cache, params, study.get_packing(self.shipped, params)[0])
+        if self.shipped is not None:
+            found = study.load(self.shipped, kinds.PACKING, params)
+            if found is not None:
+                kinds.keep_packing(self.cache, params, dataset_packing(found))
 
     def expected_steps(self, n, mu):
         """Compaction steps of the stored packing of n grains with the nearest μ, or None."""
         known = []
         for store in self.stores:
-            for entry in store.find(kind="packing", n=n):
-                if entry.version == study.PACKING_VERSION:
-                    away = abs(np.log((entry.params["mu"] + 1e-3) / (mu + 1e-3)))
-                    known.append((away, entry.name, store))
+            for entry in study.entries(store, kinds.PACKING, n=n):
+                away = abs(np.log((entry.params["mu"] + 1e-3) / (mu + 1e-3)))
+                known.append((away, entry.name, store))
         if not known:
             return None
         _, name, store = min(known, key=lambda found: found[:2])
-        return study.dataset_packing(store[name]).info.get("steps")
+        with suppress(InputError), readable(store, name) as found:
+            return json.loads(found.attrs["info"]).get("steps")
+        return None
+
+
+@contextmanager
+def readable(store, name):
+    """The dataset of an entry, to be read as needed; InputError where it turns out damaged."""
+    try:
+        yield store[name]
+    except Exception as error:  # what damage raises depends on codec, zarr and xarray
+        raise _damage(store, name) from error
+
+
+def _damage(store, name):
+    return InputError(f"entry {name} in {store.path} is damaged; compute it anew, or remove it")
 
 
 def _cell(store, name):
     """The Cell of a store's entry; None where it holds no states of the current algorithms."""
     entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
-    if entry is None or entry.version != SOURCES[entry.kind][0]:
+    if entry is None or entry.version != SOURCES[entry.kind].version:
         return None
     selection = selected(entry.kind, entry.params)
     return Cell(selection, series(selection, entry.params), entry.params, store, name)
@@ -283,6 +308,9 @@ def make_replay(packing, dataset, mu):
         distance=distance,
         residual=column("residual"),
         attempts=column("attempts"),
+        growth={
+            name: np.append(np.nan, values) for name, values in measures.growing(frames[1:]).items()
+        },
         low=(dataset["low"].values / scale).astype(np.float32),
         high=(dataset["high"].values / scale).astype(np.float32),
         order=np.argsort(frames[0, :, 0], kind="stable"),

@@ -5,7 +5,11 @@ from collections import OrderedDict
 
 import numpy as np
 
-from granforce import study
+from granforce.study import kinds
+from granforce.study.bounds import UNDETERMINED
+from granforce.study.cells import entry_name
+
+from .data import readable
 
 MEASURES = ("eta1", "eta2", "eta3", "coordination", "dimension", "packing_fraction")
 CORRELATIONS = ("correlation", "correlation_low", "correlation_high")
@@ -38,9 +42,9 @@ def exact_rows(library, cells):
     """The same from exact intervals, of those packings whose intervals a store has."""
     found = []
     for cell in cells:
-        params = study.exact_parameters(cell.selection.packing, mu=cell.selection.mu)
+        params = kinds.INTERVALS.parameters(cell.selection.packing, mu=cell.selection.mu)
         for store in library.stores:
-            name = store.name("intervals", params, version=study.INTERVALS_VERSION)
+            name = entry_name(store, kinds.INTERVALS, params)
             if name in store:
                 found.append(_row(store, name, cell.selection))
                 break
@@ -53,12 +57,12 @@ def _row(store, name, selection):
         if key in _rows:
             _rows.move_to_end(key)
             return _rows[key]
-    dataset = store[name]  # lazily: the states, most of it, are not read
-    scale = dataset["force_scale"].item()
-    row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
-    row |= {k: dataset[k].item() for k in (*MEASURES, *CORRELATIONS) if k in dataset}
-    low, high = dataset["low"].values[:, 0], dataset["high"].values[:, 0]
-    row |= {"normal": dataset["original"].values[:, 0] / scale, "extent": (high - low) / scale}
+    with readable(store, name) as dataset:  # but for the states, most of it
+        scale = dataset["force_scale"].item()
+        row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
+        row |= {k: dataset[k].item() for k in (*MEASURES, *CORRELATIONS) if k in dataset}
+        low, high = dataset["low"].values[:, 0], dataset["high"].values[:, 0]
+        row |= {"normal": dataset["original"].values[:, 0] / scale, "extent": (high - low) / scale}
     with _lock:
         _rows[key] = row
         while len(_rows) > KEPT:
@@ -73,7 +77,7 @@ def groups(found, mu, most=MOST_CURVES):
     """
     by_mu = {}
     for row in found:
-        if row["extent"].max(initial=0) > study.UNDETERMINED:
+        if row["extent"].max(initial=0) > UNDETERMINED:
             by_mu.setdefault(row["mu"], []).append(row["extent"])
     others = sorted(value for value in by_mu if value != mu)
     most -= mu in by_mu

@@ -1,4 +1,4 @@
-"""What is on screen as files, made in memory: table, dataset, packing, picture, parameters."""
+"""What is on screen as files, made in memory: table, dataset, packing, parameters."""
 
 import io
 import json
@@ -9,18 +9,14 @@ import numpy as np
 import xarray as xr
 import zarr
 
-from granforce import importers
-from granforce.schema import packing_dataset
-from granforce.store import canonical
+from granforce.packing import importers
+from granforce.study.schema import packing_dataset
+from granforce.study.store import canonical
 
 from .selection import command
 
 # The contact dimension of a packing's own arrays; that of the states holds the backbone only.
 PACKING_CONTACTS = "packing_contact"
-
-# Of the picture, as in the player: chain width of ⟨f_n⟩, least force drawn, marks of Fig. 5.
-WIDTH, CARRYING, STRONG, DIM, MARK = 0.23, 1e-6, 2.0, 0.35, 0.24
-PIXELS = 900  # of the picture's side
 
 
 class File(NamedTuple):
@@ -29,18 +25,6 @@ class File(NamedTuple):
     name: str
     mime: str
     content: bytes
-
-
-class Look(NamedTuple):
-    """How the packing is seen."""
-
-    frame: int  # row of the Replay
-    reference: int  # row that is pinned
-    colour: str  # as in state.COLOURS
-    thickness: str  # as in state.WIDTHS
-    overlay: bool
-    palettes: dict  # of style.palettes
-    background: str
 
 
 def contacts(replay, exact, frame):
@@ -66,9 +50,40 @@ def contacts(replay, exact, frame):
     return columns
 
 
-def csv(columns):
-    """Columns {name: array} as a table; whole numbers stay whole."""
+# What the columns of the table of contacts hold.
+COLUMNS = {
+    "contact": "number of the contact in the packing",
+    "i": "number of the first grain; the normal n points from i to j",
+    "j": "number of the second grain",
+    "f_n_original": "normal force with which the packing came to rest, force",
+    "f_t_original": "tangential force with it, along t = (-n_y, n_x), force",
+    "f_n": "normal force in the state on screen, force",
+    "f_t": "tangential force in the state on screen, force",
+    "f_n_low": "smallest normal force of all states, force",
+    "f_n_high": "largest normal force of all states, force",
+    "f_t_low": "smallest tangential force of all states, force",
+    "f_t_high": "largest tangential force of all states, force",
+    "f_n_min": "least possible normal force (exact), force",
+    "f_n_max": "largest possible normal force (exact), force",
+    "f_t_min": "least possible tangential force (exact), force",
+    "f_t_max": "largest possible tangential force (exact), force",
+}
+
+
+def explained(columns, replay, title):
+    """Lines, each after a #, that tell what a table holds and in which units."""
+    unit = (
+        f"Forces are in the packing's own unit (pressure times length): mean normal force "
+        f"{replay.force_scale:.9g}. Lengths are in the packing's unit."
+    )
+    lines = [title, unit, *(f"{name}: {COLUMNS[name]}" for name in columns)]
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def csv(columns, head=""):
+    """Columns {name: array} as a table below the head; whole numbers stay whole."""
     file = io.StringIO()
+    file.write(head)
     whole = [np.issubdtype(values.dtype, np.integer) for values in columns.values()]
     np.savetxt(
         file,
@@ -127,93 +142,3 @@ def parameters(cell, link, view):
         "view": view,
     }
     return json.dumps(told, indent=1, ensure_ascii=False).encode()
-
-
-def picture(replay, extent, most, look):
-    """The packing as on screen, as SVG; extent (N_c,): ΔF_n in ⟨f_n⟩, most: end of its scale."""
-    x_low, x_high, y_low, y_high = replay.window
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{PIXELS}" height="{PIXELS}" '
-        f'viewBox="{x_low:.6g} {-y_high:.6g} {x_high - x_low:.6g} {y_high - y_low:.6g}">',
-        f'<rect x="{x_low:.6g}" y="{-y_high:.6g}" width="100%" height="100%" '
-        f'fill="{look.background}"/>',
-        *_disks(replay, look.palettes["scene"]),
-        *_chains(replay, extent, most, look),
-    ]
-    if look.overlay:
-        lines += _marks(replay, extent, look)
-    return "\n".join([*lines, "</svg>"])
-
-
-def _disks(replay, colours):
-    disks = replay.disks
-    kind = 2 * disks.image + (disks.contacts == 0)
-    for x, y, r, k in zip(disks.x, disks.y, disks.r, kind, strict=True):
-        paint = colours["disks"][k]
-        yield (
-            f'<circle cx="{x:.5g}" cy="{-y:.5g}" r="{r:.5g}" fill="{paint["fill"]}" '
-            f'stroke="{paint["line"]}" stroke-width="0.03"/>'
-        )
-    if np.all(np.isfinite(replay.box)):
-        width, height = replay.box
-        yield (
-            f'<rect x="0" y="{-height:.6g}" width="{width:.6g}" height="{height:.6g}" fill="none" '
-            f'stroke="{colours["edge"]}" stroke-width="0.04" stroke-dasharray="0.2"/>'
-        )
-
-
-def _chains(replay, extent, most, look):
-    width, colour = chain_widths(replay, extent, look), chain_colours(replay, extent, most, look)
-    links = replay.links
-    ends = zip(links.x0, links.y0, links.x1, links.y1, links.contact, strict=True)
-    yield f'<g stroke-linecap="round" opacity="{DIM if look.overlay else 1}">'
-    for x0, y0, x1, y1, c in ends:
-        if width[c] > 0:
-            yield (
-                f'<line x1="{x0:.5g}" y1="{-y0:.5g}" x2="{x1:.5g}" y2="{-y1:.5g}" '
-                f'stroke="{colour[c]}" stroke-width="{width[c]:.3g}"/>'
-            )
-    yield "</g>"
-
-
-def chain_widths(replay, extent, look):
-    """Width (N_c,) of each contact's chain, length; 0 for what carries nothing."""
-    value = replay.normal[look.frame]
-    if look.thickness == "extent":
-        value = extent
-    elif look.thickness == "difference":
-        value = np.abs(value - replay.normal[look.reference])
-    return np.where(value > CARRYING, WIDTH * value, 0.0)
-
-
-def chain_colours(replay, extent, most, look):
-    """Colour of each contact's chain, a list of "#rrggbb"."""
-    normal, tangential = replay.normal[look.frame], replay.tangential[look.frame]
-    mu = replay.summary["mu"]
-    if look.colour == "mobilised" and mu == 0:
-        return [look.palettes["neutral"]] * len(normal)
-    if look.colour == "mobilised":
-        part = 0.5 + np.divide(
-            tangential, 2 * mu * normal, out=np.zeros_like(normal), where=normal > CARRYING
-        )
-    elif look.colour == "extent":
-        part = extent / most if most > 0 else np.zeros_like(extent)
-    elif look.colour == "change":
-        part = 0.5 + (normal - replay.normal[0]) / 2
-    else:
-        part = 0.5 + 0.5 * np.sign(normal - replay.normal[look.reference])
-    colours = look.palettes[look.colour]
-    place = np.round((len(colours) - 1) * np.clip(part, 0, 1)).astype(int)
-    return [colours[k] for k in place]
-
-
-def _marks(replay, extent, look):
-    """Fig. 5 of the paper: strong contacts filled, undetermined ones open."""
-    links, scene = replay.links, look.palettes["scene"]
-    x, y = (links.x0 + links.x1) / 2, (links.y0 + links.y1) / 2
-    strong, loose = replay.normal[0] > STRONG, extent > extent.mean()
-    filled = f'fill="{scene["strong"]}"'
-    open_ = f'fill="none" stroke="{scene["loose"]}" stroke-width="0.09"'
-    for chosen, size, paint in ((strong, 0.75, filled), (loose, 1.25, open_)):
-        for k in np.flatnonzero(chosen[links.contact]):
-            yield f'<circle cx="{x[k]:.5g}" cy="{-y[k]:.5g}" r="{MARK * size:.3g}" {paint}/>'

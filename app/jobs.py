@@ -3,20 +3,30 @@
 The kernels release the interpreter lock, so a thread keeps neither the page nor others waiting.
 """
 
+import logging
 import threading
 import time
+from functools import partial
 from queue import SimpleQueue
 
 import param
 
 from granforce.records import Cancelled, InputError
+from granforce.system import cancelling
 
 from .garbage import settle
 from .limits import LIMITS
+from .turns import Later, turn_of
+
+ESTIMATED = 2.0  # s of a stage from which on its end can be told
+LONGEST_LINE = 500  # characters of what a page tells about an error
+WAITING = "waiting for a free processor"  # stage of a job that has not begun
+
+_log = logging.getLogger(__name__)
 
 
 class Pool:
-    """Threads that run jobs in turn; they end with the server, whatever they are doing."""
+    """Threads that run jobs in turn; they end with the server, whatever the jobs are doing."""
 
     def __init__(self, workers, name):
         self._jobs = SimpleQueue()
@@ -30,8 +40,11 @@ class Pool:
 
     def _serve(self):
         while True:
-            self._jobs.get().run()
-            settle()
+            try:
+                self._jobs.get().run()
+                settle()
+            except BaseException:  # a thread that ends is missing to all visitors from then on
+                _log.exception("a job failed outside its work")
 
 
 # All users together: more would only slow each other down.
@@ -43,20 +56,25 @@ reading = Pool(2, "granforce-read")
 class Job:
     """One piece of work under way. Fields are written by its thread and read by the page.
 
-    work(job) returns the result. It may give `job.tell` as progress callback, `job.cancelled` as
-    cancel callable, and set `job.stage` to say what it is doing.
+    work(job) returns the result. It may give `job.tell` as progress callback and set `job.stage` to
+    say what it is doing. All of it ends soon after `cancel`, unless other jobs want what it makes.
+    Raising Later it is called again. work.wants: names of turns that it will take, if it has any.
     """
 
     def __init__(self, work, pool=computing, on_end=None):
         """on_end(): called from another thread when the job has ended."""
-        self.stage = "waiting for a free processor"
+        self.stage = WAITING
         self.fraction = None  # done, 0 … 1; None where unknown
         self.seconds_left = None  # of this stage
         self.error = ""
         self.result = None
-        self._work, self._on_end = work, on_end
+        self._work, self._pool, self._on_end = work, pool, on_end
         self._begun = time.perf_counter()
         self._cancel, self._ended = threading.Event(), threading.Event()
+        self.turns = []  # that it has just now
+        self._wants = [turn_of(named) for named in getattr(work, "wants", ())]
+        for turn in self._wants:
+            turn.join(self)
         self._taken = threading.Lock()  # by the thread that runs it, or by whoever cancels it first
         pool.submit(self)
 
@@ -70,10 +88,11 @@ class Job:
         begin, end = part
         self.fraction = begin + (end - begin) * min(1.0, done / total)
         spent = time.perf_counter() - self._begun
-        self.seconds_left = spent / done * (total - done) if 0 < done <= total else None
+        known = 0 < done <= total and spent > ESTIMATED
+        self.seconds_left = spent / done * (total - done) if known else None
 
     def cancel(self):
-        """Ask it to end; it does so within about a second, or at once if it has not begun."""
+        """Ask it to end: at once if it has not begun, else within a second once it is unwanted."""
         self._cancel.set()
         if self._taken.acquire(blocking=False):
             self._end()
@@ -81,6 +100,10 @@ class Job:
     def cancelled(self):
         """Whether it was asked to end."""
         return self._cancel.is_set()
+
+    def unwanted(self):
+        """Whether it was asked to end, and no other job needs what it is making just now."""
+        return self.cancelled() and not any(turn.wanted(self) for turn in list(self.turns))
 
     @property
     def ended(self):
@@ -95,23 +118,41 @@ class Job:
         """Do the work, unless cancelled before; called by a thread of the pool."""
         if not self._taken.acquire(blocking=False):
             return
-        self.begin("starting")
+        if self.stage == WAITING:
+            self.begin("starting")
         try:
-            self.result = self._work(self)
+            if not self.cancelled():
+                with cancelling.watched(self.unwanted):
+                    self.result = self._work(self)
+        except Later:
+            self._taken.release()
+            self._pool.submit(self)
+            if self.cancelled():  # meanwhile: it need not come to its turn
+                self.cancel()
+            return
         except Cancelled:
             pass
-        except InputError as error:
-            self.error = str(error)
-        except Exception as error:  # told on the page, or nobody would see it
-            self.error = f"the computation failed: {type(error).__name__}: {error}"
-        finally:
-            self._end()
+        except BaseException as error:  # told on the page, or nobody would see it
+            self.error = told(error)
+        self._end()
 
     def _end(self):
         self._work = None  # what it refers to may be large
         self._ended.set()
-        if self._on_end is not None:
-            self._on_end()
+        on_end, self._on_end = self._on_end, None
+        try:
+            if on_end is not None:
+                on_end()
+        except Exception:
+            _log.exception("the end of a job could not be told")
+
+
+def told(error):
+    """What went wrong, in one line for the page."""
+    line = " ".join(str(error).split())[:LONGEST_LINE]
+    if isinstance(error, InputError):
+        return line
+    return f"the computation failed: {type(error).__name__}: {line}"
 
 
 class Task(param.Parameterized):
@@ -131,11 +172,17 @@ class Task(param.Parameterized):
         super().__init__(**params)
         self._pool, self._wake = pool, wake
         self._job = self._done = None
+        self._closed = False
 
     def start(self, work, done=None):
-        """Begin work(job), as for Job; done(result) follows within `poll` unless it failed."""
+        """Begin work(job), as for Job; done(result) follows within `poll` unless it failed.
+
+        Nothing begins once the task is closed.
+        """
         self.cancel()
-        on_end = None if self._wake is None else lambda: self._wake(self.poll)
+        if self._closed:
+            return
+        on_end = None if self._wake is None else partial(self._wake, self.poll)
         self._job, self._done = Job(work, self._pool, on_end), done
         self.param.update(
             running=True, stage=self._job.stage, fraction=None, seconds_left=None, message=""
@@ -146,6 +193,10 @@ class Task(param.Parameterized):
         job = self._job
         if job is None:
             return
+        if not job.ended and job.cancelled() and not job.unwanted():
+            self._job = self._done = None  # it goes on for others
+            self.param.update(running=False, message="")
+            return
         if not job.ended:
             self.param.update(
                 stage="cancelling …" if job.cancelled() else job.stage,
@@ -154,11 +205,22 @@ class Task(param.Parameterized):
             )
             return
         done, self._job, self._done = self._done, None, None
-        self.param.update(running=False, message=job.error)
-        if done is not None and not job.error and not job.cancelled():
-            done(job.result)
+        # Told as one: at no moment is the work over and its result not yet there.
+        with param.parameterized.batch_call_watchers(self):
+            self.param.update(running=False, message=job.error)
+            if done is not None and not job.error and not job.cancelled():
+                try:
+                    done(job.result)
+                except Exception as error:
+                    _log.exception("a result could not be shown")
+                    self.message = told(error)
 
     def cancel(self):
         """Ask the job to end; its result is dropped."""
         if self._job is not None:
             self._job.cancel()
+
+    def close(self):
+        """End the job, and begin no other: nobody is there any more."""
+        self._closed = True
+        self.cancel()

@@ -1,11 +1,16 @@
 """How much one visitor may ask of the server, from the environment variable GRANFORCE_LIMITS."""
 
+import math
 import os
 from typing import NamedTuple
 
 from granforce.records import InputError
 
 LIMITS_VARIABLE = "GRANFORCE_LIMITS"
+
+
+MOST = 10**9  # of any limit,
+MOST_COMPUTATIONS = 64  # and of threads
 
 
 class Limits(NamedTuple):
@@ -17,14 +22,66 @@ class Limits(NamedTuple):
     computations: int = 2  # at the same time, all visitors together
 
     def check(self, **asked):
-        """InputError if one of the given sizes is below 1 or above its limit."""
+        """InputError if a number lies outside its limits, or radii differ by more than SIZE_RATIO.
+
+        asked: any of NAMES; what has no field here must lie in its range of RANGES.
+        """
         for name, value in asked.items():
-            most = getattr(self, name)
-            if not 1 <= value <= most:
-                raise InputError(f"{NAMES[name]} must lie between 1 and {most}, got {value}")
+            if name == "radii":
+                _check_radii(value)
+                continue
+            least, most = RANGES.get(name) or (1, getattr(self, name))
+            if not least <= value <= most:  # nor if it is NaN
+                raise InputError(
+                    f"{NAMES[name]} must lie between {least:g} and {most}, got {_short(value)}"
+                )
 
 
-NAMES = {"n": "N", "states": "the number of states", "upload": "an upload's size in MB"}
+# What else a link can name, and between which values the dynamics makes sense.
+RANGES = {
+    "mu": (0, 1000),
+    "seed": (0, 2**53 - 1),  # whole numbers that browsers know, too
+    "pressure": (1e-6, 1e6),
+    "dt": (0.001, 0.1),
+    "box_mass": (10, 10_000),
+    "sweeps": (1, 1000),
+}
+SIZE_RATIO = 20  # largest over smallest radius that a distribution may name
+DISTRIBUTIONS = {"uniform": 2, "bidisperse": 3}  # of radii, and how many numbers they take
+NAMES = {
+    "n": "N",
+    "states": "the number of states",
+    "upload": "an upload's size in MB",
+    "mu": "the friction coefficient",
+    "seed": "a seed",
+    "pressure": "the pressure",
+    "dt": "the time step dt",
+    "box_mass": "the box mass",
+    "sweeps": "the number of sweeps",
+}
+
+
+def _check_radii(text):
+    """InputError unless it is a distribution of sizes that can be packed together."""
+    kind, _, numbers = str(text).partition(":")
+    try:
+        values = [float(number) for number in numbers.split(",")]
+    except ValueError:
+        values = []
+    sizes = values[:2]
+    if len(values) != DISTRIBUTIONS.get(kind) or not (
+        0 < min(sizes) <= max(sizes) <= SIZE_RATIO * min(sizes) < math.inf
+    ):
+        raise InputError(
+            "radii must be named as uniform:LOW,HIGH or bidisperse:SMALL,LARGE,FRACTION, the "
+            f"largest at most {SIZE_RATIO} times the smallest, got {_short(text)}"
+        )
+
+
+def _short(value):
+    """A value in few characters, however long it is."""
+    text = repr(value)
+    return text if len(text) <= 30 else f"{text[:12]}… ({len(text)} characters)"
 
 
 def read_limits(text=None):
@@ -36,9 +93,14 @@ def read_limits(text=None):
     given = {}
     for part in filter(None, text.replace(" ", "").split(",")):
         name, _, value = part.partition("=")
-        if name not in Limits._fields or not value.isdigit() or int(value) < 1:
+        most = MOST_COMPUTATIONS if name == "computations" else MOST
+        digits = value if value.isdecimal() and len(value) <= len(str(MOST)) else "0"
+        if name not in Limits._fields or not 1 <= int(digits) <= most:
             names = ", ".join(Limits._fields)
-            raise InputError(f"{LIMITS_VARIABLE}: {part!r} is none of {names} = a whole number")
+            raise InputError(
+                f"{LIMITS_VARIABLE}: {_short(part)} is none of {names} = a whole number from 1 to "
+                f"{most}"
+            )
         given[name] = int(value)
     return Limits(**given)
 

@@ -1,12 +1,16 @@
 """Local perturbations of the packing on screen, and what the stores know about those of others."""
 
+import json
 from typing import NamedTuple
 
 import numpy as np
 
-from granforce import study
+from granforce.study import kinds
+from granforce.study.cells import entries
+from granforce.study.responses import moved_grains
 
 from .compute import found_or_made
+from .data import readable
 from .distributions import alike, rows
 
 # Fewer contacts than this say little about the mean over all.
@@ -38,6 +42,8 @@ class Pushed(NamedTuple):
     radius: np.ndarray  # (shells,) length
     profile: np.ndarray  # (shells,) mean |u|
     exponent: float  # α of |u| ~ r^−α for this contact alone
+    fit: tuple  # smallest and largest r of its fit, length
+    spread: tuple  # smallest and largest α of other ranges of r; NaN where no fit is possible
     seconds: float
 
 
@@ -45,16 +51,9 @@ def limit_loads(library, cell):
     """Work, for jobs.Task, that finds or computes the limit loads of all contacts."""
 
     def work(job):
-        params = study.exact_parameters(cell.selection.packing, mu=cell.selection.mu)
-        found = found_or_made(
-            library,
-            job,
-            "limit loads of all contacts",
-            "limit_loads",
-            params,
-            study.LIMIT_LOADS_VERSION,
-            study.get_limit_loads,
-        )
+        params = kinds.LIMIT_LOADS.parameters(cell.selection.packing, mu=cell.selection.mu)
+        stage = "limit loads of all contacts"
+        found = found_or_made(library, job, stage, kinds.LIMIT_LOADS, params)
         scale = found["force_scale"].item()
         numbers = (found[name].item() for name in ("max_gap", "seconds"))
         return Loads(found["limit_load"].values / scale, *numbers)
@@ -66,20 +65,13 @@ def push(library, cell, replay, contact):
     """Work that finds or computes what a growing force pair on one contact does."""
 
     def work(job):
-        params = study.perturbation_parameters(
+        params = kinds.PERTURBATION.parameters(
             cell.selection.packing,
             mu=cell.selection.mu,
             contacts=[int(replay.backbone[contact])],
         )
-        found = found_or_made(
-            library,
-            job,
-            "contact dynamics under a growing load",
-            "perturbation",
-            params,
-            study.PERTURBATION_VERSION,
-            study.get_perturbation,
-        )
+        stage = "contact dynamics under a growing load"
+        found = found_or_made(library, job, stage, kinds.PERTURBATION, params)
         return _pushed(found, library.packing(cell.selection.packing), contact)
 
     return work
@@ -90,34 +82,30 @@ def _pushed(found, packing, contact):
     forces = (found[name].values[0] / scale for name in _FORCES)
     counts = (int(found[name].values[0]) for name in ("opened", "slid", "kept"))
     u = found["displacement"].values[0]
-    moves = np.isfinite(u).all(axis=1)
-    distance = _distances(packing, found["backbone"].values[0])
+    distance, size = moved_grains(packing, found)
     return Pushed(
         contact,
         *forces,
         *counts,
         breach=float(found["motion_breach"].values[0]),
-        displacement=np.where(moves[:, None], u, 0.0),
-        distance=distance[moves],
-        size=np.linalg.norm(u[moves], axis=1),
+        displacement=np.nan_to_num(u),
+        distance=distance,
+        size=size,
         radius=found["shell_radius"].values,
         profile=found["profile"].values[0],
         exponent=found["decay_exponent"].item(),
+        fit=tuple(json.loads(found.attrs["fit_range"])),
+        spread=_range(found["fit_exponent"].values),
         seconds=found["contact_seconds"].values[0].item(),
     )
 
 
+def _range(values):
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+
+
 _FORCES = ("limit_load", "critical_low", "critical_high")
-
-
-def _distances(packing, contact):
-    """Distance (N,) of every grain from the point of contact, by the nearest image."""
-    c = packing.contacts
-    apart = packing.x - packing.x[c.i[contact]] - c.arm_i[contact] * c.normal[contact]
-    periodic = np.isfinite(packing.box)
-    side = np.where(periodic, packing.box, 1.0)
-    apart -= np.where(periodic, side * np.round(apart / side), 0.0)
-    return np.linalg.norm(apart, axis=1)
 
 
 def over_store(library, cells, cell):
@@ -130,15 +118,15 @@ def over_store(library, cells, cell):
         measured[_key(other.selection.packing, other.selection.mu)] = other
     found = []
     for store in library.stores:
-        for entry in store.find(kind="perturbation"):
+        for entry in entries(store, kinds.PERTURBATION):
             states = measured.get(_key(entry.params["packing"], entry.params["mu"]))
-            if entry.version != study.PERTURBATION_VERSION or states is None:
+            if states is None:
                 continue
-            dataset = store[entry.name]
-            if dataset.sizes["contact"] < ENOUGH_CONTACTS:
-                continue
-            load = dataset["limit_load"].values.mean() / dataset["force_scale"].item()
-            values = {k: dataset[k].item() for k in ("critical_force", "decay_exponent")}
+            with readable(store, entry.name) as dataset:
+                if dataset.sizes["contact"] < ENOUGH_CONTACTS:
+                    continue
+                load = dataset["limit_load"].values.mean() / dataset["force_scale"].item()
+                values = {k: dataset[k].item() for k in ("critical_force", "decay_exponent")}
             measure = {k: rows([states])[0][k] for k in ("mu", "eta2")}
             found.append(measure | values | {"limit_load": load, "entry": entry.name})
     return list({row["entry"]: row for row in found}.values())

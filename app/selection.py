@@ -4,10 +4,10 @@ import shlex
 from typing import NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
-from granforce import study
 from granforce.records import InputError, friction
+from granforce.study import kinds
 
-# Names on screen of study.RELAXATIONS; the first is what a new walk takes unless told otherwise.
+# Names on screen of kinds.RELAXATIONS; the first is what a new walk takes unless told otherwise.
 SOLVERS = {
     "accelerated": "nearest admissible state",
     "nearest": "nearest admissible state, by PIQP",
@@ -19,12 +19,13 @@ KINDS = {"walk": "the paper's random walk", "uniform": "uniform in S"}
 OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps")
 # Stored states take at most about this much; measures are those of all states anyway.
 KEPT_BYTES = 64e6
+LONGEST_REASON = 200  # characters of a message about a link, which may hold anything
 
 
 class Selection(NamedTuple):
     """States asked for: of which packing, at which friction, from which source."""
 
-    packing: dict  # parameters of the packing, as for study.get_packing
+    packing: dict  # parameters of the packing, as kinds.PACKING names it
     mu: float  # friction coefficient of the ensemble
     kind: str = "walk"  # one of KINDS
     relax: str = "accelerated"  # of the walk
@@ -49,18 +50,46 @@ class Selection(NamedTuple):
         return self._replace(mu=mu, packing=self.packing | {"mu": mu})
 
     def parameters(self):
-        """Parameters of the walk or sample, as for study.get_walk or study.get_uniform."""
+        """Parameters of the walk or sample, as its kind names it."""
         most = int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400)))
         common = {"mu": self.mu, "keep": None if self.states <= most else most}
         if self.kind == "uniform":
-            return study.uniform_parameters(self.packing, self.states, self.seed, **common)
-        return study.walk_parameters(
+            return kinds.UNIFORM.parameters(self.packing, self.states, self.seed, **common)
+        return kinds.WALK.parameters(
             self.packing, self.states, self.seed, relax=self.relax, **common
         )
+
+    def check(self, limits):
+        """InputError if it asks for more than these Limits allow."""
+        limits.check(states=self.states, mu=self.mu, seed=self.seed)
+        if not self.imported:
+            limits.check(**self.packing)
 
     def names(self, other):
         """Whether other is the same but for details that this kind of states does not have."""
         return _plain(self) == _plain(other)
+
+
+def differing(asked, shown):
+    """What of a Selection is not as in another one (None: all of it), in words."""
+    if shown is None or asked.imported or shown.imported:
+        return f"the packing at μ = {asked.mu:g}" if asked.imported else f"μ = {asked.mu:g}"
+    words, other = [], shown.packing
+    if asked.mu != shown.mu:
+        words.append(f"μ = {asked.mu:g}")
+    if asked.packing["n"] != other["n"]:
+        words.append(f"N = {asked.packing['n']}")
+    if asked.packing["seed"] != other["seed"]:
+        words.append(f"seed {asked.packing['seed']}")
+    if not asked.same_mu and asked.packing["mu"] != other["mu"]:
+        words.append(f"packed at μ = {asked.packing['mu']:g}")
+    if asked.kind != shown.kind:
+        words.append(f"states {KINDS[asked.kind]}" if asked.kind == "uniform" else KINDS["walk"])
+    if asked.states != shown.states:
+        words.append(f"{asked.states} states")
+    if asked.kind == shown.kind == "walk" and asked.relax != shown.relax:
+        words.append(SOLVERS[asked.relax])
+    return ", ".join(words) or f"μ = {asked.mu:g}"
 
 
 def _plain(selection):
@@ -81,14 +110,14 @@ def select(n=400, mu=0.1, packing_seed=1, packed_mu=None, **others):
     Selection.
     """
     mu = friction(mu)
-    packing = study.packing_parameters(n, mu if packed_mu is None else packed_mu, packing_seed)
+    packing = kinds.PACKING.parameters(n, mu if packed_mu is None else packed_mu, packing_seed)
     if packing["n"] < 3:
         raise InputError(f"a packing needs at least 3 disks, got {n}")
     return Selection(packing, mu, **others)
 
 
 def _unusual(packing):
-    usual = study.packing_parameters(packing["n"], packing["mu"], packing["seed"])
+    usual = kinds.PACKING.parameters(packing["n"], packing["mu"], packing["seed"])
     return {name: packing[name] for name in OPTIONS if packing[name] != usual[name]}
 
 
@@ -118,22 +147,26 @@ def series(selection, parameters=None):
 
 def command(selection):
     """The command that makes the same states in a terminal."""
-    words = ["granforce", selection.kind]
-    packing = selection.packing
-    if selection.imported:
-        words += ["--packing", "PACKING.npz"]
-    else:
-        words += ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
-        for name, value in _unusual(packing).items():
-            words += [f"--{name.replace('_', '-')}", value]
-    if not selection.same_mu:
-        words += ["--ensemble-mu", f"{selection.mu:.9g}"]
-    words += ["--states", selection.states]
+    words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
     if selection.kind == "walk":
         words += ["--walk-seed", selection.seed, "--relax", selection.relax]
     elif selection.seed:
         words += ["--sample-seed", selection.seed]
     return shlex.join(str(word) for word in words)
+
+
+def of_packing(selection):
+    """Words of a command that name a selection's packing and μ."""
+    packing = selection.packing
+    if selection.imported:
+        words = ["--packing", "PACKING.npz"]
+    else:
+        words = ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
+        for name, value in _unusual(packing).items():
+            words += [f"--{name.replace('_', '-')}", value]
+    if not selection.same_mu:
+        words += ["--ensemble-mu", f"{selection.mu:.9g}"]
+    return words
 
 
 def link(selection, view):
@@ -165,7 +198,7 @@ def read_link(query):
     try:
         return _read_selection(given), given
     except (ValueError, TypeError) as error:
-        raise InputError(f"this link cannot be read: {error}") from None
+        raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
 
 
 def _read_selection(given):

@@ -2,15 +2,19 @@
 
 from functools import partial
 
+import numpy as np
 import param
 
 from granforce.records import InputError
 
-from . import compute
+from . import compute, grabs, known, perturbations
+from .beside import Beside
 from .data import best_cell, nearest_cell
 from .jobs import Job, Task, computing, reading
+from .known import Knowledge
 from .limits import LIMITS
-from .selection import link, read_link
+from .live import Arriving, Following
+from .selection import command, link, read_link, series
 
 # What colour, width and order can show: word in links → words on screen.
 COLOURS = {
@@ -18,13 +22,22 @@ COLOURS = {
     "extent": "length of the interval ΔFₙ",
     "change": "change since the original",
     "sign": "sign of fₙ − pinned fₙ",
+    "load": "limit load",
+    "known": "what is known: part of the interval gone",
 }
-WIDTHS = {"normal": "normal force fₙ", "extent": "ΔFₙ", "difference": "|fₙ − pinned fₙ|"}
+WIDTHS = {
+    "normal": "normal force fₙ",
+    "extent": "ΔFₙ",
+    "difference": "|fₙ − pinned fₙ|",
+    "load": "limit load",
+    "known": "what is known: length of the interval gone",
+}
 SORTS = {
     "original": "original fₙ",
     "extent": "ΔFₙ of all states",
     "exact": "exact ΔFₙ",
     "position": "place of the original in its interval",
+    "shortened": "how much what is known shortened it",
 }
 SCALES = {"mean": "fₙ / ⟨fₙ⟩", "own": "fₙ / original fₙ"}
 
@@ -38,16 +51,34 @@ class AppState(param.Parameterized):
     cell = param.Parameter(doc="the Cell on screen, or None")
     replay = param.Parameter(doc="the Replay on screen, or None")
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
+    loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
+    live = param.Parameter(doc="the Following of what is being computed, or None")
+    arriving = param.Parameter(doc="the Arriving of exact intervals under way, or None")
+    moving = param.Boolean(doc="whether a packing is on screen that is being compressed")
+    growing = param.Parameter(doc="the Replay of a walk under way, on screen before `replay`")
+    fourfold = param.Integer(doc="how often the walk under way has grown fourfold: new axes")
     source = param.String(doc="where the states on screen come from, in words")
     message = param.String(doc="one line about what went wrong, or empty")
 
     tab = param.String(default="intervals", doc="name of the visible tab; others compute nothing")
+    wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
     contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
+    second = param.Integer(default=None, allow_None=True, doc="contact beside it in a plane")
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
+    split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
+    beside = param.Number(
+        default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
+    )
+    twin = param.Parameter(doc="the Shown of that μ, or None")
     between = param.Tuple(
         default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
     )
+    pulls = param.List(doc="what was pulled one after the other, from `frame` on; see `grabs`")
+    plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
+    known = param.List(doc="known.Statements: forces of contacts that are taken for known")
+    narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
+    ranked = param.Parameter(doc="known.Ranked: contacts to measure next, or None")
     colour = param.Selector(default="mobilised", objects=list(COLOURS))
     thickness = param.Selector(default="normal", objects=list(WIDTHS))
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
@@ -64,8 +95,12 @@ class AppState(param.Parameterized):
         """
         super().__init__(**params)
         self.library, self._wake = library, wake
-        self.tasks = []
+        self.tasks, self._ahead, self._closed = [], [], False
         self.computation, self.reader = self.task(), self.task(reading)
+        self.loading = self.task()
+        self.knowledge = Knowledge(self)
+        self.besides = Beside(self)
+        self.param.watch(self._need_loads, ["colour", "thickness", "replay"])
         self.open(query)
 
     # Tasks
@@ -84,6 +119,8 @@ class AppState(param.Parameterized):
         task.param.watch(self._tell, "message")
         task.param.watch(self._count, "running")
         self.tasks.append(task)
+        if self._closed:
+            task.close()
         return task
 
     def poll(self):
@@ -91,10 +128,17 @@ class AppState(param.Parameterized):
         for task in self.tasks:
             task.poll()
 
+    def cancel(self):
+        """End all work of the page that is under way."""
+        for work in (*self.tasks, *self._ahead):
+            work.cancel()
+
     def close(self):
-        """End all work of the page."""
+        """End all work of the page for good."""
+        self._closed = True
+        self.cancel()
         for task in self.tasks:
-            task.cancel()
+            task.close()
 
     def _tell(self, event):
         if event.new:
@@ -112,7 +156,27 @@ class AppState(param.Parameterized):
         except InputError as error:
             wanted, view = None, {}
             self.message = str(error)
-        self._look_up(wanted, read_view(view))
+        self._look_up(wanted, self._as_new() | read_view(view))
+
+    def _as_new(self):
+        """What a new page shows, but for the theme: what a link does not name."""
+        return {name: self.param[name].default for name in VIEW if name != "dark"}
+
+    def shows(self, name):
+        """Whether what has this tab is on screen."""
+        return name == self.tab or (self.wide and name == "plane")
+
+    @property
+    def seen(self):
+        """The Replay on screen: that of the walk under way, if there is one."""
+        return self.replay if self.growing is None else self.growing
+
+    @property
+    def possible(self):
+        """The exact intervals of the Replay on screen, under what is known; or None."""
+        if self.growing is not None:
+            return None
+        return self.exact if self.narrowed is None else self.narrowed.after
 
     def refresh(self, shown=None):
         """Read the catalogue anew; show what was just computed."""
@@ -122,22 +186,41 @@ class AppState(param.Parameterized):
 
     def ask(self, selection, at_once=False):
         """Select states: shown if a store has them, else `missing`, or computed at_once."""
+        self.besides.keep(selection)
+        self._ask(selection, at_once)
+
+    def _ask(self, selection, at_once):
         self.message = ""
         found = best_cell(self.catalogue, selection)
         if found is not None and found.selection.names(selection):
             self.show(found)
             return
-        self.param.update(selection=selection, missing=True)
-        if at_once:
-            self.compute()
+        try:
+            selection.check(LIMITS)
+        except InputError as error:
+            self.message = str(error)
+            return
+        # Told as one: nobody sees what is computed at once as missing, which would move the page.
+        with param.parameterized.batch_call_watchers(self):
+            self.param.update(selection=selection, missing=True)
+            if at_once:
+                self.compute()
 
     def choose(self, series=None, mu=None):
-        """Show the stored cell of this series with the nearest μ; by default those on screen."""
-        series = self.cell.series if series is None else series
-        mu = self.cell.mu if mu is None else mu
-        cells = [cell for cell in self.catalogue if cell.series == series]
-        if cells:
-            self.show(nearest_cell(cells, mu))
+        """Show a stored series at its μ nearest to that on screen; or the one on screen at this μ.
+
+        Where that has no states there, they are asked for, and can be computed.
+        """
+        if mu is not None:
+            found = [cell for cell in self.cells() if np.isclose(cell.mu, mu, rtol=1e-3, atol=0)]
+        else:
+            cells = [cell for cell in self.catalogue if cell.series == series]
+            found = cells and [nearest_cell(cells, self.cell.mu)]
+        if found:
+            self.besides.keep(found[0].selection)
+            self.show(found[0])
+        elif mu is not None and self.cell is not None:
+            self.ask(self.cell.selection.at(mu))
 
     def cells(self):
         """The cells of the series on screen, by μ."""
@@ -156,31 +239,43 @@ class AppState(param.Parameterized):
         cells = self.cells()
         if self.cell in cells:
             here = cells.index(self.cell)
-            for near in cells[max(here - 1, 0) : here + 2]:
-                if self.library.shown_in_memory(near) is None:
-                    Job(lambda job, near=near: self.library.shown(near), reading)
+            for job in self._ahead:
+                job.cancel()
+            self._ahead = [
+                Job(lambda job, near=near: self.library.shown(near), reading)
+                for near in cells[max(here - 1, 0) : here + 2]
+                if self.library.shown_in_memory(near) is None
+            ]
 
     def _look_up(self, wanted, view):
         library = self.library
 
         def read(job):
-            cells = library.cells()
-            cell = best_cell(cells, wanted)
-            return cells, cell and library.shown(cell)
+            damage = ""
+            while True:
+                cells = library.cells()
+                cell = best_cell(cells, wanted)
+                try:
+                    return cells, cell and library.shown(cell), damage
+                except InputError as error:
+                    if cell in library.cells():
+                        raise
+                    damage = str(error)  # the next best, then
 
         def done(found):
-            cells, shown = found
+            cells, shown, damage = found
+            self.message = damage or self.message
             self._list(cells)
             self.param.update(**{k: v for k, v in view.items() if k not in OF_A_REPLAY})
             if shown is not None:
                 self._show(shown, view)
             if wanted is not None and (shown is None or not shown.cell.selection.names(wanted)):
-                self.ask(wanted, at_once=True)
+                self._ask(wanted, at_once=True)
 
         at_hand = best_cell(library.catalogue, wanted)
         shown = at_hand and library.shown_in_memory(at_hand)
         if shown and (wanted is None or at_hand.selection.names(wanted)):
-            done((library.catalogue, shown))  # the first picture needs no thread
+            done((library.catalogue, shown, ""))  # the first picture needs no thread
             self.refresh()
         else:
             self.reader.start(read, done)
@@ -194,37 +289,96 @@ class AppState(param.Parameterized):
 
     def _show(self, shown, view=None):
         cell, replay, exact = shown
-        where = "finished results" if cell.store is self.library.shipped else "your cache"
-        fresh = {"contact": None, "frame": 0, "reference": 0, "between": None}
-        if self.replay is replay:
+        fresh = dict(UNSEEN)
+        if (self.replay is replay and view is None) or self._is_grown(replay):
             fresh = {}
+        if self.live is not None and not self.live.selection.names(cell.selection):
+            self.computation.cancel()  # it was not waited for
         self.param.update(
             selection=cell.selection,
             missing=False,
+            live=None,
+            moving=False,
+            arriving=None,
+            growing=None,
             cell=cell,
             replay=replay,
             exact=exact,
-            source=f"μ = {cell.mu:g}, {cell.series} (from {where})",
+            source=self._source(cell),
             displacement=None,
+            loads=self.loads if self.replay is replay else None,
+            plane=self.plane if self.replay is replay else None,
             **fresh | _fitting(view or {}, replay),
         )
+
+    def _source(self, cell=None):
+        """Where the states of a cell, by default the one on screen, come from."""
+        cell = cell or self.cell
+        if cell is None:
+            return ""
+        here = "" if cell.store is self.library.shipped else ", computed here"
+        return f"μ = {cell.mu:g}, {cell.series} (from finished results{here})"
+
+    def _is_grown(self, replay):
+        """Whether a Replay is what the walk on screen has grown into."""
+        growing = self.growing
+        return growing is not None and np.array_equal(growing.normal[0], replay.normal[0])
 
     # What is computed
 
     def compute(self):
-        """Compute the states selected, in the background, and show them."""
-        if self.computation.running or self.selection is None:
+        """Compute the states selected, in the background, and show them as they are found."""
+        if self.selection is None or self._computes(self.selection):
             return
         self.message = ""
         asked = self.selection
         try:
-            sizes = {} if asked.imported else {"n": asked.packing["n"]}
-            LIMITS.check(states=asked.states, **sizes)
             asked.parameters()
         except InputError as error:
             self.message = str(error)
             return
-        self.computation.start(compute.states(self.library, asked), self.refresh)
+        self.param.update(live=Following(asked), arriving=None, growing=None)
+        self.computation.start(compute.states(self.library, asked), self._computed)
+
+    def _computed(self, shown):
+        """Show states that were just computed; their exact intervals follow, if that is soon."""
+        self.refresh(shown)
+        if shown.replay.normal.shape[1] <= EXACT_FOLLOW and shown.replay.summary["dimension"]:
+            self.compute_exact()
+
+    def _computes(self, selection):
+        """Whether this is what is being computed."""
+        return self.computation.running and self.live and self.live.selection == selection
+
+    def grow(self, replay):
+        """Put the Replay of a walk that begins on screen."""
+        asked = self.live.selection
+        source = f"μ = {asked.mu:g}, {series(asked)} (as they are found)"
+        self.param.update(
+            growing=replay, fourfold=0, plane=None, moving=False, source=source, displacement=None,
+            **UNSEEN,
+        )  # fmt: skip
+
+    def follow(self):
+        """The Following or Arriving of what is computed, or None; what has ended is dropped."""
+        if self.live is not None and not self.computation.running:
+            plane = self.plane if self.growing is None else None
+            self.param.update(
+                live=None, moving=False, growing=None, plane=plane, source=self._source(), **UNSEEN
+            )
+        if not self.computation.running:
+            self.arriving = None
+        return self.live or self.arriving
+
+    @property
+    def asked(self):
+        """What was asked for and is not on screen, in words; empty where there is nothing."""
+        if not self.missing or self.cell is None:
+            return ""
+        words = f"μ = {self.selection.mu:g}, {series(self.selection)}"
+        if self.computation.running:
+            return f"asked for: {words}"
+        return f"of μ = {self.cell.mu:g}; not computed: {words}"
 
     def compute_exact(self):
         """Compute the exact intervals of the packing on screen, in the background."""
@@ -238,8 +392,38 @@ class AppState(param.Parameterized):
                 self._show(found)
 
         self.computation.start(compute.exact(self.library, shown), done)
+        self.arriving = Arriving(compute.exact_parameters(self.cell.selection))
+
+    @property
+    def exact_wanted(self):
+        """Whether exact intervals are neither there nor under way, nor anything before them."""
+        under_way = self.computation.running or self.knowledge.task.running
+        return self.exact is None and self.growing is None and not under_way
+
+    def _need_loads(self, *events):
+        """Limit loads of all contacts are computed where colour or width show them."""
+        replay, cell = self.replay, self.cell
+        if "load" not in (self.colour, self.thickness) or replay is None:
+            self.loading.cancel()
+        elif self.loads is None and replay.summary["mu"] > 0:
+            self.loading.start(
+                perturbations.limit_loads(self.library, cell),
+                lambda found: self._loads_known(found, replay),
+            )
+
+    def _loads_known(self, found, replay):
+        if self.replay is replay:
+            self.loads = found.load
 
     # What a link tells
+
+    @property
+    def command(self):
+        """The commands that make the states asked for, and the intervals under what is known."""
+        made = command(self.selection)
+        if self.known and self.replay is not None and not self.missing:
+            made += "\n" + known.commands(self.selection, self.replay, self.known)
+        return made
 
     def link(self):
         """The query of an address that reopens this view."""
@@ -249,7 +433,7 @@ class AppState(param.Parameterized):
         for name in VIEW:
             value = getattr(self, name)
             if value != self.param[name].default:
-                view[name] = _spelled(value)
+                view[name] = SPELLED.get(name, _spelled)(value)
         return link(self.selection, view)
 
 
@@ -259,16 +443,25 @@ def _pair(text):
     return a, b
 
 
+def _tab(text):
+    return {"projection": "plane"}.get(text, text)  # as older links call it
+
+
 def _flag(text):
     return {"0": False, "1": True}[text]
 
 
 VIEW = {
-    "tab": str,
+    "tab": _tab,
     "contact": int,
+    "second": int,
     "frame": int,
     "reference": int,
     "between": _pair,
+    "split": _flag,
+    "beside": float,
+    "pulls": grabs.read,
+    "known": known.read,
     "colour": str,
     "thickness": str,
     "overlay": _flag,
@@ -276,7 +469,11 @@ VIEW = {
     "scale": str,
     "dark": _flag,
 }
-OF_A_REPLAY = ("contact", "frame", "reference", "between")
+SPELLED = {"pulls": grabs.spelled, "known": known.spelled}
+EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
+UNSEEN = {"contact": None, "second": None, "frame": 0, "reference": 0, "between": None}
+UNSEEN |= {"pulls": [], "known": []}
+OF_A_REPLAY = tuple(UNSEEN)
 
 
 def _spelled(value):
@@ -301,10 +498,17 @@ def read_view(given):
 def _fitting(view, replay):
     """Of these rows and contacts those that a Replay has."""
     frames, contacts = replay.normal.shape
-    sizes = {"contact": contacts, "frame": frames, "reference": frames, "between": frames}
+    sizes = dict.fromkeys(OF_A_REPLAY, frames)
+    sizes |= dict.fromkeys(("contact", "second", "pulls", "known"), contacts)
 
     def fits(name):
+        if view[name] is None:
+            return True
         values = view[name] if name == "between" else (view[name],)
+        if name == "pulls":
+            values = list(grabs.contacts(view[name]))
+        if name == "known":
+            values = [one.contact for one in view[name]]
         return all(0 <= value < sizes[name] for value in values)
 
     return {name: view[name] for name in OF_A_REPLAY if name in view and fits(name)}

@@ -3,8 +3,9 @@
 import io
 from typing import NamedTuple
 
-from granforce import importers, study
+from granforce.packing import importers
 from granforce.records import InputError
+from granforce.study import kinds
 
 from .limits import LIMITS
 
@@ -13,6 +14,7 @@ FAMILIES = {
     "npz": ("NPZ of granforce", ("npz",), ()),
     "lammps": ("LAMMPS dumps", ("particles", "contacts"), ()),
     "table": ("tables", ("grains",), ("joined",)),
+    "pegs": ("photoelastic frame", ("positions", "adjacency"), ()),
 }
 WORDS = {
     "npz": "packing",
@@ -20,15 +22,19 @@ WORDS = {
     "contacts": "dump of the contacts",
     "grains": "table of grains",
     "joined": "table of contacts",
+    "positions": "positions of the grains",
+    "adjacency": "adjacency list with the forces",
 }
 # An archive may unpack to this many times the bytes that may be sent.
 UNPACKED = 8
+# What of a file is looked at to see whether it is photoelastic.
+LOOKED_AT, ROWS = 4000, 20
 
 
 class Brought(NamedTuple):
     """A packing that was read and kept, and what it is."""
 
-    params: dict  # that name it, as for study.get_packing
+    params: dict  # that name it, as kinds.PACKING names it
     report: dict  # of granforce.report
     source: str  # which files it came from, in words
 
@@ -50,10 +56,31 @@ def role(name, content):
         return "grains"
     if {"i", "j"} <= columns:
         return "joined"
+    measured = _photoelastic(content)
+    if measured:
+        return measured
     raise InputError(
         f"{name}: neither an NPZ of granforce, nor a LAMMPS dump, nor a table with columns x, y, r "
-        "(grains) or i, j (contacts)"
+        "(grains) or i, j (contacts), nor a photoelastic list of positions or of forces"
     )
+
+
+def _photoelastic(content):
+    """Which file of a photoelastic frame it is, or None: rows of five or six plain numbers."""
+    rows, lines = [], content[:LOOKED_AT].decode("utf-8", "replace").splitlines()
+    whole = lines if len(content) <= LOOKED_AT else lines[:-1]
+    for line in filter(str.strip, whole[:ROWS]):
+        try:
+            rows.append([float(field) for field in line.replace(";", ",").split(",")])
+        except ValueError:
+            if rows:  # only the first line may have names
+                return None
+    counts = {len(row) for row in rows}
+    if counts == {6}:
+        return "positions"
+    if counts == {5}:  # the ids of two grains, or a grain and where it is
+        return "adjacency" if all(row[2].is_integer() for row in rows) else "positions"
+    return None
 
 
 def family(roles):
@@ -89,23 +116,26 @@ def read(files, *, mu=None, box=None, pressure=1.0):
     mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, pressure: of a
     table. Raises InputError, naming file and line, for what cannot be used, and beyond LIMITS.
     """
-    opened = {part: _opened(*given) for part, given in files.items()}
+    LIMITS.check(pressure=pressure)
+    given = {part: opened(*file) for part, file in files.items()}
+    most = {"most_grains": LIMITS.n}
     if "npz" in files:
-        packing = importers.load_packing(opened["npz"], unpacked=UNPACKED * LIMITS.upload * 10**6)
+        unpacked = UNPACKED * LIMITS.upload * 10**6
+        packing = importers.load_packing(given["npz"], unpacked=unpacked, **most)
     elif "particles" in files:
-        packing = importers.read_lammps(opened["particles"], opened["contacts"], mu)
+        packing = importers.read_lammps(given["particles"], given["contacts"], mu, **most)
     else:
-        contacts = opened.get("joined")
         packing = importers.read_table(
-            opened["grains"], contacts, mu=mu, box=box, pressure=pressure
+            given["grains"], given.get("joined"), mu=mu, box=box, pressure=pressure, **most
         )
-    LIMITS.check(n=len(packing.r))
+    LIMITS.check(mu=packing.mu)
     return packing
 
 
-def _opened(name, content):
+def opened(name, content):
+    """A file of this content; its name is for messages only."""
     file = io.BytesIO(content)
-    file.name = name  # for messages only
+    file.name = name
     return file
 
 
@@ -119,8 +149,8 @@ def bring(library, files, **options):
         report = importers.report(packing)
         if library.cache is None:
             raise InputError("no cache folder can be written, so nothing can be taken in")
-        params = study.imported_parameters(packing)
-        study.keep_packing(library.cache, params, packing)
+        params = kinds.imported_parameters(packing)
+        kinds.keep_packing(library.cache, params, packing)
         names = " and ".join(name for name, _ in files.values())
         return Brought(params, report, f"{FAMILIES[family(files)][0]}: {names}")
 

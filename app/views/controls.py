@@ -6,18 +6,50 @@ import panel_material_ui as pmui
 from granforce.records import InputError, friction
 
 from ..data import SOURCES
-from ..limits import LIMITS
-from ..selection import KINDS, SOLVERS, command, select
+from ..limits import LIMITS, RANGES
+from ..selection import KINDS, SOLVERS, differing, select
 from ..state import COLOURS, WIDTHS
 from .copying import CopyButton
 from .friction import FrictionSlider
-from .progress import Progress
+from .number import NumberField
 
 WIDE = {"sizing_mode": "stretch_width"}
 SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
+FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
 HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
-HELP = "Computed in the background and kept in your cache."
 SAME = "as S"  # a packing made with the friction of the ensemble
+
+
+def offered(state):
+    """Options and value of the finished results: each series with where it has states."""
+    # The series on screen is among them even before the catalogue is read anew: a Select whose
+    # value is not on offer takes the first one, as if a visitor had chosen it.
+    on_screen = [] if state.cell is None else [state.cell]
+    series = {}
+    for cell in [*state.catalogue, *on_screen]:
+        series.setdefault(cell.series, set()).add(cell.mu)
+    options = {f"{name} — {_frictions(sorted(found))}": name for name, found in series.items()}
+    if state.missing:  # what was asked for has no states: those on screen are of another packing
+        return {"options": {f"none with {differs(state)}": "", **options}, "value": ""}
+    return {"options": options, "value": state.cell.series if state.cell else None}
+
+
+def _frictions(found):
+    if len(found) > 2:
+        return f"{len(found)} μ from {found[0]:g} to {found[-1]:g}"
+    return "μ = " + ", ".join(f"{mu:g}" for mu in found)
+
+
+def meaningful(state, labels, name):
+    """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
+    there = {"sign": state.reference, "difference": state.reference, "known": state.known}
+    chosen = getattr(state, name)
+    return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
+
+
+def differs(state):
+    """What was asked for and is not on screen, in words."""
+    return differing(state.selection, state.cell and state.cell.selection)
 
 
 def _swap(labels):
@@ -31,14 +63,18 @@ class Controls:
         self.state = state
         self._following = False
         self.mu = FrictionSlider(self._typed, **WIDE)
-        self.n = pmui.IntInput(label="Disks N", start=3, end=LIMITS.n, step=100, **SMALL)
-        self.seed = pmui.IntInput(label="Seed", start=0, **SMALL)
+        # Where the sidebar lies over the page, the one control that all need stays on the page.
+        self.beside = FrictionSlider(self._typed, on_narrow=True, **WIDE)
+        self.beside.link(self.mu, mu="mu", bidirectional=True)
+        self.mu.link(self.beside, stored="stored")
+        self.n = self._number("Disks N", 3, LIMITS.n, 100)
+        self.seed = self._number("Seed", 0, RANGES["seed"][1])
         self.packed = pmui.TextInput(label="Packed at μ", placeholder=SAME, **SMALL)
-        self.states = pmui.IntInput(label="States", start=1, end=LIMITS.states, step=100, **SMALL)
+        self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
         self.kind = pmui.Select(label="States from", options=_swap(kinds), **SMALL)
         self.relax = pmui.Select(label="Relaxation", options=_swap(SOLVERS), **SMALL)
-        self.series = pmui.Select(label="In the store", options=[], **SMALL)
+        self.series = pmui.Select(label="Finished results", options=[], **SMALL)
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
         self.colour = pmui.Select(label="Colour", options=_swap(COLOURS), **SMALL)
         self.thickness = pmui.Select(label="Width", options=_swap(WIDTHS), **SMALL)
@@ -48,10 +84,15 @@ class Controls:
         self.error = pmui.Alert(severity="error", visible=False, **WIDE)
         self.link = CopyButton(label="Copy link", margin=(4, 10), **WIDE)
         self.command = CopyButton(label="Copy CLI command", margin=(4, 10), **WIDE)
-        self.progress = Progress(state.computation)
         self._connect()
         self._follow()
         self._look()
+
+    def _number(self, label, start, end, step=1):
+        def refuse(line):
+            self.state.message = line
+
+        return NumberField(refuse, label=label, start=start, end=end, step=step, **FIELD)
 
     def panel(self):
         """The widgets in order."""
@@ -62,7 +103,6 @@ class Controls:
             self.kind,
             self.relax,
             self.go,
-            self.progress,
             self.error,
             self.series,
             pmui.Typography("Force chains", **HEADING),
@@ -86,15 +126,14 @@ class Controls:
                 lambda event, name=name: state.param.update({name: event.new}), "value"
             )
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
-        state.param.watch(self._look, ["colour", "thickness", "overlay"])
+        state.param.watch(self._look, ["colour", "thickness", "overlay", "reference", "known"])
+        state.param.watch(self._command, ["selection", "missing", "replay", "known"])
+        self._command()
         state.param.watch(self._tell, "message")
         state.computation.param.watch(self._rest, "running")
         self._tell()
 
     # From the widgets
-
-    def _set(self, name, event):
-        setattr(self.state, name, event.new)
 
     def _typed(self, text):
         try:
@@ -108,14 +147,12 @@ class Controls:
         if self._following or state.selection is None:
             return
         try:
-            state.ask(self._selection())
+            state.ask(self._selection(), at_once=True)
         except InputError as error:
             state.message = str(error)
 
     def _selection(self):
         now, packing = self.state.selection, self.state.selection.packing
-        if None in (self.n.value, self.seed.value, self.states.value):
-            raise InputError("fill in every field")
         own = self.packed.value.strip()
         packed_mu = friction(own) if own else None
         details = {
@@ -131,7 +168,7 @@ class Controls:
         return made._replace(packing=made.packing | same)
 
     def _choose(self, event):
-        if not self._following:
+        if not self._following and event.new:
             self.state.choose(series=event.new)
 
     # From the state
@@ -146,25 +183,32 @@ class Controls:
         self.mu.param.update(stored=[cell.mu for cell in state.cells()], mu=asked.mu)
         if not asked.imported:
             self.n.value, self.seed.value = packing["n"], packing["seed"]
-        for widget in (self.n, self.seed, self.packed):
-            widget.disabled = asked.imported
+        known = state.cell is not None and state.cell.selection.packing == packing
+        if asked.imported and known:
+            self.n.value = state.replay.summary["n"]
+        self.n.param.update(disabled=asked.imported, visible=known or not asked.imported)
+        self.seed.visible = self.packed.visible = not asked.imported
         self.packed.value = "" if asked.same_mu else f"{packing['mu']:g}"
         self.states.value = asked.states
         self.kind.value, self.relax.value = asked.kind, asked.relax
         self.relax.visible = asked.kind == "walk"
-        offered = list(dict.fromkeys(cell.series for cell in state.catalogue))
-        self.series.param.update(options=offered, value=state.cell.series if state.cell else None)
-        self.command.text = command(asked)
+        self.series.param.update(**offered(state))
         self._following = False
         self._rest()
+
+    def _command(self, *events):
+        if self.state.selection is not None:
+            self.command.text = self.state.command
 
     def _rest(self, *events):
         state = self.state
         self.go.visible = state.missing and not state.computation.running
         if state.missing:
-            self.go.label = f"Compute μ = {state.selection.mu:g}"
+            self.go.label = f"Compute {differs(state)}"
 
     def _look(self, *events):
+        for name, labels in (("colour", COLOURS), ("thickness", WIDTHS)):
+            getattr(self, name).options = _swap(meaningful(self.state, labels, name))
         for name in ("colour", "thickness", "overlay"):
             getattr(self, name).value = getattr(self.state, name)
 

@@ -1,18 +1,22 @@
 """Take along what is on screen: pictures, tables, datasets, the packing, the parameters."""
 
-import numpy as np
 import panel as pn
 
-from .. import exports
+from .. import exports, movies, planes, standalone
+from ..compute import found_or_made
+from ..data import SOURCES
 from ..jobs import reading
-from ..state import VIEW
+from ..state import VIEW, WIDTHS
 from .handover import Handover
-from .packing import SATURATION, exact_intervals, normal_extent
+from .packing import colour_bar, colour_words, exact_intervals, full_extent, gone, pins
 from .parts import note
+from .progress import Progress
 from .style import palettes
 
 FILES = {
     "Picture of the packing": {"svg": "SVG", "png": "PNG"},
+    "Movie of what plays": {"webm": "Movie (WebM)", "gif": "Movie (GIF)"},
+    "To send to somebody": {"html": "This view as a page (HTML)"},
     "Data on screen": {
         "csv": "Contacts (CSV)",
         "netcdf": "States (NetCDF)",
@@ -20,12 +24,18 @@ FILES = {
     },
     "To go on elsewhere": {"npz": "Packing (NPZ)", "json": "Parameters (JSON)"},
 }
+DRAWN = ("svg", "png", "webm")  # in the browser
 HELP = """
+Pictures have a colour bar, a scale and a caption. Movies play from the first state to the last, or
+to and fro between two: WebM is recorded here at the player's speed, GIF is drawn for slides, at
+most 5 MB. The page as one file plays without a server and without a network.
 Contacts: one row each with grains, original and present forces, the range over the states and,
-where known, exact bounds. States: packing, states and measures with their units and parameters.
-Every plot is saved as PNG or SVG by the buttons above it. The address of the page reopens this
-view; <code>granforce walk --packing packing.npz</code> goes on with the packing.
+where known, exact bounds; the file's first lines explain the columns. States: the packing, and
+<b>all</b> states with their measures, units and parameters; where only some were kept, all are
+computed again. Every plot is saved as PNG or SVG by the buttons above it. The address of the page
+reopens this view; <code>granforce walk --packing packing.npz</code> goes on with the packing.
 """
+LONG = ("netcdf", "zarr", "gif", "html")  # with progress
 GROUND = ("#ffffff", "#121212")  # by day, by night
 
 
@@ -36,14 +46,22 @@ class View:
 
     def __init__(self, state):
         self.state = state
-        self.task = state.task(reading)
+        self.task, self.making = state.task(reading), state.task()
         self.buttons = Handover(self._asked, files=FILES, margin=(12, 10, 0, 10))
         self.told = note()
-        self.task.param.watch(self._follow, "message")
+        for task in (self.task, self.making):
+            task.param.watch(self._follow, "message")
+        self.making.param.watch(self._rest, "running")
 
     def panel(self):
         """Buttons, and what they are for."""
-        return pn.Column(self.buttons, self.told, note(HELP), sizing_mode="stretch_width")
+        return pn.Column(
+            self.buttons,
+            Progress(self.making),
+            self.told,
+            note(HELP),
+            sizing_mode="stretch_width",
+        )
 
     def _asked(self, key):
         state = self.state
@@ -51,48 +69,135 @@ class View:
         if state.replay is None:
             self.told.object = "There is nothing on screen yet."
             return
-        self.task.start(
-            self._making(key), lambda file: self.buttons.hand_over(file, png=key == "png")
-        )
+        stem = _stem(state.cell.selection)
+        if key in DRAWN:
+            self.buttons.hand_over_picture(f"{stem}.{key}", self._caption())
+        elif key in LONG:
+            self.making.start(self._long(key, stem), self.buttons.hand_over)
+        else:
+            self.task.start(self._making(key, stem), self.buttons.hand_over)
 
-    def _making(self, key):
+    def _rest(self, event):
+        """What failed or was cancelled brings no file: its button rests, too."""
+        if not event.new:
+            self.buttons.rest()
+
+    def _caption(self):
+        """What a picture says about itself: background, colour bar, scale and words."""
+        state = self.state
+        low, stops, high = colour_bar(state)
+        contrast = "#f2f5f9" if state.dark else "#18191d"
+        return {
+            "background": GROUND[state.dark],
+            "ink": contrast,
+            "bar": {"low": low, "high": high, "stops": stops},
+            "lines": [
+                f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state)}.",
+                state.source,
+                *known_words(state),
+                f"granforce ?{state.link()}",
+            ],
+        }
+
+    def _long(self, key, stem):
+        """Work that makes a file that takes a while: all states, a movie, the page."""
+        state = self.state
+        library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
+        possible = state.possible
+        loads, given, known = state.loads, gone(state, replay), pins(state)
+        view = {name: getattr(state, name) for name in VIEW}
+        source = " ".join([state.source, *known_words(state)])
+        told = {"link": state.link(), "command": state.command, "source": source}
+
+        def work(job):
+            if key in ("netcdf", "zarr"):
+                states = all_states(library, cell, job)
+                job.begin("making the file")
+                whole = exports.dataset(library.packing(cell.params["packing"]), states, exact)
+                if key == "netcdf":
+                    return exports.File(f"{stem}.nc", "application/x-netcdf", exports.netcdf(whole))
+                return exports.File(f"{stem}.zarr.zip", "application/zip", exports.zarr_zip(whole))
+            if key == "gif":
+                job.begin("drawing the movie")
+                bounds = exact_intervals(possible, replay)
+                names = ("colour", "thickness", "reference", "dark")
+                look = movies.shades(
+                    replay, bounds, palettes(view["dark"]), most=full_extent(replay, bounds),
+                    loads=loads, gone=given, **{name: view[name] for name in names},
+                )  # fmt: skip
+                content = movies.gif(
+                    replay, look, between=view["between"], progress=job.tell,
+                    cancelled=job.cancelled,
+                )  # fmt: skip
+                return exports.File(f"{stem}.gif", "image/gif", content)
+            outlined = None
+            if replay.summary["dimension"] > 0:
+                shown = standalone.thinned(replay)[0]
+                plane = planes.principal(shown)
+                outlined = planes.outline(library, cell, shown, plane)(job)
+            job.begin("making the page")
+            content = standalone.html(
+                library,
+                cell,
+                replay,
+                possible,
+                loads=loads,
+                gone=given,
+                pins=known,
+                view=view,
+                outlined=outlined,
+                **told,
+            )
+            return exports.File(f"{stem}.html", "text/html", content)
+
+        return work
+
+    def _making(self, key, stem):
         """Work that makes a file of what is on screen now."""
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
-        stem = _stem(cell.selection)
         frame = min(state.frame, len(replay.normal) - 1)
+        source = state.source
         link, view = state.link(), {name: getattr(state, name) for name in VIEW}
-        look = exports.Look(
-            frame, state.reference, state.colour, state.thickness, state.overlay,
-            palettes(state.dark), GROUND[state.dark],
-        )  # fmt: skip
 
         def work(job):
             job.begin("making the file")
-            if key in ("svg", "png"):
-                extent = normal_extent(replay, exact_intervals(exact, replay))
-                most = float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
-                content = exports.picture(replay, extent, most, look).encode()
-                return exports.File(f"{stem}.{key}", "image/svg+xml", content)
             if key == "csv":
-                content = exports.csv(exports.contacts(replay, exact, frame))
+                columns = exports.contacts(replay, exact, frame)
+                head = exports.explained(columns, replay, source)
+                content = exports.csv(columns, head)
                 return exports.File(f"{stem}.csv", "text/csv", content)
             if key == "json":
                 content = exports.parameters(cell, link, view)
                 return exports.File(f"{stem}.json", "application/json", content)
             packing = library.packing(cell.params["packing"])
-            if key == "npz":
-                return exports.File(f"{stem}.npz", "application/zip", exports.npz(packing))
-            whole = exports.dataset(packing, library.dataset(cell), exact)
-            if key == "netcdf":
-                return exports.File(f"{stem}.nc", "application/x-netcdf", exports.netcdf(whole))
-            return exports.File(f"{stem}.zarr.zip", "application/zip", exports.zarr_zip(whole))
+            return exports.File(f"{stem}.npz", "application/zip", exports.npz(packing))
 
         return work
 
     def _follow(self, event):
         if event.new:
             self.told.object = event.new
+
+
+NAMED = 4  # known forces that a caption names
+
+
+def known_words(state):
+    """What is known, in a line of a caption; none where nothing is."""
+    number = state.replay.backbone
+    told = [one.words(number[one.contact]) for one in state.known]
+    if told:
+        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+        yield f"Known: {'; '.join(told[:NAMED])}{more}."
+
+
+def all_states(library, cell, job):
+    """The dataset of a cell with all its states: those that were not kept are computed again."""
+    if cell.params.get("keep") is None:
+        return library.dataset(cell)
+    params = cell.params | {"keep": None}
+    return found_or_made(library, job, "all states", SOURCES[cell.kind], params)
 
 
 def _stem(selection):

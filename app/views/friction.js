@@ -2,6 +2,8 @@
 
 const SNAP = 0.07 // decades within which the thumb jumps to a stored value
 
+const NARROW = "(max-width: 599.95px)" // where the sidebar lies over the page
+
 const place = (mu, least) => (mu > 0 ? Math.max(least, Math.log10(mu)) : least)
 const rounded = (mu) => Number(mu.toPrecision(2))
 
@@ -72,5 +74,12 @@ export function render({ model }) {
   for (const name of ["least", "most", "stored"]) model.on(name, draw)
   model.on("mu", follow)
   draw()
-  return root
+
+  // In the page where it is narrow, else in the sidebar: never in both.
+  const host = document.createElement("div"), narrow = matchMedia(NARROW)
+  const settle = () => host.replaceChildren(...(narrow.matches === model.on_narrow ? [root] : []))
+  narrow.addEventListener("change", settle)
+  model.on("remove", () => narrow.removeEventListener("change", settle))
+  settle()
+  return host
 }

@@ -18,6 +18,7 @@ class FrictionSlider(JSComponent):
     stored = param.List(default=[], doc="values of μ that need no computing")
     least = param.Number(default=LEAST_PLACE, constant=True, doc="stands for μ = 0")
     most = param.Number(default=MOST_PLACE, constant=True)
+    on_narrow = param.Boolean(doc="whether it is for narrow pages, else for all others")
 
     _esm = Path(__file__).with_name("friction.js")
     _stylesheets: ClassVar = [Path(__file__).with_name("friction.css")]

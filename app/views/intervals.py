@@ -5,16 +5,31 @@ import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 
+from .. import live
 from ..state import SCALES, SORTS
+from .hints import term
+from .known import Known
 from .packing import exact_intervals
-from .parts import figure
-from .progress import Progress
-from .style import DARK, DOT, ORIGINAL, PALE, SERIES, hover, quiet_legend
+from .parts import MOVES, figure, note
+from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
+STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
+BARS += ("whole_low", "whole_high")  # exact intervals without what is known
+ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
 ETAS = ("eta1", "eta2", "eta3")
 SMALL = {"size": "small", "width": 190, "margin": (10, 8, 2, 8)}
+
+
+HELP = f"""
+One bar for each contact. Pale: every force it can have in any network in balance
+({term("exact", "possible")}); dark: what the states passed so far had; yellow: in the
+{term("original")}; dots: in the state on screen. Below: η of the states passed so far (of η3,
+{term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
+{term("known", "known")}, the palest is what was possible before.
+Click a bar to find its contact in the packing.
+"""
 
 
 class View:
@@ -36,20 +51,22 @@ class View:
         self.exact = pmui.Button(
             label="Compute exact intervals", variant="outlined", size="small", margin=(14, 8, 2, 8)
         )
+        self.told = note(HELP)
         self.left_out = pn.pane.HTML(margin=(0, 10), styles={"font-size": "12px", "opacity": "0.8"})
-        self.progress = Progress(state.computation)
         self._connect()
         self._show()
 
     def panel(self):
         """Choices, bars and growth."""
         wide = {"sizing_mode": "stretch_width", "margin": 0}
-        choices = pn.FlexBox(self.sort, self.scale, self.exact, sizing_mode="stretch_width")
+        choices = pn.FlexBox(self.sort, self.scale, sizing_mode="stretch_width")
         return pn.Column(
             choices,
-            self.progress,
+            Known(self.state),
             pn.pane.Bokeh(self.figure, **wide),
+            self.exact,  # below, as the plot must not move when the button goes
             self.left_out,
+            self.told,
             pn.pane.Bokeh(self.growth_figure, **wide),
             sizing_mode="stretch_width",
         )
@@ -60,9 +77,13 @@ class View:
         self.scale.param.watch(lambda event: state.param.update(scale=event.new), "value")
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
-        state.param.watch(self._show, ["replay", "exact", "sort", "scale"])
+        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "sort", "scale"])
+        state.param.watch(self._offer, ["replay", "growing", "exact"])
         state.param.watch(self._mark, "contact")
         state.param.watch(self._catch_up, "tab")
+        for task in (state.computation, state.knowledge.task):
+            task.param.watch(self._offer, "running")
+        self._offer()
         self._stale = False
 
     # Contents
@@ -73,24 +94,27 @@ class View:
 
     def _show(self, *events):
         """Take over contacts, exact intervals and the walk's length."""
-        state, replay = self.state, self.state.replay
+        state, replay = self.state, self.state.seen
         self._stale = state.tab != self.name
         if replay is None or self._stale:
             return
         self.sort.value, self.scale.value = state.sort, state.scale
-        exact = exact_intervals(state.exact, replay)
-        self.exact.visible = not exact
-        order = sorted_contacts(replay, exact, state.sort)
+        exact = exact_intervals(state.possible, replay)
+        order = sorted_contacts(replay, exact, state.sort, state.narrowed)
         step = -(-len(order) // MOST_BARS)
         ranks = np.arange(0, len(order), step)
         self.contacts = order[ranks]
         self._show_bars(replay, exact, ranks)
         self.left_out.object = (
-            f"Every {step}th of {len(order)} contacts is drawn." if step > 1 else ""
+            f"One contact in {step} is drawn: {len(ranks)} of {len(order)}." if step > 1 else ""
         )
-        if not events or any(event.name == "replay" for event in events):
+        if not events or any(event.name in ("replay", "growing") for event in events):
             self._show_growth(replay)
         self._mark()
+
+    def _offer(self, *events):
+        """Exact intervals are to be asked for only where none are there or under way."""
+        self.exact.visible = self.state.replay is not None and self.state.exact_wanted
 
     def _show_bars(self, replay, exact, ranks):
         contacts = self.contacts
@@ -98,31 +122,48 @@ class View:
         unit = original if self.state.scale == "own" else np.ones_like(original)
         none = np.full_like(original, np.nan)
         low, high = (exact[name][contacts] if exact else none for name in ("low", "high"))
+        whole, before = (none, none), {}
+        if exact and self.state.narrowed is not None:
+            before = exact_intervals(self.state.narrowed.before, replay)
+            whole = before["low"][contacts], before["high"][contacts]
+        self.whole.visible = self.whole_item.visible = whole[0] is not none
         self.bars.data = {
             "rank": (ranks + 1).astype(np.float32),
             "at": contacts.astype(np.int32),
             "contact": replay.backbone[contacts].astype(np.int32),
             "original": original / unit,
+            "whole_low": whole[0] / unit,
+            "whole_high": whole[1] / unit,
             "exact_low": low / unit,
             "exact_high": high / unit,
             **{name: original / unit for name in ("low", "high", "now")},
         }
-        self.width = len(replay.order)
+        self.width = len(contacts) if self.state.sort == "shortened" else len(replay.order)
         _set_range(self.figure.x_range, 0, self.width + 1)
-        top = 3.0 if self.state.scale == "own" else _top(replay, exact)
+        top = 3.0 if self.state.scale == "own" else _top(replay, before or exact)
+        if self.state.growing is not None:
+            top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         self.figure.xaxis.axis_label = f"contacts, sorted by {SORTS[self.state.sort]}"
         self.figure.yaxis.axis_label = SCALES[self.state.scale]
 
     def _show_growth(self, replay):
-        unseen = np.full(len(replay.number), np.nan, dtype=np.float32)
-        self.growth.data = {"state": replay.number.astype(np.int32)} | {
+        grows = self.state.growing is not None
+        number = live.numbers(replay.summary) if grows else replay.number
+        unseen = np.full(len(number), np.nan, dtype=np.float32)
+        self.growth.data = {"state": number.astype(np.int32)} | {
             name: unseen.copy() for name in ETAS
         }
-        finals = [replay.summary[name] * (0.15 if name == "eta3" else 1) for name in ETAS]
+        _set_range(self.growth_figure.x_range, 0, max(1, int(number[-1])))
+        for span in self.finals:
+            span.visible = not grows
+        if grows:  # how far they will grow is not known
+            return
+        # Of the states shown, like the curves: all states of the walk have seen more.
+        finals = [replay.growth[name][-1] * (0.15 if name == "eta3" else 1) for name in ETAS]
+        finals = [float(np.nan_to_num(value)) for value in finals]
         for span, value in zip(self.finals, finals, strict=True):
             span.location = value
-        _set_range(self.growth_figure.x_range, 0, max(1, int(replay.number[-1])))
         _set_range(self.growth_figure.y_range, 0, 1.25 * max(finals) if max(finals) > 1e-9 else 1)
 
     # Selection, linked with the packing
@@ -136,7 +177,7 @@ class View:
         """Show where the selected contact stands."""
         state = self.state
         marks = {"rank": [], "low": [], "high": []}
-        if state.contact is not None and state.replay is not None and state.tab == self.name:
+        if state.contact is not None and state.seen is not None and state.tab == self.name:
             at = np.flatnonzero(self.contacts == state.contact)
             if len(at):
                 column = self.bars.data
@@ -153,24 +194,33 @@ class View:
             "contacts",
             "fₙ / ⟨fₙ⟩",
             x_range=Range1d(0, 1),
-            y_range=Range1d(0, 1),
+            y_range=Range1d(0, 1, name="bars_range"),
             height=330,
         )
         bar = {"x": "rank", "source": self.bars, "line_color": None}
+        self.whole = fig.vbar(
+            bottom="whole_low",
+            top="whole_high",
+            width=1,
+            fill_color=PALE,
+            fill_alpha=0.3,
+            legend_label="before",
+            **bar,
+        )
         exact = fig.vbar(
             bottom="exact_low",
             top="exact_high",
             width=1,
             fill_color=PALE,
-            legend_label="exact",
+            legend_label="possible",
             **bar,
         )
         seen = fig.vbar(
             bottom="low", top="high", width=0.8, fill_color=DARK, legend_label="seen so far", **bar
         )
-        for glyph in (exact, seen):
+        for glyph in (self.whole, exact, seen):
             glyph.nonselection_glyph = None
-        fig.line(
+        line = fig.line(
             "rank",
             "original",
             source=self.bars,
@@ -187,8 +237,13 @@ class View:
             legend_label="now",
             nonselection_alpha=1,
         )
+        for moving in (seen, line, dots):
+            moving.tags = MOVES
+        fig.name = "bars_figure"
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
-        quiet_legend(fig, "top_left")
+        self.whole_item = fig.legend[0].items[0]
+        legend_above(fig, 5)
+        corner(fig, "possible: exact; seen: so far")
         fig.add_tools(
             hover(
                 [seen, exact],
@@ -196,7 +251,7 @@ class View:
                 ("now", "@now{0.000}"),
                 ("original", "@original{0.000}"),
                 ("seen", "@low{0.000} … @high{0.000}"),
-                ("exact", "@exact_low{0.000} … @exact_high{0.000}"),
+                ("possible", "@exact_low{0.000} … @exact_high{0.000}"),
             ),
             TapTool(renderers=[exact, seen, dots]),
         )
@@ -205,27 +260,37 @@ class View:
     def _growth_figure(self):
         fig = figure(
             "eta_so_far",
-            "η of the states shown so far (dashed: of all states)",
+            None,
             "states",
             "η",
             x_range=Range1d(0, 1),
-            y_range=Range1d(0, 1),
-            height=200,
+            y_range=Range1d(0, 1, name="growth_range"),
+            height=210,
             tools="",
         )
         labels = ("eta1", "η1"), ("eta2", "η2"), ("eta3", "0.15 η3")
         for (name, label), colour in zip(labels, SERIES, strict=True):
-            fig.line(
+            line = fig.line(
                 "state", name, source=self.growth, line_width=2, color=colour, legend_label=label
             )
+            line.tags = MOVES
+        fig.name = "growth_figure"
         for span in self.finals:
             fig.add_layout(span)
-        quiet_legend(fig, "bottom_right")
+        legend_above(fig)
+        corner(fig, "seen so far; dashed: in all states shown")
         return fig
 
 
-def sorted_contacts(replay, exact, by):
-    """Positions of the contacts (N_c,), ascending in what `by`, one of state.SORTS, names."""
+def sorted_contacts(replay, exact, by, narrowed=None):
+    """Positions of the contacts (N_c,), ascending in what `by`, one of state.SORTS, names.
+
+    narrowed: known.Narrowed; the STRONGEST whose interval it has shortened most, alone.
+    """
+    if by == "shortened":
+        if not exact or narrowed is None:
+            return replay.order
+        return np.argsort(-narrowed.shortened, kind="stable")[:STRONGEST]
     if by == "original" or (by in ("exact", "position") and not exact):
         return replay.order
     if by == "extent":

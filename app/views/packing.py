@@ -3,23 +3,53 @@
 import numpy as np
 import panel as pn
 
+from .. import live
 from ..state import COLOURS, WIDTHS
 from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
-SHARED = ("contact", "frame", "reference")  # both ways
-FOLLOWED = ("source", "busy", "tab", "colour", "thickness", "overlay", "scale")  # from the state
+SHARED = ("contact", "frame", "reference", "split", "beside")  # both ways
+FOLLOWED = (
+    "second",
+    "source",
+    "busy",
+    "tab",
+    "wide",
+    "colour",
+    "thickness",
+    "overlay",
+    "scale",
+)  # from the state
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
+# What colours and widths show → key of the glossary.
+EXPLAINED = {
+    "mobilised": "mobilisation",
+    "extent": "extent",
+    "change": "change",
+    "sign": "sign",
+    "normal": "fn",
+    "difference": "difference",
+    "load": "limit_load",
+    "known": "gone",
+}
 LEGEND = """
 <div style="display:flex;flex-wrap:wrap;gap:3px 20px;align-items:center;font-size:12px">
- <span>width: {width}
+ <span tabindex="0" data-term="{width_term}">width: {width}
   <svg width="56" height="12" style="vertical-align:middle"><polygon points="0,5.5 56,0 56,12 0,6.5"
    fill="currentColor" fill-opacity="0.65"/></svg></span>
- <span>colour: {colour} {bar}</span>
+ <span tabindex="0" data-term="{colour_term}">colour: {colour} {bar}</span>
  {marks}
- <span>pale disks: rattlers; dashed: the box{sides}, outside it images</span>
+ <span tabindex="0" data-term="rattler">pale disks: loose; dashed: the box{sides},
+  outside it images</span>
+</div>
+"""
+JAMMING = """
+<div style="display:flex;flex-wrap:wrap;gap:3px 20px;font-size:12px">
+ <span tabindex="0" data-term="fn">width: normal force fₙ of what touches just now</span>
+ <span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
+ <span>pale disks: touch nothing; dashed: the box, which shrinks, outside it images</span>
 </div>
 """
 BAR = """{low} <span style="display:inline-block;width:96px;height:10px;vertical-align:middle;
@@ -34,6 +64,7 @@ class PackingView:
     def __init__(self, state):
         self.state = state
         self.player = Player(
+            name="player",  # by which others in the page find it
             sizing_mode="stretch_width",
             palettes=palettes(state.dark),
             **{name: getattr(state, name) for name in (*SHARED, *FOLLOWED)},
@@ -41,14 +72,21 @@ class PackingView:
         self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(2, 10))
         for name in SHARED:
             self.player.param.watch(lambda event: state.param.update({event.name: event.new}), name)
+        self._shown = None
         self.player.param.watch(self._swing, "between")
         state.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(self._show, ["replay", "exact", "between"])
+        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "between"])
+        state.param.watch(self._pin, ["known", "ranked", "replay"])
         state.param.watch(self._displace, "displacement")
+        state.param.watch(self._accompany, "twin")
+        state.param.watch(self._load, "loads")
+        state.param.watch(self._project, "plane")
         state.param.watch(self._dress, ["dark"])
-        shown = ["colour", "thickness", "overlay", "exact", "dark", "replay"]
-        state.param.watch(self._explain, shown)
+        shown = ["colour", "thickness", "overlay", "exact", "narrowed", "loads", "dark"]
+        state.param.watch(self._explain, [*shown, "replay", "growing", "moving", "pulls"])
         self._show()
+        self._accompany()
+        self._pin()
         self._explain()
 
     def _swing(self, event):
@@ -59,16 +97,40 @@ class PackingView:
 
     def _show(self, *events):
         """What belongs together comes in one message."""
-        state = self.state
-        if state.replay is None:
+        state, replay = self.state, self.state.seen
+        if replay is None:
             return
+        exact = exact_intervals(state.possible, replay)
         changes = {
-            "exact": exact_intervals(state.exact, state.replay),
+            "exact": exact,
+            "gone": gone(state, replay),
+            "most": full_extent(replay, exact),
             "between": None if state.between is None else list(state.between),
         }
-        if not events or any(event.name == "replay" for event in events):
-            changes["walk"] = frames(state.replay)
+        if self._shown is not replay:
+            self._shown = replay
+            room = 0 if state.growing is None else len(live.numbers(replay.summary))
+            changes["walk"] = frames(replay, room)
         self.player.param.update(changes)
+
+    def _accompany(self, *events):
+        """Another packing, beside the one on screen."""
+        twin = self.state.twin
+        if twin is None:
+            self.player.twin = {}
+        else:
+            exact = exact_intervals(twin.exact, twin.replay)
+            self.player.twin = frames(twin.replay) | {"exact": exact}
+
+    def _pin(self, *events):
+        self.player.pins = pins(self.state)
+
+    def _load(self, event):
+        self.player.loads = event.new
+
+    def _project(self, event):
+        """The plane of force space on screen: where networks lie in it that are no states."""
+        self.player.plane = projection(event.new)
 
     def _displace(self, event):
         field = event.new
@@ -79,7 +141,26 @@ class PackingView:
         self.player.palettes = palettes(event.new)
 
     def _explain(self, *events):
-        self.legend.object = legend(self.state)
+        self.legend.object = JAMMING if self.state.moving else legend(self.state)
+
+
+def pins(state):
+    """Contacts that are known, whether exactly, and those to measure next, the best first."""
+    return {
+        "contacts": [one.contact for one in state.known],
+        "exact": [not one.error for one in state.known],
+        "ranked": [] if state.ranked is None else state.ranked.contacts.tolist(),
+    }
+
+
+def projection(plane):
+    """A planes.Plane as the player takes it: axes of f_n and f_t, and what to take away."""
+    if plane is None:
+        return {}
+    axes = plane.axes.astype(np.float32)
+    names = {"xn": (0, 0), "xt": (0, 1), "yn": (1, 0), "yt": (1, 1)}
+    columns = {name: np.ascontiguousarray(axes[k, :, part]) for name, (k, part) in names.items()}
+    return columns | {"origin": [float(value) for value in plane.origin]}
 
 
 def exact_intervals(dataset, replay):
@@ -92,6 +173,14 @@ def exact_intervals(dataset, replay):
     }
 
 
+def gone(state, replay):
+    """Of ΔF_n (N_c,), by what is known, in ⟨f_n⟩; or None while nothing is."""
+    narrowed = state.narrowed
+    if narrowed is None or len(narrowed.gone) != len(replay.backbone):
+        return None
+    return narrowed.gone.astype(np.float32)
+
+
 def normal_extent(replay, exact):
     """ΔF_n (N_c,) in ⟨f_n⟩: exact where known, else of all states."""
     if exact:
@@ -99,28 +188,54 @@ def normal_extent(replay, exact):
     return replay.high[:, 0] - replay.low[:, 0]
 
 
+def full_extent(replay, exact):
+    """ΔF_n in ⟨f_n⟩ at which its colour is full."""
+    extent = normal_extent(replay, exact)
+    return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
+
+
+def colour_bar(state):
+    """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
+    diverging = [BLUE, GREY, ORANGE]
+    if state.pulls:
+        return "−½ ⟨fₙ⟩", diverging, "+½ ⟨fₙ⟩"  # see FULL in grab.js
+    most = full_extent(state.seen, exact_intervals(state.possible, state.seen))
+    return {
+        "mobilised": ("−1", diverging, "1"),
+        "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
+        "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads)),
+        "change": ("−⟨fₙ⟩", diverging, "+⟨fₙ⟩"),
+        "known": ("0", list(palettes(state.dark)["known"][::8]), "1"),
+        "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
+    }[state.colour]
+
+
+def colour_words(state):
+    """What colours mean just now."""
+    return "change by what was pulled" if state.pulls else COLOURS[state.colour]
+
+
+def _largest(loads):
+    return "(being computed)" if loads is None else f"{loads.max(initial=0):.2f} ⟨fₙ⟩"
+
+
 def legend(state):
     """What width and colour mean just now, as HTML."""
-    if state.replay is None:
+    replay = state.seen
+    if replay is None:
         return ""
-    diverging = f"{BLUE},{GREY},{ORANGE}"
-    extent = normal_extent(state.replay, exact_intervals(state.exact, state.replay))
-    most = float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
-    stops = ",".join(palettes(state.dark)["extent"][::8])
-    bars = {
-        "mobilised": ("−1", diverging, "1"),
-        "extent": ("0", stops, f"{most:.2f} ⟨fₙ⟩"),
-        "change": ("−⟨fₙ⟩", diverging, "+⟨fₙ⟩"),
-        "sign": ("less", f"{BLUE} 50%,{ORANGE} 50%", "more"),
-    }
-    low, stops, high = bars[state.colour]
-    bar = BAR.format(low=low, stops=stops, high=high)
-    if state.colour == "mobilised" and state.replay.summary["mu"] == 0:
+    low, stops, high = colour_bar(state)
+    bar = BAR.format(low=low, stops=",".join(stops), high=high)
+    if state.colour == "mobilised" and not state.pulls and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
-    sides = [f"{side:.2f}" for side in state.replay.box if np.isfinite(side)]
+    if state.colour == "known" and not state.pulls and state.narrowed is None:
+        bar = "(nothing is known: select a contact and press H)"
+    sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
     return LEGEND.format(
         width=WIDTHS[state.thickness],
-        colour=COLOURS[state.colour],
+        width_term=EXPLAINED[state.thickness],
+        colour_term=EXPLAINED[state.colour],
+        colour=colour_words(state),
         bar=bar,
         marks=_marks(state.dark) if state.overlay else "",
         sides=f" of {' × '.join(sides)} largest radii" if sides else "",
@@ -129,6 +244,6 @@ def legend(state):
 
 def _marks(dark):
     colours = palettes(dark)["scene"]
-    strong = DOT.format(fill=colours["strong"], line="none", text="fₙ &gt; 2⟨fₙ⟩")
-    loose = DOT.format(fill="none", line=colours["loose"], text="ΔFₙ &gt; ⟨ΔFₙ⟩")
-    return f"<span>{strong}{loose}</span>"
+    strong = DOT.format(fill=colours["strong"], line="none", text="tenth with largest fₙ")
+    loose = DOT.format(fill="none", line=colours["loose"], text="tenth with largest ΔFₙ")
+    return f'<span tabindex="0" data-term="overlay">{strong}{loose}</span>'

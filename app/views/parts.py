@@ -3,11 +3,15 @@
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import CustomAction, CustomJS, SaveTool
+from panel.io import document as panel_document
 from panel.io import unlocked
+from panel.reactive import Syncable
 
 from .style import plot
 
 NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
+
+MOVES = ["moves"]  # tags of what the player draws itself while it plays
 
 PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
 
@@ -26,6 +30,37 @@ link.click()
 setTimeout(() => URL.revokeObjectURL(link.href), 1000)
 """
 
+# Panel builds the views of a new child before React mounts them; told of another size of the
+# window in between, Bokeh measures plots that have no layout yet, fails, and leaves all as it was.
+UNMOUNTED = """
+const view = Bokeh.Models.get("Figure").prototype.default_view.prototype
+for (const name of ["measure_layout", "after_layout"]) {
+  const usual = view[name]
+  view[name] = function () { if (this.layout != null) usual.call(this) }
+}
+"""
+
+
+def leave_unmounted_plots(document):
+    """Have the browser pass over plots that are not on the page yet where it lays the page out."""
+    document.js_on_event("document_ready", CustomJS(code=UNMOUNTED))
+
+
+def answer_with_lock():
+    """Have events of a browser answered while Bokeh's lock is held, as its changes are."""
+    # Panel does without it where changes told just before still wait for their turn, and answers
+    # them, too: Bokeh, through which plots are changed, refuses then, and all of it is lost.
+    Syncable._event_coroutine.lock = True
+
+
+def send_what_waits(document):
+    """Send messages that Panel keeps back although nothing holds them any more."""
+    # One of its tasks, having sent its own, takes away the mark by which the next would know that
+    # it has some to send; they would wait for the next change.
+    if document in panel_document._WRITE_MSGS:
+        panel_document._WRITE_BLOCK[document] = True
+        panel_document._dispatch_write_task(document, panel_document._dispatch_msgs, document)
+
 
 def together(function, **arguments):
     """Call a function, and send all it changes on the page as one message, in its turn."""
@@ -35,21 +70,21 @@ def together(function, **arguments):
         function(**arguments)
 
 
-class Seen:
-    """A view that calls `update` when something watched has changed, but only while it is seen.
+class TabView:
+    """A tab's view, which calls `update` when something watched has changed, but only on screen.
 
     Subclasses have a `name`, that of their tab.
     """
 
     def __init__(self, state, *watched):
         self.state = state
-        self._stale = True
-        state.param.watch(self._changed, ["tab", *watched])
+        self._stale, self.left = True, False  # whether it was taken off the page
+        state.param.watch(self._changed, ["tab", "wide", *watched])
 
     @property
     def visible(self):
         """Whether the view's tab is on screen."""
-        return self.state.tab == self.name
+        return not self.left and self.state.shows(self.name)
 
     def catch_up(self):
         """Update if need be and if seen; to be called once when the view has been built."""
@@ -63,7 +98,7 @@ class Seen:
         self.catch_up()
 
     def _changed(self, *events):
-        self._stale |= any(event.name != "tab" for event in events)
+        self._stale |= any(event.name not in ("tab", "wide") for event in events)
         self.catch_up()
 
 
@@ -86,11 +121,34 @@ def figure(name, title, x, y, **options):
     return savable(plot(title, x, y, **options), name)
 
 
+CLAIMS = """
+.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
+.term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
+.claims { border-collapse: collapse; margin-top: 10px; font-size: 12.5px; }
+.claims caption { text-align: left; padding-bottom: 4px; font-weight: 600; }
+.claims td { border-top: 1px solid rgba(128, 128, 128, 0.35); padding: 3px 12px 3px 0; }
+.claims td + td { vertical-align: top; }
+"""
+
+
 def note(text="", **options):
     """Small print, as HTML."""
     return pn.pane.HTML(
-        text, styles=NOTE, sizing_mode="stretch_width", margin=(2, 10, 8, 10), **options
-    )
+        text, styles=NOTE, stylesheets=[CLAIMS], sizing_mode="stretch_width",
+        margin=(2, 10, 8, 10), **options,
+    )  # fmt: skip
+
+
+def of_replay(state, text, style, margin):
+    """HTML about the replay on screen, text(summary) of its numbers; empty while there is none."""
+    pane = pn.pane.HTML(stylesheets=[style], sizing_mode="stretch_width", margin=margin)
+
+    def show(*events):
+        pane.object = "" if state.replay is None else text(state.replay.summary)
+
+    state.param.watch(show, "replay")
+    show()
+    return pane
 
 
 def choice(labels, value):

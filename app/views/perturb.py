@@ -3,25 +3,36 @@
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import ColumnDataSource, TapTool
+from bokeh.models import BoxAnnotation, ColumnDataSource, TapTool
 
 from .. import perturbations
-from .drawing import drawn_here, rendered
-from .parts import Seen, choice, figure, note
+from . import studied
+from .hints import term
+from .parts import TabView, choice, figure, note
 from .progress import Progress
-from .style import DARK, DOT, ORIGINAL, hover, quiet_legend
+from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
-WHAT = {"one": "one contact", "all": "limit loads of all", "store": "F_crit, α against η2"}
+WHAT = {"one": "one contact", "all": "limit loads of all", "store": "critical force – η2"}
 TILE = (
-    '<div style="padding:4px 10px;border-radius:6px;background:rgba(128,128,128,.1)">'
+    '<div style="padding:4px 10px;border-radius:6px;background:rgba(128,128,128,.1)"{}>'
     '<div style="font-size:11px;opacity:.75">{}</div>'
     '<div style="font-size:15px;font-variant-numeric:tabular-nums">{}</div></div>'
 )
+EXPLAINED = {  # words on tiles → keys of the glossary
+    "fₙ": "fn",
+    "critical force": "critical_force",
+    "limit load": "limit_load",
+    "α": "alpha",
+}
 TILES = '<div style="display:flex;flex-wrap:wrap;gap:6px">{}</div>'
-HINT = "Click a contact in the packing: a pair of forces ±F will push its two grains apart."
+HINT = (
+    "Click a contact in the packing: two opposite forces will press its two disks apart. Why? How "
+    "much load a packing bears, and how far a disturbance reaches, is where it shows that its "
+    "forces are undetermined."
+)
 
 
-class View(Seen):
+class View(TabView):
     """The selected contact pushed; limit loads of all; critical force and decay over the store."""
 
     name, title = "perturb", "Perturb"
@@ -78,7 +89,7 @@ class View(Seen):
         if state.replay is None:
             return
         if state.replay.summary["mu"] == 0:
-            self._say("At μ = 0 the packing is isostatic: any force moves it, and F_crit is 0.")
+            self._say("At μ = 0 the packing is isostatic: the least force moves it.")
             self.push.visible = self.strongest.visible = False
             return
         {"one": self._one, "all": self._all, "store": self._store}[what]()
@@ -134,25 +145,31 @@ class View(Seen):
             known = self.loads is not None
             if known:
                 tiles.append(("limit load", f"{self.loads.load[state.contact]:.3f} ⟨fₙ⟩"))
-            text = "Push: F is raised until contact dynamics finds no equilibrium any more."
+            text = "Push: the two forces grow until the disks find no balance any more."
             self._say(text, numbers=_tiles(tiles))
             return
         pushed = self.pushed[0]
         tiles += [
-            ("F_crit", f"{pushed.low:.3f} ⟨fₙ⟩"),
+            ("critical force", f"{pushed.low:.3f} ⟨fₙ⟩"),
             ("limit load", f"{pushed.limit:.3f} ⟨fₙ⟩"),
             ("opened", f"{pushed.opened}"),
             ("slid", f"{pushed.slid}"),
             ("kept", f"{pushed.kept}"),
         ]
         text = (
-            f"F_crit lies between {pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩, never above the "
-            "limit load, beyond which no equilibrium exists. Above it the grains set off: |u| is "
-            "their first motion without dilation."
+            f"The {term('critical_force', 'critical force')} lies between {pushed.low:.3f} and "
+            f"{pushed.high:.3f} ⟨fₙ⟩, never above the {term('limit_load', 'limit load')}, beyond "
+            "which no network in balance exists. Above it the disks set off: |u| is how far each "
+            "moves first. Of the contacts some open, some slide, the others are kept."
         )
         if np.isfinite(pushed.exponent):  # not in boxes too small for a fit
             tiles.append(("α", f"{pushed.exponent:.2f}"))
-            text += f" Its mean in shells falls like r^−{pushed.exponent:.2f}."
+            inner, outer = pushed.fit
+            text += (
+                f" Its mean in shells goes like r<sup>−α</sup> with α = {pushed.exponent:.2f}, "
+                f"fitted from r = {inner:.1f} to {outer:.1f} largest radii (shaded); other "
+                f"ranges give α from {pushed.spread[0]:.2f} to {pushed.spread[1]:.2f}."
+            )
         self._say(text, [self._decay(pushed)], _tiles(tiles))
 
     def _decay(self, pushed):
@@ -171,7 +188,10 @@ class View(Seen):
             pushed.radius[known], pushed.profile[known], color=ORIGINAL, line_width=2.5,
             legend_label="mean in shells",
         )  # fmt: skip
-        quiet_legend(fig, "bottom_left")
+        if np.isfinite(pushed.exponent):
+            _fit(fig, pushed)
+        legend_above(fig)
+        corner(fig, "measured: the first motion")
         return fig
 
     def _animate(self, *events):
@@ -212,6 +232,7 @@ class View(Seen):
             TapTool(renderers=[points]),
         )
         source.selected.on_change("indices", self._tapped)
+        corner(fig, "exact: certified bounds")
         spread = np.percentile(loads.load, [10, 50, 90])
         self._say(
             f"Limit loads of {len(loads.load)} contacts: median {spread[1]:.2f} ⟨fₙ⟩, nine in ten "
@@ -239,31 +260,38 @@ class View(Seen):
 
 
 def over_store(library, cells, cell):
-    """Work that draws Fig. 2 of the paper from all perturbed packings of the stores."""
+    """Work that draws Fig. 2 of the paper: the study, and all perturbed packings of the stores."""
 
     def work(job):
         job.begin("reading the stores")
         found = perturbations.over_store(library, cells, cell)
-        if not found:
-            return (
-                "No packing in the stores has been perturbed at enough contacts: "
-                "granforce perturb -n 400 --mu 0.1 --random 30 does it.",
-            )
         job.begin("drawing")
-        text = (
-            f"Means over {len(found)} perturbed packings: critical force (and limit load beside "
-            "it), and decay exponent, joined in order of μ."
-        )
-        with drawn_here:
-            from granforce import figures  # HoloViews takes its time
-
-            page = list(figures.perturbation(found))
-            if not any(np.isfinite(row["decay_exponent"]) for row in found):
-                page = page[:1]  # boxes too small for a fit
-            return text, rendered(page, ("critical_force", "decay"), (280, 260))
+        drawn, text = studied.responses(found)
+        return text + studied.claims("store"), drawn
 
     return work
 
 
+def _fit(fig, pushed):
+    """The power law that was fitted, and over which range."""
+    inner, outer = pushed.fit
+    known = np.isfinite(pushed.profile) & (pushed.profile > 0)
+    known &= (pushed.radius >= inner) & (pushed.radius <= outer)
+    r = pushed.radius[known]
+    middle = np.exp(np.log(pushed.profile[known]).mean() + pushed.exponent * np.log(r).mean())
+    ends = np.array([inner, outer])
+    fig.line(
+        ends, middle * ends**-pushed.exponent, color=DOT, line_width=2.5, line_dash="dashed",
+        legend_label=f"fit, α = {pushed.exponent:.2f}",
+    )  # fmt: skip
+    fig.add_layout(BoxAnnotation(left=inner, right=outer, fill_alpha=0.1, fill_color="#808080"))
+
+
 def _tiles(tiles):
-    return TILES.format("".join(TILE.format(*tile) for tile in tiles))
+    return TILES.format("".join(TILE.format(_explained(name), name, v) for name, v in tiles))
+
+
+def _explained(name):
+    """Attributes by which a tile is explained where it stands."""
+    key = EXPLAINED.get(name)
+    return f' tabindex="0" data-term="{key}"' if key else ""

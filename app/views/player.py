@@ -13,7 +13,13 @@ FOLDER = Path(__file__).parent
 
 
 class Player(JSComponent):
-    """Packing on canvases, with buttons, scrub slider and live numbers; see player.js.
+    """Packing on canvases, with buttons, scrub slider and live numbers.
+
+    Its script is of parts: what is replayed (replay.js), how it looks (look.js), where it is drawn
+    (scene.js, or sheet.js for a file), its buttons (buttons.js), the plots beside (plots.js, and
+    layer.js for what moves in them), and player.js, which plays; live.js shows what is still being
+    computed, grab.js pulls single contacts, point.js the point in force space; split.js shows two
+    networks, or two packings, and pins.js marks the contacts that are known.
 
     The frames are shipped once, in `walk`. Plots beside it are found in the page by their names;
     any ColumnDataSource with the tags ["follows", NAME, TAB] has its single row moved along the
@@ -22,35 +28,79 @@ class Player(JSComponent):
 
     walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
+    loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
+    gone = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
+    most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
+    pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
+    plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
     palettes = param.Dict(default={}, doc="colours, see style.palettes")
+    live = param.Boolean(doc="whether something is being computed that can be seen")
+    asked = param.String(doc="what was asked for and is not on screen, in words")
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
     contact = param.Integer(default=None, allow_None=True)
+    second = param.Integer(default=None, allow_None=True)
     frame = param.Integer(default=0)
     reference = param.Integer(default=0)
+    split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
+    beside = param.Number(default=None, allow_None=True, doc="μ that is seen beside in its place")
+    twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     between = param.List(default=None, allow_None=True)
     tab = param.String()
+    wide = param.Boolean(doc="whether force space is on screen, whatever the tab")
     colour = param.String(default="mobilised")
     thickness = param.String(default="normal")
     overlay = param.Boolean()
     scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    _esm = joined("seen", "scene", "player")
+    SCRIPTS: ClassVar = (
+        "ask",
+        "sheet",
+        "scene",
+        "replay",
+        "look",
+        "layer",
+        "plots",
+        "buttons",
+        "live",
+        "pins",
+        "split",
+        "point",
+        "grab",
+        "opening",
+        "player",
+    )
+    _esm = joined(*SCRIPTS)
     _stylesheets: ClassVar = [FOLDER / "player.css"]
 
     def __init__(self, **params):
         super().__init__(**params)
-        self.on_digit = None
+        self.on_digit = self.on_live = self.on_hand = self.on_wide = self.on_known = None
+
+    def hand_over(self, news):
+        """Send something of what is being computed, or of what was pulled."""
+        self._send_msg(news)
 
     def _handle_msg(self, message):
-        """Digits pressed anywhere on the page."""
+        """Digits pressed anywhere on the page; what the browser has painted of a computation."""
         if self.on_digit is not None and isinstance(message.get("tab"), int):
             self.on_digit(message["tab"])
+        if self.on_hand is not None and isinstance(message.get("hand"), dict):
+            self.on_hand(message["hand"])
+        if self.on_known is not None and isinstance(message.get("known"), dict):
+            self.on_known(message["known"])
+        if self.on_wide is not None and isinstance(message.get("wide"), bool):
+            self.on_wide(message["wide"])
+        if self.on_live is not None and isinstance(message.get("live"), dict):
+            self.on_live(message["live"])
 
 
-def frames(replay):
-    """What the player needs of a Replay: flat arrays, frame after frame, and the geometry."""
+def frames(replay, room=0):
+    """What the player needs of a Replay: flat arrays, frame after frame, and the geometry.
+
+    room: frames that it grows to while it is being computed.
+    """
     disks, links = replay.disks, replay.links
     whole = {"contact", "i", "j"}
     radius = np.zeros(replay.summary["n"])
@@ -59,10 +109,12 @@ def frames(replay):
         "normal": replay.normal.ravel(),
         "tangential": replay.tangential.ravel(),
         "contacts": replay.normal.shape[1],
+        "room": room,
         "number": replay.number.astype(np.int32),
         "distance": replay.distance.astype(np.float32),
         "residual": replay.residual.astype(np.float32),
-        "attempts": replay.attempts.astype(np.float32),
+        "acceptance": _acceptance(replay.attempts).astype(np.float32),
+        **{name: values.astype(np.float32) for name, values in replay.growth.items()},
         "low": np.ascontiguousarray(replay.low[:, 0]),
         "high": np.ascontiguousarray(replay.high[:, 0]),
         "backbone": replay.backbone.astype(np.int32),
@@ -83,3 +135,12 @@ def frames(replay):
             for name, values in links._asdict().items()
         },
     }
+
+
+def _acceptance(attempts):
+    """Accepted states per attempt (F,) up to each frame; NaN for the original."""
+    tried = np.append(np.nan, np.cumsum(attempts[1:]))
+    # Where nothing was tried, since all forces are determined, nothing was accepted either.
+    return np.divide(
+        np.arange(len(attempts)), tried, out=np.full(len(attempts), np.nan), where=tried > 0
+    )

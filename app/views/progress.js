@@ -2,21 +2,24 @@
 
 export function render({ model, view }) {
   const root = document.createElement("div")
-  root.className = "progress"
+  root.className = "task"
   root.innerHTML = `
-    <div class="bar" role="progressbar" aria-valuemin="0" aria-valuemax="100"><div></div></div>
+    <div class="bar" role="progressbar" aria-label="progress" aria-valuemin="0" aria-valuemax="100"><div></div></div>
     <span></span><button type="button">Cancel</button>`
   const [bar, words, button] = root.children
 
   function show() {
     root.hidden = !model.running
+    if (model.css_classes.includes("titled")) {
+      document.documentElement.style.setProperty("--task", model.running ? `${root.offsetHeight}px` : "0px")
+    }
     const known = model.fraction !== null && model.fraction !== undefined
     const percent = known ? Math.round(100 * model.fraction) : 40
     bar.classList.toggle("unknown", !known)
     bar.firstElementChild.style.width = `${percent}%`
     if (known) bar.setAttribute("aria-valuenow", percent)
     else bar.removeAttribute("aria-valuenow")
-    words.textContent = model.words
+    words.textContent = words.title = model.words
   }
 
   button.addEventListener("click", () => ask(model, view, { cancel: true }))

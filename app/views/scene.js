@@ -6,6 +6,7 @@ const FEW = 2500 // chains drawn one by one, with round ends; more are gathered 
 const FINE = 16 // colours; of more, every second serves where chains are gathered
 const GRAB = 6 // px from a chain that still mean it
 const ZOOM = [0.02, 4] // least and largest part of the whole view
+const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 class Scene {
   constructor(onSelect) {
@@ -25,7 +26,8 @@ class Scene {
     this.size = 0
     this.painted = 0
     this.counts = { segments: 0, drawn: 0, outside: 0, thin: 0 }
-    this.selected = null
+    this.selected = this.second = null
+    this.frozen = false // whether what is drawn moves by itself and cannot be pointed at
     this.offset = null
     this.mixed = null
     this.listen()
@@ -101,6 +103,19 @@ class Scene {
     context.setTransform(s, 0, 0, -s, middle - s * view.x, middle + s * view.y)
   }
 
+  /** The whole packing, drawn as on screen, as the text of an SVG. */
+  picture(caption) {
+    const { disks, chains, marks, view, size, geometry } = this, sheet = new Sheet()
+    Object.assign(this, { disks: sheet, chains: sheet, marks: sheet, size: PIXELS })
+    this.reset(false)
+    this.drawDisks()
+    this.stale = false
+    this.drawChains(this.style)
+    Object.assign(this, { disks, chains, marks, view, size })
+    this.changed()
+    return sheet.svg(geometry.window, { ...caption, unit: Math.max(...geometry.radius) })
+  }
+
   drawDisks() {
     const { x, y, r, kind, grain } = this.geometry, { disks, view, scale } = this
     this.begin(disks)
@@ -163,7 +178,7 @@ class Scene {
     this.counts = { segments: contact.length, drawn, outside, thin }
     this.begin(chains)
     chains.globalAlpha = style.alpha
-    if (drawn <= FEW) this.strokeEach(order, drawn, style.colours)
+    if (drawn <= FEW || chains instanceof Sheet) this.strokeEach(order, drawn, style.colours)
     else this.strokeByClass(order, drawn, style.colours)
     chains.globalAlpha = 1
     this.drawMarks(style)
@@ -225,7 +240,7 @@ class Scene {
     const { marks, scale, palette, geometry } = this
     this.begin(marks)
     const { contact } = geometry
-    const radius = Math.max(0.24, 2 / scale)
+    const radius = Math.max(MARK, 2 / scale)
     if (style.strong) {
       for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
         marks.beginPath()
@@ -242,11 +257,18 @@ class Scene {
         else marks.stroke()
       }
     }
-    if (this.selected !== null) this.drawSelected()
+    if (this.selected !== null) this.drawSelected(this.selected)
+    if (this.second !== null) {
+      marks.setLineDash([5 / scale, 4 / scale])
+      this.drawSelected(this.second)
+      marks.setLineDash([])
+    }
+    if (marks instanceof Sheet) this.onSheet?.(marks, this)
+    else this.onMarks?.(marks, this)
   }
 
-  drawSelected() {
-    const { marks, scale, palette, geometry, selected } = this
+  drawSelected(selected) {
+    const { marks, scale, palette, geometry } = this
     marks.strokeStyle = palette.selected
     marks.lineCap = "round"
     for (let k = 0; k < geometry.contact.length; k++) {
@@ -268,8 +290,8 @@ class Scene {
 
   // Pointer
 
-  /** Segment under a point of the layout, or −1. */
-  linkAt(px, py) {
+  /** Segment under a point of the layout, or −1; reach: px from a chain that still mean it. */
+  linkAt(px, py, reach = GRAB) {
     const [x, y] = this.toPlace(px, py), { x0, y0, x1, y1, contact } = this.geometry
     let best = -1, least = Infinity
     for (let k = 0; k < contact.length; k++) {
@@ -279,7 +301,7 @@ class Scene {
       const away = Math.hypot(x - x0[k] - along * dx, y - y0[k] - along * dy)
       if (away - this.width[k] / 2 < least) { least = away - this.width[k] / 2; best = k }
     }
-    return least * this.scale <= GRAB ? best : -1
+    return least * this.scale <= reach ? best : -1
   }
 
   diskAt(px, py) {
@@ -297,7 +319,11 @@ class Scene {
 
   listen() {
     const { root } = this, fingers = new Map()
-    let moved = 0
+    let moved = 0, taken = null
+    // By touch only the selected contact is taken: else the page scrolls under the finger.
+    root.addEventListener("touchstart", (event) => {
+      if (event.touches.length === 1 && this.takenAt(event.touches[0], true) !== null) event.preventDefault()
+    }, { passive: false })
     root.addEventListener("wheel", (event) => {
       event.preventDefault()
       this.zoom(Math.exp(event.deltaY * 0.0015), ...this.place(event))
@@ -308,17 +334,24 @@ class Scene {
       fingers.set(event.pointerId, this.place(event))
       root.setPointerCapture(event.pointerId)
       moved = 0
+      taken = fingers.size > 1 ? null : this.takenAt(event, event.pointerType === "touch")
     })
     root.addEventListener("pointermove", (event) => {
       const before = fingers.get(event.pointerId), now = this.place(event)
       if (!before) return this.hover(...now)
       const step = [now[0] - before[0], now[1] - before[1]]
+      const still = moved <= 3
       moved += Math.hypot(...step)
-      if (moved > 3) this.drag(fingers, event.pointerId, now, step)
       fingers.set(event.pointerId, now)
+      if (moved <= 3) return
+      if (taken === null) return this.drag(fingers, event.pointerId, before, now)
+      if (still) this.hand.takeInScene(taken, ...before)
+      this.hand.moveInScene(...now)
     })
     const end = (event) => {
       if (!fingers.delete(event.pointerId)) return
+      if (taken !== null && moved > 3) this.hand.leave()
+      taken = null
       if (event.type === "pointerup" && moved <= 3) this.pick(...this.place(event))
     }
     root.addEventListener("pointerup", end)
@@ -326,11 +359,20 @@ class Scene {
     root.addEventListener("pointerleave", () => this.tip.classList.remove("on"))
   }
 
-  drag(fingers, id, now, [dx, dy]) {
+  /** The contact that a pointer takes in hand, or null where it moves the view. */
+  takenAt(event, touch) {
+    if (!this.geometry || this.frozen || !this.hand) return null
+    const k = this.linkAt(...this.place(event), touch ? 3 * GRAB : GRAB)
+    if (k < 0 || (touch && this.geometry.contact[k] !== this.selected)) return null
+    return this.geometry.contact[k]
+  }
+
+  drag(fingers, id, before, now) {
     this.tip.classList.remove("on")
+    const [dx, dy] = [now[0] - before[0], now[1] - before[1]]
     const other = [...fingers].find(([key]) => key !== id)?.[1]
     if (other) {
-      const before = fingers.get(id), apart = (p) => Math.hypot(p[0] - other[0], p[1] - other[1])
+      const apart = (p) => Math.hypot(p[0] - other[0], p[1] - other[1])
       this.zoom(apart(before) / Math.max(1, apart(now)), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2)
     }
     const part = other ? 0.5 : 1
@@ -351,13 +393,13 @@ class Scene {
   }
 
   pick(px, py) {
-    if (!this.geometry) return
+    if (!this.geometry || this.frozen) return
     const k = this.linkAt(px, py), contact = k < 0 ? null : this.geometry.contact[k]
     this.onSelect(contact === this.selected ? null : contact)
   }
 
   hover(px, py) {
-    if (!this.geometry || !this.describe) return
+    if (!this.geometry || !this.describe || this.frozen) return this.tip.classList.remove("on")
     const k = this.linkAt(px, py), disk = k < 0 ? this.diskAt(px, py) : -1
     const rows = k >= 0 ? this.describe.contact(k) : disk >= 0 ? this.describe.grain(disk) : null
     this.tip.classList.toggle("on", rows !== null)

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+FOLDER = Path(__file__).parent
+
 
 def joined(*names):
     """One module from these scripts: a component has no address to import others from."""
-    return "\n".join(Path(__file__).with_name(f"{name}.js").read_text() for name in names)
+    return "\n".join((FOLDER / f"{name}.js").read_text() for name in names)

@@ -3,14 +3,14 @@
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import ColumnDataSource, GlyphRenderer, LegendItem, Scatter, Span, TapTool
+from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
 
 from .. import distributions
 from ..jobs import reading
-from .drawing import drawn_here, rendered
+from . import studied
 from .packing import exact_intervals
-from .parts import Seen, choice, figure, note
-from .style import DARK, DOT, ORIGINAL, PALE, hover, quiet_legend
+from .parts import TabView, choice, figure, note
+from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
 WHAT = {
     "eta": "η(μ)",
@@ -20,31 +20,26 @@ WHAT = {
     "force": "P(fₙ)",
 }
 SCALES = {"linear": "linear", "log": "logarithmic"}
-SCALED = ("eta", "force")  # those that have both scales
-# Beside the linear plot, in its upper right corner where there is nothing, as in the paper; on a
-# narrow screen, below it.
-INSET = """
-:host { position: absolute; top: 118px; right: 8px; width: 52% !important; }
-@media (max-width: 700px) { :host { position: static; width: 100% !important; } }
-"""
+SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
 LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
 
 
-class View(Seen):
+class View(TabView):
     """One figure at a time; those over μ are drawn in a thread by granforce.figures."""
 
     name, title = "statistics", "Statistics"
 
     def __init__(self, state):
         super().__init__(state, "replay", "exact", "catalogue")
-        self.what, self.scale = choice(WHAT, "eta"), choice(SCALES, "log")
+        self.what, self.scale = choice(WHAT, "eta"), choice(SCALES, "linear")
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.told = note()
         self.task = state.task(reading)
         self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
         self.chosen = ColumnDataSource({"x": [], "y": []})
-        for widget in (self.what, self.scale):
-            widget.param.watch(self.refresh, "value")
+        self._drawn = None  # what the plots are of
+        self.what.param.watch(self._choose, "value")
+        self.scale.param.watch(self.refresh, "value")
         self.task.param.watch(self._follow, ["running", "message"])
         state.param.watch(self._mark, "contact")
         self.catch_up()
@@ -59,11 +54,21 @@ class View(Seen):
             sizing_mode="stretch_width",
         )
 
+    def _choose(self, event):
+        scale = SCALED.get(event.new, self.scale.value)
+        if scale == self.scale.value:
+            self.refresh()
+        else:
+            self.scale.value = scale  # which has it drawn
+
     def update(self):
         """Draw the figure chosen: at once from the states on screen, or over μ in a thread."""
         state, what = self.state, self.what.value
         self.scale.visible = what in SCALED
         self.task.cancel()
+        if what != self._drawn:  # another figure's plot is no answer to this choice
+            self.plots.objects, self.told.object = [], ""
+            self._drawn = what
         if state.replay is None:
             return
         if what in ("scatter", "force"):
@@ -90,10 +95,7 @@ class View(Seen):
     def _panes(self, figures):
         for fig in figures:
             self._choosable(fig)
-        panes = [_pane(fig) for fig in figures]
-        if self.what.value == "extent":
-            panes[1] = pn.Column(panes[1], stylesheets=[INSET], css_classes=["inset"])
-        return panes
+        return [_pane(fig) for fig in figures]
 
     def _follow(self, *events):
         self.bar.visible = self.task.running and self.what.value in DRAWN
@@ -119,7 +121,7 @@ class View(Seen):
 
     def _tapped(self, source, indices):
         if indices:
-            self.state.choose(mu=float(next(iter(source.data.values()))[indices[0]]))
+            self.state.choose(mu=float(source.data["x"][indices[0]]))
 
     # Of the states on screen
 
@@ -148,7 +150,8 @@ class View(Seen):
         )
         self._points = original, seen
         self._mark()
-        quiet_legend(fig, "top_right")
+        legend_above(fig)
+        corner(fig, "exact pale, seen dark" if exact else "seen by the states")
         values = [f"of the states {replay.summary['correlation']:.2f}"]
         if exact:
             values.append(f"exact {self.state.exact['correlation'].item():.2f}")
@@ -194,7 +197,8 @@ class View(Seen):
             else:
                 fig.line(middle, height, color=colour, line_width=2, legend_label=label)
                 fig.scatter(middle, height, color=colour, size=5)
-        quiet_legend(fig, "top_right")
+        legend_above(fig)
+        corner(fig, "measured: of the states shown")
         beyond = float(np.mean(replay.normal > LARGEST))
         self.told.object = (
             f"{len(replay.normal) - 1} states of {replay.normal.shape[1]} contacts; "
@@ -211,78 +215,26 @@ def over_friction(library, cells, mu, what, log):
     """Work that reads the cells and draws a figure of the paper: ([Bokeh figures], caption)."""
 
     def work(job):
-        job.begin(f"reading {len(cells)} results")
+        job.begin(f"reading {len(cells)} results and the finished study")
         rows = distributions.rows(cells)
         exact = distributions.exact_rows(library, cells)
         job.begin("drawing")
-        with drawn_here:
-            return DRAWN[what](rows, exact, mu, log)
+        drawn, text = DRAWN[what](rows, exact, mu, log)
+        return drawn, text + studied.claims(what)
 
     return work
 
 
 def _indeterminacy(rows, exact, mu, log):
-    from granforce import figures  # HoloViews takes its time
-
-    page = list(figures.indeterminacy(rows, beside={"exact": exact} if exact else None))
-    chosen = [page[1] if log else page[0], page[2]]
-    seeds = len({row["seed"] for row in rows})
-    text = (
-        "η1, η2 and 0.15 η3 of the states against μ, and the coordination z of the backbone"
-        f"{_over(seeds)}. A tap on a point shows its states."
-    )
-    if exact:
-        text += f" Dashed: 0.15 η3 of exact intervals, where known ({len(exact)} packings)."
-    drawn = rendered(chosen, ("indeterminacy", "coordination"), heights=(330, 210))
-    _legend_above(drawn[0], 3)
-    return drawn, text
-
-
-def _legend_above(fig, columns):
-    legend = fig.legend[0]
-    fig.center.remove(legend)
-    fig.add_layout(legend.clone(orientation="horizontal", ncols=columns, visible=True), "above")
+    return studied.indeterminacy(rows, exact, log)
 
 
 def _extents(rows, exact, mu, log):
-    from granforce import figures
-
-    chosen = distributions.groups(rows, mu)
-    names = "extents", "extents_logarithmic"
-    drawn = rendered(list(figures.extents(chosen)), names, heights=(440, 185))
-    # HoloViews gave the legend to the second one; the series of both are a line and dots each.
-    series = drawn[1].legend[0].items
-    drawn[0].legend.items = [
-        LegendItem(label=item.label, renderers=drawn[0].renderers[2 * k : 2 * k + 2])
-        for k, item in enumerate(series)
-    ]
-    _legend_above(drawn[0], 2)
-    drawn[1].legend.visible = False
-    quiet = {"min_border_left": 30, "min_border_right": 0, "border_fill_alpha": 0}
-    drawn[1].update(background_fill_alpha=0, **quiet)
-    drawn[1].axis.axis_label = None
-    text = (
-        "Distribution of ΔFₙ, the extent of each normal force over the states, in units of its "
-        "mean, and the same on a logarithmic scale; tails fitted by exp(−(λx)ᵇ) beyond the "
-        "median: b = 1 is exponential, larger b falls faster."
-    )
-    return drawn, text
+    return studied.extents(distributions.groups(rows, mu), mu, log)
 
 
 def _correlations(rows, exact, mu, log):
-    from granforce import figures
-
-    known = [row for row in rows if np.isfinite(row["correlation"])]
-    drawn = figures.correlations(known, beside={"exact": exact} if exact else None)
-    text = (
-        "Correlation of the original fₙ with ΔFₙ over contacts. Bars: the range with any other "
-        "sampled network in place of the original."
-    )
-    return rendered([drawn], ("correlation",), heights=(380,)), text
+    return studied.correlations(rows, exact)
 
 
 DRAWN = {"eta": _indeterminacy, "extent": _extents, "correlation": _correlations}
-
-
-def _over(seeds):
-    return f"; means over {seeds} packings with their standard errors" if seeds > 1 else ""

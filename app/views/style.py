@@ -1,6 +1,6 @@
 """Colours and small helpers that the plots share."""
 
-from bokeh.models import HoverTool
+from bokeh.models import CustomJS, HoverTool, Title
 from bokeh.plotting import figure
 
 # Blue and orange are told apart with every common colour blindness; the middle is grey, not white,
@@ -14,6 +14,7 @@ EXTENT = (
     ("#16407a", "#3c5a80", "#5f6f7d", "#7f8478", "#a39a6c", "#c6b159", "#e3c53f"),
     ("#2f62a6", "#4c6a94", "#66768a", "#858a7e", "#a9a070", "#cdb85e", "#fee838"),
 )
+STATES = "#3d8bd4"  # small dots, seen by day and by night
 EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
 PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
@@ -44,15 +45,23 @@ def palettes(dark):
     return {
         "mobilised": diverging,
         "extent": ramp(*EXTENT[dark]),
+        "load": ramp(*EXTENT[dark]),
+        "known": ramp(*EXTENT[dark]),
         "change": diverging,
         "sign": [BLUE, GREY, ORANGE],
         "neutral": NEUTRAL[dark],
+        "plots": {
+            **{"seen": DARK, "original": ORIGINAL, "now": DOT, "states": STATES},
+            **dict(zip(("eta1", "eta2", "eta3"), SERIES, strict=True)),
+        },
         "scene": {
             "disks": disks,
             "edge": EDGE,
             "strong": "#ffffff" if dark else "#101720",
             "loose": "#ff5ca8" if dark else DOT,
             "selected": "#ff5ca8" if dark else DOT,
+            "known": "#4dd0b5" if dark else "#00695c",
+            "halo": "rgba(20, 24, 30, 0.8)" if dark else "rgba(255, 255, 255, 0.85)",
         },
     }
 
@@ -85,14 +94,23 @@ def hover(renderers, *rows, **options):
     return HoverTool(renderers=renderers, tooltips=list(rows), **options)
 
 
-def quiet_legend(fig, location):
-    """A small horizontal legend without a frame."""
-    fig.legend.update(
-        location=location,
-        orientation="horizontal",
-        label_text_font_size="11px",
-        border_line_alpha=0,
-        background_fill_alpha=0,
-        padding=2,
-        margin=4,
-    )
+def corner(fig, word):
+    """Say in a plot's upper right corner whether it shows exact, seen or measured values."""
+    look = {"text_font_size": "11px", "text_font_style": "italic", "text_color": "#808080"}
+    fig.add_layout(Title(text=word, align="right", **look), "above")
+
+
+def legend_above(fig, columns=4):
+    """A small legend above the plot, where no curve strikes it through."""
+    legend = fig.legend[0]
+    fig.center.remove(legend)
+    legend.update(
+        orientation="horizontal", ncols=columns, location="left", label_text_font_size="11px",
+        border_line_alpha=0, background_fill_alpha=0, padding=0, margin=2, spacing=8,
+        glyph_width=16, glyph_height=14, label_height=14, label_standoff=3,
+    )  # fmt: skip
+    fig.add_layout(legend, "above")
+    # Outside the plot Bokeh draws a legend's marks but once, before there may be any data.
+    again = CustomJS(args={"legend": legend}, code="setTimeout(() => legend.change.emit(), 50)")
+    for source in {renderer.data_source for item in legend.items for renderer in item.renderers}:
+        source.js_on_change("data", again)

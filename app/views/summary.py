@@ -1,29 +1,56 @@
 """Numbers of the walk on screen, and what was left out or went wrong on the way."""
 
-import panel as pn
+from .hints import term
+from .parts import of_replay
 
-TILE = '<div class="tile" title="{title}"><div class="name">{name}</div><div>{value}</div></div>'
+TILE = """<div class="tile" tabindex="0" data-term="{term}"><div class="name">{name}</div>
+<div>{value}</div></div>"""
 STYLE = """
-.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(52px, 1fr)); gap: 5px;
+.tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(114px, 1fr)); gap: 5px;
   margin-top: 6px; }
 .tile { padding: 4px 6px 3px; border-radius: 6px; background: rgba(128, 128, 128, 0.1);
-  font-variant-numeric: tabular-nums; font-size: 13.5px; line-height: 18px; }
-.tile .name { font-size: 11px; line-height: 13px; opacity: 0.75; }
+  font-variant-numeric: tabular-nums; font-size: 13.5px; cursor: help; line-height: 18px; }
+.tile .name { font-size: 11px; line-height: 13px; opacity: 0.85; white-space: nowrap; }
+.tile:focus-visible { outline: 2px solid #e8710a; }
+.flag { margin: 6px 0 0; padding: 5px 9px; border-radius: 6px; font-size: 12.5px;
+  background: #7a4a00; color: #ffffff; }
 .rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
+.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
+.term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
 """
 
+# Words and symbol, name among the summary's numbers, form, and key of the glossary.
 TILES = (
-    ("N", "n", "d", "number of disks"),
-    ("φ", "packing_fraction", ".4f", "packing fraction, rattlers included"),
-    ("z", "coordination", ".3f", "mean coordination number of the backbone"),
-    ("h", "dimension", "d", "dimension of the set of admissible networks"),
-    ("η1", "eta1", ".4f", "mean spread of a contact force over mean force"),
-    ("η2", "eta2", ".4f", "distance of two states over the mean state"),
-    ("0.15 η3", "scaled_eta3", ".4f", "mean interval over mean force, times 0.15"),
-    ("accepted", "acceptance", ".0%", "accepted states per attempt"),
-    ("R̂", "worst_r_hat", ".3f", "split R̂ of the component that mixes worst: 1 where chains agree"),
-    ("ESS", "least_bulk_size", ".0f", "effective sample size of the component that mixes worst"),
+    ("disks N", "n", "d", "n"),
+    ("covered φ", "packing_fraction", ".4f", "phi"),
+    ("contacts per grain z", "coordination", ".3f", "z"),
+    ("free dimensions h", "dimension", "d", "h"),
+    ("spread η1", "eta1", ".4f", "eta1"),
+    ("distance η2", "eta2", ".4f", "eta2"),
+    ("intervals 0.15 η3", "scaled_eta3", ".4f", "eta3"),
+    ("accepted", "acceptance", ".0%", "accepted"),
+    ("mixing R̂", "worst_r_hat", ".3f", "r_hat"),
+    ("effective size", "least_bulk_size", ".0f", "ess"),
 )
+
+# Beyond these, numbers from a sample are flagged: chains do not agree, or too few states count.
+MOST_R_HAT, LEAST_SIZE = 1.1, 100
+FLAG = '<div class="flag" role="note">⚠ {}</div>'
+
+
+def doubts(summary):
+    """Sentences on what is not good enough to be relied on."""
+    r_hat, size = summary.get("worst_r_hat"), summary.get("least_bulk_size")
+    if r_hat is not None and r_hat > MOST_R_HAT:
+        yield (
+            f"The chains have not mixed: R̂ = {r_hat:.2f} for the worst component, more than "
+            f"{MOST_R_HAT:g}. Ask for more states before relying on these numbers."
+        )
+    if size is not None and size < LEAST_SIZE:
+        yield (
+            f"The worst component is worth {size:.0f} independent states only, fewer than "
+            f"{LEAST_SIZE}: its errors are large. Ask for more states."
+        )
 
 
 def numbers(summary):
@@ -33,51 +60,47 @@ def numbers(summary):
         values["acceptance"] = None  # nothing was tried
     texts = {key: _text(values[key], form) for _, key, form, _ in TILES if key in values}
     tiles = "".join(
-        TILE.format(name=name, value=texts[key], title=title)
-        for name, key, _, title in TILES
+        TILE.format(name=name, value=texts[key], term=term)
+        for name, key, _, term in TILES
         if key in texts
     )
-    return f'<div class="tiles">{tiles}</div><div class="rest">{left_out(summary)}</div>'
+    flags = "".join(map(FLAG.format, doubts(summary)))
+    return f'<div class="tiles">{tiles}</div>{flags}<div class="rest">{left_out(summary)}</div>'
 
 
 def _text(value, form):
     return "–" if value is None else format(value, form)
 
 
+# Number of the summary → key of the glossary, and words.
 LEFT_OUT = {
-    "rattlers": "rattlers",
-    "unloaded_contacts": "unloaded contacts",
-    "tangential_unknowns": "tangential unknowns",
-    "skipped": "states without relaxation",
-    "held": "components that cannot vary",
-    "dropped": "states on the way to the sample",
+    "rattlers": ("rattler", "loose disks"),
+    "unloaded_contacts": ("unloaded", "contacts without force"),
+    "tangential_unknowns": ("no_friction", "forces along contacts"),
+    "skipped": ("determined", "states that could only be the same"),
+    "held": ("held_components", "forces that cannot vary"),
+    "dropped": ("dropped", "states on the way to the sample"),
 }
 
 
 def left_out(summary):
-    """One line on work that was skipped and attempts that failed."""
-    counts = [f"{summary[key]} {words}" for key, words in LEFT_OUT.items() if summary.get(key)]
-    line = f"Left out: {', '.join(counts) or 'nothing'}."
+    """One line on work that was skipped and attempts that failed, as HTML."""
+    counts = [
+        f"{summary[key]} {term(key_of_term, words)}"
+        for key, (key_of_term, words) in LEFT_OUT.items()
+        if summary.get(key)
+    ]
+    line = f"Not counted: {', '.join(counts) or 'nothing'}."
     if summary.get("rejected") or summary.get("unconverged"):
-        line += f" Failed: {summary['rejected']} rejected, {summary['unconverged']} unconverged."
+        line += (
+            f" {term('failed', 'Failed attempts')}: {summary['rejected']} not in balance, "
+            f"{summary['unconverged']} not finished."
+        )
     if summary["kept"] < summary["states"]:
         line += f" Shown: {summary['kept']} evenly spaced of {summary['states']} states."
     return line
 
 
-class SummaryView:
+def tiles(state):
     """The numbers of the replay on screen."""
-
-    def __init__(self, state):
-        self.state = state
-        self.pane = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
-        state.param.watch(self._show, "replay")
-        self._show()
-
-    def panel(self):
-        """The tiles."""
-        return self.pane
-
-    def _show(self, *events):
-        replay = self.state.replay
-        self.pane.object = numbers(replay.summary) if replay is not None else ""
+    return of_replay(state, numbers, STYLE, margin=(0, 10))

@@ -7,9 +7,10 @@ import panel_material_ui as pmui
 
 from granforce.records import InputError, friction, positive
 
-from .. import uploads
+from .. import photoelastic, uploads
 from ..limits import LIMITS
 from ..selection import Selection
+from . import photoelastic as measured
 from .dropper import Dropper
 from .parts import note
 from .progress import Progress
@@ -19,7 +20,10 @@ HELP = """
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
 contacts; <b>tables</b> (CSV): grains with columns x, y, r, and, if there are any, contacts with
-columns i, j and fn, ft. The files are read in memory; only the packing is kept, in the cache.
+columns i, j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
+y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), for which the nearest forces in
+balance are found. The files are read in memory; only a packing is kept, in the cache; a frame is
+not.
 """
 REPORT = """
 <table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
@@ -48,10 +52,12 @@ class View:
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
         self.box = pmui.TextInput(label="Box L_x, L_y", placeholder="open", **SMALL)
         self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
+        self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
         self.waiting = pmui.Alert(severity="info", visible=False, sizing_mode="stretch_width")
         self.report = note()
+        self.frame = pn.Column(sizing_mode="stretch_width")
         self.read.on_click(lambda event: self._read())
         self.task.param.watch(lambda event: self._refuse(event.new), "message")
         self._ask()
@@ -60,11 +66,15 @@ class View:
         """Where to drop, what is asked, and what came."""
         return pn.Column(
             self.dropper,
-            pn.FlexBox(self.mu, self.box, self.pressure, self.read, sizing_mode="stretch_width"),
+            pn.FlexBox(
+                *(self.mu, self.box, self.pressure, self.reverse, self.read),
+                sizing_mode="stretch_width",
+            ),
             Progress(self.task),
             self.error,
             self.waiting,
             self.report,
+            self.frame,
             note(HELP),
             sizing_mode="stretch_width",
         )
@@ -72,12 +82,14 @@ class View:
     def _ask(self):
         """Show the fields that the files at hand need."""
         kind = uploads.family(self.files) if self.files else None
-        self.mu.visible = kind in ("lammps", "table")
+        self.mu.visible = kind in ("lammps", "table", "pegs")
+        self.reverse.visible = kind == "pegs"
         self.box.visible = self.pressure.visible = kind == "table"
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
 
     def _dropped(self, new):
         self._refuse("")
+        self._clear()  # what was dropped before
         try:
             self.files = uploads.added(self.files, new)
         except InputError as error:
@@ -99,11 +111,17 @@ class View:
         except InputError as error:
             self._refuse(str(error))
             return
+        if uploads.family(self.files) == "pegs":
+            self._clear()
+            self.task.start(photoelastic.infer(self.files, **options), self._compare)
+            return
         self.task.start(uploads.bring(self.state.library, self.files, **options), self._show)
 
     def _options(self):
         kind = uploads.family(self.files)
         options = {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
+        if kind == "pegs":
+            options["reverse"] = self.reverse.value
         if kind == "table":
             sides = (self.box.value_input or self.box.value).replace(",", " ").split()
             if len(sides) not in (0, 2):
@@ -118,6 +136,14 @@ class View:
         self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
         mu = brought.params["mu"]
         self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
+
+    def _compare(self, frame):
+        """Measured beside inferred forces; the frame itself stays here, as it has no pressure."""
+        self.frame[:] = measured.panel(frame)
+
+    def _clear(self):
+        self.report.object = ""
+        self.frame[:] = []
 
     def _refuse(self, line):
         self.error.param.update(title=line, visible=bool(line))

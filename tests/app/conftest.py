@@ -3,11 +3,14 @@
 import time
 
 import pytest
-from serving import CHROMIUM, FLAGS
+from serving import CHROMIUM, FLAGS, painted, serve
 from small_store import cell_parameters
 
-from granforce import study
-from granforce.store import open_store
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.store import open_store
+
+PATIENCE = 60_000  # ms, on a busy machine
 
 
 @pytest.fixture(scope="session")
@@ -16,8 +19,15 @@ def shipped(tmp_path_factory):
     path = tmp_path_factory.mktemp("shipped") / "start.zarr"
     store = open_store(path)
     for mu in (0, 0.1, 1):
-        study.get_walk(store, cell_parameters(mu), dtypes={"states": "float32"})
+        study.get(store, kinds.WALK, cell_parameters(mu), dtypes={"states": "float32"})
     return path
+
+
+@pytest.fixture(scope="module")
+def address(shipped, tmp_path_factory):
+    """The app, served with stores of its own, once for each module."""
+    with serve(tmp_path_factory.mktemp("served"), GRANFORCE_DATA=str(shipped)) as (url, _):
+        yield url
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +36,45 @@ def chromium():
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as context:
         browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        browser.fresh_context = browser.new_context  # of somebody who was never here
+        browser.new_context = lambda **options: _returning(browser, **options)
+        browser.new_page = lambda **options: browser.new_context(**options).new_page()
         yield browser
         browser.close()
+
+
+def _returning(browser, **options):
+    """A context of somebody who knows the page: no tour, and nothing moves by itself."""
+    context = browser.fresh_context(**{"reduced_motion": "reduce"} | options)
+    context.add_init_script("try { localStorage.setItem('granforce.tour', 'seen') } catch {}")
+    return context
+
+
+@pytest.fixture
+def visit(chromium, address):
+    """visit(query, width, height, …): a page with its tabs; at the end no error was told.
+
+    first: whether it is of somebody who was never here; further options are of its context.
+    """
+    errors, contexts = [], []
+
+    def visit(query="", width=1280, height=900, first=False, **options):
+        begin = chromium.fresh_context if first else chromium.new_context
+        context = begin(viewport={"width": width, "height": height}, **options)
+        contexts.append(context)
+        context.set_default_timeout(PATIENCE)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("console", lambda told: told.type == "error" and errors.append(told.text))
+        page.goto(address + query)
+        painted(page, PATIENCE)
+        page.get_by_role("tab").first.wait_for()
+        return page
+
+    yield visit
+    for context in contexts:
+        context.close()
+    assert not [error for error in errors if "favicon" not in error]
 
 
 @pytest.fixture

@@ -4,8 +4,10 @@
 
 Parts: opening (first picture, changes of μ, bytes), playing (painted frames a second of 400 disks),
 crowd (of 10,000 disks; computed first if $GRANFORCE_CACHE has none), stalls (of the server's event
-loop while pages and tabs open and while it computes), memory (over open–close cycles), visitors
-(ten at once). Each starts a server of its own on the shipped store.
+loop while pages and tabs open and while it computes), watching (first moving picture, pictures and
+states a second, what watching costs), dragging (of a force, and of the point in force space: frames
+a second, hand to picture), memory (over open–close cycles), visitors (ten at once).
+Each starts a server of its own on the shipped store.
 """
 
 import os
@@ -17,7 +19,7 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, CLOSED, FLAGS, painted, scene, serve  # noqa: E402
+from serving import CHROMIUM, CLOSED, FLAGS, MODEL, painted, scene, serve  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
 
@@ -145,10 +147,8 @@ def stalls(stage):
     print(f"longest stall while tabs are opened: {_longest(log)}")
     page.locator("input.typed").fill("0.17")
     page.locator("input.typed").press("Enter")
-    page.get_by_role("button", name="Compute μ").click()
-    page.get_by_text("μ = 0.17, N = 400").wait_for(timeout=300_000)
+    page.get_by_text("μ = 0.17, N = 400").first.wait_for(timeout=300_000)
     print(f"longest stall while packing and walk are computed: {_longest(log)}")
-    page.get_by_role("button", name="Compute exact intervals").click()
     page.get_by_role("button", name="Compute exact intervals").wait_for(
         state="hidden", timeout=120_000
     )
@@ -162,6 +162,181 @@ def _longest(log):
     log.write_text("")
     gap, spent = max(tuple(map(float, line.split()[1:])) for line in lines)
     return f"{1000 * gap:.0f} ms ({1000 * spent:.0f} ms of them the server's own)"
+
+
+LOG = """e => {
+    const {hand} = e.scene, {live} = hand.player, {hear} = Object.getPrototypeOf(live)
+    window.log = {begin: performance.now(), pictures: [], states: []}
+    live.hear = (news) => {
+        const now = performance.now() - log.begin, {states} = news
+        const found = states && (states.number ?? states.get("number"))
+        if (found) log.states.push([now, found.length, found[found.length - 1]])
+        else requestAnimationFrame(() => log.pictures.push(performance.now() - log.begin))
+        hear.call(live, news)
+    }
+}"""
+
+
+def watching(stage):
+    """A new μ at 400 disks: when it is seen to move, pictures and states a second, bytes."""
+    page, _ = stage.open()
+    page.wait_for_timeout(4000)
+    for mu in ("0.17", "0.18"):
+        page.locator("input.typed").fill(mu)
+        page.locator(".scene").evaluate(LOG)
+        before = page.bytes
+        page.locator("input.typed").press("Enter")
+        page.wait_for_function(
+            "([e, mu]) => e.scene.geometry.mu === mu && !e.scene.hand.player.grows",
+            arg=[page.locator(".scene").element_handle(), float(mu)],
+            timeout=300_000,
+        )
+        log = page.evaluate("log")
+        pictures, states = log["pictures"], log["states"]
+        seconds = (pictures[-1] - pictures[0]) / 1000
+        walked = (states[-1][0] - states[0][0]) / 1000
+        print(
+            f"μ = {mu}: first moving picture after {pictures[0] / 1000:.2f} s, "
+            f"{(len(pictures) - 1) / seconds:.0f} pictures a second for {seconds:.1f} s, "
+            f"{sum(count for _, count, _ in states) / walked:.0f} states a second seen of "
+            f"{states[-1][2] / walked:.0f} computed, "
+            f"{(page.bytes - before) / 1e6:.1f} MB in all"
+        )
+    page.context.close()
+    _watch_many(stage)
+    _cost_of_watching()
+
+
+def _watch_many(stage, disks=5000, seconds=20):
+    """Pictures a second while so many disks are compressed, from the first on."""
+    page, _ = stage.open()
+    page.wait_for_timeout(3000)
+    page.locator(".scene").evaluate(LOG)
+    page.get_by_label("Disks N").first.fill(str(disks))
+    page.get_by_label("Disks N").first.press("Enter")
+    page.wait_for_function("() => log.pictures.length > 0", timeout=120_000)
+    page.wait_for_timeout(1000 * seconds)
+    pictures = page.evaluate("log.pictures")
+    spent = (pictures[-1] - pictures[0]) / 1000
+    print(
+        f"{disks} disks: first moving picture after {pictures[0] / 1000:.2f} s, "
+        f"{(len(pictures) - 1) / spent:.0f} pictures a second for {spent:.1f} s"
+    )
+    page.get_by_role("button", name="Cancel").first.click()
+    page.context.close()
+
+
+def _cost_of_watching():
+    """How much longer compaction and walk take while they are watched, in this process."""
+    import granforce as gf
+
+    def spent(work, rounds=3):
+        times = []
+        for _ in range(rounds):
+            begin = time.perf_counter()
+            done = work()
+            times.append(time.perf_counter() - begin)
+        return min(times), done
+
+    seen = []
+    gf.pack(12, 0.5, 0, watch=seen.append)
+    alone, packing = spent(lambda: gf.pack(400, 0.1, 1))
+    watched, _ = spent(lambda: gf.pack(400, 0.1, 1, watch=seen.append))
+    print(f"compaction of 400 disks: {alone:.2f} s, watched {watched:.2f} s")
+    S = gf.ensemble(packing)
+    gf.walk(S, 2, 0)
+    alone, _ = spent(lambda: gf.walk(S, 100, 0))
+    watched, _ = spent(lambda: gf.walk(S, 100, 0, watch=seen.append))
+    print(f"100 states: {alone:.2f} s, watched {watched:.2f} s")
+
+
+GRABBED = """e => {
+    const {hand} = e.scene, {paint} = hand.player
+    window.grabbed = {asked: 0, gaps: []}
+    for (const held of [hand, hand.spot]) {
+        const {set} = held
+        held.set = function (value) { grabbed.asked ||= performance.now(); set.call(held, value) }
+    }
+    hand.player.paint = function () {
+        paint.call(hand.player)
+        if (grabbed.asked) grabbed.gaps.push(performance.now() - grabbed.asked)
+        grabbed.asked = 0
+    }
+}"""
+
+
+def dragging(stage):
+    """A force in the hand at 400 disks: time to its rail, frames a second, hand to picture."""
+    page, _ = stage.open()
+    page.wait_for_timeout(4000)
+    x, y = page.locator(".scene").evaluate(
+        """e => {
+            const {scene} = e, {geometry: g, size} = scene, box = e.getBoundingClientRect()
+            const middle = (k) => scene.toPixel((g.x0[k] + g.x1[k]) / 2, (g.y0[k] + g.y1[k]) / 2)
+            const found = Array.from(g.contact.keys()).filter((k) => scene.width[k] > 0.4 &&
+                middle(k).every((v) => v > 0.4 * size && v < 0.6 * size))
+            const [px, py] = middle(found[0])
+            return [box.x + px, box.y + py]
+        }"""
+    )
+    page.locator(".scene").evaluate(GRABBED)
+    for visit in ("first", "second"):
+        _drag(page, x, y, "scene.hand.rail", f"rail of the {visit} contact")
+    page.get_by_role("tab", name="Force space").click()
+    page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 4", timeout=120_000)
+    page.wait_for_timeout(1500)
+    for visit in ("first", "second"):
+        x, y = page.evaluate(HERE)
+        _drag(page, x, y, "scene.hand.spot.fan", f"networks around the point, the {visit} time")
+
+
+# Where the point in force space is on the page.
+HERE = """() => {
+    const page = Bokeh.documents[0], here = page.get_model_by_name("here")
+    const view = page.views_manager.find_one(page.get_model_by_name("path_figure"))
+    const box = view.canvas_view.el.getBoundingClientRect(), {x_scale, y_scale} = view.frame
+    return [box.x + x_scale.compute(here.get_column("x")[0]),
+            box.y + y_scale.compute(here.get_column("y")[0])]
+}"""
+
+
+# A hand that moves once a frame, as a mouse does; moved from outside, it would be the slower one.
+TO_AND_FRO = """(e, [x, y]) => new Promise((done) => {
+    const {scene} = e, before = scene.painted, begin = performance.now()
+    let k = 0
+    const step = () => {
+        if (++k > 120) return done(1000 * (scene.painted - before) / (performance.now() - begin))
+        e.dispatchEvent(new PointerEvent("pointermove", {
+            pointerId: 1, pointerType: "mouse", buttons: 1, bubbles: true, composed: true,
+            clientX: x, clientY: y - 40 * Math.abs((k % 40) - 20) / 20,
+        }))
+        requestAnimationFrame(step)
+    }
+    step()
+})"""
+
+
+def _drag(page, x, y, ready, words):
+    """Take what is at a point, wait for its networks, and drag it to and fro."""
+    begin = time.perf_counter()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 6)
+    page.wait_for_function(
+        f"e => {{ const {{scene}} = e; return {ready} !== null }}",
+        arg=page.locator(".scene").element_handle(),
+        timeout=120_000,
+    )
+    print(f"{words}: {time.perf_counter() - begin:.2f} s")
+
+    rate = page.locator(".scene").evaluate(TO_AND_FRO, [x, y - 6])
+    gaps = page.evaluate("grabbed.gaps.splice(0)")
+    print(
+        f"dragging: {rate:.0f} painted frames a second, longest from hand to picture "
+        f"{max(gaps):.0f} ms"
+    )
+    page.mouse.up()
+    page.wait_for_timeout(1500)
 
 
 def memory(stage, cycles=50):
@@ -184,7 +359,6 @@ def visitors(stage, count=10):
     for page, mu in zip(pages, ("0.15", "0.25"), strict=False):
         page.locator("input.typed").fill(mu)
         page.locator("input.typed").press("Enter")
-        page.get_by_role("button", name="Compute μ").click()
     time.sleep(1)
     _longest(stage.folder / "stalls")
     spent = []
@@ -203,7 +377,9 @@ def visitors(stage, count=10):
     )
 
 
-PARTS = {f.__name__: f for f in (opening, playing, crowd, stalls, memory, visitors)}
+PARTS = {
+    f.__name__: f for f in (opening, playing, crowd, watching, dragging, stalls, memory, visitors)
+}
 
 
 def main(names):

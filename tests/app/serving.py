@@ -17,33 +17,42 @@ FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
 # Closed pages are soon given up, but not too soon for a busy machine: a session given
 # up before its page has connected comes back without what panel serve knows of it.
 CLOSED = ("--unused-session-lifetime", "10000", "--check-unused-sessions", "500")
-MODEL = "Bokeh.documents[0].get_model_by_name"
+# The newest model of a name, as the page itself looks it up: what moves to another place is made
+# anew there, and for a moment there are two.
+MODEL = (
+    "(name => [...Bokeh.documents[0]._all_models.values()]"
+    ".findLast(model => model.name === name) ?? null)"
+)
 
 
 @contextmanager
-def serve(folder, *options, **variables):
-    """Address and process of the app on a free port; its cache and log are in folder."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+def serve(folder, *options, port=None, **variables):
+    """Address and process of the app on a free port or this one; cache and log are in folder."""
+    port = port or free_port()
     env = os.environ | variables
     env.setdefault("GRANFORCE_CACHE", str(folder / "cache"))
     # The program, not `python -m panel`, which would find modules in the working folder too.
     panel = Path(sys.executable).with_name("panel")
     command = [str(panel), "serve", "app", "--port", str(port), *options]
-    with open(folder / "log", "w") as log:
+    with open(folder / "log", "a") as log:
         server = subprocess.Popen(command, cwd=ROOT, env=env, stdout=log, stderr=log)
     try:
-        _wait_until_served(
-            f"http://localhost:{port}/static/js/bokeh.min.js", server, folder / "log"
-        )
+        wait_until_served(f"http://localhost:{port}/static/js/bokeh.min.js", server, folder / "log")
         yield f"http://localhost:{port}/app", server
     finally:
         server.terminate()
         server.wait(20)
 
 
-def _wait_until_served(url, server, log):
+def free_port():
+    """A port that nobody listens on just now."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+def wait_until_served(url, server, log):
+    """Wait until an address answers; RuntimeError with the log where the server ends."""
     for _ in range(300):
         if server.poll() is not None:
             raise RuntimeError(f"the server ended: {log.read_text()}")
@@ -61,6 +70,22 @@ def painted(page, timeout=30_000):
     scene = page.locator(".scene").element_handle()
     page.wait_for_function("scene => scene.scene.painted > 0", arg=scene, timeout=timeout)
     return page.evaluate("scene => scene.scene.painted", scene)
+
+
+def laid_out(page, name, timeout=60_000):
+    """Wait until a figure has its place on the page."""
+    page.wait_for_function(
+        f"""() => {{
+            const fig = {MODEL}("{name}")
+            return fig && !fig.properties.inner_width.is_unset && fig.inner_width > 50
+        }}""",
+        timeout=timeout,
+    )
+
+
+def bars_drawn(page):
+    """Wait until the intervals of the contacts are there."""
+    page.wait_for_function(f"() => {MODEL}('bars')?.get_length() > 0")
 
 
 def column(page, source, name):

@@ -1,6 +1,8 @@
 """Data, state, links and tasks of the app, without a browser."""
 
 import gc
+import re
+import shutil
 import sys
 import threading
 import time
@@ -9,8 +11,10 @@ import numpy as np
 import pytest
 from small_store import DISKS, KEPT, STATES, cell_parameters
 
-from granforce import measures, study
+import granforce as gf
+from granforce import measures
 from granforce.records import Cancelled, InputError
+from granforce.study import kinds
 
 
 def cell_at(library, mu):
@@ -96,13 +100,15 @@ def test_frames_begin_with_the_original_and_balance(library):
     assert np.all(replay.normal[1:] <= replay.high[:, 0] + 1e-6)
 
 
-def test_replayed_eta3_is_that_of_measures(library):
-    """What the player accumulates, min and max of all kept states, gives η3 of the kept ones."""
+def test_replayed_measures_are_those_of_the_states_kept(library):
     replay = replay_at(library, 0.1)
     kept = np.stack([replay.normal, replay.tangential], axis=2)[1:].astype(float)
-    growing = measures.growing_eta3(kept)
-    assert np.all(np.diff(growing) >= -1e-9)
-    assert growing[-1] <= replay.summary["eta3"] + 1e-6
+    assert replay.growth["eta1"][-1] == pytest.approx(measures.eta1(kept))
+    assert replay.growth["eta2"][-1] == pytest.approx(measures.eta2(kept))
+    assert np.isnan(replay.growth["eta3"][0]) and np.all(
+        np.diff(replay.growth["eta3"][1:]) >= -1e-6
+    )
+    assert replay.growth["eta3"][-1] <= replay.summary["eta3"] + 1e-6
 
 
 def test_mu_zero_is_one_point_without_relaxation(library):
@@ -174,6 +180,25 @@ def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
     assert read == made and view == {"tab": "perturb"}
 
 
+def test_older_links_to_a_renamed_tab_open_it():
+    from app.page import TABS
+    from app.state import read_view
+
+    (tab,) = read_view({"tab": "projection"}).values()
+    assert TABS[tab] == "Force space"
+
+
+def test_a_button_names_all_that_is_to_be_computed_anew():
+    from app.selection import differing, select
+
+    shown = select(30, 0.1, 1, states=30)
+    assert differing(select(30, 0.4, 1, states=30), shown) == "μ = 0.4"
+    assert differing(select(40, 0.1, 2, states=31), shown) == "N = 40, seed 2, 31 states"
+    assert differing(select(30, 0.1, 1, states=30, kind="uniform"), shown) == "states uniform in S"
+    assert differing(select(30, 0.1, 1, 0.3, states=30), shown) == "packed at μ = 0.3"
+    assert differing(shown, None) == "μ = 0.1"
+
+
 def test_links_to_imported_packings_name_their_hash():
     from app.selection import Selection, link, read_link
 
@@ -222,18 +247,19 @@ def test_views_that_make_no_sense_are_left_out(library, wait_for):
 def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
     """The command line reads the words back as the parameters of the cell."""
     from app.selection import command, select
-    from granforce import cli, commands
+    from granforce.cli import commands
+    from granforce.cli import parser as cli
 
     wanted = select(31, 0.25, 3, packed, relax="accelerated", states=9, seed=2)
     wanted = wanted._replace(packing=wanted.packing | {"sweeps": 60})
     found = []
 
-    def note(store, parameters, **options):
+    def note(store, kind, parameters, **options):
         found.append(parameters)
         raise Cancelled
 
-    monkeypatch.setattr(commands.study, "get_packing", lambda *given, **options: (None, True))
-    monkeypatch.setattr(commands.study, "get_walk", note)
+    monkeypatch.setattr(commands.kinds, "get_packing", lambda *given, **options: (None, True))
+    monkeypatch.setattr(commands.study, "get", note)
     assert cli.main(command(wanted).split()[1:]) == 130
     expected = wanted.parameters()
     assert found[0] | {"keep": None} == expected | {"keep": None}
@@ -259,7 +285,15 @@ def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatc
     from app import state as module
 
     asked = []
-    monkeypatch.setattr(module, "Job", lambda work, pool: asked.append(work(None).cell.mu))
+
+    class Done:
+        def __init__(self, work, pool):
+            asked.append(work(None).cell.mu)
+
+        def cancel(self):
+            pass
+
+    monkeypatch.setattr(module, "Job", Done)
     state.choose(mu=1)
     wait_for(state)
     assert asked == []  # 0.1 is in memory, and 0 is no neighbour
@@ -282,9 +316,38 @@ def test_states_in_no_store_are_missing_until_computed(state, wait_for):
     state.compute()
     wait_for(state)
     assert state.message == "" and state.cell.mu == 0.3 and not state.missing
-    assert "cache" in state.source and len(state.replay.number) == 9
+    assert "computed here" in state.source and len(state.replay.number) == 9
     assert [cell.mu for cell in state.cells()] == [0.3]
     assert len(state.catalogue) == 4
+
+
+def test_a_series_without_states_at_a_friction_asks_for_them(state, wait_for):
+    """What is shown at a μ is of that μ: another series or another μ is not put in its place."""
+    before = state.replay
+    state.choose(mu=0.3)
+    assert state.missing and state.replay is before and state.selection.mu == 0.3
+    assert state.selection == state.cell.selection.at(0.3) and not state.busy
+    state.choose(mu=1)
+    wait_for(state)
+    assert not state.missing and state.cell.mu == 1
+
+
+def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_for):
+    from app.views.intervals import View
+
+    state.choose(mu=1)
+    wait_for(state)
+    view = View(state)
+    assert view.exact.visible
+    state.compute_exact()
+    assert not view.exact.visible
+    state.cancel()
+    wait_for(state)
+    assert view.exact.visible
+    state.knowledge.hold(3, float(state.replay.normal[0, 3]))  # which needs them
+    assert state.knowledge.task.running and not view.exact.visible
+    wait_for(state)
+    assert state.exact is not None and not view.exact.visible
 
 
 def test_a_link_to_missing_states_computes_them(library, wait_for):
@@ -298,9 +361,9 @@ def test_a_link_to_missing_states_computes_them(library, wait_for):
 def test_a_shipped_packing_is_not_made_again(state, wait_for):
     state.ask(small(0.1, 5), at_once=True)
     wait_for(state)
-    packing = study.packing_parameters(DISKS, 0.1, 1)
-    copied, cached = study.get_packing(state.library.cache, packing)
-    shipped, _ = study.get_packing(state.library.shipped, packing)
+    packing = kinds.PACKING.parameters(DISKS, 0.1, 1)
+    copied, cached = kinds.get_packing(state.library.cache, packing)
+    shipped, _ = kinds.get_packing(state.library.shipped, packing)
     assert cached and np.array_equal(copied.x, shipped.x)
 
 
@@ -337,7 +400,8 @@ def test_closing_the_page_ends_its_computation(state):
     assert job.wait(30) and job.result is None and job.error == ""
 
 
-def test_progress_grows_and_estimates_the_rest(state, wait_for):
+def test_progress_grows_and_estimates_the_rest(state, wait_for, monkeypatch):
+    monkeypatch.setattr("app.state.EXACT_FOLLOW", 0)  # of the states alone
     from app.selection import select
 
     fractions = []
@@ -359,12 +423,60 @@ def test_sizes_beyond_the_limits_are_refused(state, monkeypatch):
         assert not state.busy and word in state.message and "\n" not in state.message
 
 
+BEYOND = {
+    "n": ("20001", "1e9", "9" * 4000, "9" * 5000, "-" + "9" * 4000),
+    "states": ("20001", "0", "-1", "9" * 4000),
+    "walkseed": ("-1", "9" * 4000),
+    "seed": ("-1", str(2**53), "9" * 4000),
+    "mu": ("1001", "1e308", "1e999", "nan", "x" * 9000),
+    "packed": ("1001", "1e308", "-inf", "nan"),
+    "sweeps": ("0", "1001", "1000000000", "9" * 4000),
+    "dt": ("0", "0.2", "1e-4", "1e308", "inf", "nan", "-0.01"),
+    "box_mass": ("5", "1e5", "1e308", "nan"),
+    "pressure": ("0", "1e-300", "1e300", "inf", "nan"),
+    "radii": (
+        "uniform:1e-9,1", "uniform:1e308,1e308", "uniform:nan,1", "uniform:1,2,3,", "uniform:",
+        "bidisperse:1,30,0.5", "bidisperse:-1,1,0.5", "x:" + "1," * 9000,
+    ),
+    "source": ("oracle", "x" * 9000),
+    "relax": ("9" * 4000,),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_links_beyond_the_limits_compute_nothing_and_say_so(state, name):
+    """Whatever a link asks for: one line, at most 300 characters, and what was there stays."""
+    from app.selection import read_link
+
+    before, selection = state.replay, state.selection
+    for value in BEYOND[name]:
+        given = {"mu": "0.2", "n": "30", "states": "5"} | {name: value}
+        try:
+            wanted, _ = read_link("&".join(f"{key}={text}" for key, text in given.items()))
+        except InputError as error:
+            line = str(error)
+        else:
+            state.ask(wanted, at_once=True)
+            line = state.message
+        assert line and "\n" not in line and len(line) <= 300, value[:20]
+        assert not state.busy and state.replay is before and state.selection is selection
+
+
+def test_all_that_a_link_may_name_is_limited():
+    """A new option of a packing needs a limit, too."""
+    from app.limits import NAMES
+    from app.selection import OPTIONS
+
+    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii"}
+
+
 def test_limits_are_read_and_wrong_ones_refused():
     from app.limits import Limits, read_limits
 
     assert read_limits("") == Limits()
     assert read_limits("n=500, states=20,upload=3,computations=1") == Limits(500, 20, 3, 1)
-    for text in ("n=0", "disks=4", "n=", "n=1e3"):
+    wrong = "n=0", "disks=4", "n=", "n=1e3", "n=²", f"n={'9' * 5000}", "computations=65", "9" * 5000
+    for text in wrong:
         with pytest.raises(InputError, match="GRANFORCE_LIMITS"):
             read_limits(text)
     with pytest.raises(InputError, match="N must lie between 1 and 500"):
@@ -372,6 +484,18 @@ def test_limits_are_read_and_wrong_ones_refused():
 
 
 # Tasks
+
+
+def once_both_are_there(begin, work):
+    """The work, begun for the first time when others have reached the barrier, too."""
+    met = []
+
+    def run(job):
+        if not met:
+            met.append(begin.wait(10))
+        return work(job)
+
+    return run
 
 
 def test_a_later_job_replaces_an_earlier_one(wait_for):
@@ -413,16 +537,31 @@ def test_a_job_that_waits_is_cancelled_at_once():
     assert first.wait(10) and Job(lambda job: None, pool).wait(10) and begun == []
 
 
+def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
+    from app.jobs import Job
+
+    begun = threading.Event()
+
+    def work(job):
+        begun.set()
+        return gf.pack(20_000, mu=0.5, seed=1)  # for minutes
+
+    job = Job(work)
+    assert begun.wait(10) and not job.wait(0.3)
+    job.cancel()
+    assert job.wait(60) and job.result is None and job.error == ""
+
+
 def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
     from app import compute
     from app.jobs import Job, Pool
     from app.selection import selected
 
-    made, walk, begin = [], study.walk, threading.Barrier(2)
-    monkeypatch.setattr(study, "walk", lambda *a, **k: made.append(1) or walk(*a, **k))
+    made, walk, begin = [], kinds.walk, threading.Barrier(2)
+    monkeypatch.setattr(kinds, "walk", lambda *a, **k: made.append(1) or walk(*a, **k))
     work = compute.states(library, selected("walk", cell_parameters(0.2)))
     pool = Pool(2, "test")
-    jobs = [Job(lambda job: begin.wait(10) >= 0 and work(job), pool) for _ in range(2)]
+    jobs = [Job(once_both_are_there(begin, work), pool) for _ in range(2)]
     assert all(job.wait(60) and job.error == "" for job in jobs)
     assert [job.result.cell.mu for job in jobs] == [0.2, 0.2] and made == [1]
 
@@ -432,12 +571,12 @@ def test_a_packing_that_two_pages_need_is_made_once(library, monkeypatch):
     from app.jobs import Job, Pool
     from app.selection import select
 
-    made, pack, begin = [], study.pack, threading.Barrier(2)
-    monkeypatch.setattr(study, "pack", lambda *a, **k: made.append(1) or pack(*a, **k))
+    made, pack, begin = [], kinds.pack, threading.Barrier(2)
+    monkeypatch.setattr(kinds, "pack", lambda *a, **k: made.append(1) or pack(*a, **k))
     pool, jobs = Pool(2, "test"), []
     for states in (3, 4):
         work = compute.states(library, select(DISKS, 0.2, 7, states=states))
-        jobs.append(Job(lambda job, work=work: begin.wait(10) >= 0 and work(job), pool))
+        jobs.append(Job(once_both_are_there(begin, work), pool))
     assert all(job.wait(60) and job.error == "" for job in jobs)
     assert [len(job.result.replay.number) for job in jobs] == [4, 5] and made == [1]
 
@@ -491,6 +630,9 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
     def work(job):
         job.begin("counting")
         job.tell(1, 4)
+        assert job.seconds_left is None  # too early to say
+        job._begun -= 400
+        job.tell(1, 4)
         told.set()
         while not job.cancelled():
             time.sleep(0.01)
@@ -499,7 +641,7 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
     assert told.wait(10)
     state.poll()
     assert progress.running and progress.fraction == 0.25
-    assert progress.words.startswith("counting — about ")
+    assert progress.words == "counting — about 20 min more"
     progress._handle_msg({"cancel": True})
     wait_for(state)
     assert not progress.running
@@ -512,6 +654,191 @@ def test_a_job_wakes_the_page_when_it_ends():
     task = Task(wake=lambda function: woken.set())
     task.start(lambda job: None)
     assert woken.wait(10)
+
+
+# Damaged stores
+
+
+def garble(store, name, array):
+    """Metadata of one array, or of all, that no longer are what they were."""
+    for metadata in (store.path / name).glob(f"{array}/zarr.json"):
+        metadata.write_text(metadata.read_text().replace('"codecs"', '"codices"'))
+
+
+@pytest.mark.parametrize("array", ["states", "*"])
+def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(
+    shipped, tmp_path, wait_for, array, caplog
+):
+    from app import distributions
+    from app.data import Library
+    from app.state import AppState
+
+    shutil.copytree(shipped, tmp_path / "shipped")
+    library = Library(tmp_path / "shipped", tmp_path / "cache")
+    best = cell_at(library, 0.1)
+    garble(library.shipped, best.name, array)
+    state = AppState(library)
+    with pytest.warns(UserWarning, match="damaged"):
+        wait_for(state)
+    assert f"{best.name} in" in state.message and "\n" not in state.message
+    assert state.cell is not None and state.cell.mu != 0.1
+    assert [cell.mu for cell in state.catalogue] == [0, 1]
+    if array == "*":
+        with pytest.raises(InputError, match=r"damaged; compute it anew"):
+            distributions.rows([best])
+    gc.collect()
+    assert not [told for told in caplog.records if told.name == "asyncio"]
+
+
+@pytest.mark.filterwarnings("ignore:entry walk")
+def test_a_damaged_entry_is_computed_anew(shipped, tmp_path, wait_for):
+    from app.data import Library
+    from app.state import AppState
+
+    for where in ("shipped", "cache"):
+        stores = {k: tmp_path / where / k for k in ("shipped", "cache")}
+        shutil.copytree(shipped, stores[where])
+        library = Library(**stores)
+        garble(getattr(library, where), cell_at(library, 1).name, "*")
+        state = AppState(library, query=f"mu=1&n={DISKS}&states={STATES}&relax=nearest")
+        wait_for(state)
+        assert state.cell.mu == 1 and state.cell.store is library.cache, where
+        assert [cell.mu for cell in state.catalogue] == [0, 0.1, 1]
+
+
+@pytest.mark.filterwarnings("ignore:entry packing")
+def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_path, wait_for):
+    from app.data import Library
+    from app.state import AppState
+
+    shutil.copytree(shipped, tmp_path / "shipped")
+    library = Library(tmp_path / "shipped", tmp_path / "cache")
+    for entry in library.shipped.find(kind="packing"):
+        garble(library.shipped, entry.name, "*")
+    assert library.expected_steps(DISKS, 0.1) is None
+    state = AppState(library)
+    wait_for(state)
+    assert "no store" in state.message and state.cell is None
+    state.ask(small(1, 4), at_once=True)
+    wait_for(state)
+    assert state.cell.mu == 1 and state.cell.store is library.cache and state.message == ""
+
+
+# Survival
+
+
+def next_on(pool, seconds=10):
+    """Whether the pool still runs what it is given."""
+    from app.jobs import Job
+
+    job = Job(lambda job: "done", pool)
+    return job.wait(seconds) and job.result == "done"
+
+
+def raising(error):
+    def fail(*anything):
+        raise error
+
+    return fail
+
+
+class Panic(BaseException):
+    """As compiled libraries raise it: no Exception."""
+
+
+@pytest.mark.parametrize(
+    "error", [NameError("partial"), SystemExit(3), KeyboardInterrupt(), Panic("two\nlines")]
+)
+def test_a_pool_survives_what_its_jobs_raise(error):
+    from app.jobs import Job, Pool
+
+    pool = Pool(1, "test")
+    job = Job(raising(error), pool)
+    assert job.wait(10) and type(error).__name__ in job.error and "\n" not in job.error
+    assert next_on(pool)
+
+
+def test_a_pool_survives_jobs_whose_end_fails():
+    from app.jobs import Job, Pool
+
+    pool = Pool(1, "test")
+    for _ in range(3):
+        job = Job(lambda job: "done", pool, raising(NameError("partial")))
+        assert job.wait(10) and job.result == "done"
+    release = threading.Event()
+    Job(lambda job: release.wait(10), pool)
+    waiting = Job(lambda job: None, pool, raising(NameError("partial")))
+    waiting.cancel()  # by the thread of the page, which goes on as well
+    release.set()
+    assert waiting.ended and next_on(pool)
+
+
+def test_a_pool_survives_what_is_no_job():
+    from app.jobs import Pool
+
+    pool = Pool(1, "test")
+    pool.submit(None)
+    assert next_on(pool)
+
+
+def test_a_pool_survives_pages_that_are_gone(library):
+    """All work of a page whose thread cannot be reached any more is ended, one after the other."""
+    from app.jobs import Pool
+    from app.state import AppState
+
+    pool, state = Pool(1, "test"), AppState(library, raising(RuntimeError("page destroyed")))
+    begun, tasks = threading.Event(), [state.task(pool) for _ in range(3)]
+
+    def work(job):
+        begun.set()
+        while not job.cancelled():
+            time.sleep(0.01)
+
+    for task in tasks:
+        task.start(work)
+    jobs = [task._job for task in tasks]
+    assert begun.wait(10)
+    state.close()
+    assert all(job.wait(10) for job in jobs) and next_on(pool)
+
+
+def test_nothing_begins_for_a_page_that_was_closed(state):
+    begun = []
+    state.close()
+    task = state.task()
+    task.start(begun.append)
+    state.reader.start(begun.append)
+    assert not task.running and not state.reader.running and begun == []
+
+
+def test_a_result_that_cannot_be_shown_is_told_in_one_line():
+    from app.jobs import Task
+
+    task = Task()
+    task.start(lambda job: 5, raising(KeyError("states\nand more")))
+    while task.running:
+        task.poll()
+    assert "KeyError" in task.message and "\n" not in task.message
+
+
+def test_who_waits_for_another_page_leaves_the_thread_to_others():
+    from app import compute
+    from app.jobs import Job, Pool
+
+    release, inside = threading.Event(), threading.Event()
+
+    def work(job):
+        with compute.in_turn(job, "walk", {"mu": 2}):
+            inside.set()
+            return release.wait(30)
+
+    pool = Pool(2, "test")
+    first = Job(work, pool)
+    assert inside.wait(10)
+    others = [Job(work, pool) for _ in range(3)]
+    assert next_on(pool) and not any(job.ended for job in (first, *others))
+    release.set()
+    assert all(job.wait(10) and job.result for job in (first, *others))
 
 
 # Views
@@ -564,7 +891,7 @@ def test_many_contacts_are_drawn_in_part_and_that_is_told(state, monkeypatch):
     monkeypatch.setattr(intervals, "MOST_BARS", 20)
     view = intervals.View(state)
     assert 10 <= len(view.bars.data["rank"]) <= 20
-    assert "th of" in view.left_out.object
+    assert view.left_out.object.startswith("One contact in ")
 
 
 def test_a_tap_on_a_bar_selects_its_contact(state):
@@ -580,14 +907,15 @@ def test_left_out_work_is_counted(library):
     from app.views.summary import left_out
 
     text = left_out(replay_at(library, 0).summary)
-    assert "tangential unknowns" in text and f"{STATES} states without relaxation" in text
+    assert "forces along contacts" in text and f"{STATES} <span" in text
+    assert 'data-term="no_friction"' in text and 'data-term="determined"' in text
     assert f"Shown: {KEPT}" in text
 
 
 def test_every_relaxation_has_a_name_on_screen():
     from app.selection import SOLVERS
 
-    assert set(SOLVERS) == set(study.RELAXATIONS)
+    assert set(SOLVERS) == set(kinds.RELAXATIONS)
 
 
 def test_a_walk_in_the_store_is_found_not_computed(library):
@@ -600,3 +928,11 @@ def test_a_walk_in_the_store_is_found_not_computed(library):
     job = Job(compute.states(library, chosen))
     assert job.wait(60) and job.error == "" and job.result.cell.mu == 1
     assert stored.store is library.shipped
+
+
+def test_scripts_of_one_component_name_nothing_twice():
+    """They make one module, where a second declaration is an error that leaves the page empty."""
+    from app.views.player import Player
+
+    declared = re.findall(r"^(?:const|let|class|(?:async )?function) (\w+)", Player._esm, re.M)
+    assert len(declared) > 50 and sorted(set(declared)) == sorted(declared)

@@ -10,6 +10,7 @@ from serving import CHROMIUM, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 from granforce import measures
+from granforce.study.store import open_store
 
 # Pictures to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts"
@@ -21,11 +22,16 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def address(shipped, tmp_path_factory):
+def cache(tmp_path_factory):
+    """Where the app of `address` keeps what it computes."""
+    return tmp_path_factory.mktemp("served") / "cache"
+
+
+@pytest.fixture(scope="module")
+def address(shipped, cache):
     """The app, served from the repository's root on a free port, with stores of its own."""
-    folder = tmp_path_factory.mktemp("served")
-    stores = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_CACHE": str(folder / "cache")}
-    with serve(folder, **stores) as (url, _):
+    stores = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_CACHE": str(cache)}
+    with serve(cache.parent, **stores) as (url, _):
         yield url
 
 
@@ -203,19 +209,24 @@ def test_a_click_selects_the_contact_everywhere(page):
 
 def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
     whole = scene(page, "scene.view.half")
-    x, y = (round(value) for value in at(page, 4, 4))
+    free = scene(  # a rattler: where a chain is, the pointer would take its force in hand
+        page,
+        "(k => [scene.geometry.x[k], scene.geometry.y[k]])"
+        "(scene.geometry.touching.findIndex((n, k) => n === 0 && scene.geometry.kind[k] === 1))",
+    )
+    x, y = (round(value) for value in at(page, *free))
     page.mouse.move(x, y)
     page.mouse.wheel(0, -400)
     page.wait_for_timeout(100)
     assert scene(page, "scene.view.half") < 0.7 * whole
-    assert at(page, 4, 4) == pytest.approx((x, y), abs=2)
-    place = at(page, 4, 4)
+    assert at(page, *free) == pytest.approx((x, y), abs=2)
+    place = at(page, *free)
     outside = scene(page, "scene.counts.outside")
     assert outside > 0 and f"({outside} out of view" in page.locator(".skips").inner_text()
     page.mouse.down()
     page.mouse.move(x + 40, y + 25)
     page.mouse.up()
-    assert at(page, 4, 4) == pytest.approx((place[0] + 40, place[1] + 25), abs=0.1)
+    assert at(page, *free) == pytest.approx((place[0] + 40, place[1] + 25), abs=0.1)
     page.mouse.dblclick(x, y)
     page.wait_for_timeout(100)
     assert scene(page, "scene.view.half") == whole
@@ -261,7 +272,7 @@ def test_chains_are_coloured_by_what_is_chosen(visit, colour):
             np.array(scene(page, f"Array.from(scene.geometry.{name})")) for name in ("low", "high")
         )
         extent = high - low
-        most = np.sort(extent)[int(0.98 * (len(extent) - 1))]
+        most = np.quantile(extent, 0.98)
         np.testing.assert_allclose(shown, 32 * np.clip(extent / most, 0, 1), atol=0.501)
 
 
@@ -273,8 +284,9 @@ def test_strong_and_undetermined_contacts_are_marked(visit):
     extent = np.array(
         scene(page, "Array.from(scene.geometry.high, (h, k) => h - scene.geometry.low[k])")
     )
-    np.testing.assert_array_equal(strong, original > 2)
-    np.testing.assert_array_equal(loose, extent > extent.mean())
+    for marked, values in ((strong, original), (loose, extent)):
+        assert marked.sum() == max(1, round(0.1 * len(values)))
+        assert values[marked].min() >= values[~marked].max()
     page.screenshot(path=_artefact("overlay.png"))
 
 
@@ -356,6 +368,7 @@ def test_keys_typed_into_a_field_stay_there(page):
     typed.type("0.2 ")
     assert page.locator(".stage.playing").count() == 0
     assert "tab=" not in page.url
+    typed.fill("0.1")  # as it was, or it would be computed when the field is left
 
 
 def test_numbers_told_while_playing_are_those_of_measures(page):
@@ -411,6 +424,44 @@ def test_to_and_fro_between_the_pinned_state_and_this_one(page):
 # Selecting and computing
 
 
+SLOW_TO_ANSWER = """
+    const send = WebSocket.prototype.send, held = []
+    let fetching = false, left = 0
+    WebSocket.prototype.send = function (...given) {
+        if (String(given[0]).includes("PULL-DOC-REQ")) { fetching = true; left = 3 } // frames of it
+        if (!fetching || left-- > 0) return send.apply(this, given)
+        held.push(() => send.apply(this, given))
+    }
+    window.answer = () => {
+        WebSocket.prototype.send = send
+        for (const sent of held) sent()
+    }
+"""
+
+
+def test_states_computed_while_the_page_is_on_its_way_are_shown(chromium, address, cache):
+    """The browser has fetched the page, and says so only when the states have been computed."""
+    context, problems = _context(chromium, 1280)
+    context.add_init_script(SLOW_TO_ANSWER)
+    page = context.new_page()
+    page.goto(address + "?mu=0.1&n=30&states=5&walkseed=77")
+    painted(page, 60_000)
+    for _ in range(600):
+        if cache.is_dir() and open_store(cache).find("walk"):
+            break
+        page.wait_for_timeout(100)
+    page.wait_for_timeout(500)  # until the page's thread knows
+    page.evaluate("answer()")
+    page.wait_for_function(
+        "e => e.scene.geometry.states === 5",
+        arg=page.locator(".scene").element_handle(),
+        timeout=20_000,
+    )
+    assert "5 states" in page.locator(".source").inner_text()
+    context.close()
+    assert not problems
+
+
 def test_another_stored_mu_is_shown_by_a_key(page):
     page.locator(".friction input[type=range]").press("ArrowRight")
     page.get_by_text("μ = 1, N = 30").wait_for()
@@ -423,10 +474,8 @@ def test_mu_typed_is_computed_and_shown_with_exact_intervals(page):
     typed = page.locator("input.typed")
     typed.fill("0.4")
     typed.press("Enter")
-    page.get_by_role("button", name="Compute μ = 0.4").click()
     page.get_by_text("μ = 0.4, N = 30").wait_for(timeout=60_000)
-    page.get_by_role("button", name="Compute exact intervals").click()
-    page.wait_for_function(
+    page.wait_for_function(  # they follow by themselves
         f"() => {MODEL}('bars').get_column('exact_high').every(Number.isFinite)", timeout=60_000
     )
     high, seen = (np.array(column(page, "bars", name)) for name in ("exact_high", "high"))

@@ -3,7 +3,6 @@
 import io
 import json
 import time
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,15 +10,18 @@ import xarray as xr
 import zarr
 from packings import REFERENCE, packed
 from panel.pane import Bokeh
-from small_store import KEPT
+from small_store import KEPT, STATES
 
 import granforce as gf
-from app import distributions, exports, perturbations, projections, uploads
-from app.state import COLOURS, WIDTHS
-from app.views.packing import normal_extent
-from app.views.style import palettes
-from granforce import measures, study
+from app import distributions, exports, perturbations, planes, uploads
+from app.views import labels
+from app.views import plane as plane_view
+from app.views import studied as drawn_study
+from app.views.controls import Controls
+from granforce import measures
 from granforce.records import InputError
+from granforce.study import cells as study
+from granforce.study import kinds
 
 LAMMPS = REFERENCE.parent / "lammps"
 
@@ -68,12 +70,12 @@ def dumps():
 # Force space
 
 
-def test_the_path_is_the_projection_of_the_states(state):
+def test_the_path_is_where_the_states_lie_in_the_plane(state):
     replay = opened(state).replay
-    plane = projections.components(replay, (3, 0), (5, 1))
+    plane = planes.components(replay, (3, 0), (5, 1))
     np.testing.assert_array_equal(plane.path[:, 0], replay.normal[:, 3])
     np.testing.assert_array_equal(plane.path[:, 1], replay.tangential[:, 5])
-    plane = projections.principal(replay)
+    plane = planes.principal(replay)
     assert plane.path.shape == (KEPT + 1, 2)
     np.testing.assert_allclose(plane.path[1:].mean(axis=0), 0, atol=1e-5)
     variance = plane.path[1:].var(axis=0)
@@ -82,25 +84,25 @@ def test_the_path_is_the_projection_of_the_states(state):
 
 
 def test_the_outline_holds_the_path_and_is_kept(state):
-    from app.views.projection import View
+    from app.views.plane import View
 
     opened(state)
     view = View(state)
     assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
     state.tab = view.name
-    assert view.projecting.running
+    assert view.placing.running
     settled(state)
     assert len(view.path.data["x"]) == KEPT + 1
     corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
     path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
-    merged = projections.hull(np.concatenate([corners, path]))
-    assert projections.area(merged) == pytest.approx(projections.area(corners), rel=1e-6)
+    merged = planes.hull(np.concatenate([corners, path]))
+    assert planes.area(merged) == pytest.approx(planes.area(corners), rel=1e-6)
     assert "linear programs" in view.told.object
     assert len(state.library.cache.find("outline")) == 1
 
 
 def test_one_contact_is_seen_in_its_cone(state):
-    from app.views.projection import View
+    from app.views.plane import View
 
     opened(state)
     state.contact = 4
@@ -119,12 +121,12 @@ def test_one_contact_is_seen_in_its_cone(state):
 
 
 def test_a_point_has_no_outline(state):
-    from app.views.projection import View
+    from app.views.plane import View
 
     opened(state)
     state.choose(mu=0)
     settled(state, done=lambda: state.cell.mu == 0)
-    state.tab = "projection"
+    state.tab = "plane"
     view = View(state)
     settled(state)
     assert "one point" in view.told.object and not len(view.outer.data["x"])
@@ -133,16 +135,16 @@ def test_a_point_has_no_outline(state):
 def test_planes_of_unknown_contacts_are_refused(state):
     replay = opened(state).replay
     with pytest.raises(InputError, match="counted from 0"):
-        projections.components(replay, (10**6, 0), (0, 0))
+        planes.components(replay, (10**6, 0), (0, 0))
     with pytest.raises(InputError, match="different"):
-        projections.components(replay, (1, 0), (1, 0))
+        planes.components(replay, (1, 0), (1, 0))
 
 
 def test_areas():
     square = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 1]], float)
-    assert projections.area(projections.hull(square)) == 4
+    assert planes.area(planes.hull(square)) == 4
     line = np.array([[0, 0], [1, 1], [2, 2]], float)
-    assert projections.area(projections.hull(line)) == 0
+    assert planes.area(planes.hull(line)) == 0
 
 
 # Bring your own
@@ -214,7 +216,7 @@ def test_damaged_and_hostile_files_are_one_clear_line(state):
 def test_sizes_are_limited(monkeypatch):
     packing = packed(30, 0.3)
     monkeypatch.setattr(uploads, "LIMITS", uploads.LIMITS._replace(n=20))
-    with pytest.raises(InputError, match="N must lie between 1 and 20"):
+    with pytest.raises(InputError, match="30 grains, where at most 20 are taken"):
         uploads.read({"npz": ("p.npz", npz(packing))})
     monkeypatch.setattr(uploads, "LIMITS", uploads.LIMITS._replace(upload=1))
     with pytest.raises(InputError, match="at most 1 MB"):
@@ -266,9 +268,40 @@ def test_more_than_allowed_is_not_collected(state):
     view.dropper._handle_msg({"begin": True})
     for _ in range(50):
         view.dropper._handle_msg({"name": "x", "data": bytes(100)})
-    assert not view.dropper._pieces
+    assert not view.dropper._files
     view.dropper._handle_msg({"end": True})
     assert "nothing was read" in view.error.title and not view.files
+
+
+@pytest.mark.parametrize(
+    "pieces, word",
+    [
+        ([{"name": f"{k}", "data": b""} for k in range(1000)], "16 files"),
+        ([{"name": "a", "data": 7}, {"name": "b", "data": b"x,y,r"}], "no file"),
+        ([{"data": {"deep": [1]}}], "no file"),
+    ],
+)
+def test_a_drop_of_nothing_but_names_is_not_collected(state, pieces, word):
+    from app.views.upload import View
+
+    view = View(opened(state))
+    view.dropper._handle_msg({"begin": True})
+    for piece in pieces:
+        view.dropper._handle_msg(piece)
+    assert not view.dropper._files
+    view.dropper._handle_msg({"end": True})
+    assert word in view.error.title and "nothing was read" in view.error.title and not view.files
+
+
+def test_empty_pieces_take_no_memory(state):
+    from app.views.upload import View
+
+    view = View(opened(state))
+    view.dropper._handle_msg({"begin": True})
+    for _ in range(1000):
+        view.dropper._handle_msg({"name": "a" * 10_000, "data": b""})
+    ((name, content),) = view.dropper._files.items()
+    assert len(name) == 120 and content == b""
 
 
 # Statistics
@@ -280,7 +313,7 @@ def test_rows_are_those_of_the_study_and_unlike_cells_stay_out(state):
     assert [cell.mu for cell in cells] == [0, 0.1, 1]
     found = distributions.rows(cells)
     for cell, row in zip(cells, found, strict=True):
-        dataset, _ = study.get_walk(cell.store, cell.params)
+        dataset, _ = study.get(cell.store, kinds.WALK, cell.params)
         assert row["eta2"] == dataset["eta2"].item() and row["mu"] == cell.mu
         extent = measures.normal_extent(dataset["low"].values, dataset["high"].values)
         np.testing.assert_allclose(
@@ -328,7 +361,7 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     state.tab = view.name
     settled(state)
     figures = [pane.object for pane in view.plots.select(Bokeh)]
-    assert len(figures) == (2 if what in ("eta", "extent") else 1)
+    assert len(figures) == (3 if what == "eta" else 1)
     columns = [r.data_source.data for fig in figures for r in fig.renderers]
     drawn = np.concatenate([np.ravel(v).astype(float) for c in columns for v in c.values()])
     row = distributions.rows([state.cell])[0]
@@ -424,38 +457,6 @@ def test_parameters_name_what_is_on_screen(state):
     assert found.name == state.cell.name == told["entry"]
 
 
-@pytest.mark.parametrize("colour", list(COLOURS))
-@pytest.mark.parametrize("thickness", list(WIDTHS))
-def test_the_picture_is_whole_and_to_scale(state, colour, thickness):
-    replay = opened(state).replay
-    extent = normal_extent(replay, {})
-    look = exports.Look(5, 2, colour, thickness, True, palettes(False), "#fff")
-    text = exports.picture(replay, extent, float(extent.max()), look)
-    root = ElementTree.fromstring(text)
-    width, height = map(float, root.get("viewBox").split()[2:])
-    assert width == pytest.approx(height) and root.get("width") == root.get("height")
-    circles = [e for e in root.iter() if e.tag.endswith("circle")]
-    radii = [float(c.get("r")) for c in circles[: len(replay.disks.r)]]
-    np.testing.assert_allclose(radii, replay.disks.r, rtol=1e-4)
-    lines = [e for e in root.iter() if e.tag.endswith("line")]
-    drawn = exports.chain_widths(replay, extent, look)[replay.links.contact] > 0
-    assert len(lines) == drawn.sum() > 20
-    assert len(circles) > len(replay.disks.r)  # marks of Fig. 5
-
-
-def test_colours_tell_mobilisation(state):
-    replay = opened(state).replay
-    look = exports.Look(4, 0, "mobilised", "normal", False, palettes(False), "#fff")
-    colours = exports.chain_colours(replay, None, 1.0, look)
-    shades = look.palettes["mobilised"]
-    mu = replay.summary["mu"]
-    part = replay.tangential[4] / (mu * np.maximum(replay.normal[4], 1e-9))
-    place = np.array([shades.index(colour) for colour in colours])
-    carries = replay.normal[4] > 1e-3
-    expected = (part[carries] + 1) / 2 * (len(shades) - 1)
-    assert np.abs(place[carries] - expected).max() <= 0.51
-
-
 def test_every_button_hands_a_file_over(state):
     from app.views.export import View
 
@@ -463,11 +464,14 @@ def test_every_button_hands_a_file_over(state):
     keys = [key for group in view.buttons.files.values() for key in group]
     for key in keys:
         handed = []
-        view.buttons.hand_over = lambda file, png=False, to=handed: to.append(file)
+        view.buttons._send_msg = handed.append
         view.buttons._handle_msg({"key": key})
         settled(state)
-        assert len(handed[0].content) > 300 and "/" not in handed[0].name, key
-    assert len(keys) == 7
+        (file,) = (given for given in handed if "name" in given)
+        assert "/" not in file["name"], key
+        drawn = key in ("svg", "png", "webm")  # by the browser
+        assert file["caption"]["lines"] if drawn else file["content"][300:]
+    assert len(keys) == 10
 
 
 def test_unknown_keys_are_ignored(state):
@@ -526,15 +530,6 @@ def test_the_field_moves_only_while_its_tab_is_seen(state):
     assert view.pushed is None and state.displacement is None
 
 
-def test_distances_are_those_of_the_nearest_images():
-    packing = packed(30, 0.3)
-    distance = perturbations._distances(packing, 2)
-    c = packing.contacts
-    assert distance[c.i[2]] == pytest.approx(packing.r[c.i[2]], rel=1e-6)
-    assert distance[c.j[2]] == pytest.approx(packing.r[c.j[2]], rel=1e-6)
-    assert distance.max() <= np.hypot(*packing.box) / 2
-
-
 def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     from app.views.perturb import View
 
@@ -572,10 +567,10 @@ def test_figure_2_takes_what_the_stores_hold(state, monkeypatch):
     assert perturbations.over_store(library, cells, state.cell) == []
     for cell in cells[1:]:
         library.lend_packing(cell.selection.packing)
-        params = study.perturbation_parameters(cell.selection.packing, random=4)
-        study.get_perturbation(library.cache, params)
-    few = study.perturbation_parameters(cells[1].selection.packing, contacts=[5])
-    study.get_perturbation(library.cache, few)
+        params = kinds.PERTURBATION.parameters(cell.selection.packing, random=4)
+        study.get(library.cache, kinds.PERTURBATION, params)
+    few = kinds.PERTURBATION.parameters(cells[1].selection.packing, contacts=[5])
+    study.get(library.cache, kinds.PERTURBATION, few)
     found = perturbations.over_store(library, cells, state.cell)
     assert sorted(row["mu"] for row in found) == [0.1, 1]
     assert all(0 < row["critical_force"] <= row["limit_load"] for row in found)
@@ -584,23 +579,115 @@ def test_figure_2_takes_what_the_stores_hold(state, monkeypatch):
     view = View(state)
     view.what.value = "store"
     settled(state)
-    # Boxes of 30 disks are too small for an exponent: one panel of the two.
-    assert "2 perturbed packings" in view.told.object and len(view.plots.objects) == 1
+    assert "like those on screen (2)" in view.told.object and len(view.plots.objects) == 2
+    force = view.plots.objects[0].object
+    drawn = [r.data_source.data for r in force.renderers]
+    rings = [np.asarray(d["x"]) for d in drawn if "x" in d and len(d["x"]) == 2]
+    assert any(np.allclose(sorted(x), sorted(row["eta2"] for row in found)) for x in rings)
+    lines = [d for d in drawn if "x" in d and len(d["x"]) > 10]
+    assert lines  # the finished study, all its μ
 
 
-def test_figures_drawn_in_a_thread_leave_other_pages_alone(monkeypatch):
-    """HoloViews would take, and theme, the document that is being served just then."""
-    import holoviews as hv
+def test_states_just_computed_stay_on_screen_though_the_catalogue_does_not_list_them_yet(state):
+    catalogue, cell = state.catalogue, state.cell
+    assert len({cell.series for cell in catalogue}) == 1
+    newer = cell._replace(series="N = 9, just computed")
+    state.cell = newer
+    controls = Controls(state)
+    controls.series.get_root()  # as the browser is sent it
+    assert state.cell is newer
+    assert controls.series.value == newer.series
 
-    from app.views.drawing import rendered
 
-    class Served(Exception):
-        pass
+def test_finished_results_say_where_they_have_states_and_where_there_are_none(state):
+    controls = Controls(state)
+    (words,) = controls.series.options
+    assert words.endswith("— 3 μ from 0 to 1") and controls.series.value == state.cell.series
+    state.choose(mu=0.3)  # none there
+    assert next(iter(controls.series.options)) == "none with μ = 0.3"
+    assert controls.series.value == ""
+    controls.series.value = state.cell.series  # back to what there is
+    assert not state.missing and controls.series.value == state.cell.series
+    assert "none with μ = 0.3" not in controls.series.options
 
-    def served():
-        raise Served
 
-    hv.extension("bokeh")
-    monkeypatch.setattr("holoviews.plotting.bokeh.renderer.curdoc", served)
-    (fig,) = rendered([hv.Curve([1, 2, 3])], ["curve"], [200])
-    assert fig.height == 200 and fig.document is None
+def test_colours_and_widths_are_offered_once_there_is_what_they_show(state, wait_for):
+    controls = Controls(state)
+    assert not {"sign", "known"} & set(controls.colour.options.values())
+    assert not {"difference", "known"} & set(controls.thickness.options.values())
+    state.reference = 2
+    assert "sign" in controls.colour.options.values()
+    assert "difference" in controls.thickness.options.values()
+    state.knowledge.hold(3, float(state.replay.normal[0, 3]), 0.1)
+    assert "known" in controls.colour.options.values()
+    state.colour = "known"
+    state.knowledge.release(3)
+    wait_for(state)
+    assert controls.colour.value == "known"  # what was chosen stays
+
+
+@pytest.mark.parametrize("span", [(1.0, 1.0), (4.0, 0.5)])
+def test_labels_beside_points_collide_neither_with_each_other_nor_with_points(span):
+    rng, count = np.random.default_rng(3), 30
+    x, y = rng.uniform(0, span[0], count), rng.uniform(0, span[1], count)
+    words = [f"{value:.{k % 4}g}" for k, value in enumerate(10 ** rng.uniform(-3, 1, count))]
+    found = labels.labels(x, y, words, span)
+    (wide, high), side = labels.LETTER, labels.POINT
+    room = 0.9 * np.array(labels.SMALLEST) / span  # pixels for each unit
+
+    def box(k):
+        left, top = room[0] * found["x"][k] + found["right"][k], -room[1] * found["y"][k]
+        top += found["down"][k] - (high if found["baseline"][k] == "bottom" else 0)
+        width = wide * len(found["text"][k])
+        left -= width if found["align"][k] == "right" else 0
+        return left, top, left + width, top + high
+
+    points = [(px - side, py - side, px + side, py + side)
+              for px, py in zip(room[0] * x, -room[1] * y, strict=True)]  # fmt: skip
+    boxes = [box(k) for k in range(len(found["text"]))]
+    for k, a in enumerate(boxes):
+        for b in [*boxes[:k], *points]:
+            assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+    assert count / 2 < len(boxes) <= count
+    assert set(found["text"]) <= set(words)
+
+
+def test_the_study_names_its_frictions_once(state):
+    figures, _ = drawn_study.responses([])
+    for fig in figures:
+        (text,) = fig.select(name="frictions")
+        assert len(text.data_source.data["text"]) > 8  # of 14
+
+
+def test_the_inner_half_of_an_outline_has_a_quarter_of_its_area():
+    corners = np.array([[0, 0], [4, 0], [5, 3], [1, 4]], float)
+    points = np.random.default_rng(0).uniform(0, 5, (40_000, 2))
+    edge, away = np.roll(corners, -1, axis=0) - corners, points[:, None] - corners
+    inside = np.all(edge[:, 0] * away[..., 1] >= edge[:, 1] * away[..., 0], axis=1)
+    assert planes.inner_share(points[inside], corners) == pytest.approx(0.25, abs=0.01)
+    assert planes.inner_share(points[inside], corners[::-1]) == pytest.approx(0.25, abs=0.01)
+
+
+def test_walk_and_uniform_states_are_shown_together(state, wait_for):
+    state.tab = "plane"
+    view = plane_view.View(state)
+    wait_for(state)
+    assert not view.also.value and not len(view.beside.data["x"])
+    assert "inner half" in view.told.object and "uniform" not in view.told.object
+    view.also.value = True
+    wait_for(state)
+    wait_for(state)  # the catalogue is read anew
+    count = len(view.beside.data["x"])
+    assert view.other_kind == "uniform" and count >= STATES
+    assert f"of the {count} uniform ones" in view.told.object
+    # in the store from now on: shown at once, in any plane, and the walk beside them
+    view.planes.value = "contact"
+    wait_for(state)
+    assert len(view.beside.data["x"]) == count and view.marks.visible
+    other = planes.beside(state.catalogue, state.cell)
+    state.show(other)
+    wait_for(state)
+    assert state.cell.kind == "uniform" and view.other_kind == "walk"
+    assert view.also.value and len(view.beside.data["x"]) == KEPT
+    view.also.value = False
+    assert not len(view.beside.data["x"]) and not view.marks.visible

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from packings import REFERENCE
-from serving import CHROMIUM, CLOSED, MODEL, column, painted, serve
+from serving import CHROMIUM, CLOSED, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 import granforce as gf
@@ -24,20 +24,15 @@ pytestmark = [
 ]
 
 
-@pytest.fixture(scope="module")
-def address(shipped, tmp_path_factory):
-    """The app with stores of its own."""
-    with serve(tmp_path_factory.mktemp("served"), GRANFORCE_DATA=str(shipped)) as (url, _):
-        yield url
-
-
 @pytest.fixture
 def visit(chromium, address, request):
-    """visit(query, width, height): a page; at the end a picture, and no error was told."""
+    """visit(query, width, height, slower): a page; at the end a picture, and no error was told."""
     errors, pages = [], []
 
-    def visit(query, width=1280, height=1000):
+    def visit(query, width=1280, height=1000, slower=1):
         page = chromium.new_page(viewport={"width": width, "height": height})
+        session = page.context.new_cdp_session(page)
+        session.send("Emulation.setCPUThrottlingRate", {"rate": slower})
         page.set_default_timeout(PATIENCE)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda told: told.type == "error" and errors.append(told.text))
@@ -82,7 +77,8 @@ def drawn(page, number=1):
     page.wait_for_function(
         """number => {
             const figures = [...Bokeh.documents[0]._all_models.values()]
-                .filter((model) => model.type === "Figure" && model.inner_width > 50)
+                .filter((model) => model.type === "Figure" &&
+                    !model.properties.inner_width.is_unset && model.inner_width > 50)
             return figures.length >= number
         }""",
         arg=number,
@@ -101,7 +97,7 @@ def download(page, action, folder):
 
 @pytest.mark.parametrize("width, dark", [(1280, 0), (1280, 1), (400, 0)])
 def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
-    page = visit(f"?tab=projection&dark={dark}", width, 1000 if width > 400 else 2200)
+    page = visit(f"?tab=plane&dark={dark}", width, 1000 if width > 400 else 2200)
     filled(page, "outer")
     page.wait_for_timeout(500)
     across, up = figure_of(page, "path")
@@ -119,6 +115,16 @@ def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
     assert np.all(path.max(axis=0) <= outer.max(axis=0) + 1e-6)
 
 
+def test_a_window_may_change_its_size_while_a_slow_browser_still_builds_the_page(visit):
+    page = visit("?tab=plane", 400, 2200, slower=4)
+    page.evaluate(
+        """() => setInterval(() => {
+            document.body.style.width = document.body.style.width === "396px" ? "398px" : "396px"
+        }, 10)"""
+    )
+    filled(page, "outer")
+
+
 def test_one_contact_in_its_cone(visit):
     page = visit("?tab=projection&contact=3")
     filled(page, "outer")
@@ -132,13 +138,13 @@ def test_one_contact_in_its_cone(visit):
 def test_statistics_are_drawn_one_after_another(visit):
     page = visit("?tab=statistics")
     drawn(page, 2)
-    page.get_by_text("A tap on a point shows its states").wait_for()
+    page.get_by_text("A tap on a point shows the states of that μ").wait_for()
     for words, text in (
-        ("P(ΔFₙ)", "Distribution of ΔFₙ"),
-        ("corr(μ)", "Bars: the range"),
+        ("P(ΔFₙ)", "How the extents ΔFₙ"),
+        ("corr(μ)", "Whether strong contacts"),
         ("ΔFₙ – fₙ", "Correlation of fₙ with ΔFₙ"),
         ("P(fₙ)", "of the forces lie beyond"),
-        ("η(μ)", "coordination z"),
+        ("η(μ)", "How undetermined the forces are"),
     ):
         page.get_by_role("button", name=words, exact=True).click()
         page.get_by_text(text).wait_for()
@@ -154,25 +160,11 @@ def test_statistics_by_night_on_a_narrow_screen(visit):
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
-@pytest.mark.parametrize("width", [1280, 400])
-def test_the_logarithmic_extents_are_an_inset_where_there_is_room(visit, width):
-    page = visit("?tab=statistics", width, 1000 if width > 400 else 2200)
-    drawn(page, 2)
-    page.get_by_role("button", name="P(ΔFₙ)", exact=True).dispatch_event("click")
-    page.locator(".inset").wait_for()
-    drawn(page, 2)
-    whole = page.locator(":has(> .inset) .bk-Figure").first.bounding_box()
-    inset = page.locator(".inset").bounding_box()
-    within = inset["y"] + inset["height"] < whole["y"] + whole["height"]
-    assert within == (width > 400)
-    assert inset["x"] + inset["width"] <= width
-
-
 def test_a_contact_is_pushed_and_its_field_seen(visit):
     page = visit("?tab=perturb&contact=5")
     before = page.locator(".scene").evaluate("element => element.scene.offset")
     page.get_by_role("button", name="Push", exact=True).click()
-    page.get_by_text("F_crit lies between").wait_for()
+    page.get_by_text("The critical force lies between").wait_for()
     assert before is None
     page.wait_for_function(
         "scene => Math.abs(scene.scene.offset?.amplitude) > 0.001",
@@ -212,10 +204,12 @@ def test_everything_can_be_taken_along(visit, tmp_path):
         button = page.get_by_role("button", name=words, exact=True)
         return download(page, button.click, tmp_path)
 
-    svg = ElementTree.fromstring(take("SVG").read_text())
-    assert len([e for e in svg.iter() if e.tag.endswith("circle")]) >= DISKS
+    ElementTree.fromstring(take("SVG").read_text())
     assert take("PNG").read_bytes()[:4] == b"\x89PNG"
-    rows = take("Contacts (CSV)").read_text().splitlines()
+    text = take("Contacts (CSV)").read_text().splitlines()
+    head = [row for row in text if row.startswith("# ")]
+    rows = text[len(head) :]
+    assert any(row.startswith("# f_n_low: smallest normal force") for row in head)
     assert rows[0].startswith("contact,i,j,f_n_original") and len(rows) > DISKS
     packing = gf.load_packing(io.BytesIO(take("Packing (NPZ)").read_bytes()))
     assert len(packing.r) == DISKS
@@ -224,11 +218,43 @@ def test_everything_can_be_taken_along(visit, tmp_path):
     assert '"command": "granforce walk' in take("Parameters (JSON)").read_text()
 
 
-@pytest.mark.parametrize("tab, number", [("projection", 1), ("statistics", 2)])
+@pytest.mark.parametrize("look", ["", "&overlay=1&colour=extent", "&thickness=difference"])
+def test_the_picture_is_that_of_the_screen_whole_and_to_scale(visit, tmp_path, look):
+    page = visit(f"?tab=export&frame=5{look}")
+    page.locator(".scene").hover()
+    page.mouse.wheel(0, -400)  # what is in view makes no difference
+    button = page.get_by_role("button", name="SVG", exact=True)
+    whole = ElementTree.fromstring(download(page, button.click, tmp_path).read_text())
+    told = " ".join(whole.itertext())
+    assert "largest radii" in told and "Width: " in told and "granforce ?" in told
+    root = next(e for e in whole.iter() if e.tag.endswith("svg") and e is not whole)
+    box = [float(value) for value in root.get("viewBox").split()]
+    window = scene(page, "scene.geometry.window")
+    assert box == pytest.approx([window[0], -window[3], *[window[1] - window[0]] * 2], rel=1e-4)
+    elements = {
+        name: [e for e in root.iter() if e.tag.endswith(name)] for name in ("circle", "line")
+    }
+    radii = scene(page, "Array.from(scene.geometry.r)")
+    drawn = [float(e.get("r")) for e in elements["circle"][: len(radii)]]
+    assert sorted(drawn) == pytest.approx(sorted(radii), rel=1e-4)
+    assert (len(elements["circle"]) > len(radii)) == ("overlay" in look)  # marks of Fig. 5
+    widths, colours = scene(
+        page,
+        "[Array.from(scene.geometry.contact, c => scene.style.width[c]),"
+        " Array.from(scene.geometry.contact, c => scene.style.colours[scene.style.bin[c]])]",
+    )
+    least = 0.1 * (window[1] - window[0]) / 900  # a tenth of a pixel
+    expected = [(w, c) for w, c in zip(widths, colours, strict=True) if w > least]
+    found = [(float(e.get("stroke-width")), e.get("stroke")) for e in elements["line"]]
+    assert [c for _, c in found] == [c for _, c in expected] and len(found) > 20
+    assert [w for w, _ in found] == pytest.approx([w for w, _ in expected], rel=1e-4)
+
+
+@pytest.mark.parametrize("tab, number", [("plane", 1), ("statistics", 2)])
 def test_plots_are_saved_as_svg(visit, tmp_path, tab, number):
     page = visit(f"?tab={tab}")
     drawn(page, number)
-    if tab == "projection":
+    if tab == "plane":
         filled(page, "outer")
     # Toolbars are hidden until the pointer is on the plot; their buttons work all the same.
     save = """() => {

@@ -1,0 +1,63 @@
+"""Two frictions side by side: the packing of the states on screen, made or held at another μ."""
+
+from granforce.records import InputError
+
+from . import compute
+from .data import best_cell
+from .limits import LIMITS
+
+
+class Beside:
+    """What is seen beside the states on screen where `state.beside` names another μ.
+
+    It is the same selection at that μ, with its own packing: `state.twin`. While the view is split,
+    who chooses another μ leaves there what was on screen; who pins a state or ends the split view
+    gives it up.
+    """
+
+    def __init__(self, state):
+        self.state, self.task = state, state.task()
+        state.param.watch(self._follow, ["split", "beside", "cell"])
+
+    def keep(self, wanted):
+        """Another Selection was chosen: if only μ differs, what is on screen stays beside it."""
+        state = self.state
+        if not state.split or state.beside is not None or state.cell is None:
+            return
+        shown = state.cell.selection
+        if shown.mu != wanted.mu and shown.at(wanted.mu).names(wanted):
+            state.beside = shown.mu
+
+    def _follow(self, *events):
+        """Have the other packing found, or computed if no store has it."""
+        state = self.state
+        if not state.split:
+            state.beside = None
+        if state.beside is None or state.cell is None:
+            self.task.cancel()
+            state.twin = None
+            return
+        try:
+            wanted = state.cell.selection.at(state.beside)
+            wanted.check(LIMITS)
+        except InputError as error:
+            state.param.update(beside=None, message=str(error))
+            return
+        if state.twin is None or not state.twin.cell.selection.names(wanted):
+            self._find(wanted)
+
+    def _find(self, wanted):
+        state, library = self.state, self.state.library
+        cell = best_cell(state.catalogue, wanted)
+        if cell is None or not cell.selection.names(wanted):
+            self.task.start(compute.states(library, wanted), self._found)
+            return
+        shown = library.shown_in_memory(cell)
+        if shown is None:
+            self.task.start(lambda job: library.shown(cell), self._found)
+        else:
+            self.task.cancel()
+            state.twin = shown
+
+    def _found(self, shown):
+        self.state.twin = shown

@@ -1,0 +1,287 @@
+"""Forces in the visitor's hand: what was pulled where, and the networks that follow.
+
+A pull is a pair (position of a contact, its f_n in ⟨f_n⟩), or three, (name of a plane, x, y), where
+the point in force space was pulled.
+"""
+
+import threading
+from collections import OrderedDict
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.records import InputError
+from granforce.study.pulls import Puller
+
+from . import known, planes
+
+MOST_PULLS = 32  # that a page, or a link, may hold
+PULLERS_KEPT = 4  # for all visitors
+
+_pullers, _lock = OrderedDict(), threading.Lock()
+
+
+class Held(NamedTuple):
+    """A network that the visitor's pulls have led to; forces in ⟨f_n⟩."""
+
+    forces: np.ndarray  # (N_c, 2)
+    residual: float
+
+
+def _puller(library, cell, given):
+    """The Puller of a cell's packing; given: rows of known forces, which pulls keep."""
+    key = cell.name, str(given)
+    with _lock:
+        found = _pullers.pop(key, None)
+    if found is None:
+        found = Puller(library.packing(cell.params["packing"]), cell.mu, given or None)
+    with _lock:
+        _pullers[key] = found
+        while len(_pullers) > PULLERS_KEPT:
+            _pullers.popitem(last=False)
+    return found
+
+
+class Hand:
+    """The pulls of one page, as a stack; networks are made in the background.
+
+    `state.pulls` names them, from the state on screen on; what is known (`state.known`) stays in
+    all of them. tell(message) gets what the player shows: {"held": …}, {"rail": …} of a contact and
+    {"fan": …} of a plane.
+    """
+
+    def __init__(self, state, task, tell):
+        self.state, self._task, self._tell = state, task, tell
+        self._made, self._base = [], None  # (pull, Held) of the pulls made, and where from
+        task.param.watch(self._failed, "message")
+        state.param.watch(self._follow, ["pulls", "replay", "frame", "known"])
+        if state.pulls:  # of the link
+            self._work()
+
+    def grab(self, contact):
+        """Select a contact and have its rail made, from the network on screen."""
+        state = self.state
+        if state.replay is None or state.growing is not None:
+            return
+        state.contact = contact
+        if contact in _held(state.known):
+            state.message = (
+                f"contact {state.replay.backbone[contact]} is held: let it go (H) to pull it"
+            )
+            self._tell({"rail": None})
+        else:
+            self._work(contact)
+
+    def grab_point(self):
+        """Have the fan of the plane on screen made."""
+        if self.state.plane is not None and self.state.growing is None:
+            self._work(self.state.plane)
+
+    def hold(self, pull):
+        """Let go: the pull stays."""
+        pulls = self.state.pulls
+        if len(pulls) >= MOST_PULLS:
+            self.state.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
+            return
+        self.state.pulls = [*pulls, pull]
+
+    def undo(self):
+        """Step back before the last pull."""
+        self.state.pulls = self.state.pulls[:-1]
+
+    def heard(self, message):
+        """What the browser tells of the hand."""
+        count = 0 if self.state.replay is None else len(self.state.replay.backbone)
+        match message:
+            case {"grab": int(contact)} if 0 <= contact < count:
+                self.grab(contact)
+            case {"hold": [int(contact), int() | float() as value]} if 0 <= contact < count:
+                self.hold((contact, float(value)))
+            case {"point": True}:
+                self.grab_point()
+            case {"hold_point": [int() | float() as x, int() | float() as y]}:
+                if self.state.plane is not None and np.isfinite([x, y]).all():
+                    self.hold((planes.name(self.state.plane), float(x), float(y)))
+            case {"undo": True}:
+                self.undo()
+            case {"free": True}:
+                self.state.pulls = []
+            case {"anew": True} if self._made:
+                self._show(self._made)
+
+    def _follow(self, *events):
+        """Pulls belong to one state: with another one on screen they are gone."""
+        names = {event.name for event in events}
+        if "pulls" in names:
+            self._work()
+        elif self.state.pulls and names != {"known"}:
+            self.state.pulls = []
+        elif self.state.pulls:
+            self._work()  # the networks that keep what is known now
+
+    def _work(self, grabbed=None):
+        """Make the networks of all pulls, and the rail of a contact or the fan of a Plane."""
+        state = self.state
+        replay, cell, pulls = state.replay, state.cell, list(state.pulls)
+        if replay is None or cell is None:
+            return
+        told = tuple(state.known)
+        base = cell.name, state.frame, told
+        made = self._made if self._base == base else []
+        first = Held(_forces(replay, state.frame), float(replay.residual[state.frame]))
+        library = state.library
+
+        def work(job):
+            puller = _puller(library, cell, known.rows(replay, told))
+            held, refusal = _networks(library, cell, replay, puller, told, made, pulls, first)
+            ready = None
+            if grabbed is not None and not refusal:
+                last = held[-1][1] if held else first
+                ready = _to_pull(puller, replay, last, grabbed)
+            return base, held, ready, refusal
+
+        if pulls or grabbed is not None:
+            self._task.start(work, self._done)
+        else:
+            self._task.cancel()
+            self._made, self._base = [], base
+            self._tell({"held": None})
+
+    def _done(self, found):
+        base, made, ready, refusal = found
+        self._made, self._base = made, base
+        if refusal:
+            self.state.message = refusal
+            self.state.pulls = [pull for pull, _ in made]
+            return
+        if ready is not None:
+            self._tell(ready)
+        elif made:
+            self._show(made)
+
+    def _show(self, made):
+        pull, held = made[-1]
+        self._tell({"held": _spelled(held) | {"pull": list(pull)}})
+
+    def _failed(self, event):
+        if event.new:
+            self.state.message = event.new
+            self._tell({"rail": None, "fan": None})
+
+
+def _forces(replay, frame):
+    return np.stack([replay.normal[frame], replay.tangential[frame]], axis=1).astype(np.float64)
+
+
+def _held(told):
+    """{contact: f_n} of those that are held exactly."""
+    return {one.contact: one.value for one in told if not one.error}
+
+
+def _networks(library, cell, replay, puller, told, made, pulls, first):
+    """The networks of all pulls, those made before included; a refusal.
+
+    told: Statements, which hold in all of them.
+    """
+    held = _held(told)
+    kept = 0
+    while kept < min(len(made), len(pulls)) and made[kept][0] == pulls[kept]:
+        kept += 1
+    made = list(made[:kept])
+    for pull in pulls[kept:]:
+        last = made[-1][1] if made else first
+        try:
+            # A pull to where the contact was held afterwards.
+            to = (pull[0], held[pull[0]]) if pull[0] in held else pull
+            network = _pulled(library, cell, replay, puller, last, to)
+        except InputError as error:
+            return made, str(error)
+        made.append((pull, network))
+    return made, ""
+
+
+def _pulled(library, cell, replay, puller, last, pull):
+    """What one pull makes of the network before."""
+    scale = replay.force_scale
+    if isinstance(pull[0], str):
+        plane = planes.named(library, cell, replay, pull[0])
+        point = np.array(pull[1:]) + plane.origin
+        found = puller.mixed(puller.fan(plane.axes), plane.axes, point, last.forces * scale)
+    else:
+        found = puller.at(replay.backbone[pull[0]], pull[1] * scale, last.forces * scale)
+    return Held(found[0] / scale, found[1])
+
+
+def _to_pull(puller, replay, last, grabbed):
+    """What the page needs to pull a contact, or the point in a Plane."""
+    scale = replay.force_scale
+    if isinstance(grabbed, planes.Plane):
+        return {"fan": _fan(puller.fan(grabbed.axes), grabbed, scale)}
+    rail = puller.rail(replay.backbone[grabbed], last.forces * scale)
+    return {"rail": {"contact": grabbed} | _rail(rail, scale)}
+
+
+def _spelled(held):
+    return {
+        "normal": held.forces[:, 0].astype(np.float32),
+        "tangential": held.forces[:, 1].astype(np.float32),
+        "residual": held.residual,
+    }
+
+
+def _fan(fan, plane, scale):
+    """A Fan as the player takes it, in the coordinates of the plane on screen."""
+    points = fan.points - plane.origin
+    return {
+        "x": points[:, 0].copy(),
+        "y": points[:, 1].copy(),
+        "normal": (fan.states[..., 0] / scale).astype(np.float32).ravel(),
+        "tangential": (fan.states[..., 1] / scale).astype(np.float32).ravel(),
+        "residual": fan.residual.astype(np.float64),
+    }
+
+
+def _rail(rail, scale):
+    """A Rail as the player takes it: flat arrays, forces in ⟨f_n⟩."""
+    return {
+        "lower": rail.lower / scale,
+        "upper": rail.upper / scale,
+        "values": (rail.values / scale).astype(np.float64),
+        "normal": (rail.states[..., 0] / scale).astype(np.float32).ravel(),
+        "tangential": (rail.states[..., 1] / scale).astype(np.float32).ravel(),
+        "residual": rail.residual.astype(np.float64),
+        "opened": rail.opened.astype(np.uint8).ravel(),
+        "sliding": rail.sliding.astype(np.uint8).ravel(),
+    }
+
+
+def spelled(pulls):
+    """Pulls as a link holds them."""
+    return "~".join(":".join([str(name), *(f"{x:.6g}" for x in at)]) for name, *at in pulls)
+
+
+def read(text):
+    """Pulls of a link's text; ValueError for what is none."""
+    pulls = [_read(*part.split(":")) for part in text.split("~")[: MOST_PULLS + 1]]
+    if len(pulls) > MOST_PULLS:
+        raise ValueError("too many pulls")
+    return pulls
+
+
+def _read(name, *at):
+    values = tuple(float(value) for value in at)
+    if not all(abs(value) < 1e6 for value in values):
+        raise ValueError("forces that cannot be")
+    if len(values) == 2:
+        planes.read(name)
+        return name, *values
+    (value,) = values
+    if int(name) < 0 or value < 0:
+        raise ValueError("forces that cannot be")
+    return int(name), value
+
+
+def contacts(pulls):
+    """Positions of the contacts that pulls name."""
+    for name, *_ in pulls:
+        yield from (c for c, _ in planes.read(name)) if isinstance(name, str) else (name,)

@@ -1,0 +1,362 @@
+"""What a visitor takes for known: forces held, or within error bars; what they leave open."""
+
+import math
+import shlex
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.records import InputError
+from granforce.study import kinds
+from granforce.tolerances import CARRYING
+
+from . import compute
+from .data import Shown
+from .selection import of_packing
+
+MOST_KNOWN = 32  # statements that a page, or a link, may hold
+LARGEST = 1e6  # ⟨fₙ⟩
+# A force whose interval is shorter than this, in ⟨fₙ⟩, is known already.
+DETERMINED = 1e-6
+# Held forces stay so much of their interval away from its ends: at the very ends rounding decides.
+INWARD = 1e-4
+# Contacts to measure next that are listed; checked by exact bounds where there are many contacts.
+LISTED, CHECKED, FEW = 10, 3, 200
+
+
+class Statement(NamedTuple):
+    """That f_n of a contact is `value`, up to `error` either way; both in ⟨f_n⟩."""
+
+    contact: int  # position in the backbone
+    value: float
+    error: float = 0.0
+
+    def words(self, number):
+        """It in words, with the contact's number in the packing."""
+        bar = f" ± {self.error:.3g}" if self.error else ""
+        return f"contact {number}: fₙ = {self.value:.3f}{bar} ⟨fₙ⟩"
+
+
+class Narrowed(NamedTuple):
+    """Exact intervals of all contacts under what is known, beside those without."""
+
+    known: tuple  # Statements
+    before: object  # Dataset of intervals
+    after: object
+    left: float = 0.0  # part of the bounds that `after` still has as before
+
+    @property
+    def dimension(self):
+        """h before and after."""
+        return tuple(int(part["dimension"]) for part in self[1:3])
+
+    @property
+    def mean(self):
+        """Mean interval of f_n before and after, in ⟨f_n⟩."""
+        return tuple(float(extents.mean()) for extents in self.extents)
+
+    @property
+    def extents(self):
+        """Length of the intervals of f_n (N_c,), before and after, in ⟨f_n⟩."""
+        return tuple(_normal(part, "high") - _normal(part, "low") for part in self[1:3])
+
+    @property
+    def gone(self):
+        """(N_c,) by how much the intervals of f_n are shorter, in ⟨f_n⟩."""
+        before, after = self.extents
+        return np.maximum(before - after, 0.0)
+
+    @property
+    def shortened(self):
+        """The same of the contacts that are not known themselves: of those that are, 0."""
+        change = self.gone
+        change[[one.contact for one in self.known]] = 0.0
+        return change
+
+    @property
+    def carrying(self):
+        """How many contacts carry in every network that is left, by certified bounds."""
+        low, gap = (self.after[name].values for name in ("low", "interval_gap"))
+        least = low[:, 0] / self.after["force_scale"].item() - gap[:, 0, 0]
+        return int(np.sum(least > CARRYING))
+
+
+def _normal(dataset, name):
+    return dataset[name].values[:, 0] / dataset["force_scale"].item()
+
+
+class Underway:
+    """Intervals under what is known as their bounds are found: a Narrowed at any time."""
+
+    def __init__(self, known, before, backbone):
+        self.known, self._before, self._backbone = known, before, backbone
+        self._after, self._count = before.copy(deep=True), 0
+
+    def add(self, bound):
+        """Keep a Bound."""
+        place = np.searchsorted(self._backbone, bound.contact)
+        name = "high" if bound.side else "low"
+        self._after[name].values[place, bound.component] = bound.value
+        self._count += 1
+
+    @property
+    def narrowed(self):
+        """What is known by now."""
+        left = 1 - self._count / (4 * len(self._backbone))
+        return Narrowed(self.known, self._before, self._after.copy(deep=True), max(left, 1e-3))
+
+
+class Ranked(NamedTuple):
+    """Contacts whose f_n would be worth measuring next, the best first."""
+
+    replay: object  # of whose packing
+    known: tuple  # Statements that hold already
+    contacts: np.ndarray  # (k,) positions in the backbone
+    before: float  # mean interval of f_n now, in ⟨f_n⟩
+    after: np.ndarray  # (k,) the same once this one is known as well; NaN where not computed
+    expected: np.ndarray  # (k,) part by which errors fall, as forces go together over the states
+
+
+class Knowledge:
+    """The statements of one page; exact intervals under them are computed in the background.
+
+    `state.known` holds the statements, `state.narrowed` what they leave open, `state.ranked` which
+    contact to measure next.
+    """
+
+    def __init__(self, state):
+        self.state = state
+        self.task, self.ranking = state.task(), state.task()
+        state.param.watch(self._follow, ["known", "replay"])
+        self._arriving = None  # the Underway of what is being computed
+        self.task.param.watch(self._failed, "message")
+        self.task.param.watch(self._arrive, "fraction")
+        self._first = None  # the Ranked of what is being computed, before exact bounds
+        self.ranking.param.watch(lambda event: self._ranked(self._first), "fraction")
+
+    def hold(self, contact, value, error=0.0):
+        """Take f_n of a contact for known, in ⟨f_n⟩; a message where it cannot be."""
+        state = self.state
+        others = [one for one in state.known if one.contact != contact]
+        if state.replay is None or state.growing is not None:
+            return
+        try:
+            if len(others) >= MOST_KNOWN:
+                raise InputError(f"{MOST_KNOWN} known forces are the most; let some go")
+            state.known = [*others, self._stated(contact, value, error)]
+            state.message = ""
+        except InputError as error:
+            state.message = str(error)
+
+    def release(self, contact):
+        """Take f_n of a contact for unknown again."""
+        self.state.known = [one for one in self.state.known if one.contact != contact]
+
+    def heard(self, message):
+        """What a browser tells of the selected contact."""
+        count = 0 if self.state.replay is None else len(self.state.replay.backbone)
+        match message:
+            case {"hold": [int(contact), int() | float() as value, int() | float() as error]}:
+                if 0 <= contact < count:
+                    self.hold(contact, value, error)
+            case {"release": int(contact)}:
+                self.release(contact)
+
+    def compute(self):
+        """Compute the exact intervals under what is known, in the background."""
+        state = self.state
+        replay, known, cell = state.replay, tuple(state.known), state.cell
+        shown = Shown(cell, replay, state.exact)
+        self._arriving = None
+
+        def tell(arriving):
+            self._arriving = arriving
+
+        def done(narrowed):
+            if state.replay is replay:
+                state.param.update(exact=narrowed.before, narrowed=narrowed)
+
+        self.task.start(narrowing(state.library, shown, known, tell), done)
+
+    def rank(self):
+        """Find which contact to measure next, in the background."""
+        state = self.state
+        replay, known = state.replay, tuple(state.known)
+        if replay is None or state.growing is not None:
+            return
+        state.message = ""
+
+        self._first = None
+
+        def tell(ranked):
+            self._first = ranked
+
+        self.ranking.start(ranking(state.library, state.cell, replay, known, tell), self._ranked)
+
+    def _ranked(self, found):
+        """Show contacts to measure next, if it is still this that is known."""
+        state = self.state
+        if found is not None and found.replay is state.replay:
+            state.ranked = found if found.known == tuple(state.known) else None
+
+    def _stated(self, contact, value, error):
+        """The Statement of a force, refused where what is known leaves no room for it."""
+        state = self.state
+        value, error = _number(value, "a known force"), _number(error, "an error bar")
+        number = state.replay.backbone[contact]
+        current = self._settled and tuple(state.known) == state.narrowed.known
+        others = state.exact if not state.known else state.narrowed.after if current else None
+        if others is None or error or contact in {one.contact for one in state.known}:
+            return Statement(contact, _rounded(value), _rounded(error))
+        low, high = (float(_normal(others, name)[contact]) for name in ("low", "high"))
+        width = high - low
+        if width < DETERMINED:
+            raise InputError(
+                f"fₙ of contact {number} is {low:.3f} ⟨fₙ⟩ in every network that is left: "
+                "to hold it would tell nothing new"
+            )
+        if not low - INWARD * width <= value <= high + INWARD * width:
+            raise InputError(
+                f"fₙ of contact {number} is {value:.3f} ⟨fₙ⟩ on screen, but what is known leaves "
+                f"{low:.3f} to {high:.3f}: pull it there first, or let another force go"
+            )
+        inside = np.clip(value, low + INWARD * width, high - INWARD * width)
+        return Statement(contact, _rounded(inside))
+
+    @property
+    def _settled(self):
+        """Whether intervals under some known forces are there, all of them."""
+        return self.state.narrowed is not None and not self.state.narrowed.left
+
+    def _follow(self, *events):
+        """Intervals under what is known now; statements belong to one packing."""
+        state = self.state
+        state.ranked = None
+        self.ranking.cancel()
+        if any(event.name == "replay" for event in events) or not state.known:
+            state.narrowed = None
+        done = state.narrowed.known if self._settled else ()
+        if state.known and state.replay is not None and tuple(state.known) != done:
+            self.compute()
+        else:
+            self.task.cancel()
+
+    def _arrive(self, event):
+        """Show the intervals that are there by now."""
+        arriving, state = self._arriving, self.state
+        if event.new and arriving is not None and arriving.known == tuple(state.known):
+            narrowed = arriving.narrowed
+            state.param.update(exact=narrowed.before, narrowed=narrowed)
+
+    def _failed(self, event):
+        """What contradicts itself is taken back; the message says what it was."""
+        if event.new:
+            state = self.state
+            state.known = list(state.narrowed.known) if self._settled else []
+            state.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
+
+
+def _number(value, what):
+    if not 0 <= value < LARGEST:  # nor if it is NaN
+        raise InputError(f"{what} must lie between 0 and {LARGEST:g} ⟨fₙ⟩, got {value:g}")
+    return float(value)
+
+
+def _rounded(value):
+    return float(f"{value:.9g}")  # as links hold it
+
+
+def rows(replay, known):
+    """Statements as `conditions` takes them: contacts of the packing, forces."""
+    scale, number = replay.force_scale, replay.backbone
+    return [
+        [int(number[c]), (value - error) * scale, (value + error) * scale, None, None]
+        for c, value, error in known
+    ]
+
+
+def commands(selection, replay, known):
+    """Two lines for a terminal: what is known as a file, and the intervals under it."""
+    lines = ["contact,f_n_min,f_n_max"]
+    lines += [f"{c},{low:.12g},{high:.12g}" for c, low, high, *_ in rows(replay, known)]
+    words = ["granforce", "intervals", *of_packing(selection), "--known", "known.csv"]
+    return (
+        f"printf '%s\\n' {shlex.join(lines)} > known.csv\n{shlex.join(str(word) for word in words)}"
+    )
+
+
+def narrowing(library, shown, known, tell):
+    """Work, for jobs.Task, that finds the intervals under what is known; a Narrowed.
+
+    tell(Underway): called before they are computed, the contacts first that may change most.
+    """
+
+    def work(job):
+        whole = shown if shown.exact is not None else compute.exact(library, shown)(job)
+        bounds = Underway(known, whole.exact, shown.replay.backbone)
+        tell(bounds)
+        selection = shown.cell.selection
+        given = {"mu": selection.mu, "known": rows(shown.replay, known)}
+        params = kinds.INTERVALS.parameters(selection.packing, **given)
+        stage = "exact intervals under what is known"
+        options = {"widths": affected(shown.replay, known), "watch": bounds.add}
+        found = compute.found_or_made(library, job, stage, kinds.INTERVALS, params, **options)
+        return Narrowed(known, whole.exact, found)
+
+    return work
+
+
+def affected(replay, known):
+    """(N_c,) how much f_n goes with what is known over the states shown; most for what is known."""
+    off = replay.normal[1:] - replay.normal[1:].mean(axis=0)
+    spread = np.maximum(off.std(axis=0), DETERMINED)
+    chosen = [one.contact for one in known]
+    score = spread * np.abs((off / spread).T @ (off[:, chosen] / spread[chosen])).max(axis=1)
+    score[chosen] = 1 + 2 * score.max()
+    return score
+
+
+def ranking(library, cell, replay, known, tell):
+    """Work, for jobs.Task, that finds which contact to measure next; a Ranked.
+
+    tell(Ranked): called with their order before it is checked by exact bounds.
+    """
+
+    def ranked(contacts, expected, before, after):
+        place = np.searchsorted(replay.backbone, contacts)
+        return Ranked(replay, known, place, before, after, expected)
+
+    def work(job):
+        selection = cell.selection
+        given = {"mu": selection.mu, "known": rows(replay, known) or None}
+        few = len(replay.backbone) <= FEW
+        params = kinds.INFORMATIVE.parameters(
+            selection.packing, check=LISTED if few else CHECKED, k=LISTED, **given
+        )
+        stage = "which measurement next"
+        options = {"watch": lambda found: tell(ranked(*found))}
+        found = compute.found_or_made(library, job, stage, kinds.INFORMATIVE, params, **options)
+        names = "backbone", "part_expected", "mean_before", "mean_after"
+        return ranked(*(found[name].values for name in names))
+
+    return work
+
+
+def spelled(known):
+    """Statements as a link holds them."""
+    rows = (one if one.error else one[:2] for one in known)
+    return "~".join(":".join(f"{part:.9g}" for part in row) for row in rows)
+
+
+def read(text):
+    """Statements of a link's text; ValueError for what is none."""
+    parts = [part.split(":") for part in text.split("~")[: MOST_KNOWN + 1]]
+    pairs = [(contact, rest) for contact, *rest in parts if 1 <= len(rest) <= 2]
+    known = [Statement(int(contact), *map(float, rest)) for contact, rest in pairs]
+    numbers = [number for one in known for number in one[1:]]
+    contacts = {one.contact for one in known}
+    if not len(parts) == len(known) == len(contacts) <= MOST_KNOWN:
+        raise ValueError("too many known forces, or one contact twice")
+    if min(contacts) < 0 or not all(0 <= n < LARGEST and math.isfinite(n) for n in numbers):
+        raise ValueError("forces that cannot be")
+    return known

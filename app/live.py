@@ -1,0 +1,281 @@
+"""What a computation shows of itself while it runs, for all pages that ask for the same.
+
+The thread that computes adds to a Compaction or a Walking; each page reads them through a Following
+of its own, which keeps its place, and sends as much as its browser paints.
+"""
+
+import threading
+import time
+from collections import deque
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from granforce import measures
+
+from . import geometry
+from .data import FRAME_BYTES, Replay
+
+# A moving packing is kept each time its box has shrunk by this part, or so many seconds have gone:
+# the gas, which is compressed within a tenth of a second, is seen as well as the slow end.
+STRAIN, EVERY_S = 0.003, 0.04
+PICTURE_BYTES = 16e6  # of the pictures kept of one compaction
+BEHIND = 12  # pictures; for each so many that a page is behind it leaves one more out
+BATCH = 64  # states sent at a time
+ENOUGH = 256  # states, from which axes of force space are found while a walk is under way
+BOUNDS_S = 0.25  # exact bounds are sent no more often: what stands still is drawn anew for them
+
+_shared, _lock = WeakValueDictionary(), threading.Lock()
+
+
+def shared(kind, params):
+    """The Compaction, Walking or Bounding of these parameters: one for all who name them alike."""
+    with _lock:
+        key = kind.__name__, repr(params)
+        found = _shared.get(key)
+        if found is None:
+            found = _shared[key] = kind()
+        return found
+
+
+class Compaction:
+    """Pictures of a packing that is being compressed, the last ones kept."""
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self.run = 0  # how often it was begun
+        self.restart()
+
+    def restart(self):
+        """Begin anew: an earlier run was cancelled."""
+        with self._lock:
+            self.run += 1
+            self._kept, self._total = deque(), 0
+            self._side, self._at = np.inf, -np.inf
+
+    def add(self, glimpse):
+        """Keep a Glimpse, if it differs enough from the last one."""
+        now, side = time.perf_counter(), float(glimpse.box[0])
+        if side > (1 - STRAIN) * self._side and now < self._at + EVERY_S:
+            return
+        self._side, self._at = side, now
+        picture = _picture(glimpse)
+        size = sum(value.nbytes for value in picture.values() if isinstance(value, np.ndarray))
+        with self._lock:
+            self._kept.append(picture)
+            self._total += 1
+            while len(self._kept) * size > PICTURE_BYTES and len(self._kept) > 1:
+                self._kept.popleft()
+
+    @property
+    def total(self):
+        """Pictures kept since it was begun, those dropped since included."""
+        return self._total
+
+    def after(self, run, place):
+        """(run, place, picture or None): the next picture for who has seen `place` of a run."""
+        with self._lock:
+            if run != self.run:
+                run, place = self.run, 0
+            left = self._total - place
+            if left <= 0:
+                return run, place, None
+            place = max(place + (left - 1) // BEHIND, self._total - len(self._kept))
+            return run, place + 1, self._kept[place - self._total]
+
+
+def _picture(glimpse):
+    """A Glimpse as the page draws it; forces in units of its own ⟨f_n⟩."""
+    forces = glimpse.forces.astype(np.float32)
+    mean = float(forces[:, 0].mean()) if len(forces) else 1.0
+    return {
+        "box": [float(side) for side in glimpse.box],
+        "x": glimpse.x.astype(np.float32).ravel(),
+        "radius": glimpse.r.astype(np.float32),
+        "i": glimpse.i.astype(np.int32),
+        "j": glimpse.j.astype(np.int32),
+        "reach": glimpse.reach.astype(np.float32).ravel(),
+        "normal": forces[:, 0] / mean,
+        "tangential": forces[:, 1] / mean,
+        "step": glimpse.step,
+        "fraction": glimpse.packing_fraction,
+        "unbalance": glimpse.unbalance if np.isfinite(glimpse.unbalance) else -1.0,
+    }
+
+
+class Walking:
+    """The states of a walk as they are found, and the Replay that they go into."""
+
+    def __init__(self):
+        self.run = 0
+        self.replay, self.parts = None, []
+
+    def restart(self, replay):
+        """Begin anew, on the `first_replay` of the ensemble."""
+        self.parts = []
+        self._every = every(replay.summary)
+        self._growth = measures.Growth()
+        self._found = self._attempts = 0
+        self.replay = replay
+        self.run += 1
+
+    def add(self, found):
+        """Keep a Found state, or every so many where not all can be sent."""
+        state = found.forces / self.replay.force_scale
+        grown = self._growth.add(state)
+        self._found += 1
+        self._attempts += found.attempts
+        if (self._found - 1) % self._every:
+            return
+        numbers = self._found, found.residual, self._found / self._attempts, *grown
+        self.parts.append((state.astype(np.float32), numbers))
+
+
+class Bounding:
+    """Exact bounds of f_n as they are found; NaN where one is still to come."""
+
+    def __init__(self):
+        self.version = 0  # how often something has changed
+        self.low = self.high = np.zeros(0, np.float32)
+
+    def restart(self, S):
+        """Begin anew, on an ensemble."""
+        self._place = {int(contact): k for k, contact in enumerate(S.index)}
+        self._scale = S.force_scale
+        self.low, self.high = np.full((2, len(S.index)), np.nan, dtype=np.float32)
+        self.version += 1
+
+    def add(self, bound):
+        """Keep a Bound, if it is one of f_n."""
+        if bound.component == 0:
+            side = self.high if bound.side else self.low
+            side[self._place[bound.contact]] = bound.value / self._scale
+            self.version += 1
+
+
+class Arriving:
+    """What one page has been sent of a Bounding."""
+
+    def __init__(self, params):
+        """params: of the exact intervals, as a store names them."""
+        self._bounding = shared(Bounding, params)
+        self._sent, self._at = 0, -np.inf
+
+    def next(self):
+        """What comes next, or None: {"bounds": {"low", "high": (N_c,)}}, in ⟨f_n⟩."""
+        bounding, now = self._bounding, time.perf_counter()
+        version = bounding.version
+        if version == self._sent or now < self._at + BOUNDS_S or not len(bounding.low):
+            return None
+        self._sent, self._at = version, now
+        return {"bounds": {"low": bounding.low.copy(), "high": bounding.high.copy()}}
+
+
+def every(summary):
+    """Of a walk under way every so many states are sent: all, if they fit in FRAME_BYTES."""
+    most = max(2, int(FRAME_BYTES / (8 * max(1, summary["contacts"]))))
+    return -(-summary["states"] // most)
+
+
+def numbers(summary):
+    """Numbers (F,) of the states that are sent of a walk under way, 0 for the original."""
+    return np.append(0, np.arange(1, summary["states"] + 1, every(summary)))
+
+
+NUMBERS = ("number", "residual", "acceptance", "eta1", "eta2", "eta3")
+
+
+def _batch(parts):
+    """States as the player takes them: flat arrays, one state after the other."""
+    forces = np.stack([state for state, _ in parts])
+    rows = np.array([numbers for _, numbers in parts], dtype=np.float32).T
+    return {
+        "normal": forces[..., 0].ravel(),
+        "tangential": forces[..., 1].ravel(),
+        **dict(zip(NUMBERS, rows, strict=True)),
+    }
+
+
+def first_replay(S, states):
+    """The Replay of an ensemble before its walk: the original network alone; `states` will follow.
+
+    S is of any kind that has packing, index, original, force_scale and mu.
+    """
+    packing, backbone, scale = S.packing, S.index, S.force_scale
+    original = (S.original / scale).astype(np.float32)
+    x = geometry.into_box(packing)
+    window = geometry.square(x, packing)
+    nothing = np.full(1, np.nan)
+    return Replay(
+        disks=geometry.disks(packing, x, window, backbone),
+        links=geometry.links(packing, x, window, backbone),
+        box=packing.box,
+        window=window,
+        backbone=backbone,
+        force_scale=scale,
+        normal=np.ascontiguousarray(original[None, :, 0]),
+        tangential=np.ascontiguousarray(original[None, :, 1]),
+        number=np.zeros(1),
+        distance=nothing,
+        residual=nothing,
+        attempts=nothing,
+        growth={name: nothing for name in ("eta1", "eta2", "eta3")},
+        low=original,
+        high=original,
+        order=np.argsort(original[:, 0], kind="stable"),
+        summary={
+            "mu": S.mu,
+            "n": len(packing.r),
+            "contacts": len(backbone),
+            "states": states,
+            "packing_fraction": packing.packing_fraction,
+            "coordination": S.coordination,
+            "dimension": S.dimension,
+        },
+    )
+
+
+class Following:
+    """One page's place in what is computed for a Selection."""
+
+    def __init__(self, selection):
+        self.selection = selection
+        self._compaction = shared(Compaction, selection.packing)
+        self._walking = shared(Walking, selection.parameters())
+        # Who joins later begins with the newest picture.
+        self._run, self._place = self._compaction.run, max(0, self._compaction.total - 1)
+        self._walk_run = self._state = 0
+
+    def rewind(self):
+        """The page has forgotten the states that it was sent."""
+        self._state = 0
+
+    @property
+    def fourfold(self):
+        """How often the states sent have grown fourfold since the first: 4 → 1, 16 → 2, …"""
+        return max(0, self._state.bit_length() - 1) // 2
+
+    def states(self):
+        """The states (k, N_c, 2) sent, in ⟨f_n⟩, of more than ENOUGH so many, evenly; or None."""
+        sent = self._walking.parts[: self._state]
+        if not sent:
+            return None
+        return np.stack([state for state, _ in sent[:: -(-len(sent) // ENOUGH)]])
+
+    def next(self):
+        """What comes next, or None: {"picture": …}, {"replay": Replay} or {"states": …}."""
+        self._run, self._place, picture = self._compaction.after(self._run, self._place)
+        if picture is not None:
+            return {"picture": picture | {"mu": self.selection.packing["mu"]}}
+        walking = self._walking
+        run, replay = walking.run, walking.replay
+        if replay is None:
+            return None
+        if run != self._walk_run:
+            self._walk_run, self._state = run, 0
+            return {"replay": replay}
+        parts = walking.parts[self._state : self._state + BATCH]
+        if not parts:
+            return None
+        self._state += len(parts)
+        return {"states": _batch(parts)}

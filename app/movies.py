@@ -1,0 +1,150 @@
+"""A movie of what plays, as GIF: drawn here, small enough for slides."""
+
+import io
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from granforce.records import Cancelled
+
+SIDE = 480  # pixels
+FINER = 2  # times as many while drawing, for smooth edges
+FRAMES = 60
+FRAME_MS = 80
+MOST_BYTES = 5e6
+FEWER = (1.0, 0.7, 0.5, 0.35)  # parts of SIDE that are tried until it is small enough
+TONES = 64  # colours of the whole movie
+WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
+
+
+def gif(replay, look, *, between=None, progress=None, cancelled=None):
+    """GIF (bytes, at most MOST_BYTES) of the states, or to and fro between two of them.
+
+    look: see `shades`. progress(done, total); cancelled() ends it with Cancelled.
+    """
+    for part in FEWER:
+        images = _drawn(replay, look, int(SIDE * part), between, progress, cancelled)
+        file = io.BytesIO()
+        images[0].save(
+            file, "GIF", save_all=True, append_images=images[1:], duration=FRAME_MS, loop=0
+        )
+        if file.tell() <= MOST_BYTES:
+            break
+    return file.getvalue()
+
+
+def _drawn(replay, look, side, between, progress, cancelled):
+    fine = side * FINER
+    ground = _disks(replay, look, fine)
+    images = []
+    for k, (a, b, part) in enumerate(_moments(len(replay.normal), between)):
+        if cancelled is not None and cancelled():
+            raise Cancelled("the movie was cancelled")
+        normal, tangential = (
+            (1 - part) * values[a] + part * values[b]
+            for values in (replay.normal, replay.tangential)
+        )
+        image = ground.copy()
+        _chains(ImageDraw.Draw(image), replay, look, normal, tangential, fine)
+        small = image.resize((side, side), Image.Resampling.LANCZOS)
+        # One palette for all frames, or colours would flicker.
+        tones = images[0] if images else None
+        images.append(
+            small.quantize(TONES, dither=Image.Dither.NONE)
+            if tones is None
+            else small.quantize(palette=tones, dither=Image.Dither.NONE)
+        )
+        if progress is not None:
+            progress(k + 1, FRAMES)
+    return images
+
+
+def _moments(count, between):
+    """(state, next state, part of the way) of each frame of the movie."""
+    if between is not None:
+        way = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(FRAMES) / FRAMES)
+        return [(*between, float(part)) for part in way]
+    places = np.linspace(0, count - 1, FRAMES)
+    before = np.minimum(places.astype(int), max(count - 2, 0))
+    return [
+        (int(a), min(int(a) + 1, count - 1), float(place - a))
+        for a, place in zip(before, places, strict=True)
+    ]
+
+
+def _place(replay, fine):
+    """Pixels of places, and pixels for each unit of length."""
+    left, right, _, top = replay.window
+    scale = fine / (right - left)
+    return lambda x, y: ((x - left) * scale, (top - y) * scale), scale
+
+
+def _disks(replay, look, fine):
+    image = Image.new("RGB", (fine, fine), look["ground"])
+    draw, (place, scale) = ImageDraw.Draw(image), _place(replay, fine)
+    disks = replay.disks
+    for x, y, r, touching, outside in zip(
+        disks.x, disks.y, disks.r, disks.contacts, disks.image, strict=True
+    ):
+        px, py = place(x, y)
+        fill = look["pale"] if touching == 0 or outside else look["disk"]
+        box = (px - r * scale, py - r * scale, px + r * scale, py + r * scale)
+        draw.ellipse(box, fill=fill, outline=look["edge"], width=FINER)
+    return image
+
+
+def _chains(draw, replay, look, normal, tangential, fine):
+    place, scale = _place(replay, fine)
+    links = replay.links
+    width = WIDTH * look["thickness"](normal) * scale
+    colours = look["colours"]
+    tone = np.clip(look["shade"](normal, tangential), 0, 1) * (len(colours) - 1)
+    for k in np.argsort(width[links.contact], kind="stable"):
+        c = links.contact[k]
+        if width[c] < 0.2:
+            continue
+        ends = (*place(links.x0[k], links.y0[k]), *place(links.x1[k], links.y1[k]))
+        draw.line(ends, fill=colours[int(tone[c] + 0.5)], width=max(1, round(float(width[c]))))
+
+
+def shades(
+    replay, exact, palettes, *, colour, thickness, reference, most, dark, loads=None, gone=None
+):
+    """How forces are drawn, as on screen: colours, and functions of the forces of a moment.
+
+    exact: {"low", "high"} (N_c,) or empty; the others as in the state, most: ΔF_n at full colour,
+    loads (N_c,) limit loads or None; gone (N_c,) of ΔF_n by what is known, or None.
+    """
+    low, high = (exact["low"], exact["high"]) if exact else (replay.low[:, 0], replay.high[:, 0])
+    extent, first, pinned = high - low, replay.normal[0], replay.normal[reference]
+    mu = replay.summary["mu"]
+
+    def mobilised(normal, tangential):
+        limit = np.maximum(mu * normal, 1e-9)
+        return 0.5 + tangential / limit / 2 if mu > 0 else np.zeros_like(normal)
+
+    shade = {
+        "mobilised": mobilised,
+        "extent": lambda normal, tangential: extent / (most or 1.0),
+        "change": lambda normal, tangential: 0.5 + (normal - first) / 2,
+        "sign": lambda normal, tangential: 0.5 + 0.5 * np.sign(normal - pinned),
+        "load": lambda normal, tangential: (
+            np.full_like(normal, 0.5) if loads is None else loads / loads.max()
+        ),
+        "known": lambda normal, tangential: (
+            np.zeros_like(normal) if gone is None else gone / np.maximum(gone + extent, 1e-6)
+        ),
+    }[colour]
+    width = {
+        "normal": lambda normal: normal,
+        "extent": lambda normal: extent,
+        "difference": lambda normal: np.abs(normal - pinned),
+        "load": lambda normal: normal if loads is None else loads,
+        "known": lambda normal: normal if gone is None else gone,
+    }[thickness]
+    neutral = (colour == "mobilised" and mu == 0) or (colour == "known" and gone is None)
+    tones = {"ground": "#121212", "disk": "#3b444f", "pale": "#22272d", "edge": "#55606e"}
+    if not dark:
+        tones = {"ground": "#ffffff", "disk": "#d0d8e2", "pale": "#eef1f5", "edge": "#a9b7c8"}
+    colours = [palettes["neutral"]] if neutral else palettes[colour]
+    return {"shade": shade, "thickness": width, "colours": colours, **tones}

@@ -1,0 +1,317 @@
+"""One visitor's page, from the first picture to its end, when nothing more is computed for it."""
+
+import importlib
+from functools import partial
+
+import panel as pn
+import panel_material_ui as pmui
+import param
+from panel.util import edit_readonly
+
+from . import garbage
+from .data import Library
+from .grabs import Hand
+from .jobs import reading
+from .state import AppState
+from .views.address import Address
+from .views.controls import Controls
+from .views.explanation import Explanation
+from .views.hints import Hints
+from .views.packing import PackingView
+from .views.parts import (
+    PLAIN,
+    answer_with_lock,
+    leave_unmounted_plots,
+    send_what_waits,
+    together,
+)
+from .views.progress import Progress
+from .views.stream import Stream
+from .views.summary import tiles
+from .views.tour import Tour
+
+# Where it lies over the page, the sidebar begins unseen: player.js shows it once it is closed.
+UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
+# Narrow pages leave room at the lower edge for what is told there (progress.py, tour.js), and have
+# less for their title.
+NARROW = """
+@media (max-width: 899.95px) {
+  .main-content { padding-bottom: calc(var(--task, 0px) + var(--card, 0px)) }
+}
+@media (max-width: 599.95px) { .header .title { font-size: 15px !important } }
+"""
+# Packing and tabs; under each other where there is no room.
+SIDE_BY_SIDE = {
+    "& .main-content": {
+        "display": "grid",
+        "gridTemplateColumns": "repeat(auto-fit, minmax(min(100%, 440px), 1fr))",
+        "alignItems": "start",
+        "alignContent": "start",
+        "columnGap": "8px",
+    },
+    # The template's bar, which never shows anything here but which screen readers would tell.
+    "& .MuiAppBar-root .MuiLinearProgress-root": {"display": "none"},
+}
+POLL_MS = 200  # how often the page asks running work how far it is
+WAITING_MS = 250  # how often what Panel has kept back is sent
+GONE_MS = (
+    3000  # without a browser, after which a page's work is ended; the page itself stays longer
+)
+
+# The tabs: name in links → title, module of app.views whose `View(state)` fills it when first seen.
+TABS = {
+    "intervals": "Intervals",
+    "statistics": "Statistics",
+    "plane": "Force space",  # the third: see TAB_LESS
+    "perturb": "Perturb",
+    "upload": "Your packing",
+    "export": "Export",
+}
+
+TAB = {"& .MuiTab-root": {"minWidth": 0, "padding": "12px 8px", **PLAIN}}
+# The same with the tab of force space hidden, which has a place of its own on a wide screen.
+TAB_LESS = TAB | {"& .MuiTab-root:nth-of-type(3)": {"display": "none"}}
+GROWING = ("intervals", "plane")  # what shows a walk while it is computed
+
+
+def page():
+    """One visitor's page."""
+    pn.extension()
+    document = pn.state.curdoc
+    leave_unmounted_plots(document)
+    answer_with_lock()
+    query = pn.state.location.search if pn.state.location else ""
+    state = AppState(pn.state.as_cached("library", _open_library), _turns(document), query)
+    state.message = state.message or " ".join(state.library.notes)
+    wide = {"sizing_mode": "stretch_width"}
+    packing = PackingView(state)
+    Stream(state, packing.player, document)
+    packing.player.on_wide = lambda wide: state.param.update(wide=wide)
+    packing.player.on_hand = Hand(state, state.task(reading), packing.player.hand_over).heard
+    packing.player.on_known = state.knowledge.heard
+    left = pn.Column(packing.player, **wide)
+    middle = pn.Column(visible=False, css_classes=["in-plane"], **wide)
+    right, sidebar = pn.Column(**wide), pn.Column()
+    header = pn.Row(sizing_mode="stretch_width", align="center", margin=(0, 8))
+    whole = pmui.Page(
+        title="granforce — see force space",
+        header=[header],
+        sidebar=[sidebar],
+        sidebar_width=290,
+        sidebar_resizable=False,  # its handle has a name but no role
+        main=[left, middle, right],
+        sx=SIDE_BY_SIDE,
+        stylesheets=[UNSEEN, NARROW],
+        dark_theme=state.dark,
+        busy_indicator=None,  # but the player's: for this one Bokeh looks through the whole page
+    )
+    with edit_readonly(whole):
+        # pn.state, to which it was bound, would keep every closed page, and does if given a value.
+        whole.busy = param.rx(False)
+
+    def parts():
+        """What follows the packing."""
+        controls = Controls(state)
+        left.extend([controls.beside, packing.legend, Explanation(state), Address(state), Hints()])
+        header[:] = in_title(state, query)
+        widgets = controls.panel()
+        yield
+        for k in range(0, len(widgets), 3):
+            sidebar.extend(widgets[k : k + 3])
+            yield
+        summary = tiles(state)
+        right.append(summary)
+        tabs = Tabs(state)
+        _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
+        packing.player.on_digit = tabs.choose
+        state.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
+        yield
+        right.append(tabs.tabs)
+        yield
+        yield from tabs.filling(state.tab)
+        yield from tabs.beside(middle)
+        state.read_ahead()
+
+    pn.state.onload(partial(state.piecewise, parts()))
+    whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
+    _poll_while_running(state, document)
+    document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
+    closed = garbage.opened()
+
+    def end(context):
+        state.close()
+        closed()
+
+    pn.state.on_session_destroyed(end)
+    return whole
+
+
+def _turns(document):
+    """wake(function): call it on the page's thread, soon, when what it changes will be seen."""
+    waiting = []
+
+    def run(function):
+        if _in_transit(document):
+            waiting.append(function)
+        else:
+            together(function)
+
+    def wake(function):
+        if document.session_context is not None:  # else the page has ended
+            document.add_next_tick_callback(partial(run, function))
+
+    def arrived():
+        while waiting:
+            wake(waiting.pop(0))
+
+    pn.state.onload(arrived)
+    return wake
+
+
+def _in_transit(document):
+    """Whether the browser has connected but not yet said that it has the page.
+
+    Panel forgets what changes before that, as if the browser were still to fetch the page: changes
+    after it was fetched would be lost.
+    """
+    context = document.session_context
+    session = None if context is None else context.session
+    return not pn.state.loaded and session is not None and session.connection_count > 0
+
+
+def _open_library():
+    """The stores, once for all visitors."""
+    garbage.settle()
+    return Library()
+
+
+def in_title(state, query):
+    """What stands in the title bar, where it covers nothing: what is computed, and the tour."""
+    knowledge = state.knowledge
+    tasks = state.computation, state.loading, state.besides.task, knowledge.task, knowledge.ranking
+    return [Progress(*tasks, titled=True), Tour(state, query)]
+
+
+class Tabs:
+    """Views beside the packing; each is made when it is first seen, and told when it is hidden."""
+
+    def __init__(self, state):
+        self.state = state
+        self.names = list(TABS)
+        self._begun, self._space = set(), None  # the view of force space, wherever it is
+        self.pages = {
+            name: pn.Column(sizing_mode="stretch_width", css_classes=[f"in-{name}"])
+            for name in self.names
+        }
+        if state.tab not in self.names:
+            state.tab = self.names[0]
+        self.tabs = pmui.Tabs(
+            *((TABS[name], self.pages[name]) for name in self.names),
+            active=self.names.index(state.tab),
+            sx=TAB,
+            sizing_mode="stretch_width",
+        )
+        self.tabs.param.watch(lambda event: state.piecewise(self._showing()), "active")
+        state.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
+
+    def choose(self, number):
+        """Show tab 1, 2, …; other numbers do nothing, and what is on screen anyway stays there."""
+        if 1 <= number <= len(self.names) and not self._has_place(self.names[number - 1]):
+            self.tabs.active = number - 1
+
+    def _showing(self):
+        name = self.names[self.tabs.active]
+        yield from self.filling(name)  # first, so that those who follow the state find it there
+        if name == self.names[self.tabs.active]:
+            self.state.tab = name
+
+    def beside(self, place):
+        """Put force space into a place of its own on a wide screen, else back into its tab."""
+        wide, page = self.state.wide, self.pages["plane"]
+        self.tabs.sx = TAB_LESS if wide else TAB
+        if wide == place.visible:
+            return
+        place.visible = wide  # at once: nobody else need begin with it
+        if wide:
+            if self.state.tab == "plane":
+                self.tabs.active = self.names.index("intervals")
+            self._begun.add("plane")
+            self._leave(page)
+            yield  # two plots of one name must not be in one message
+            view = self._space = _module("plane").View(self.state)
+            yield
+            place[:] = [
+                pmui.Typography(TABS["plane"], variant="h6", margin=(8, 10, 0, 10)),
+                view.panel(),
+            ]
+        else:
+            self._leave(place)
+            self._begun.discard("plane")
+        yield
+
+    def _leave(self, place):
+        """Take force space away from a place; it is made anew for another."""
+        place[:] = []
+        if self._space is not None:
+            self._space.left = True
+
+    def filling(self, name):
+        """Make the view of a tab, once; a generator of pieces."""
+        if name not in self._begun and not self._has_place(name):
+            self._begun.add(name)
+            yield
+            view = _module(name).View(self.state)
+            if name == "plane":
+                self._space = view
+            yield
+            pieces = list(view.panel())
+            # Choices, then two at a time: not one by one, since each time Bokeh goes through all.
+            for k in range(-1, len(pieces), 2):
+                if self._has_place(name):
+                    return
+                self.pages[name].extend(pieces[max(k, 0) : k + 2])
+                yield
+
+    def _has_place(self, name):
+        """Whether a tab's view is beside the packing instead, where there may be but one of it."""
+        return self.state.wide and name == "plane"
+
+
+def _module(name):
+    # Relative: `panel serve` names the package after the folder, without a place to find it by.
+    return importlib.import_module(f".views.{name}", __package__)
+
+
+def _pale_when_old(parts):
+    """Have parts (name, view) of other states than those asked for be pale; see player.js."""
+    for name, part in parts:
+        part.styles = {"opacity": f"var(--{'growing' if name in GROWING else 'still'}, 1)"}
+
+
+def _poll_while_running(state, document):
+    """Take over the progress of tasks while there are any; end them where nobody looks any more."""
+    polling, loaded = [], []
+
+    def poll():
+        if loaded and _left_alone(document.session_context):
+            state.cancel()
+        if not _in_transit(document):
+            state.poll()
+
+    def switch(*events):
+        if state.busy and not polling:
+            polling.append(document.add_periodic_callback(partial(together, poll), POLL_MS))
+        elif polling and not state.busy:
+            document.remove_periodic_callback(polling.pop())
+
+    pn.state.onload(lambda: loaded.append(True))
+    state.param.watch(switch, "busy")
+    switch()
+
+
+def _left_alone(context):
+    """Whether the browser has been gone for so long that it will hardly come back."""
+    session = None if context is None else context.session
+    if session is None or session.connection_count:
+        return False
+    return session.milliseconds_since_last_unsubscribe > GONE_MS

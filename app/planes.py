@@ -1,0 +1,228 @@
+"""Force space seen in a plane: where states of a Replay lie in it, and the outline of S there."""
+
+import json
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from granforce import measures
+from granforce.records import InputError
+from granforce.study import kinds
+from granforce.study.stresses import stress_axes
+
+from .compute import found_or_made
+
+
+class Plane(NamedTuple):
+    """Two axes of force space, and where states lie in their plane. Forces are in ⟨f_n⟩."""
+
+    components: tuple  # two (position in the backbone, 0 or 1), or empty for principal axes
+    axes: np.ndarray  # (2, N_c, 2)
+    origin: np.ndarray  # (2,) of the plane's coordinates
+    share: np.ndarray  # (2,) of the variance of the states, NaN for components
+    path: np.ndarray  # (F, 2) float32: the original network, then the states shown
+    kind: str = ""  # STRESS where the axes are those of stresses
+
+
+STRESS = "stress"
+
+
+class Outlined(NamedTuple):
+    """The outline of S in a Plane, between polygons inside and outside."""
+
+    plane: Plane
+    inner: np.ndarray  # (k, 2) corners
+    outer: np.ndarray  # (m, 2)
+    gap: float  # largest distance between them
+    programs: int  # linear programs it took
+    seconds: float
+
+
+def principal(replay, states=None):
+    """The Plane of the two directions along which states (k, N_c, 2), by default those shown, vary
+    most.
+    """
+    states = _frames(replay)[1:] if states is None else states.astype(np.float64)
+    axes, share = measures.principal_axes(states)
+    return _plane(replay, (), axes, measures.mean_network(states), share)
+
+
+def components(replay, first, second):
+    """The Plane of two components (position in the backbone, 0 for f_n or 1 for f_t).
+
+    InputError for a contact that is not there, or one component named twice.
+    """
+    chosen = tuple(first), tuple(second)
+    count = replay.normal.shape[1]
+    for contact, component in chosen:
+        if not 0 <= contact < count or component not in (0, 1):
+            raise InputError(f"contacts are counted from 0 to {count - 1}, got {contact}")
+    if first == second:
+        raise InputError("choose two different components")
+    axes = np.zeros((2, count, 2))
+    for k, place in enumerate(chosen):
+        axes[(k, *place)] = 1.0
+    return _plane(replay, chosen, axes, np.zeros(axes.shape[1:]), np.full(2, np.nan))
+
+
+def stress(library, selection, replay):
+    """The Plane of stresses: (σ_xx − σ_yy)/2P and σ_xy/P. InputError without a pressure."""
+    axes = stress_axes(library.packing(selection.packing), selection.mu)
+    none = np.zeros(axes.shape[1:])
+    return _plane(replay, (), axes, none, np.full(2, np.nan))._replace(kind=STRESS)
+
+
+def _frames(replay):
+    return np.stack([replay.normal, replay.tangential], axis=2).astype(np.float64)
+
+
+def _plane(replay, chosen, axes, centre, share):
+    path = np.tensordot(_frames(replay) - centre, axes, ((1, 2), (1, 2)))
+    origin = np.tensordot(axes, centre, ((1, 2), (0, 1)))
+    return Plane(chosen, axes, origin, share, path.astype(np.float32))
+
+
+def labels(replay, plane):
+    """Titles of the two axes, in words."""
+    if plane.components:
+        return tuple(
+            f"{'fₙ' if component == 0 else 'fₜ'} of contact {replay.backbone[contact]} / ⟨fₙ⟩"
+            for contact, component in plane.components
+        )
+    if plane.kind == STRESS:
+        return "(σₓₓ − σᵧᵧ) / 2P", "σₓᵧ / P"
+    ordinals = ("first", "second")
+    return tuple(
+        f"{word} principal axis ({part:.0%} of the variance) / ⟨fₙ⟩"
+        for word, part in zip(ordinals, plane.share, strict=True)
+    )
+
+
+def name(plane):
+    """What a link calls a Plane."""
+    if not plane.components:
+        return "s" if plane.kind == STRESS else "p"
+    return "-".join(f"{contact}{'nt'[part]}" for contact, part in plane.components)
+
+
+def read(text):
+    """The components () or ((contact, part), (contact, part)) of a name; ValueError for none."""
+    if text in ("p", "s"):
+        return ()
+    first, second = ((int(part[:-1]), "nt".index(part[-1:] or "?")) for part in text.split("-"))
+    return first, second
+
+
+def named(library, cell, replay, text):
+    """The Plane of a name, with the axes that are kept of it."""
+    chosen = read(text)
+    if chosen:
+        return components(replay, *chosen)
+    if text == "s":
+        return stress(library, cell.selection, replay)
+    plane = principal(replay)
+    kept = library.stored(kinds.OUTLINE, _parameters(cell, replay, plane))
+    return plane if kept is None else _as_kept(replay, plane, kept)
+
+
+def beside(cells, cell):
+    """Of these the cell of the other kind of states of the same packing and μ with most, or None.
+
+    States uniform in S beside a walk, a walk beside uniform ones.
+    """
+    own = cell.selection
+    others = [
+        other
+        for other in cells
+        if other.kind != cell.kind
+        and other.mu == cell.mu
+        and other.selection.packing == own.packing
+    ]
+    return max(others, key=lambda other: other.selection.states, default=None)
+
+
+def points(plane, replay, other):
+    """Where the states (k, 2) of another Replay of the same contacts lie in a Plane."""
+    if not np.array_equal(replay.backbone, other.backbone):
+        return np.empty((0, 2))
+    return np.tensordot(_frames(other)[1:], plane.axes, ((1, 2), (1, 2))) - plane.origin
+
+
+def inner_share(points, outline):
+    """Share of points (n, 2) within a convex polygon (k, 2) shrunk to half about its centre."""
+    corners = np.asarray(outline, dtype=np.float64)
+    after = np.roll(corners, -1, axis=0)
+    slice_ = corners[:, 0] * after[:, 1] - after[:, 0] * corners[:, 1]
+    centre = ((corners + after) * slice_[:, None]).sum(axis=0) / (3 * slice_.sum())
+    far = centre + 2 * (points - centre)
+    edge, away = after - corners, far[:, None] - corners
+    turn = edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0]
+    return float(np.mean(np.all(turn * np.sign(slice_.sum()) >= 0, axis=1)))
+
+
+def hull(points):
+    """Corners of the convex hull of points (n, 2); all points where they lie on a line."""
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError:
+        return points
+
+
+def area(polygon):
+    """Area of a convex polygon (k, 2); 0 for fewer than three corners."""
+    x, y = np.asarray(polygon, dtype=np.float64).T
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+
+
+def outline(library, cell, replay, plane):
+    """Work, for jobs.Task, that finds or computes the outline of S in a Plane."""
+
+    def work(job):
+        if plane.kind == STRESS:
+            return _stresses(library, job, cell, plane)
+        params = _parameters(cell, replay, plane)
+        axes = None if plane.components else plane.axes
+        found = found_or_made(library, job, "outline of S", kinds.OUTLINE, params, axes=axes)
+        return _outlined(replay, plane, found)
+
+    return work
+
+
+def _stresses(library, job, cell, plane):
+    """The Outlined of all stresses."""
+    params = kinds.STRESS.parameters(cell.selection.packing, mu=cell.mu)
+    found = found_or_made(library, job, "outline of all stresses", kinds.STRESS, params)
+    inner, outer = found["stress_inner"].values, found["stress_outer"].values
+    gap = found["friction_bound"].item() - found["friction"].item()
+    programs = json.loads(found.attrs["counts"])["programs"]
+    return Outlined(plane, inner, outer, gap, programs, found["seconds"].item())
+
+
+def _parameters(cell, replay, plane):
+    """As a store names the outline in a Plane."""
+    selection = cell.selection
+    chosen = [[int(replay.backbone[contact]), part] for contact, part in plane.components]
+    return kinds.OUTLINE.parameters(
+        selection.packing,
+        mu=selection.mu,
+        components=chosen or None,
+        states=None if chosen else cell.params,
+    )
+
+
+def _as_kept(replay, plane, found):
+    """The Plane on the axes that its outline was made with."""
+    axes = found["axes"].values
+    if np.array_equal(axes, plane.axes):
+        return plane
+    centre = measures.mean_network(_frames(replay)[1:])
+    return _plane(replay, plane.components, axes, centre, plane.share)
+
+
+def _outlined(replay, plane, found):
+    """The outline as kept; its axes are those it was made with, and the path follows them."""
+    plane = _as_kept(replay, plane, found)
+    inner, outer = (found[name].values - plane.origin for name in ("inner", "outer"))
+    numbers = (found[name].item() for name in ("outline_gap", "programs", "seconds"))
+    return Outlined(plane, inner, outer, *numbers)

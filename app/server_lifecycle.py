@@ -1,0 +1,35 @@
+"""Run once when the server starts: limits that cannot be read end it, kernels are compiled.
+
+And once when it ends.
+"""
+
+import importlib
+import sys
+from contextlib import suppress
+
+from granforce.records import InputError
+from granforce.study.scan import warm_up
+from granforce.system.cancelling import end_everything
+from granforce.system.compiled import compile_ahead
+
+try:
+    from .jobs import Job  # which reads the limits
+except InputError as error:
+    print(error, file=sys.stderr)
+    sys.exit(2)
+
+
+def on_server_loaded(server_context):
+    """Import and load what visitors will need, or compile it first; they may come meanwhile."""
+    # xarray imports dask, where it is installed, with the first array it looks at, which fails
+    # where two threads do so at once.
+    with suppress(ImportError):
+        importlib.import_module("dask.base")
+    importlib.import_module(".page", __package__)
+    if compile_ahead("from granforce.study.scan import warm_up; warm_up()", "flow._follow"):
+        Job(lambda job: warm_up())
+
+
+def on_server_unloaded(server_context):
+    """Whatever is being computed ends, or the process would wait for its threads."""
+    end_everything()

@@ -1,0 +1,153 @@
+"""The page as one file: packing, player, intervals and force space, without a server or network."""
+
+import base64
+import json
+from html import escape
+
+import numpy as np
+from bokeh.embed import components
+from bokeh.resources import Resources
+
+from . import planes
+from .views import explanation, still
+from .views.packing import exact_intervals, full_extent, legend
+from .views.player import Player, frames
+from .views.scripts import FOLDER, joined
+from .views.style import palettes
+
+FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
+# Rows of these belong to the states.
+BY_FRAME = ("number", "distance", "residual", "acceptance", "eta1", "eta2", "eta3")
+
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+body {{ margin: 0; font-family: Helvetica, Arial, sans-serif; color: #18191d; background: #fff; }}
+main {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 440px), 1fr));
+  gap: 0 18px; align-items: start; max-width: 1700px; margin: 0 auto; padding: 0 8px 24px; }}
+h1 {{ font-size: 19px; margin: 12px 16px 4px; }}
+footer {{ padding: 10px 16px 30px; font-size: 13px; line-height: 1.5; }}
+code {{ overflow-wrap: anywhere; white-space: pre-wrap; }}
+p {{ max-width: 68ch; font-size: 14px; line-height: 1.5; }}
+</style>
+{bokeh}
+</head><body>
+<h1>{title}</h1>
+<main><div><div id="player"></div><div>{legend}</div>{words}</div><div>{plots}</div></main>
+<footer>Made with granforce. The same states in a terminal: <code>{command}</code><br>
+This view on a server of granforce: <code>?{link}</code><br>{left_out}</footer>
+{script}
+<script type="module">
+const PLAYER_STYLE = {style}
+const GIVEN = {given}
+{code}
+</script>
+</body></html>
+"""
+
+
+def html(
+    library,
+    cell,
+    replay,
+    exact,
+    *,
+    view,
+    link,
+    command,
+    source,
+    outlined=None,
+    loads=None,
+    gone=None,
+    pins=None,
+):
+    """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
+
+    exact: under what is known; gone, pins: as the player has them.
+    """
+    intervals = exact_intervals(exact, replay)
+    shown, acceptance = thinned(replay)
+    plane = planes.principal(shown)
+    figures = still.figures(shown, exact, plane, outlined, view)
+    script, plots = components(figures)
+    frame = min(view["frame"], len(shown.normal) - 1)
+    between = view["between"]
+    if len(shown.normal) < len(replay.normal):
+        frame, between = 0, None
+    given = {name: view[name] for name in ("contact", "colour", "thickness", "overlay", "scale")}
+    given |= {
+        "walk": frames(shown) | {"acceptance": acceptance},
+        "exact": intervals,
+        "most": full_extent(replay, intervals),
+        "palettes": palettes(False),
+        "source": source,
+        "frame": frame,
+        "between": between,
+        "reference": 0,
+        "tab": "intervals",
+        "busy": False,
+        "live": False,
+        "asked": "",
+        "second": None,
+        "split": False,
+        "beside": None,
+        "twin": {},
+        "plane": {},
+        "displacement": None,
+        "loads": loads,
+        "gone": gone,
+        "pins": pins or {},
+    }
+    left = len(replay.normal) - len(shown.normal)
+    text = PAGE.format(
+        title=escape(f"Force space: {source}"),
+        bokeh=Resources(mode="inline", components=["bokeh"]).render(),
+        legend=legend(still.Light(replay, exact, view, loads=loads)),
+        words=explanation.text(replay.summary),
+        plots="".join(plots),
+        script=script,
+        command=escape(command),
+        link=escape(link),
+        left_out=f"{left} of the states are left out, evenly, to keep this file small."
+        if left
+        else "",
+        style=_script((FOLDER / "player.css").read_text()),
+        given=_script({name: _plain(value) for name, value in given.items()}),
+        code=joined(*Player.SCRIPTS, "standalone"),
+    )
+    return text.encode()
+
+
+def thinned(replay):
+    """A Replay of at most FRAME_BYTES, and the acceptance of its frames."""
+    count, contacts = replay.normal.shape
+    most = max(2, int(FRAME_BYTES / (8 * max(1, contacts))))
+    whole = frames(replay)["acceptance"]
+    if count <= most:
+        return replay, whole
+    pick = np.linspace(0, count - 1, most).astype(int)
+    rows = {
+        name: np.ascontiguousarray(getattr(replay, name)[pick])
+        for name in ("normal", "tangential", "number", "distance", "residual", "attempts")
+    }
+    growth = {name: values[pick] for name, values in replay.growth.items()}
+    return replay._replace(**rows, growth=growth), whole[pick]
+
+
+def _plain(value):
+    """Arrays as base64 with their type, all else as JSON takes it."""
+    if isinstance(value, dict):
+        return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, np.ndarray):
+        whole = np.issubdtype(value.dtype, np.integer) or value.dtype == bool
+        packed = np.ascontiguousarray(value, dtype="<i4" if whole else "<f4")
+        kind = "Int32Array" if whole else "Float32Array"
+        return {"array": kind, "data": base64.b64encode(packed.tobytes()).decode()}
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _script(value):
+    """JSON that can stand in a script."""
+    return json.dumps(value, ensure_ascii=False).replace("</", "<\\/")

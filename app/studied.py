@@ -1,0 +1,50 @@
+"""The finished study that comes with the page: its numbers, and the paper's claims judged."""
+
+import json
+import threading
+from functools import cache
+from pathlib import Path
+
+from granforce.paper import tables
+from granforce.records import InputError
+
+DATA = Path(__file__).resolve().parent.parent / "data"
+# What the claims of each statistic begin with; see data/claims.json.
+ABOUT = {
+    "eta": ("η", "z "),
+    "extent": ("P(ΔF_n)", "tail of P(ΔF_n)"),
+    "correlation": ("corr(",),
+    "store": ("F_crit", "α "),
+}
+
+_reading = threading.Lock()
+
+
+def study():
+    """The reduced study (granforce.paper.tables.Table), or None where it was not brought along."""
+    with _reading:
+        return _study()
+
+
+@cache
+def _study():
+    try:
+        return tables.load(DATA / "study.zarr")
+    except InputError:
+        return None
+
+
+@cache
+def claims(about):
+    """The paper's claims about one of ABOUT: dicts with statement, value, low, high, verdict."""
+    path = DATA / "claims.json"
+    if not path.exists():
+        return []
+    found = json.loads(path.read_text())["claims"]
+    return [claim for claim in found if claim["statement"].startswith(ABOUT[about])]
+
+
+def rows(*parts):
+    """Rows of parts of the study at its usual number of disks; empty without a study."""
+    table = study()
+    return [] if table is None else table.part(*parts, n=table.plan["n"])

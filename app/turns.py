@@ -1,0 +1,68 @@
+"""Of jobs that need the same, one works at a time, and goes on as long as any of them wants it."""
+
+import threading
+from contextlib import contextmanager
+from weakref import WeakSet, WeakValueDictionary
+
+# How long a job stays for its turn before it lets others have the thread, s.
+_ASK = 0.2
+
+_turns, _turns_lock = WeakValueDictionary(), threading.Lock()
+
+
+class Later(Exception):
+    """Raised by work that cannot go on yet; its job stands at the end of the queue again."""
+
+
+class Turn:
+    """Whose turn it is among jobs that need what has one name, and who they are."""
+
+    def __init__(self):
+        self.lock, self.job = threading.Lock(), None
+        self._wanting, self._guard = WeakSet(), threading.Lock()
+
+    def join(self, job):
+        """Count a job among those that need it."""
+        with self._guard:
+            self._wanting.add(job)
+
+    def wanted(self, without):
+        """Whether a job other than this one needs it that is neither cancelled nor at its end."""
+        with self._guard:
+            others = [job for job in self._wanting if job is not without]
+        return not all(job.cancelled() or job.ended for job in others)
+
+
+def turn_of(named):
+    """The Turn of a name; it lasts while somebody refers to it."""
+    with _turns_lock:
+        return _turns.setdefault(repr(named), Turn())
+
+
+@contextmanager
+def in_turn(job, *named):
+    """One job at a time of those named alike: the next finds in the cache what the first made.
+
+    Raises Later while another one has its turn: who waits leaves the thread to those who need not.
+    """
+    turn = turn_of(named)
+    turn.join(job)
+    if not turn.lock.acquire(timeout=_ASK):
+        _tell_as(job, turn.job)
+        raise Later
+    turn.job, job.stage = job, "starting"
+    job.turns.append(turn)
+    try:
+        yield
+    finally:
+        job.turns.remove(turn)
+        turn.job = None
+        turn.lock.release()
+
+
+def _tell_as(job, other):
+    """The progress of the other one, which works for both."""
+    job.stage = "being computed for another page"
+    if other is not None:
+        job.stage += f": {other.stage}"
+        job.fraction, job.seconds_left = other.fraction, other.seconds_left

@@ -1,0 +1,43 @@
+"""The page's address: a copy of it reopens the view, Back and Forward go through the views."""
+
+from typing import ClassVar
+
+import param
+from panel.custom import JSComponent
+
+from ..state import VIEW
+from .scripts import FOLDER, joined
+
+# Nobody goes back to the frame before, or to the other theme.
+PASSING = ("frame", "dark")
+
+
+class Address(JSComponent):
+    """Keeps the address like the state and the state like the address; see address.js.
+
+    It also says when the server is gone, and reopens the view when there is one again. Not Panel's
+    Location, which remembers every frame, and tells nobody when the visitor goes back.
+    """
+
+    query = param.String(doc="of the address, as the state has it")
+    passing = param.List(
+        default=list(PASSING), doc="what changes the address but is not gone back to"
+    )
+
+    _esm = joined("ask", "address")
+    _stylesheets: ClassVar = [FOLDER / "address.css"]
+
+    def __init__(self, state, **params):
+        super().__init__(**params)
+        self._state = state
+        state.param.watch(self._tell, ["selection", *VIEW])
+        self._tell()
+
+    def _tell(self, *events):
+        if self._state.cell is not None:
+            self.query = f"?{self._state.link()}"
+
+    def _handle_msg(self, message):
+        """The visitor went back or forward to another view."""
+        if isinstance(message, dict):
+            self._state.open(str(message.get("query", "")))

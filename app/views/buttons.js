@@ -1,0 +1,200 @@
+// The player's buttons, sliders and numbers around the scene, and the keys that stand for them.
+
+const ICONS = {
+  restart: "M6 5h2v14H6zM20 5v14L9 12z",
+  back: "M18 5v14L8 12z",
+  play: "M7 4v16l13-8z",
+  pause: "M6 5h4v14H6zM14 5h4v14h-4z",
+  step: "M6 5v14l10-7zM17 5h2v14h-2z",
+  pin: "M12 2a7 7 0 0 1 7 7c0 5-7 13-7 13S5 14 5 9a7 7 0 0 1 7-7zm0 4a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",
+  undo: "M12 5V1L6 6l6 5V7a6 6 0 1 1-6 6H4a8 8 0 1 0 8-8z",
+  hold: "M8 2h8v2l-1 1v6l3 3v2h-5v6l-1 1-1-1v-6H6v-2l3-3V5L8 4z",
+  between: "M4 12l5-5v3h6V7l5 5-5 5v-3H9v3z",
+  split: "M3 5h8v14H3zM13 5h8v14h-8z",
+}
+const HELD = { "[": "less", "]": "more", z: "undo", Z: "undo", Escape: "free", h: "hold", H: "hold" }
+const KEYS = { ArrowRight: "step", ArrowLeft: "back", Home: "restart" }
+
+function icon(name) {
+  return `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
+}
+
+function button(name, title) {
+  return `<button type="button" class="${name}" title="${title}" aria-label="${title}">${icon(name)}</button>`
+}
+
+const BUTTONS = `
+  <div class="source"></div>
+  <div class="bar">
+    ${button("restart", "restart at the original network (Home)")}
+    ${button("back", "one state back (←)")}
+    ${button("play", "play (space)")}
+    ${button("step", "one state on (→)")}
+    <input class="scrub" type="range" min="0" value="0" step="1" aria-label="state">
+    ${button("pin", "pin this state, to compare others with it")}
+    ${button("between", "to and fro between the pinned state and this one")}
+    ${button("split", "the pinned state and this one side by side; another μ then comes beside this one")}
+    <label title="speed, states per second"><input class="speed" type="range" min="0" max="6" step="0.25" value="3"
+      aria-label="speed"><span class="rate"></span></label>
+    ${button("undo", "undo the last pull (Z); Esc lets all go")}
+    <span class="knowing">
+      ${button("hold", "hold the selected contact at its present force (H); again: let it go")}
+      <label title="error bar of a force that is held, in mean forces ⟨fₙ⟩; 0: held exactly">±
+        <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in ⟨fₙ⟩"></label>
+    </span>
+  </div>
+  <div class="read">
+    <span>state <b class="state"></b></span>
+    <span tabindex="0" data-term="eta1">η1 <b class="eta1"></b></span>
+    <span tabindex="0" data-term="eta2">η2 <b class="eta2"></b></span>
+    <span tabindex="0" data-term="eta3">η3 <b class="eta3"></b></span>
+    <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
+    <span tabindex="0" data-term="distance">from centre of the states <b class="distance"></b> ⟨fₙ⟩</span>
+    <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
+  </div>`
+
+class Buttons {
+  /** actions: by the buttons' names; scrub(position); tab(number), for the digits. */
+  constructor(scene, actions) {
+    this.root = document.createElement("div")
+    this.root.className = "stage"
+    this.root.innerHTML = BUTTONS
+    this.actions = actions
+    this.skips = document.createElement("div")
+    this.skips.className = "skips"
+    this.skips.dataset.term = "segment"
+    this.skips.tabIndex = 0
+    this.asked = scene.root.appendChild(document.createElement("div"))
+    this.asked.className = "asked"
+    this.scenes = document.createElement("div")
+    this.scenes.className = "scenes"
+    this.scenes.append(scene.root)
+    this.root.append(this.scenes, this.skips)
+    this.scene = scene
+    for (const name of Object.keys(ICONS)) this.part(name)?.addEventListener("click", actions[name])
+    this.part("scrub").addEventListener("input", (event) => actions.scrub(Number(event.target.value)))
+    this.part("error").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
+    this.part("speed").addEventListener("input", () => this.tellRate())
+    this.tellRate()
+    // Before the widget that has the focus: what was clicked keeps it, but Space and arrows then mean
+    // the player again. Who goes by Tab means the widget.
+    this.tabbed = false
+    this.onKey = (event) => this.key(event)
+    this.onPress = () => { this.tabbed = false }
+    window.addEventListener("keydown", this.onKey, true)
+    window.addEventListener("pointerdown", this.onPress, true)
+  }
+
+  remove() {
+    window.removeEventListener("keydown", this.onKey, true)
+    window.removeEventListener("pointerdown", this.onPress, true)
+  }
+
+  part(name) { return this.root.querySelector(`.${name}`) }
+
+  /** States per second. */
+  get speed() { return 2 ** Number(this.part("speed").value) }
+
+  /** Error bar of a force that is held, in ⟨fₙ⟩. */
+  get error() { return Math.max(0, Number(this.part("error").value) || 0) }
+
+  /** Whether a contact is selected, whose force can be held. */
+  tellChosen(chosen) { this.root.classList.toggle("chosen", Boolean(chosen)) }
+
+  tellRate() { this.part("rate").textContent = `${this.speed.toFixed(this.speed < 10 ? 1 : 0)} /s` }
+
+  tellPlaying(playing) {
+    const play = this.part("play"), word = playing ? "pause" : "play"
+    play.innerHTML = icon(word)
+    play.title = `${word} (space)`
+    play.setAttribute("aria-label", word)
+    this.root.classList.toggle("playing", playing)
+  }
+
+  /** What was asked for and is not there yet lies over the old picture; empty: nothing was. */
+  tellAsked(words) {
+    this.asked.textContent = words
+    this.root.classList.toggle("pale", Boolean(words))
+  }
+
+  /** Whether a network is on screen that was pulled. */
+  tellHeld(held) { this.root.classList.toggle("held", held) }
+
+  /** Whether two networks are asked for, and whether they are there. */
+  tellSplit(asked, there) {
+    this.part("split").classList.toggle("on", asked)
+    this.root.classList.toggle("two", there)
+  }
+
+  tellTrack({ last, swinging, walk }) {
+    const scrub = this.part("scrub"), between = this.part("between")
+    scrub.max = last
+    scrub.step = swinging ? 0.01 : 1
+    between.classList.toggle("on", swinging)
+    between.disabled = !swinging && walk.number.length < 2
+  }
+
+  /** The numbers of the position. */
+  read(replay) {
+    const { walk, seen, residual } = replay
+    const form = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–")
+    const accepted = walk.acceptance[seen]
+    const texts = {
+      state: replay.place,
+      eta1: form(walk.eta1[seen], 3),
+      eta2: form(walk.eta2[seen], 3),
+      eta3: form(walk.eta3[seen], 3),
+      acceptance: accepted <= 1 ? `${Math.round(100 * accepted)} %` : "–",
+      distance: form(replay.distance, 2),
+      residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
+    }
+    for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text
+    this.part("scrub").value = replay.position
+    this.count()
+  }
+
+  count() {
+    const { drawn, segments, outside, thin } = this.scene.counts
+    this.skips.textContent = `Drawn: ${drawn} of ${segments} force lines ` +
+      `(${outside} out of view, ${thin} thinner than ${LEAST} px).`
+  }
+
+  key(event) {
+    if (!this.root.isConnected) return this.remove()
+    if (event.key === "Tab") this.tabbed = true
+    const at = event.composedPath()[0]
+    if (typing(at) || event.ctrlKey || event.metaKey || event.altKey) return
+    const own = { space: usesSpace(at, this.tabbed), arrows: usesArrows(at, this.tabbed) }
+    const name = KEYS[event.key]
+    if (event.key === " " && !own.space) this.actions.play()
+    else if (name && !own.arrows) this.actions[name]()
+    else if (HELD[event.key]) return this.actions[HELD[event.key]]()
+    else if (/^[1-9]$/.test(event.key)) this.actions.tab(Number(event.key))
+    else return
+    event.preventDefault()
+    event.stopPropagation()
+  }
+}
+
+// Which keys the element with the focus needs for itself
+
+function typing(at) {
+  return at.isContentEditable || /^(TEXTAREA|SELECT)$/.test(at.tagName) ||
+    (at.tagName === "INPUT" && !["range", "checkbox", "radio", "button"].includes(at.type))
+}
+
+const chosen = (at) => at.ariaSelected === "true" || at.ariaPressed === "true"
+const inMenu = (at) => ["option", "menuitem", "listbox", "menu"].includes(at.role)
+
+/** A tab or one of several that is chosen already has no use for it. */
+function usesSpace(at, tabbed) {
+  if (inMenu(at)) return true
+  const pressed = at.tagName === "BUTTON" || at.tagName === "A" || at.type === "checkbox" ||
+    ["combobox", "tab", "button", "switch"].includes(at.role)
+  return pressed && tabbed && !chosen(at)
+}
+
+function usesArrows(at, tabbed) {
+  if (inMenu(at) || at.type === "range") return true
+  return tabbed && ["tab", "combobox", "radio"].includes(at.role)
+}

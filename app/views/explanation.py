@@ -1,0 +1,116 @@
+"""What the picture shows, in sentences with the numbers of the packing on screen."""
+
+from typing import ClassVar
+
+import param
+from panel.custom import JSComponent
+
+from .hints import term
+from .scripts import joined
+
+QUESTION = "What am I seeing? Why are there many?"
+STYLE = """
+:host { display: block; }
+details[hidden] { display: none; }
+p { margin: 6px 0; font-size: 13.5px; line-height: 1.5; max-width: 68ch; }
+summary { cursor: pointer; font-size: 13.5px; font-weight: 600; padding: 4px 0; }
+summary:focus-visible, .term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
+.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
+"""
+
+
+def first(summary):
+    """What moves and what does not."""
+    return (
+        f"<p><b>The disks never move.</b> These {summary['n']} rigid disks are held by one "
+        "pressure. Every state is another set of contact forces on the same "
+        f"{term('packing')}: in each, all disks are in balance. Thick lines are large forces. "
+        f"What plays goes from one such {term('network')} to the next.</p>"
+    )
+
+
+def rest(summary):
+    """Why there are many networks, how many, and what measures that."""
+    forces, grains = 2 * summary["contacts"], summary["n"] - summary.get("rattlers", 0)
+    free, mu = summary["dimension"], summary["mu"]
+    if mu == 0:
+        why = (
+            f"Without friction each of the {summary['contacts']} contacts carries one force, and "
+            "there are as many equations as forces: the forces are determined, h = 0. Choose some "
+            "friction to see more than one network."
+        )
+    else:
+        needed = forces - free
+        why = (
+            f"Newton's laws ask for balance: two forces and a torque at each of {grains} disks "
+            f"that carry, and the pressure{_dependent(3 * grains + 1 - needed)}: {needed} "
+            f"equations. But {summary['contacts']} contacts carry {forces} forces, a {term('fn')} "
+            f"and a {term('ft')} each: <b>h = {free}</b> numbers are left free ({term('h')}). "
+            "That the forces are not determined by balance is called force indeterminacy. "
+            f"{term('s')} is all that is left once no contact pulls (fₙ ≥ 0) and none slips "
+            "(|fₜ| ≤ μ fₙ)."
+        )
+    return (
+        f"<p><b>Why not just one?</b> {why}</p>"
+        f"<p><b>How undetermined?</b> {term('eta1')}: how much a contact's force scatters over the "
+        f"states. {term('eta2')}: how far apart two states are. {term('eta3')}: how long a "
+        "contact's interval of possible forces is. All are measured against the mean force: 0 "
+        "means determined, 0.1 means uncertain by about a tenth.</p>"
+        "<p><b>What friction does.</b> Each μ is a packing of its own. More friction lets each "
+        "contact carry more different forces, but a packing made with more friction comes to rest "
+        "with fewer contacts, so fewer forces are free. Little friction leaves many directions "
+        "open, each of them narrow; much friction few, but wide: the indeterminacy rises and "
+        "then falls, and is largest around μ = 0.1 to 0.2.</p>"
+        f"<p><b>Where the states come from.</b> {term('walk')}: kick all forces at random, take "
+        f"the network in balance that is nearest to the kicked forces, go on from there. The "
+        f"{term('original')} is that with which the packing came to rest. All this follows "
+        f"{term('paper')}.</p>"
+    )
+
+
+def _dependent(count):
+    """In words, how many of the equations follow from the others."""
+    if count < 1:
+        return ""
+    return f" (less {count} that follow from the others, as each force acts on two disks)"
+
+
+def jamming(selection):
+    """What moves while a packing is made."""
+    return (
+        f"<p><b>These disks move until they jam.</b> A gas of {selection.packing['n']} rigid disks "
+        "is compressed by one pressure: the box shrinks, collisions (the short chains) turn into "
+        "contacts that last, and at last nothing can move any more. From then on the disks "
+        f"never move again, and the contact forces are explored on that {term('packing')}.</p>"
+    )
+
+
+def text(summary):
+    """All of it, the longer part to be opened."""
+    more = "<details><summary>{}</summary>{}</details>"
+    return first(summary) + more.format(QUESTION, rest(summary))
+
+
+class Explanation(JSComponent):
+    """Sentences below the packing; what was opened stays open, see explanation.js."""
+
+    first = param.String(doc="HTML")
+    rest = param.String(doc="HTML, to be opened; empty where there is no more to say")
+    question = param.String(default=QUESTION, constant=True)
+
+    _esm = joined("explanation")
+    _stylesheets: ClassVar = [STYLE]
+
+    def __init__(self, state, **params):
+        super().__init__(sizing_mode="stretch_width", margin=(4, 10), **params)
+        self._state = state
+        state.param.watch(self._tell, ["replay", "growing", "moving"])
+        self._tell()
+
+    def _tell(self, *events):
+        state = self._state
+        if state.moving and not state.selection.imported:
+            self.param.update(first=jamming(state.selection), rest="")
+        elif state.seen is not None:
+            summary = state.seen.summary
+            self.param.update(first=first(summary), rest=rest(summary))

@@ -1,0 +1,80 @@
+"""What a word on the page means: told where it stands, on hover, focus and touch."""
+
+from html import escape
+from typing import ClassVar
+
+import param
+from panel.custom import JSComponent
+
+from granforce.glossary import TERMS, title
+
+from .scripts import FOLDER, joined
+
+# Words on the page that are not the glossary's own: what stands there → key of the glossary.
+LABELS = {
+    "Friction coefficient μ": "mu",
+    "Disks N": "n",
+    "Seed": "seed",
+    "States": "states",
+    "Packed at μ": "packed_mu",
+    "States from": "s",
+    "Relaxation": "accelerated",
+    "Finished results": "store",
+    "what is known: part of the interval gone": "gone",
+    "what is known: length of the interval gone": "gone",
+    "Colour": "mobilisation",
+    "Width": "fn",
+    "mobilisation fₜ/(μ fₙ)": "mobilisation",
+    "length of the interval ΔFₙ": "extent",
+    "ΔFₙ": "extent",
+    "normal force fₙ": "fn",
+    "Strong and undetermined contacts": "overlay",
+    "original fₙ": "original",
+    "ΔFₙ of all states": "seen",
+    "exact ΔFₙ": "exact",
+    "place of the original in its interval": "place",
+    "how much what is known shortened it": "known",
+    "fₙ / ⟨fₙ⟩": "mean_force",
+    "fₙ / original fₙ": "original",
+    "Compute exact intervals": "exact",
+    "principal axes": "principal",
+    "fₙ, fₜ of a contact": "cone",
+    "fₙ of two contacts": "pair",
+    "stresses": "stress",
+    "η(μ)": "eta2",
+    "P(ΔFₙ)": "extent",
+    "corr(μ)": "correlation",
+    "ΔFₙ – fₙ": "correlation",
+    "P(fₙ)": "fn",
+    "one contact": "push",
+    "Which measurement next?": "informative",
+    "Push": "push",
+    "limit loads of all": "limit_load",
+    "critical force – η2": "critical_force",
+    "Force space": "s",
+    "Intervals": "exact",
+    "Perturb": "push",
+    "limit load": "limit_load",
+    "what limit loads are": "limit_load",
+}
+
+
+def labels():
+    """{words on the page: key of the glossary}."""
+    return {term.word: key for key, term in TERMS.items()} | LABELS
+
+
+def term(key, words=None):
+    """A word of the glossary as HTML, explained where it stands; words: how it is called there."""
+    shown = escape(title(key) if words is None else words)
+    return f'<span class="term" tabindex="0" data-term="{key}">{shown}</span>'
+
+
+class Hints(JSComponent):
+    """Shows a sentence beside the word pointed at, focused or touched; see hints.js."""
+
+    terms = param.Dict(default={key: [title(key), t.sentence] for key, t in TERMS.items()})
+    labels = param.Dict(default=labels())
+
+    _esm = joined("hints")
+    _stylesheets: ClassVar = [FOLDER / "hints.css"]

@@ -1,0 +1,72 @@
+"""Places for labels beside the points of a plot, such that all of them can be read."""
+
+import numpy as np
+
+# Pixels between the axes of the smallest plot that has labels, and of a letter and a point.
+SMALLEST, LETTER, POINT = (270.0, 190.0), (6.0, 11.0), 4.0
+# Where a label may stand beside its point.
+CORNERS = (
+    (5, -4, "left", "bottom"),
+    (-5, -4, "right", "bottom"),
+    (5, 4, "left", "top"),
+    (-5, 4, "right", "top"),
+)
+
+
+def labels(x, y, words, span):
+    """Where labels stand beside points such that none collide, as columns of a text glyph.
+
+    span: of what the axes show. In plots larger than the SMALLEST there is more room between them.
+    Those that find no place are left out.
+    """
+    scale = [0.9 * room / (part or 1.0) for room, part in zip(SMALLEST, span, strict=True)]
+    places = np.column_stack([x * scale[0], -y * scale[1]])
+    taken = [(px - POINT, py - POINT, px + POINT, py + POINT) for px, py in places]
+    joined = [(px, py, px, py) for px, py in _along(places)]
+    ends = _ends(places)
+    names = "x", "y", "text", "right", "down", "align", "baseline"
+    rows = []
+    for k, (px, py) in enumerate(places):
+        size = LETTER[0] * len(words[k]), LETTER[1]
+        found = [(corner, _box(px, py, *corner, *size)) for corner in CORNERS]
+        free = [
+            (corner, box)
+            for corner, box in found
+            if _within(box, ends) and not any(_meet(box, other) for other in taken)
+        ]
+        clear = [one for one in free if not any(_meet(one[1], point) for point in joined)]
+        if free:
+            corner, box = (clear or free)[0]
+            taken.append(box)
+            rows.append((x[k], y[k], words[k], *corner))
+    columns = zip(*rows, strict=True) if rows else ((),) * len(names)
+    return {name: list(column) for name, column in zip(names, columns, strict=True)}
+
+
+def _box(px, py, right, down, align, baseline, width, height):
+    """Pixels (left, top, right, bottom) of a label beside a point."""
+    left = px + right - (width if align == "right" else 0)
+    top = py + down - (height if baseline == "bottom" else 0)
+    return left, top, left + width, top + height
+
+
+def _along(places):
+    """Pixels of the line that joins points, close to each other."""
+    if len(places) < 2:
+        return places
+    part = np.linspace(0, 1, 24)[:, None, None]
+    return ((1 - part) * places[:-1] + part * places[1:]).reshape(-1, 2)
+
+
+def _ends(places):
+    """The frame of a plot, whose axes go a twentieth beyond what they show."""
+    room = 0.05 * np.array(SMALLEST)
+    return (*(places.min(axis=0) - room), *(places.max(axis=0) + room))
+
+
+def _within(box, ends):
+    return ends[0] <= box[0] and ends[1] <= box[1] and box[2] <= ends[2] and box[3] <= ends[3]
+
+
+def _meet(a, b):
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

@@ -1,0 +1,37 @@
+"""A field for a whole number."""
+
+from typing import ClassVar
+
+import param
+from panel.custom import JSComponent
+
+from .scripts import FOLDER, joined
+
+
+class NumberField(JSComponent):
+    """A whole number, taken over by Enter or on leaving the field; see number.js.
+
+    Not panel-material-ui's IntInput: after Enter it took no more typing until it lost focus, and
+    what did not fit beside its buttons was cut.
+    """
+
+    label = param.String()
+    value = param.Integer(default=0)
+    start = param.Integer(default=0)
+    end = param.Integer(default=2**53 - 1)
+    step = param.Integer(default=1, doc="of the arrow keys and buttons")
+    disabled = param.Boolean()
+
+    _esm = joined("ask", "number")
+    _stylesheets: ClassVar = [FOLDER / "number.css"]
+
+    def __init__(self, on_wrong=None, **params):
+        """on_wrong(line): told what is wrong with what was typed, if anything."""
+        super().__init__(**params)
+        self._on_wrong = on_wrong
+
+    def _handle_msg(self, message):
+        """Something was typed that is no whole number."""
+        if self._on_wrong is not None and isinstance(message, dict):
+            typed, within = str(message.get("typed", ""))[:30], f"{self.start} to {self.end}"
+            self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed!r}")

@@ -1,0 +1,31 @@
+// The page opens moving: slowly, from the beginning again and again, until somebody touches it. The
+// speed stays what it was: who then plays sees what was seen before.
+
+const SLOW = 0 // log2 of states per second
+const AGAIN_MS = 700 // rest at the end
+
+function openMoving(player) {
+  const { model, buttons } = player
+  if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) return
+  if (model.frame || model.between) return // a link that shows one moment
+  buttons.part("speed").value = SLOW
+  buttons.tellRate()
+  const again = setInterval(() => {
+    if (!player.scene.root.isConnected || player.playing || !player.replay || !model.walk) return
+    player.show(0, false)
+    player.play(true)
+  }, AGAIN_MS)
+
+  /** The button and Space, which pause, do it themselves. */
+  function touched(event) {
+    const path = event.composedPath()
+    if (path.some((node) => node.classList?.contains("tour"))) return
+    const pauses = event.key === " " || path.includes(buttons.part("play"))
+    clearInterval(again)
+    for (const name of HEARD) window.removeEventListener(name, touched, true)
+    if (!pauses && player.playing) player.play(false)
+  }
+
+  const HEARD = ["pointerdown", "keydown", "wheel"]
+  for (const name of HEARD) window.addEventListener(name, touched, true)
+}

@@ -1,0 +1,81 @@
+// Marks of what is known: a pin on each contact that is held, open where it has an error bar; and
+// numbers on those that would be worth measuring, the best first.
+
+const PIN = 17 // px, its height
+const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
+
+class Pins {
+  constructor(model) { this.model = model }
+
+  get pins() { return plain(this.model.pins ?? {}) }
+
+  /** Whether the force of a contact is known. */
+  has(contact) { return [...(this.pins.contacts ?? [])].includes(contact) }
+
+  draw(context, scene) {
+    const { contacts = [], exact = [], ranked = [] } = this.pins
+    if (!contacts.length && !ranked.length) return
+    const held = new Map(), rank = new Map(), { geometry, ratio } = scene
+    for (let k = 0; k < contacts.length; k++) held.set(contacts[k], exact[k])
+    for (let k = 0; k < ranked.length; k++) rank.set(ranked[k], k + 1)
+    context.save()
+    context.setTransform(ratio, 0, 0, ratio, 0, 0)
+    for (let k = 0; k < geometry.contact.length; k++) {
+      const c = geometry.contact[k]
+      if (!held.has(c) && !rank.has(c)) continue
+      const [xa, ya, xb, yb] = scene.ends(k), place = scene.toPixel((xa + xb) / 2, (ya + yb) / 2)
+      if (held.has(c)) this.pin(context, scene.palette, place, held.get(c))
+      else this.badge(context, scene.palette, place, rank.get(c))
+    }
+    context.restore()
+  }
+
+  /** In a picture to take along: a spot on each contact that is known, open with an error bar. */
+  onSheet(sheet, scene) {
+    const { contacts = [], exact = [] } = this.pins, { contact } = scene.geometry
+    const { known, halo } = scene.palette
+    for (const [n, held] of [...contacts].entries()) {
+      for (let k = 0; k < contact.length; k++) {
+        if (contact[k] !== held) continue
+        const [xa, ya, xb, yb] = scene.ends(k)
+        sheet.beginPath()
+        sheet.arc((xa + xb) / 2, (ya + yb) / 2, SPOT)
+        sheet.strokeStyle = known
+        sheet.lineWidth = SPOT / 2
+        sheet.stroke()
+        sheet.fillStyle = exact[n] ? known : halo
+        sheet.fill()
+      }
+    }
+  }
+
+  pin(context, { known, halo }, [x, y], exact) {
+    const r = PIN / 3, top = y - PIN + r
+    context.beginPath()
+    context.arc(x, top, r, 0.85 * Math.PI, 0.15 * Math.PI)
+    context.lineTo(x, y)
+    context.closePath()
+    context.lineWidth = 4
+    context.strokeStyle = halo
+    context.stroke()
+    context.lineWidth = 2
+    context.strokeStyle = context.fillStyle = known
+    context.stroke()
+    if (!exact) context.fillStyle = halo
+    context.fill()
+  }
+
+  badge(context, { known, halo }, [x, y], number) {
+    context.beginPath()
+    context.arc(x, y, 9, 0, 2 * Math.PI)
+    context.fillStyle = halo
+    context.fill()
+    context.lineWidth = 2
+    context.strokeStyle = context.fillStyle = known
+    context.stroke()
+    context.font = "bold 11px sans-serif"
+    context.textAlign = "center"
+    context.textBaseline = "middle"
+    context.fillText(number, x, y + 0.5)
+  }
+}

@@ -1,0 +1,362 @@
+"""Force space in a plane: the states' path, the state on screen, and the outline of S."""
+
+import numpy as np
+import panel as pn
+import panel_material_ui as pmui
+from bokeh.core.properties import value
+from bokeh.models import ColumnDataSource, DataRange1d
+
+from granforce.records import InputError
+
+from .. import compute, live, planes
+from ..jobs import reading
+from . import stresses
+from .hints import term
+from .parts import MOVES, TabView, choice, figure, note, together
+from .progress import Progress
+from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
+
+PLANES = {
+    "principal": "principal axes",
+    "contact": "fₙ, fₜ of a contact",
+    "pair": "fₙ of two contacts",
+    "stress": "stresses",
+}
+
+# What is offered beside states of a kind, and what the others are called.
+ALSO = {"walk": "uniform states too", "uniform": "the walk too"}
+CALLED = {"uniform": "uniform states", "walk": "walk"}
+MARKED = {"uniform": "uniform ones (triangles)", "walk": "states of the walk (triangles)"}
+ENOUGH = 300  # states beside those shown, where they have to be computed
+MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
+
+WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
+
+COMING = "The states come as they are found; the first few tell how to look at them."
+GROWS = "The states come as they are found; the exact outline of S follows."
+
+HELP = f"""
+One point is one whole network of forces. Shown is the shadow ({term("principal", "projection")})
+that {term("s")} casts on a plane, not a section: the shaded {term("outline")} holds all of it.
+Drag the point "now": the network follows.
+"""
+
+
+class View(TabView):
+    """A plane of force space; the player moves the state on screen along the path."""
+
+    name, title = "plane", "Force space"
+
+    def __init__(self, state):
+        super().__init__(state, "replay", "growing", "fourfold", "contact", "second")
+        empty = {"x": [], "y": []}
+        self.path = ColumnDataSource(empty | {"state": []}, name="path")
+        self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
+        self.original, self.beside = ColumnDataSource(empty), ColumnDataSource(empty)
+        self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
+        self.cone = ColumnDataSource(empty)
+        self.figure = self._figure()
+        self.planes = choice(PLANES, "principal" if state.second is None else "pair")
+        self.task, self.placing = state.task(), state.task(reading)
+        self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
+        self.others, self.other = state.task(), None  # who finds the other states; their Replay
+        self.also.param.watch(lambda event: together(self._fetch), "value")
+        self.told = note()
+        self.placing.param.watch(self._failed, "message")
+        self.planes.param.watch(self._turn, "value")
+        state.param.watch(self._keep_first, "contact")
+        self.task.param.watch(self._failed, "message")
+        self.shown = self.found = None
+        self.catch_up()
+
+    def panel(self):
+        """Choice of the plane, plot, and what it says."""
+        return pn.Column(
+            pn.FlexBox(self.planes, self.also, sizing_mode="stretch_width"),
+            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
+            Progress(self.task),
+            Progress(self.others),
+            self.told,
+            note(HELP),
+            sizing_mode="stretch_width",
+        )
+
+    # Contents
+
+    def update(self):
+        """Place the states on screen in the plane, and have the outline looked up or computed."""
+        state, replay = self.state, self.state.seen
+        if replay is None:
+            return
+        wanted = replay, self.planes.value, *self._depends()
+        same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
+        if same and state.plane is not None:
+            return
+        if self.shown is None or self.shown[0] is not replay:
+            self._look_beside()
+        self.shown = wanted
+        self.task.cancel()
+        self.placing.cancel()
+        if wanted[1] in WHOLE:
+            self._place(replay, wanted[1])
+            return
+        try:
+            self._placed(replay, self._components(replay))
+        except InputError as error:
+            self._clear()
+            self.told.object = str(error)
+
+    def _depends(self):
+        """What a plane of the kind chosen depends on, beside the states."""
+        state, kind = self.state, self.planes.value
+        if kind not in WHOLE:
+            return state.contact, state.second
+        return (state.fourfold,) if kind == "principal" and state.growing is not None else ()
+
+    def _place(self, replay, kind):
+        """Have axes found that need a moment; of a walk under way from what there is of it."""
+        state = self.state
+        library, following = state.library, state.live if state.growing is replay else None
+        selection = following.selection if following else state.cell.selection
+        states = following.states() if following and state.fourfold else None
+        if kind == "principal" and following and states is None:
+            self._clear()  # too few for axes
+            self.told.object = COMING
+            return
+
+        def place(job):
+            if kind == "stress":
+                return planes.stress(library, selection, replay)
+            return planes.principal(replay, states)
+
+        self.placing.start(place, lambda plane: self._placed(replay, plane))
+
+    def _clear(self):
+        """Nothing of another plane stays."""
+        self.state.plane = None
+        self.path.data = {"x": [], "y": [], "state": []}
+        for source in (self.original, self.beside, self.here, self.inner, self.outer, self.cone):
+            source.data = {"x": [], "y": []}
+
+    def _placed(self, replay, plane):
+        state = self.state
+        if state.seen is not replay:
+            return
+        self._show(replay, plane)
+        if state.growing is not None:
+            self.told.object = GROWS
+            return
+        if replay.summary["dimension"] == 0:
+            self.told.object = "At h = 0 the forces are determined: S is one point."
+            return
+        work = planes.outline(state.library, state.cell, replay, plane)
+        self.task.start(work, lambda found: self._outlined(replay, found))
+
+    # Uniform states beside the walk, or the walk beside them
+
+    def _look_beside(self):
+        """Those of a store are shown; else the switch has them computed."""
+        cell, self.other = self.state.cell, None
+        if self.state.growing is not None:
+            return self._fetch()
+        self.others.cancel()
+        self.also.label = ALSO[cell.kind]
+        found = planes.beside(self.state.catalogue, cell) is not None
+        if self.also.value != found:
+            self.also.value = found
+        elif found:
+            self._fetch()
+
+    def _fetch(self, *events):
+        """Find or compute the other states, or take them away."""
+        state, replay = self.state, self.state.replay
+        self.others.cancel()
+        self.other = None
+        if not self.also.value or state.cell is None or state.growing is not None:
+            self.beside.data = {"x": [], "y": []}
+            self.marks.visible = False
+            return
+        found, own = planes.beside(state.catalogue, state.cell), state.cell.selection
+        kind = "walk" if own.kind == "uniform" else "uniform"
+        wanted = own._replace(kind=kind, states=min(own.states, ENOUGH))
+        work = compute.states(state.library, wanted) if found is None else _shown(state, found)
+
+        def done(shown):
+            if state.replay is replay:
+                self.other = shown.replay
+                self._show_beside()
+                if found is None:
+                    state.refresh()  # it is listed from now on
+
+        self.others.start(work, done)
+
+    def _show_beside(self):
+        """The other states, in the plane on screen."""
+        plane, replay = self.state.plane, self.state.replay
+        if self.other is None or plane is None:
+            return
+        x, y = planes.points(plane, replay, self.other).T
+        self.beside.data = {"x": x.astype(np.float32), "y": y.astype(np.float32)}
+        self.marks.update(visible=True, label=value(CALLED[self.other_kind]))
+        if self.found is not None and self.found.plane is plane:
+            self._tell(replay, self.found)
+
+    def _components(self, replay):
+        """The plane of one contact's forces, or of two contacts' normal forces."""
+        contact = self.state.contact
+        if contact is None and self.planes.value == "pair":
+            raise InputError("Click two contacts in the packing, one after the other.")
+        if contact is None:
+            contact = _loosest(replay)
+        if self.planes.value == "contact":
+            return planes.components(replay, (contact, 0), (contact, 1))
+        other = self.state.second
+        if other is None:
+            raise InputError("Now click a second contact in the packing; both are marked there.")
+        return planes.components(replay, (other, 0), (contact, 0))
+
+    def _turn(self, event):
+        """Another kind of plane; a second contact belongs to one of them only."""
+        if event.new != "pair":
+            self.state.second = None
+        elif self.state.contact is None and self.state.replay is not None:
+            self.state.contact = _loosest(self.state.replay)
+        self.refresh()
+
+    def _keep_first(self, event):
+        """The last two contacts that were clicked span the plane."""
+        if self.visible and self.planes.value == "pair" and event.new is not None:
+            self.state.second = event.old if event.old is not None else self.state.second
+
+    def _show(self, replay, plane):
+        """Path, original and cone; the outline is to come."""
+        self.state.plane = plane
+        x, y = plane.path.T
+        frame = min(self.state.frame, len(x) - 1)
+        self.path.data = self._path(replay, plane)
+        self.original.data = {"x": x[:1], "y": y[:1]}
+        self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
+        self.inner.data = self.outer.data = {"x": [], "y": []}
+        self.figure.xaxis.axis_label, self.figure.yaxis.axis_label = planes.labels(replay, plane)
+        # Distances mean something among principal axes: both then have the same scale.
+        self.figure.match_aspect = not plane.components
+        self.cone.data = self._cone(plane, 1.05 * float(x.max()))
+        self.told.object = ""
+        self.found = None
+        self._show_beside()
+
+    def _path(self, replay, plane):
+        """Columns of the path; of a walk under way the player fills in the states as they come."""
+        path, number = plane.path, replay.number
+        if self.state.growing is not None:
+            number = live.numbers(replay.summary)
+            path = np.full((len(number), 2), np.nan, dtype=np.float32)
+            path[0] = plane.path[0]
+        return {"x": path[:, 0].copy(), "y": path[:, 1].copy(), "state": number.astype(np.int32)}
+
+    def _outlined(self, replay, found):
+        self._show(replay, found.plane)
+        self.found = found
+        for source, corners in ((self.inner, found.inner), (self.outer, found.outer)):
+            closed = np.concatenate([corners, corners[:1]])
+            source.data = {"x": closed[:, 0], "y": closed[:, 1]}
+        self.cone.data = self._cone(found.plane, 1.05 * float(found.outer[:, 0].max()))
+        self._tell(replay, found)
+
+    def _tell(self, replay, found):
+        """How much of the outline the states reach, and why most huddle in its middle."""
+        if found.plane.kind == planes.STRESS:
+            self.told.object = stresses.told(found)
+            return
+        path = found.plane.path[1:]
+        part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
+        area = planes.area(planes.hull(path)) / planes.area(found.outer)
+        h, inner = replay.summary["dimension"], planes.inner_share(path, found.outer)
+        words = (
+            f"Shaded: the exact outline of S in this plane ({found.programs} linear programs, "
+            f"{found.seconds:.1f} s, known to {found.gap:.1g} ⟨fₙ⟩). The {len(path)} states shown "
+            f"span {part[0]:.0%} of it across, {part[1]:.0%} upwards and {area:.1%} of its area; "
+            f"<b>{inner:.0%} of them lie in its inner half</b> (by length)"
+        )
+        if self.other is not None and len(self.beside.data["x"]):
+            points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
+            share = planes.inner_share(points, found.outer)
+            words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
+        if h >= MANY:
+            words += (
+                f". That is no failure to explore: S is a body of {h} dimensions, and nearly all "
+                "volume of such a body casts its shadow near the middle."
+            )
+        self.told.object = words.rstrip(".") + "."
+
+    @property
+    def other_kind(self):
+        """Where the states beside come from."""
+        return "walk" if self.state.cell.kind == "uniform" else "uniform"
+
+    def _cone(self, plane, reach):
+        """Coulomb's cone of one contact, up to f_n = reach."""
+        if len({contact for contact, _ in plane.components}) != 1:
+            return {"x": [], "y": []}
+        mu = self.state.seen.summary["mu"]
+        return {"x": [reach, 0, reach], "y": [mu * reach, 0, -mu * reach]}
+
+    def _failed(self, event):
+        if event.new:
+            self.told.object = event.new
+
+    def _figure(self):
+        around = {"range_padding": 0.06, "only_visible": True}
+        fig = figure(
+            "force_space",
+            None,
+            "",
+            "",
+            x_range=DataRange1d(**around),
+            y_range=DataRange1d(**around),
+            aspect_ratio=1.08,
+            sizing_mode="scale_width",
+            match_aspect=True,
+        )
+        fig.patch(
+            "x", "y", source=self.outer, fill_color=PALE, fill_alpha=0.35, line_color=DARK,
+            line_width=1.6, legend_label="outline of S",
+        )  # fmt: skip
+        fig.patch("x", "y", source=self.inner, fill_alpha=0, line_color=DARK, line_alpha=0.4)
+        outlines = list(fig.renderers)
+        fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
+        fig.line("x", "y", source=self.path, color=STATES, line_alpha=0.5, line_width=0.8)
+        fig.scatter(
+            "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7,
+            legend_label="beside",
+        )  # fmt: skip
+        states = fig.scatter(
+            "x", "y", source=self.path, size=5, color=STATES, alpha=0.9, legend_label="states"
+        )
+        fig.scatter(
+            "x", "y", source=self.original, marker="diamond", size=15, color=ORIGINAL,
+            line_color="#333333", legend_label="original",
+        )  # fmt: skip
+        here = fig.scatter(
+            "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
+            legend_label="now",
+        )  # fmt: skip
+        here.tags, fig.name = MOVES, "path_figure"
+        # The state on screen moves too often to be looked at for the range.
+        fig.x_range.renderers = fig.y_range.renderers = [*outlines, states]
+        legend_above(fig, 5)
+        (self.marks,) = (item for item in fig.legend[0].items if item.label == value("beside"))
+        self.marks.visible = False
+        corner(fig, "outline: exact; states: seen")
+        fig.add_tools(hover([states], ("state", "@state"), ("at", "@x{0.00}, @y{0.00}")))
+        return fig
+
+
+def _shown(state, cell):
+    """Work that reads a cell."""
+    return lambda job: state.library.shown(cell)
+
+
+def _loosest(replay):
+    """The contact whose normal force varied most."""
+    return int(np.argmax(replay.high[:, 0] - replay.low[:, 0]))

@@ -1,0 +1,107 @@
+// What is replayed: the frames of a walk, and how far the page has come among them.
+// Between two states the straight line is shown: S is convex, so every point of it is admissible too.
+
+class Replay {
+  constructor(walk, between) {
+    this.walk = walk
+    this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }
+    this.held = null // a network that was pulled, on screen in place of the states
+    this.forget()
+    this.follow(between)
+  }
+
+  /** The track: all frames, or to and fro between two. */
+  follow(between, position = 0) {
+    this.swinging = Boolean(between)
+    this.track = between ? [...between] : Array.from(this.walk.number.keys())
+    this.position = position
+  }
+
+  get last() { return this.track.length - 1 }
+
+  get frame() { return this.track[Math.floor(this.position + 1e-9)] }
+
+  /** Whether the position is an end of the track. */
+  get atEnd() { return this.position >= this.last }
+
+  /** Frames before and after the position, and the part of the way. */
+  get spot() {
+    const { track, position, last } = this, k = Math.min(Math.floor(position), last - 1)
+    return last < 1 ? [track[0], track[0], 0] : [track[k], track[k + 1], position - k]
+  }
+
+  go(to) {
+    this.position = Math.max(0, Math.min(this.last, to))
+    if (!this.swinging) this.passed(this.frame)
+    this.mix()
+  }
+
+  /** The forces at the position. */
+  mix() {
+    if (this.held) {
+      for (const [name, out] of Object.entries(this.mixed)) out.set(this.held[name])
+      return
+    }
+    const [a, b, portion] = this.spot, size = this.walk.contacts, from = a * size, to = b * size
+    for (const [name, out] of Object.entries(this.mixed)) {
+      const values = this.walk[name]
+      for (let c = 0; c < size; c++) {
+        out[c] = portion ? (1 - portion) * values[from + c] + portion * values[to + c] : values[from + c]
+      }
+    }
+  }
+
+  // What was passed; the original network (frame 0) is no state of the walk
+
+  forget() {
+    this.seen = 0
+    this.low = new Float32Array(this.walk.contacts).fill(Infinity)
+    this.high = new Float32Array(this.walk.contacts).fill(-Infinity)
+  }
+
+  /** The range of each f_n in the states up to a frame: going on costs one frame, back all. */
+  passed(frame) {
+    const { contacts, normal } = this.walk
+    if (frame < this.seen) this.forget()
+    while (this.seen < frame) {
+      const begin = ++this.seen * contacts, { low, high } = this
+      for (let c = 0; c < contacts; c++) {
+        const value = normal[begin + c]
+        if (value < low[c]) low[c] = value
+        if (value > high[c]) high[c] = value
+      }
+    }
+  }
+
+  // What is told
+
+  /** From the centre: |(1−t) a + t b|² = (1−t) a² + t b² − t (1−t) |a − b|². */
+  get distance() {
+    if (this.held) return NaN
+    const { walk } = this, [a, b, t] = this.spot, size = walk.contacts
+    let square = (1 - t) * walk.distance[a] ** 2 + t * walk.distance[b] ** 2
+    if (t > 0) {
+      let apart = 0
+      for (const values of [walk.normal, walk.tangential]) {
+        for (let c = 0; c < size; c++) apart += (values[a * size + c] - values[b * size + c]) ** 2
+      }
+      square -= t * (1 - t) * apart
+    }
+    return Math.sqrt(Math.max(0, square))
+  }
+
+  get residual() {
+    if (this.held) return this.held.residual
+    const [a, b, portion] = this.spot
+    return this.walk.residual[portion > 0.5 ? b : a]
+  }
+
+  /** Where the position is, in words. */
+  get place() {
+    if (this.held) return "pulled"
+    const { walk, frame } = this, [a, b, portion] = this.spot
+    const name = (k) => (k ? `state ${walk.number[k]}` : "the original")
+    if (this.swinging) return `${Math.round(100 * portion)} % of the way from ${name(a)} to ${name(b)}`
+    return frame ? `${walk.number[frame]} of ${walk.states}` : "original"
+  }
+}

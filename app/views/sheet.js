@@ -1,0 +1,101 @@
+// A canvas of sorts that keeps what is drawn on it as SVG: only what the scene asks of one.
+
+const PIXELS = 900 // of the picture's side
+const BELOW = 60 // pixels from the picture to the first line of its caption
+const LINE = 21 // pixels
+const SCALE_LENGTH = 5 // of the scale, in largest radii
+
+class Sheet {
+  constructor() {
+    this.canvas = {}
+    this.drawn = []
+    this.shapes = []
+    this.globalAlpha = 1
+    this.lineCap = "butt"
+    this.dash = []
+  }
+
+  beginPath() { this.shapes = [] }
+
+  moveTo(x, y) { this.at = [x, y] }
+
+  lineTo(x, y) { this.add("line", { x1: this.at[0], y1: -this.at[1], x2: x, y2: -y }) }
+
+  arc(x, y, r) { this.add("circle", { cx: x, cy: -y, r }) }
+
+  strokeRect(x, y, width, height) {
+    this.beginPath()
+    this.add("rect", { x, y: -y - height, width, height })
+    this.stroke()
+  }
+
+  add(name, places) {
+    const shape = { name, ...places, fill: "none" }
+    this.shapes.push(shape)
+    this.drawn.push(shape)
+  }
+
+  fill() { for (const shape of this.shapes) shape.fill = this.fillStyle }
+
+  stroke() {
+    const paint = { stroke: this.strokeStyle, "stroke-width": this.lineWidth }
+    if (this.lineCap !== "butt") paint["stroke-linecap"] = this.lineCap
+    if (this.globalAlpha < 1) paint.opacity = this.globalAlpha
+    if (this.dash.length) paint["stroke-dasharray"] = this.dash.join(" ")
+    for (const shape of this.shapes) Object.assign(shape, paint)
+  }
+
+  setLineDash(dash) { this.dash = dash }
+
+  // The whole is shown, and nothing was there before.
+  setTransform() {}
+  clearRect() {}
+
+  /** All that was drawn, as a text, with colour bar, scale and caption below. */
+  svg([left, right, bottom, top], { background, ink, bar, lines, unit }) {
+    const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
+    const written = (value) => (typeof value === "number" ? Number(value.toPrecision(5)) : value)
+    const element = ({ name, ...given }) =>
+      `<${name} ${Object.entries(given).map(([key, value]) => `${key}="${written(value)}"`).join(" ")}/>`
+    const full = PIXELS + BELOW + LINE * lines.length
+    return [
+      `<svg xmlns="http://www.w3.org/2000/svg" width="${PIXELS}" height="${full}" viewBox="0 0 ${PIXELS} ${full}"` +
+        ` font-family="Helvetica, Arial, sans-serif" font-size="15">`,
+      `<desc>${lines.map(safe).join(" ")}</desc>`,
+      `<rect width="${PIXELS}" height="${full}" fill="${background}"/>`,
+      `<svg width="${PIXELS}" height="${PIXELS}" viewBox="${left} ${-top} ${right - left} ${top - bottom}">`,
+      `<rect ${place} fill="${background}"/>`,
+      ...this.drawn.map(element),
+      "</svg>",
+      `<g fill="${ink}">`,
+      ...colourBar(bar),
+      ...scaleBar((PIXELS / (right - left)) * SCALE_LENGTH * unit),
+      ...lines.map((line, k) => `<text x="12" y="${PIXELS + BELOW + LINE * k}">${safe(line)}</text>`),
+      "</g>",
+      "</svg>",
+    ].join("\n")
+  }
+}
+
+const safe = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;")
+
+function colourBar({ low, high, stops }) {
+  const parts = stops.map((stop, k) => {
+    const [colour, at] = stop.split(" ")
+    return `<stop offset="${at ?? `${(100 * k) / (stops.length - 1)}%`}" stop-color="${colour}"/>`
+  })
+  return [
+    `<linearGradient id="colours">${parts.join("")}</linearGradient>`,
+    `<text x="110" y="${PIXELS + 27}" text-anchor="end">${safe(low)}</text>`,
+    `<rect x="118" y="${PIXELS + 14}" width="200" height="16" fill="url(#colours)"/>`,
+    `<text x="326" y="${PIXELS + 27}">${safe(high)}</text>`,
+  ]
+}
+
+function scaleBar(length) {
+  return [
+    `<rect x="${PIXELS - 20 - length}" y="${PIXELS + 26}" width="${length}" height="4"/>`,
+    `<text x="${PIXELS - 20 - length / 2}" y="${PIXELS + 20}" text-anchor="middle">` +
+      `${SCALE_LENGTH} largest radii</text>`,
+  ]
+}

@@ -1,0 +1,51 @@
+"""The plots beside the packing as they are, for a file: bound to no page."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from ..jobs import Task
+from . import intervals, plane
+
+
+class _Deaf:
+    """Stands where views watch the state: nothing changes any more."""
+
+    def watch(self, *arguments):
+        """Never calls."""
+
+
+class Light:
+    """What of the state views ask for, by day."""
+
+    param = _Deaf()
+    dark = False
+
+    def __init__(self, replay, exact, view, tab=None, loads=None):
+        self.__dict__.update(view)
+        self.dark, self.between = False, None
+        self.replay, self.exact, self.tab = replay, exact, tab
+        self.seen, self.possible, self.growing = replay, exact, None
+        self.second, self.loads, self.narrowed = None, loads, None
+        self.computation = SimpleNamespace(running=False, param=_Deaf())
+        self.knowledge = SimpleNamespace(task=self.computation)
+        self.missing, self.cell, self.exact_wanted = False, None, False
+
+    def shows(self, name):
+        """Whether what has this tab is on screen, as for AppState."""
+        return name == self.tab
+
+    def task(self, pool=None):
+        """A Task that is never started."""
+        return Task()
+
+
+def figures(replay, exact, chosen, outlined, view):
+    """Bokeh figures of intervals, of η as it grows, and of the principal plane `chosen`."""
+    bars = intervals.View(Light(replay, exact, view, "intervals"))
+    space = plane.View(Light(replay, exact, view))
+    space._show(replay, chosen)
+    if outlined is not None and np.array_equal(outlined.plane.axes, chosen.axes):
+        space._outlined(replay, outlined)
+    space.figure.sizing_mode = "scale_width"
+    return bars.figure, bars.growth_figure, space.figure

@@ -1,0 +1,66 @@
+"""What is being computed, sent to one page's player as fast as its browser paints it."""
+
+from functools import partial
+
+from .parts import together
+
+TICK_MS = 40  # how often it is looked for something new
+AHEAD = 2  # messages that the browser may have got and not yet painted
+
+
+class Stream:
+    """Sends what a page's `state.follow()` has to show to its player; nothing to hidden tabs."""
+
+    def __init__(self, state, player, document=None):
+        """document: on which the time is kept; without one, call `tick` yourself."""
+        self.state, self.player, self._document = state, player, document
+        self._sent = self._painted = 0
+        self._awake, self._ticking = False, None
+        player.on_live = self._heard
+        state.param.watch(self._follow, ["live", "arriving"])
+        state.param.watch(self._show, ["missing", "selection", "cell", "busy"])
+        self._follow()
+
+    def _heard(self, message):
+        """The browser tells that it draws anew, what it has painted, and whether it is seen."""
+        if "anew" in message:
+            self._sent = self._painted = 0
+            if self.state.live is not None:
+                self.state.live.rewind()
+        if isinstance(message.get("painted"), int):
+            self._painted = message["painted"]
+        if isinstance(message.get("seen"), bool):
+            self._awake = message["seen"]
+
+    def _show(self, *events):
+        self.player.asked = self.state.asked
+
+    def _follow(self, *events):
+        self._show()
+        self.player.live = self.state.live is not None
+        ticking = self.player.live or self.state.arriving is not None
+        if self._document is None or ticking == (self._ticking is not None):
+            return
+        if ticking:
+            tick = partial(together, self.tick)
+            self._ticking = self._document.add_periodic_callback(tick, TICK_MS)
+        else:
+            self._document.remove_periodic_callback(self._ticking)
+            self._ticking = None
+
+    def tick(self):
+        """Send what is new, if the browser waits for it."""
+        following = self.state.follow()
+        while following and self._awake and self._sent - self._painted < AHEAD:
+            news = following.next()
+            if news is None:
+                return
+            if "replay" in news:
+                self.state.grow(news["replay"])
+                continue
+            if "picture" in news:
+                self.state.moving = True
+            self._sent += 1
+            self.player.hand_over(news | {"number": self._sent})
+            if "states" in news:
+                self.state.fourfold = following.fourfold

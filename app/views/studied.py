@@ -1,0 +1,266 @@
+"""Figures over μ: the finished study with its error bars, and on top what is on the page."""
+
+import html
+
+import numpy as np
+from bokeh.models import ColumnDataSource, FixedTicker
+
+from granforce import statistics
+
+from .. import studied
+from .hints import term
+from .labels import labels
+from .parts import figure
+from .style import SERIES, corner, hover, legend_above
+
+MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
+# Parts of the study, and what they are called.
+SAMPLERS = {
+    "walk": "random walk",
+    "sweeps_1e-3": "walk by Gauss–Seidel",
+    "uniform": "uniform in S",
+    "exact": "exact",
+}
+OWN = "finished results"
+COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
+MARKERS = ("circle", "square", "triangle", "diamond")
+SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
+DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
+CLAIMS = """<table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
+says, and what the study found, with its 95 % interval</caption>{}</table>{}"""
+CLAIM = "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>"
+VERDICTS = {"reproduced": "✓", "differs": "≈", "not reproduced": "✗"}
+# Whose numbers a claim is judged by.
+JUDGED = {
+    "gauss_seidel": f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, to 10⁻³",
+    "gauss_seidel_1e-4": f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, to 10⁻⁴",
+    "nearest": "walk to nearest states",
+    "uniform": "uniform states",
+    "exact": "exact",
+    "": "perturbed contacts",
+}
+RINGS = f"rings: {term('store', OWN)} made like those on screen"
+STUDY = f"lines: means over the packings of {term('study', 'the study')}, bars their standard error"
+
+
+def claims(about):
+    """The paper's claims and what was found, as HTML."""
+    found = studied.claims(about)
+    measured = [claim for claim in found if np.isfinite(claim["value"])]
+    lines = (
+        CLAIM.format(
+            html.escape(written(f"{c['statement']} ({c['measured']})")),
+            JUDGED[c["sampler"]],
+            _with_interval(c),
+            f"{VERDICTS.get(c['verdict'], '')} {html.escape(c['verdict'])}",
+        )
+        for c in measured
+    )
+    left = len(found) - len(measured)
+    rest = f"<p>{left} more of its statements have not been measured yet.</p>" if left else ""
+    return CLAIMS.format("".join(lines), rest) if found else ""
+
+
+def _with_interval(claim):
+    low, high = claim["low"], claim["high"]
+    interval = f" ({low:.2g} … {high:.2g})" if np.isfinite([low, high]).all() else ""
+    return f"{claim['value']:.2g}{interval}"
+
+
+def written(text):
+    """A text with its symbols as on the page."""
+    return text.replace("F_n", "Fₙ").replace("f_n", "fₙ").replace("F_crit", "Fᶜʳⁱᵗ")
+
+
+def indeterminacy(own, exact, log):
+    """η against μ by the walk, 0.15 η3 by all samplers, and z: three figures."""
+    kind = {"y_axis_type": "log" if log else "linear"}
+    etas = _over_mu("indeterminacy", "η", 310, **kind)
+    for k, (name, label, factor) in enumerate(MEASURES):
+        look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
+        _line(etas, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
+    for k, (name, _, factor) in enumerate(MEASURES):
+        _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
+    corner(etas, "measured: of the random walk's states")
+    seen = _over_mu("samplers", "0.15 η3", 270, **kind)
+    for k, (part, label) in enumerate(SAMPLERS.items()):
+        look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
+        points = statistics.means(studied.rows(part), "eta3", factor=0.15)
+        _line(seen, points, label, dash="dashed" if part == "exact" else "solid", **look)
+    _own(seen, statistics.means(own, "eta3", factor=0.15), log, COLOURS[0], MARKERS[0])
+    _own(seen, statistics.means(exact, "eta3", factor=0.15), log, COLOURS[3], MARKERS[3])
+    corner(seen, "dashed exact, others measured")
+    z = _over_mu("coordination", "contacts per grain z", 220)
+    _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
+    _own(z, statistics.means(own, "coordination"), False, COLOURS[0])
+    corner(z, "measured: of the packings")
+    legend_above(etas)
+    legend_above(seen, 3)
+    z.legend.visible = False
+    text = (
+        f"How undetermined the forces are, against friction: {term('eta1')}, {term('eta2')}, "
+        f"{term('eta3', '0.15 η3')}; {STUDY}; {RINGS}. Friction "
+        "widens what each contact may carry, but a packing made with more of it has fewer contacts "
+        "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ is "
+        "a packing of its own. A tap on a point shows the states of that μ, or asks for them. The "
+        f"second figure: 0.15 η3 of the {term('walk', 'random walk')}, of the "
+        f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, of states {term('uniform')}, and "
+        f"{term('exact', 'exact')}."
+    )
+    return [etas, seen, z], text
+
+
+def correlations(own, exact):
+    """corr(f_n, ΔF_n) against μ."""
+    fig = _over_mu("correlation", "corr(fₙ, ΔFₙ)", 380)
+    for k, part in enumerate(("walk", "uniform", "exact")):
+        look = {"log": False, "colour": COLOURS[k], "marker": MARKERS[k]}
+        points = statistics.means(studied.rows(part), "correlation")
+        _line(fig, points, SAMPLERS[part], dash="dashed" if part == "exact" else "solid", **look)
+    known = [row for row in own if np.isfinite(row["correlation"])]
+    _own(fig, statistics.means(known, "correlation"), False, COLOURS[0], MARKERS[0])
+    _own(fig, statistics.means(exact, "correlation"), False, COLOURS[2], MARKERS[2])
+    legend_above(fig)
+    corner(fig, "dashed exact, others measured")
+    text = (
+        "Whether strong contacts are the undetermined ones: correlation over contacts of the "
+        f"{term('original', 'original')} fₙ with the extent {term('extent', 'ΔFₙ')}; {STUDY}; "
+        f"{RINGS}."
+    )
+    return [fig], text
+
+
+def extents(groups, mu, log):
+    """P(ΔF_n) in ⟨f_n⟩ for some μ of the study, and of the packings on the page with this μ.
+
+    groups: {μ: extents} of the packings on the page.
+    """
+    fig = figure(
+        "extents", None, "ΔFₙ / ⟨fₙ⟩", "P(ΔFₙ)", height=400, y_axis_type="log" if log else "linear"
+    )
+    table = studied.study()
+    known = {} if table is None else table.extents("walk")
+    curves = [(value, known[value], f"μ = {value:g}") for value in SHOWN if value in known]
+    if mu in groups:
+        curves.append((mu, groups[mu], f"μ = {mu:g}, {OWN}"))
+    largest = max((np.quantile(np.concatenate(g), 0.995) for _, g, _ in curves), default=1.0)
+    edges = np.linspace(0, largest, 31)
+    middle = (edges[1:] + edges[:-1]) / 2
+    for k, (_, group, label) in enumerate(curves):
+        values = np.concatenate(group)
+        height = statistics.density(values, edges)
+        height = np.where(height > 0, height, np.nan) if log else height
+        mine = label.endswith(OWN)
+        b = statistics.tail_exponent(values)
+        look = {
+            "color": "#b5236b" if mine else COLOURS[k],
+            "legend_label": f"{label} (b = {b:.2f})",
+        }
+        fig.line(middle, height, line_width=3 if mine else 1.6, **look)
+        fig.scatter(middle, height, size=5, marker=MARKERS[k % 4], **look)
+    if curves:
+        legend_above(fig, 2)
+    corner(fig, "seen by the walk")
+    text = (
+        "How the extents ΔFₙ of the normal forces are distributed, in units of the mean force. b: "
+        "beyond the median the tail falls like exp(−(λx)ᵇ); b = 1 is exponential, larger b falls "
+        f"faster. Thin: ten packings of {term('study', 'the study')} each; thick: {OWN} made like "
+        "those on screen."
+    )
+    return [fig], text
+
+
+def responses(own):
+    """⟨F_crit⟩ and α against η2, joined in order of μ: the study, and on top own rows."""
+    table = studied.study()
+    study = [] if table is None else table.answers()
+    force = figure("critical_force", None, "η2", "force / ⟨fₙ⟩", height=300)
+    _against_eta2(force, study, {"critical_force": "critical force", "limit_load": "limit load"})
+    for k, name in enumerate(("critical_force", "limit_load")):
+        _own(force, _pairs(own, name), False, COLOURS[k], MARKERS[k])
+    alpha = figure("decay", None, "η2", "decay exponent α", height=280)
+    _against_eta2(alpha, study, {"decay_exponent": "α"})
+    known = [row for row in own if np.isfinite(row["decay_exponent"])]
+    _own(alpha, _pairs(known, "decay_exponent"), False, COLOURS[0], MARKERS[0])
+    for fig in (force, alpha):
+        if fig.renderers:
+            legend_above(fig)
+        corner(fig, "measured: contacts pushed one by one")
+    text = (
+        f"How hard a contact must be pushed until the packing gives way ("
+        f"{term('critical_force', 'critical force')}; {term('limit_load', 'limit load')}), and how "
+        f"fast the motion decays with distance ({term('alpha', '|u| ~ r⁻ᵅ')}), against "
+        f"how undetermined the forces are ({term('eta2', 'η2')}). Joined in order of μ, which is "
+        "written where there is room: means over three packings of "
+        f"{term('study', 'the study')} with 30 contacts each, bars standard errors; {RINGS} "
+        f"({len(own)})."
+    )
+    return [force, alpha], text
+
+
+def _pairs(rows, name):
+    return [(row["eta2"], row[name], 0.0) for row in rows if np.isfinite(row.get(name, np.nan))]
+
+
+def _against_eta2(fig, rows, lines):
+    """Lines {name: label} against η2, and μ beside the points of the first."""
+    drawn = []
+    for k, (name, label) in enumerate(lines.items()):
+        known = [row for row in rows if np.isfinite(row.get(name, np.nan))]
+        across, up = statistics.means(known, "eta2"), statistics.means(known, name)
+        mu = [m for m, _, _ in across]
+        points = [(x, y, e) for (_, x, _), (_, y, e) in zip(across, up, strict=True)]
+        if points:
+            _line(fig, points, label, False, COLOURS[k], MARKERS[k], zero=True, mu=mu)
+            drawn.append((mu, np.array(points)))
+    if not drawn:
+        return
+    mu, points = drawn[0]
+    every = np.concatenate([points for _, points in drawn])
+    span = np.ptp(every[:, 0]), np.ptp([every[:, 1] - every[:, 2], every[:, 1] + every[:, 2]])
+    found = labels(points[:, 0], points[:, 1], [f"{m:g}" for m in mu], span)
+    fig.text(
+        "x", "y", "text", source=ColumnDataSource(found), x_offset="right", y_offset="down",
+        text_align="align", text_baseline="baseline", text_font_size="10px",
+        text_color="#808080", name="frictions",
+    )  # fmt: skip
+
+
+def _over_mu(name, label, height, **options):
+    fig = figure(name, None, "friction μ", label, height=height, x_axis_type="log", **options)
+    fig.xaxis.ticker = FixedTicker(ticks=DECADES)
+    fig.xaxis.major_label_overrides = {mu: f"{mu:g}" for mu in DECADES}
+    fig.xaxis.major_label_overrides |= {1e-5: "10⁻⁵", 1e-4: "10⁻⁴"}
+    return fig
+
+
+def _line(fig, points, label, log, colour, marker="circle", dash="solid", zero=False, mu=None):
+    """A line with points and error bars; points (x, y, error); mu: of the points, if x is not."""
+    x, y, error = _shown(points, log, zero)
+    if not len(x):
+        return
+    fig.line(x, y, color=colour, line_width=1.6, line_dash=dash, legend_label=label)
+    source = ColumnDataSource({"x": x, "y": y} | ({} if mu is None else {"mu": mu}))
+    dots = fig.scatter(
+        "x", "y", source=source, color=colour, size=6, marker=marker, legend_label=label
+    )
+    below = np.maximum(y - error, 0.1 * y) if log else y - error
+    fig.segment(x, below, x, y + error, color=colour, line_width=1.4)
+    at = ("μ", "@x{0.00000}") if mu is None else ("at μ", "@mu{0.[00000]}")
+    fig.add_tools(hover([dots], at, (label, "@y{0.0000}")))
+
+
+def _own(fig, points, log, colour, marker="circle"):
+    """Rings around the page's own points, over everything."""
+    x, y, _ = _shown(points, log, zero=fig.xaxis.axis_label != "friction μ")
+    if len(x):
+        fig.scatter(
+            x, y, size=12, marker=marker, fill_alpha=0, line_color=colour, line_width=2.2,
+            legend_label=OWN,
+        )  # fmt: skip
+
+
+def _shown(points, log, zero=False):
+    """Columns of those points that the axes can show."""
+    kept = [p for p in points if (zero or p[0] > 0) and (not log or p[1] > 1e-12)]
+    return np.array(kept, dtype=float).reshape(-1, 3).T

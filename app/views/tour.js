@@ -1,0 +1,117 @@
+// The tour's card at the lower edge, over the page that it speaks of: nothing lies between.
+
+const SEEN = "granforce.tour" // remembered in the browser
+const LOOK_MS = 100 // between two looks for what a step is about, which may still be on its way
+// Where each step points: other parts of the page than these come and go with their tab.
+const TARGETS = { scene: ".scene", friction: ".friction", plane: ".in-plane", perturb: ".in-perturb" }
+
+export function render({ model, view }) {
+  const page = view.model.document
+  const root = document.createElement("div")
+  root.className = "tour"
+  root.innerHTML = `
+    <button type="button" class="begin">Tour</button>
+    <section class="card" role="dialog" aria-labelledby="tour-title" aria-describedby="tour-text" hidden>
+      <h2 id="tour-title" tabindex="-1"></h2>
+      <p id="tour-text"></p>
+      <div class="row">
+        <span class="count"></span>
+        <button type="button" class="earlier">Back</button>
+        <button type="button" class="on">Next</button>
+        <button type="button" class="close">Close</button>
+      </div>
+    </section>
+    <div class="ring" hidden></div>`
+  const part = (name) => root.querySelector(name), card = part(".card"), ring = part(".ring")
+  let shown = 0
+
+  const remember = () => { try { window.localStorage.setItem(SEEN, "seen") } catch { /* private */ } }
+  const known = () => { try { return window.localStorage.getItem(SEEN) !== null } catch { return true } }
+  const target = () => model.steps[model.step - 1][2]
+  const go = (step) => ask(model, view, { step })
+
+  function show() {
+    const { step } = model, steps = model.steps
+    card.hidden = !step
+    part(".begin").hidden = Boolean(step)
+    if (step !== shown) ring.hidden = true
+    if (!step) { shown = 0; leaveRoom(); return }
+    const [title, text] = steps[step - 1]
+    part("h2").textContent = title
+    part("p").textContent = text
+    part(".count").textContent = `${step} of ${steps.length}`
+    part(".earlier").disabled = step === 1
+    part(".on").textContent = step === steps.length ? "Finish" : "Next"
+    card.classList.toggle("aside", target() !== "scene") // not over what it speaks of
+    leaveRoom()
+    if (step === shown) return
+    shown = step
+    remember()
+    play(step)
+    requestAnimationFrame(() => part("h2").focus({ preventScroll: true })) // once the card is there
+    point(target(), step)
+  }
+
+  /** The second step moves: that is what it says. */
+  function play(step) {
+    const player = page.get_model_by_name("player")?.player
+    if (!player?.replay) return
+    const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
+    if (step === 2 && !still) setTimeout(() => { if (model.step === 2) player.play(true) }, 400)
+    else if (step !== 1) player.play(false)
+  }
+
+  const every = (root) => [...root.querySelectorAll("*")].flatMap(
+    (e) => [e, ...(e.shadowRoot ? every(e.shadowRoot) : [])])
+
+  /** What lies under the card can be scrolled to, see page.py. */
+  function leaveRoom() {
+    document.documentElement.style.setProperty("--card", `${card.offsetHeight}px`)
+  }
+
+  /** Bring what a step is about into view, as soon as it is there, and ring it while the step is on. */
+  function point(name, step) {
+    if (shown !== step) return
+    const all = every(document), found = all.find((e) => e.matches(TARGETS[name]) &&
+      e.offsetHeight && e.checkVisibility({ visibilityProperty: true }))
+    if (!found) return void setTimeout(() => point(name, step), LOOK_MS)
+    encircle(found, all.find((e) => e.matches(".header")), step)
+  }
+
+  function bringIntoView(found) {
+    const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
+    const block = { friction: "center", scene: "nearest" }[target()] ?? "start"
+    found.scrollIntoView({ block, behavior: still ? "auto" : "smooth" })
+  }
+
+  /** The ring follows what it is around, over all that lies there, below the title. */
+  function encircle(found, title, step, seen = 0) {
+    if (shown !== step) return
+    const tall = Math.max(seen, found.offsetHeight)
+    if (tall > seen) bringIntoView(found) // again, where more of it has come
+    if (!found.isConnected) { ring.hidden = true; return point(target(), step) }
+    const box = found.getBoundingClientRect(), top = Math.max(box.top, title.getBoundingClientRect().bottom)
+    const left = Math.max(box.left, 0), right = Math.min(box.right, window.innerWidth)
+    const bottom = Math.min(box.bottom, window.innerHeight)
+    ring.hidden = bottom <= top || right <= left
+    Object.assign(ring.style, {
+      left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px`,
+    })
+    requestAnimationFrame(() => encircle(found, title, step, tall))
+  }
+
+  part(".begin").addEventListener("click", () => go(1))
+  part(".earlier").addEventListener("click", () => go(model.step - 1))
+  part(".on").addEventListener("click", () => go(model.step === model.steps.length ? 0 : model.step + 1))
+  part(".close").addEventListener("click", () => go(0))
+  card.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") go(0)
+    if (event.key === " " || event.key.startsWith("Arrow")) event.stopPropagation()
+  })
+  model.on("step", show)
+  model.on("steps", show)
+  model.on("remove", () => { shown = 0 })
+  show()
+  if (model.first && !model.step && !known()) go(1)
+  return root
+}

@@ -1,0 +1,117 @@
+"""Six steps over the real page, for those who see it for the first time."""
+
+import re
+from typing import ClassVar
+from urllib.parse import parse_qsl
+
+import numpy as np
+import param
+from panel.custom import JSComponent
+
+from .scripts import FOLDER, joined
+
+# Title and two sentences of each step, and the part of the page that it is about, see tour.js.
+STEPS = (
+    (
+        "One pressure, many disks",
+        "These {n} rigid disks are pressed together from all sides by one pressure, and none can "
+        "move. Lines are the forces at their contacts: thick ones are large, and together they "
+        "hold every disk in balance.",
+        "scene",
+    ),
+    (
+        "Not the only way to hold",
+        "The same disks, in the same places, held by other forces: the picture goes over to "
+        "another network and back, and every network on the way balances every disk, too. Nothing "
+        "in mechanics says which of them the packing carries; drag the slider to go yourself.",
+        "scene",
+    ),
+    (
+        "Take a force in your hand",
+        "Drag the marked contact: its force goes from the least to the largest that it can have, "
+        "and the others follow, so that every disk stays in balance. Let go and it stays (Z takes "
+        "it back); the pale bars say how far each contact can go.",
+        "scene",
+    ),
+    (
+        "All networks form one body",
+        "Every point here is one whole network of forces, seen as the shadow that force space S "
+        "casts on a plane: dots are states of the walk, and the shaded outline holds every network "
+        "there is. S is convex: go straight from any network to any other, and you stay inside.",
+        "plane",
+    ),
+    (
+        "Friction decides how many",
+        "More friction widens what each contact may carry, but leaves fewer contacts per grain "
+        "(z), so that the indeterminacy η rises and then falls. Drag the friction μ, marked here, "
+        "and see packing and forces change.",
+        "friction",
+    ),
+    (
+        "What it means when you push",
+        "Two forces press the disks of the marked contact apart until the packing gives way: press "
+        "Push to see how much it bears, and how it begins to move. That is all; touch anything.",
+        "perturb",
+    ),
+)
+TABS = {3: "intervals", 4: "plane", 5: "statistics", 6: "perturb"}
+
+
+class Tour(JSComponent):
+    """A card with the steps, which closes into the page as it is; see tour.js."""
+
+    step = param.Integer(default=0, doc="1 … 6 while the tour is on, else 0")
+    steps = param.List(doc="title, text and target of each step")
+    first = param.Boolean(doc="whether the page was opened without a view to show")
+
+    _esm = joined("ask", "tour")
+    _stylesheets: ClassVar = [FOLDER / "tour.css"]
+
+    def __init__(self, state, query="", **params):
+        """query: of the address; `tour=2` opens the second step."""
+        wanted = dict(parse_qsl(query.lstrip("?"))).get("tour", "")
+        super().__init__(first=not query.lstrip("?"), **params)
+        self._state, self._set_up = state, False  # whether the page shows what the step is about
+        self._tell()
+        state.param.watch(self._tell, "replay")
+        if re.fullmatch("[1-6]", wanted):
+            self._go(int(wanted))
+
+    def _tell(self, *events):
+        replay = self._state.replay
+        disks = "" if replay is None else replay.summary["n"]
+        self.steps = [[title, text.format(n=disks), target] for title, text, target in STEPS]
+        if self.step and not self._set_up:
+            self._go(self.step)  # now that there is something to show
+
+    def _handle_msg(self, message):
+        """The visitor goes to a step, or closes the tour (0)."""
+        step = message.get("step") if isinstance(message, dict) else None
+        if isinstance(step, int) and 0 <= step <= len(STEPS):
+            self._go(step)
+
+    def _go(self, step):
+        self.step = step
+        self._set_up = self._state.replay is not None
+        if step and self._set_up:
+            self._state.param.update(**_shown(self._state, step))
+
+
+def _shown(state, step):
+    """Parameters of the state with which the page shows what a step is about."""
+    normal, extent = state.replay.normal, (state.replay.high - state.replay.low)[:, 0]
+    changes = {"between": None}
+    if step == 2 and len(normal) > 1:
+        changes["between"] = (0, _farthest(normal))
+    if step == 3:
+        changes["contact"] = int(np.argmax(extent))
+    if step == 6:
+        changes["contact"] = int(np.argmax(normal[0]))
+    if step in TABS and not state.shows(TABS[step]):
+        changes["tab"] = TABS[step]
+    return changes
+
+
+def _farthest(normal):
+    """The state that differs most from the original network."""
+    return int(np.argmax(np.abs(normal - normal[0]).sum(axis=1)))

@@ -1,0 +1,55 @@
+"""The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
+
+import pytest
+from serving import CHROMIUM, painted
+
+axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+
+PATIENCE = 60_000  # ms, on a busy machine
+GRAVE = ("serious", "critical")
+TABS = ("intervals", "statistics", "plane", "perturb", "upload", "export")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+def findings(page):
+    """Serious and critical violations, one line for each element."""
+    found = axe.Axe().run(page).response["violations"]
+    return [
+        f"{rule['id']} ({rule['impact']}): {node['target']} {node['html'][:120]}"
+        for rule in found
+        if rule["impact"] in GRAVE
+        for node in rule["nodes"]
+    ]
+
+
+def opened(chromium, address, query, width):
+    page = chromium.new_page(viewport={"width": width, "height": 1000})
+    page.set_default_timeout(PATIENCE)
+    page.goto(address + query)
+    painted(page, PATIENCE)
+    page.get_by_role("tab").first.wait_for()
+    page.wait_for_function("() => !document.querySelector('.pn-loading')")
+    if width > 900:  # else the sidebar is closed
+        page.get_by_text("Copy link").wait_for(state="attached")
+    return page
+
+
+@pytest.mark.parametrize("tab", TABS)
+@pytest.mark.parametrize("dark", [0, 1])
+def test_no_tab_has_a_serious_finding(chromium, address, tab, dark):
+    page = opened(chromium, address, f"?tab={tab}&dark={dark}", 1280)
+    if tab == "statistics":
+        page.get_by_text("How undetermined the forces are").wait_for()
+    assert findings(page) == []
+    page.context.close()
+
+
+def test_the_tour_and_a_narrow_page_have_no_serious_finding(chromium, address):
+    page = opened(chromium, address, "?tour=2", 390)
+    page.get_by_role("dialog").wait_for()
+    assert findings(page) == []
+    page.context.close()

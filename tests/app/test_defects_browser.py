@@ -1,0 +1,431 @@
+"""What visitors stumbled over, one test each: the page answers, and says what is so."""
+
+import signal
+import time
+
+import numpy as np
+import pytest
+from serving import CHROMIUM, MODEL, column, free_port, painted, scene, serve
+from small_store import KEPT, ROOT
+
+# Pictures to be looked at; ignored by git.
+ARTEFACTS = ROOT / "artefacts" / "defects"
+PATIENCE = 60_000  # ms, on a busy machine
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Where the app of `address` keeps its cache and its log."""
+    return tmp_path_factory.mktemp("served")
+
+
+@pytest.fixture(scope="module")
+def address(shipped, folder):
+    """The app with stores of its own."""
+    with serve(folder, GRANFORCE_DATA=str(shipped)) as (url, _):
+        yield url
+
+
+@pytest.fixture
+def visit(chromium, address, request):
+    """visit(query, width, height): a page at rest; at the end a picture, and no error was told."""
+    errors, contexts = [], []
+
+    def visit(query="", width=1280, height=900, at=None, wanted=()):
+        context = chromium.new_context(
+            viewport={"width": width, "height": height}, reduced_motion="reduce"
+        )
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        context.set_default_timeout(PATIENCE)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on(
+            "console",
+            lambda told: (
+                told.type == "error"
+                and not any(word in told.text for word in wanted)
+                and errors.append(told.text)
+            ),
+        )
+        page.goto((at or address) + query)
+        painted(page, PATIENCE)
+        page.get_by_role("tab").first.wait_for()
+        contexts.append((context, page))
+        return page
+
+    yield visit
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    for number, (context, page) in enumerate(contexts):
+        page.screenshot(path=ARTEFACTS / f"{request.node.name}-{number}.png", full_page=True)
+        context.close()
+    assert not [error for error in errors if "favicon" not in error]
+
+
+def shows(page, mu):
+    """Wait until the packing at μ is on screen."""
+    handle = page.locator(".scene").element_handle()
+    page.wait_for_function(f"e => e.scene.geometry.mu === {mu}", arg=handle)
+
+
+def ask_for_mu(page, mu):
+    page.locator("input.typed").fill(str(mu))
+    page.locator("input.typed").press("Enter")
+
+
+def searched(page, text):
+    page.wait_for_function(f"() => location.search.includes({text!r})")
+
+
+# 1: Back and Forward
+
+
+def test_back_and_forward_restore_views_and_copied_links(visit):
+    page = visit()
+    shows(page, 0.1)
+    ask_for_mu(page, 1)
+    shows(page, 1)
+    searched(page, "mu=1&")
+    page.get_by_role("tab", name="Statistics").click()
+    searched(page, "tab=statistics")
+    page.go_back()
+    page.wait_for_function("() => !location.search.includes('tab=')")
+    page.locator("[role=tab][aria-selected=true]", has_text="Intervals").wait_for()
+    page.go_back()
+    shows(page, 0.1)
+    searched(page, "mu=0.1&")
+    page.get_by_role("button", name="Copy link").click()
+    link = page.evaluate("navigator.clipboard.readText()")
+    assert "mu=0.1&" in link and "tab=" not in link
+    page.go_forward()
+    shows(page, 1)
+    searched(page, "mu=1&")
+    page.go_forward()
+    page.locator("[role=tab][aria-selected=true]", has_text="Statistics").wait_for()
+
+
+def test_steps_of_the_player_are_not_gone_back_to(visit):
+    page = visit()
+    before = page.evaluate("history.length")
+    for _ in range(3):
+        page.locator("button.step").click()
+    searched(page, "frame=3")
+    assert page.evaluate("history.length") == before
+
+
+# 2: A server that is gone
+
+
+def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, shipped, tmp_path):
+    port = free_port()
+    store = {"GRANFORCE_DATA": str(shipped)}
+    expected = ("WebSocket", "Failed to load resource", "not connected")
+    with serve(tmp_path, port=port, **store) as (url, server):
+        page = visit(at=url, wanted=expected)
+        ask_for_mu(page, 1)
+        shows(page, 1)
+        searched(page, "mu=1&")
+        page.locator("button.step").click()
+        searched(page, "frame=1")
+        server.send_signal(signal.SIGKILL)
+        begin = time.monotonic()
+        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
+        assert time.monotonic() - begin < 20
+        painting = scene(page, "scene.painted")
+        page.locator("button.play").click()  # what is in the page still plays
+        page.wait_for_function(
+            f"e => e.scene.painted > {painting} + 3", arg=page.locator(".scene").element_handle()
+        )
+    with serve(tmp_path, port=port, **store):
+        page.get_by_text("Connection lost").wait_for(state="detached")
+        painted(page, PATIENCE)
+        shows(page, 1)
+        ask_for_mu(page, 0)  # and it listens again
+        shows(page, 0)
+
+
+# 3: Number fields
+
+
+def test_number_fields_take_typing_after_enter(visit):
+    page = visit()
+    field = page.get_by_role("spinbutton", name="States")
+    field.click()
+    for number in (31, 32, 100_050 // 10):
+        page.keyboard.press("Control+A")
+        page.keyboard.type(str(number))
+        page.keyboard.press("Enter")
+        searched(page, f"states={number}")
+        assert field.input_value() == str(number)
+    inside = field.evaluate("e => e.scrollWidth <= e.clientWidth + 1")
+    assert inside  # nothing is cut
+
+
+def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
+    page = visit()
+    field = page.get_by_role("spinbutton", name="Disks N")
+    before = field.input_value()
+    field.fill("many")
+    field.press("Enter")
+    page.get_by_text("Disks N must be a whole number").wait_for()
+    assert field.input_value() == before
+
+
+# 4: Uploaded packings
+
+
+def test_uploaded_packings_show_their_own_number_of_disks(visit):
+    page = visit("?tab=upload")
+    lammps = ROOT / "tests" / "lammps"
+    files = [lammps / f"lammps_n400_mu0.3.{part}.dump" for part in ("particles", "contacts")]
+    page.locator("input[type=file]").set_input_files(files)
+    searched(page, "packing=")
+    page.locator(".source", has_text="imported").wait_for()
+    assert page.get_by_role("spinbutton", name="Disks N").input_value() == "400"
+    page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
+
+
+# 5: Keys
+
+
+@pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
+def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
+    page = visit("?tab=statistics" if focused == "toggle" else "")
+    clicked = {
+        "tab": page.get_by_role("tab", name="Intervals"),
+        "toggle": page.get_by_role("button", name="P(fₙ)", exact=True),
+        "switch": page.get_by_label("Strong and undetermined contacts"),
+    }[focused]
+    clicked.click()
+    page.keyboard.press("ArrowRight")
+    state = page.locator("b.state")
+    page.wait_for_function("e => e.textContent !== 'original'", arg=state.element_handle())
+    page.keyboard.press(" ")
+    page.locator(".stage.playing").wait_for()
+    page.keyboard.press(" ")
+    page.locator(".stage:not(.playing)").wait_for()
+
+
+def test_who_goes_by_tab_means_the_widget(visit):
+    page = visit()
+    switch = page.get_by_label("Strong and undetermined contacts")
+    page.get_by_role("combobox", name="Width").focus()
+    page.keyboard.press("Tab")
+    assert switch.evaluate("e => e.getRootNode().activeElement === e")
+    page.keyboard.press(" ")
+    searched(page, "overlay=1")
+    assert page.locator(".stage.playing").count() == 0
+
+
+# 6: What is not computed yet
+
+
+def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old(visit):
+    page = visit()
+    plot = page.locator(".bk-Figure").first
+    plot.wait_for()
+    page.wait_for_function(f"() => {MODEL}('bars')?.get_length() > 0")
+    before = plot.bounding_box()
+    page.evaluate(MOST_BARS)
+    ask_for_mu(page, 0.4)
+    shows(page, 0.4)
+    assert len(page.evaluate("window.mostBars")) <= 1
+    page.locator(".task").first.wait_for(state="hidden")
+    tiles = page.locator(".tiles").first
+    page.wait_for_function(
+        "e => getComputedStyle(e.getRootNode().host).opacity === '1'", arg=tiles.element_handle()
+    )
+    assert plot.bounding_box()["y"] == before["y"]
+
+
+# 7: Two contacts
+
+
+def middles(page, count):
+    """Points on the page in the middle of the thickest chains inside the box, far apart."""
+    return page.locator(".scene").evaluate(
+        """(element, count) => {
+            const { scene } = element, { x0, y0, x1, y1, contact, box } = scene.geometry
+            const inside = (v, side) => v > 0.15 * side && v < 0.85 * side
+            const found = Array.from(contact.keys()).filter((k) => inside(x0[k], box[0]) &&
+                inside(x1[k], box[0]) && inside(y0[k], box[1]) && inside(y1[k], box[1]) &&
+                contact[k] !== scene.selected)
+            found.sort((a, b) => scene.width[b] - scene.width[a])
+            const { left, top } = element.getBoundingClientRect()
+            return found.slice(0, count).map((k) => {
+                const [x, y] = scene.toPixel((x0[k] + x1[k]) / 2, (y0[k] + y1[k]) / 2)
+                return [contact[k], x + left, y + top]
+            })
+        }""",
+        count,
+    )
+
+
+def test_two_contacts_are_chosen_in_the_packing_and_both_are_marked(visit):
+    page = visit("?tab=plane")
+    page.get_by_role("button", name="fₙ of two contacts").click()
+    page.get_by_text("Now click a second contact").wait_for()
+    handle = page.locator(".scene").element_handle()
+    page.wait_for_function("e => e.scene.selected !== null", arg=handle)
+    (a, *first), (b, *second) = middles(page, 2)
+    page.mouse.click(*first)
+    searched(page, f"contact={a}")
+    page.mouse.click(*second)
+    page.wait_for_function(f"e => e.scene.selected === {b} && e.scene.second === {a}", arg=handle)
+    page.wait_for_function(f"() => {MODEL}('outer').get_column('x').length > 3")
+    backbone = scene(page, "Array.from(scene.geometry.backbone)")
+    axes = page.evaluate(
+        """() => [...Bokeh.documents[0]._all_models.values()]
+            .filter((m) => m.type === "LinearAxis").map((m) => m.axis_label)"""
+    )
+    assert f"fₙ of contact {backbone[a]} / ⟨fₙ⟩" in axes
+    assert f"fₙ of contact {backbone[b]} / ⟨fₙ⟩" in axes
+    searched(page, f"second={a}")
+
+
+# 8: Small things
+
+
+@pytest.mark.parametrize("tab", ["intervals", "statistics"])
+def test_legends_lie_where_no_curve_goes(visit, tab):
+    page = visit(f"?tab={tab}")
+    page.wait_for_function(
+        """() => [...Bokeh.documents[0]._all_models.values()]
+            .filter((m) => m.type === "Figure" &&
+                !m.properties.inner_width.is_unset && m.inner_width > 50).length >= 2"""
+    )
+    places = page.evaluate(
+        """() => [...Bokeh.documents[0]._all_models.values()]
+            .filter((m) => m.type === "Figure" &&
+                !m.properties.inner_width.is_unset && m.inner_width > 50)
+            .map((m) => [m.center, m.above].map(
+                (part) => part.filter((r) => r.type === "Legend" && r.visible).length))"""
+    )
+    assert len(places) >= 2
+    assert sum(within for within, _ in places) == 0 and sum(above for _, above in places) >= 2
+
+
+def test_ticks_of_friction_stand_apart(visit):
+    page = visit("?tab=statistics")
+    page.get_by_text("How undetermined the forces are").wait_for()
+    page.wait_for_function(
+        "() => [...Bokeh.documents[0]._all_models.values()]"
+        ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
+    )
+    ticks, width = page.evaluate(
+        """() => {
+            const models = [...Bokeh.documents[0]._all_models.values()]
+            const fig = models.find((m) => m.type === "Figure" &&
+                m.below.some((axis) => axis.axis_label === "friction μ"))
+            return [fig.below.find((axis) => axis.ticker).ticker.ticks.length, fig.inner_width]
+        }"""
+    )
+    assert width / ticks > 40  # px for each label of at most five letters
+
+
+def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, folder):
+    page = visit("?tab=perturb&contact=5")
+    page.get_by_role("button", name="Push", exact=True).click()
+    page.get_by_text("The critical force lies between").wait_for()
+    page.get_by_role("tab", name="Statistics").click()
+    page.get_by_text("How undetermined the forces are").wait_for()
+    assert "already known" not in (folder / "log").read_text()
+
+
+def test_the_report_goes_when_another_file_is_dropped(visit):
+    page = visit("?tab=upload")
+    lammps = ROOT / "tests" / "lammps"
+    files = [lammps / f"lammps_n400_mu0.3.{part}.dump" for part in ("particles", "contacts")]
+    page.locator("input[type=file]").set_input_files(files)
+    page.get_by_text("dimension h of S").wait_for()
+    page.locator("input[type=file]").set_input_files(ROOT / "LICENSE")
+    page.get_by_text("neither an NPZ of granforce").wait_for()
+    page.get_by_text("dimension h of S").wait_for(state="detached")
+
+
+def test_nothing_old_stands_under_a_new_statistic(visit):
+    page = visit("?tab=statistics")
+    page.get_by_text("How undetermined the forces are").wait_for()
+    page.get_by_role("button", name="corr(μ)", exact=True).click()
+    page.get_by_text("How undetermined the forces are").wait_for(state="detached")
+    page.get_by_text("Whether strong contacts").wait_for()
+
+
+# What is said must be so
+
+
+def test_curves_of_the_shown_states_end_at_their_targets(visit):
+    page = visit()
+    page.wait_for_function(f"() => {MODEL}('growth')?.get_column('eta1')?.length === {KEPT + 1}")
+    page.locator("input.scrub").fill(str(KEPT))
+    ends = [column(page, "growth", name)[-1] for name in ("eta1", "eta2", "eta3")]
+    targets = page.evaluate(
+        """() => [...Bokeh.documents[0]._all_models.values()]
+            .filter((m) => m.type === "Span" && m.line_dash === "dashed" ||
+                m.type === "Span" && m.line_dash.length > 0).map((m) => m.location)"""
+    )
+    assert sorted(targets) == pytest.approx(sorted(ends), rel=1e-3)
+
+
+def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
+    page = visit("?tab=statistics")
+    page.get_by_text("How undetermined the forces are").wait_for()
+    assert page.get_by_role("cell", name="reproduced").count() >= 5
+    most = page.evaluate(
+        """() => Math.max(...[...Bokeh.documents[0]._all_models.values()]
+            .filter((m) => m.type === "ColumnDataSource").map((m) => m.get_length() ?? 0))"""
+    )
+    assert most >= 15  # frictions of the study above 0
+
+
+@pytest.mark.parametrize(
+    "tab, words",
+    [
+        ("intervals", ("possible: exact; seen: so far",)),
+        ("plane", ("outline: exact; states: seen",)),
+        ("statistics", ("measured: of the random walk's states", "dashed exact, others measured")),
+    ],
+)
+def test_plots_say_whether_they_show_exact_seen_or_measured_values(visit, tab, words):
+    page = visit(f"?tab={tab}")
+    for line in words:
+        page.wait_for_function(
+            """line => [...Bokeh.documents[0]._all_models.values()]
+                .some((m) => m.type === "Title" && m.text === line)""",
+            arg=line,
+        )
+
+
+# Colour and width by limit load
+
+
+def test_limit_loads_are_shown_as_colour_and_width(visit):
+    page = visit("?colour=load&thickness=load")
+    handle = page.locator(".scene").element_handle()
+    page.wait_for_function(
+        f"() => {MODEL}('player').loads?.length > 0 || {MODEL}('player').data?.loads?.length > 0"
+    )
+    page.wait_for_function("e => e.scene.style.width.some((w) => w > 0)", arg=handle)
+    widths = np.array(scene(page, "Array.from(scene.style.width)"))
+    bins = np.array(scene(page, "Array.from(scene.style.bin)"))
+    assert (np.diff(bins[np.argsort(widths)]) >= 0).all() and bins.max() == 32
+    page.get_by_text("limit load").first.wait_for()
+
+
+# Counts progress bars that are seen at once, for as long as the page is open.
+MOST_BARS = """() => {
+    window.mostBars = []
+    const all = (root) => [...root.querySelectorAll("*")].flatMap(
+        (e) => [e, ...(e.shadowRoot ? all(e.shadowRoot) : [])])
+    const count = () => {
+        const bars = all(document).filter(
+            (e) => e.matches(".bar[role=progressbar]") && e.offsetHeight)
+        if (bars.length > window.mostBars.length) window.mostBars = bars.map((e) => e.outerHTML)
+        requestAnimationFrame(count)
+    }
+    count()
+}"""

@@ -1,0 +1,156 @@
+"""Forces in the visitor's hand: rails, pulls that stay, undo, links."""
+
+import numpy as np
+import pytest
+
+from app import grabs, planes
+from app.grabs import Hand
+from app.jobs import reading
+from app.state import AppState
+
+
+class Page:
+    """A page's hand, and what its player is told."""
+
+    def __init__(self, state, wait_for):
+        self.state, self.told, self._wait = state, [], lambda: wait_for(state)
+        self.hand = Hand(state, state.task(reading), self.told.append)
+        self._wait()
+
+    def hear(self, **message):
+        self.hand.heard(message)
+        self._wait()
+        return self.told[-1] if self.told else None
+
+
+@pytest.fixture
+def page(state, wait_for):
+    return Page(state, wait_for)
+
+
+def test_a_contact_that_is_taken_is_selected_and_gets_a_rail(page, state):
+    rail = page.hear(grab=4)["rail"]
+    contacts = len(state.replay.backbone)
+    assert state.contact == 4 and rail["contact"] == 4
+    normal = rail["normal"].reshape(-1, contacts)
+    np.testing.assert_allclose(normal[:, 4], rail["values"], atol=1e-6)
+    low, high = state.replay.low[4, 0], state.replay.high[4, 0]
+    assert rail["lower"] - 1e-5 <= low <= high <= rail["upper"] + 1e-5
+    here = np.abs(rail["values"] - state.replay.normal[0, 4]).argmin()
+    np.testing.assert_allclose(normal[here], state.replay.normal[0], atol=1e-5)
+    assert rail["residual"].max() < 1e-9 and len(rail["opened"]) == 2 * contacts
+
+
+def middle(rail):
+    return float((rail["lower"] + rail["upper"]) / 2)
+
+
+def test_let_go_it_stays_and_the_next_pull_starts_there(page, state):
+    value = middle(page.hear(grab=4)["rail"])
+    held = page.hear(hold=[4, value])["held"]
+    assert held["normal"][4] == pytest.approx(value) and held["residual"] < 1e-9
+    rail = page.hear(grab=9)["rail"]
+    here = np.abs(rail["values"] - held["normal"][9]).argmin()
+    normal = rail["normal"].reshape(len(rail["values"]), -1)
+    np.testing.assert_allclose(normal[here], held["normal"], atol=1e-5)
+
+
+def test_undo_steps_back_to_the_state(page, state):
+    first = middle(page.hear(grab=4)["rail"])
+    one = page.hear(hold=[4, first])["held"]
+    page.hear(hold=[9, middle(page.hear(grab=9)["rail"])])
+    assert len(state.pulls) == 2
+    again = page.hear(undo=True)["held"]
+    np.testing.assert_array_equal(again["normal"], one["normal"])
+    assert page.hear(undo=True) == {"held": None} and not state.pulls
+
+
+def test_pulls_travel_with_the_link(page, state, library, wait_for):
+    page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
+    held = page.hear(hold=[9, middle(page.hear(grab=9)["rail"])])["held"]
+    other = AppState(library, query=state.link())
+    wait_for(other)
+    assert len(other.pulls) == 2
+    again = Page(other, wait_for)
+    np.testing.assert_allclose(again.told[-1]["held"]["normal"], held["normal"], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x", "1", "1:2:3", "-1:2", "1:nan", "1:1e9", "~".join(["1:1"] * 40), "1:", "p:1", "q:1:2"],
+)
+def test_links_with_pulls_that_make_no_sense_pull_nothing(text):
+    with pytest.raises(ValueError):
+        grabs.read(text)
+
+
+def test_what_was_pulled_is_gone_with_another_state_on_screen(page, state):
+    page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
+    state.frame = 3
+    assert not state.pulls and page.told[-1] == {"held": None}
+
+
+def test_a_force_that_cannot_be_is_one_clear_line(page, state):
+    value = middle(page.hear(grab=4)["rail"])
+    page.hear(hold=[4, value])
+    page.hear(hold=[4, 900.0])
+    assert "outside its exact interval" in state.message
+    assert state.pulls == [(4, value)]
+
+
+def test_messages_that_make_no_sense_are_ignored(page, state):
+    for message in (
+        {"grab": -1},
+        {"grab": 10**9},
+        {"grab": "a"},
+        {"hold": [10**9, 1.0]},
+        {"hold": 3},
+    ):
+        page.hand.heard(message)
+    assert not page.told and not state.pulls and not state.busy
+
+
+def test_the_pulls_of_a_page_are_limited(page, state, monkeypatch):
+    monkeypatch.setattr(grabs, "MOST_PULLS", 1)
+    value = middle(page.hear(grab=4)["rail"])
+    page.hear(hold=[4, value])
+    page.hear(hold=[4, 0.99 * value])
+    assert len(state.pulls) == 1 and "undo" in state.message
+
+
+@pytest.mark.parametrize("pair", [None, ((4, 0), (9, 0)), ((4, 0), (4, 1))])
+def test_the_point_in_force_space_is_pulled_along_both_axes(page, state, pair):
+    replay = state.replay
+    plane = planes.principal(replay) if pair is None else planes.components(replay, *pair)
+    state.plane = plane
+    fan = page.hear(point=True)["fan"]
+    corners, contacts = np.column_stack([fan["x"], fan["y"]]), len(replay.backbone)
+    assert fan["residual"].max() < 1e-9 and len(fan["normal"]) == len(corners) * contacts
+    # The polygon holds all states, and a point inside it is reached exactly.
+    edge = np.roll(corners, -1, axis=0) - corners
+    away = plane.path[:, None] - corners
+    assert np.min(edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0]) > -0.05 * np.ptp(corners)
+    point = 0.7 * corners[0] + 0.3 * corners.mean(axis=0)
+    held = page.hear(hold_point=point.tolist())["held"]
+    found = np.stack([held["normal"], held["tangential"]], axis=1)
+    reached = np.tensordot(plane.axes, found, ((1, 2), (0, 1))) - plane.origin
+    np.testing.assert_allclose(reached, point, atol=1e-5)
+    assert held["residual"] < 1e-9 and held["normal"].min() > -1e-6
+    assert np.all(np.abs(held["tangential"]) <= replay.summary["mu"] * held["normal"] + 1e-6)
+    # outside it, the nearest point of its edge; then undo
+    far = page.hear(hold_point=(3 * corners[0]).tolist())["held"]
+    assert far["residual"] < 1e-9
+    again = page.hear(undo=True)["held"]
+    np.testing.assert_array_equal(again["normal"], held["normal"])
+
+
+def test_a_pulled_point_travels_with_the_link(page, state, library, wait_for):
+    state.plane = planes.components(state.replay, (4, 0), (9, 1))
+    fan = page.hear(point=True)["fan"]
+    held = page.hear(hold_point=[float(fan["x"].mean()), float(fan["y"].mean())])["held"]
+    other = AppState(library, query=state.link())
+    wait_for(other)
+    assert other.pulls[0][0] == "4n-9t"
+    np.testing.assert_allclose(
+        Page(other, wait_for).told[-1]["held"]["normal"], held["normal"], atol=1e-4
+    )

@@ -1,0 +1,152 @@
+"""Visitors who reload, leave, ask for too much, or are there when the server is killed.
+
+Whatever they do, the next visitor's computation begins and ends, and no thread of the server dies.
+"""
+
+import urllib.request
+
+import pytest
+from serving import CHROMIUM, CLOSED, free_port, painted, serve
+
+PATIENCE = 180_000  # ms, on a busy machine
+LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, unless it is ended
+LIMITS = "n=60,states=20000"
+LARGEST = "9" * 300
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def served(shipped, tmp_path_factory):
+    """Address of the app, which soon gives closed pages up; at the end all its threads are there.
+
+    Warmed up: there, too, a page is made and ended before its work.
+    """
+    folder = tmp_path_factory.mktemp("served")
+    variables = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_LIMITS": LIMITS}
+    with serve(folder, "--warm", *CLOSED, **variables) as (url, _):
+        yield url
+    log = (folder / "log").read_text()
+    for word in ("Exception in thread", "NameError", "failed with following error", "could not be"):
+        assert word not in log, log
+
+
+@pytest.fixture
+def page(chromium):
+    """An empty page."""
+    page = chromium.new_page()
+    page.set_default_timeout(PATIENCE)
+    yield page
+    page.context.close()
+
+
+def computing(page):
+    """Wait until states are being computed for the page, or for another one that it waits for."""
+    page.get_by_text("of 20000 states").or_(page.get_by_text("for another page")).first.wait_for()
+
+
+def computes(page, address, seed):
+    """Another computation is asked for, and succeeds."""
+    page.goto(f"{address}?mu=0.2&n=30&states=5&seed={seed}")
+    page.get_by_text(f"N = 30, seed {seed}, 5 states").first.wait_for()
+
+
+def test_after_three_reloads_while_computing_another_computation_succeeds(page, served):
+    page.goto(served + LONG.format(1))
+    computing(page)
+    for _ in range(3):
+        page.reload()
+        computing(page)
+    computes(page, served, 11)
+
+
+def test_pages_that_are_asked_for_and_never_shown_hold_no_thread(page, served):
+    """Their work is ended when the server gives the pages up."""
+    for seed in range(2, 6):
+        urllib.request.urlopen(served + LONG.format(seed), timeout=60).close()
+    computes(page, served, 12)
+
+
+def test_twenty_pages_opened_and_closed_while_computing(page, chromium, served):
+    for number in range(20):
+        visit = chromium.new_page()
+        visit.goto(served + LONG.format(20 + number % 7), wait_until="commit", timeout=PATIENCE)
+        if number % 10 == 0:
+            computing(visit)
+        visit.context.close()
+    computes(page, served, 13)
+
+
+SELECTION = (
+    "mu", "packed", "n", "seed", "states", "walkseed", "sweeps", "dt", "box_mass", "pressure",
+    "radii", "source", "relax", "packing",
+)  # fmt: skip
+VIEW = (
+    "tab", "contact", "frame", "reference", "between", "colour", "thickness", "overlay", "sort",
+    "scale", "dark",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "names, given, told",
+    [
+        (SELECTION, "", "this link names an unknown source of states"),
+        (SELECTION[:10], "", "this link cannot be read: a packing of 9"),
+        (("sweeps",), "mu=0.2&n=30&states=3&seed=14&", "the number of sweeps must lie between"),
+        (VIEW, "mu=0.1&n=30&states=30&relax=nearest&", "μ = 0.1, N = 30"),
+    ],
+    ids=["every parameter", "every number", "sweeps", "every choice of the view"],
+)
+def test_a_link_with_the_largest_numbers_computes_nothing(page, served, names, given, told):
+    """One line says what is too large, and the usual states are seen; each alone: test_app.py."""
+    page.goto(f"{served}?{given}{'&'.join(f'{name}={LARGEST}' for name in names)}")
+    painted(page, PATIENCE)
+    page.get_by_text(told).wait_for()
+    assert page.get_by_role("button", name="Cancel").count() == 0
+
+
+def test_the_largest_allowed_of_everything_can_be_cancelled(page, served):
+    # But of μ: at 1000 a packing may have one network only, whose walk ends before it is seen.
+    largest = {
+        "n": 60, "states": 20_000, "mu": 0.2, "relax": "gauss_seidel_only",
+        "seed": 2**53 - 1, "walkseed": 2**53 - 1,
+        "sweeps": 1000, "dt": 0.1, "box_mass": 10_000, "pressure": 1e6, "radii": "uniform:1,20",
+    }  # fmt: skip
+    page.goto(f"{served}?{'&'.join(f'{key}={value}' for key, value in largest.items())}")
+    page.get_by_role("button", name="Cancel").first.click()
+    page.get_by_role("button", name="Cancel").first.wait_for(state="hidden")
+    computes(page, served, 15)
+
+
+def test_a_killed_server_comes_back_and_a_reloaded_page_works(page, shipped, tmp_path):
+    port, variables = free_port(), {"GRANFORCE_DATA": str(shipped)}
+    with serve(tmp_path, port=port, **variables) as (url, server):
+        page.goto(url + LONG.format(3))
+        computing(page)
+        server.kill()
+        server.wait(20)
+        with serve(tmp_path, port=port, **variables) as (again, _):
+            assert again == url
+            page.reload()
+            computing(page)
+            computes(page, url, 16)
+
+
+def test_a_server_that_is_told_to_end_does_so_while_it_computes(page, shipped, tmp_path):
+    with serve(tmp_path, GRANFORCE_DATA=str(shipped)) as (url, server):
+        page.goto(url + LONG.format(4))
+        computing(page)
+        server.terminate()
+        assert server.wait(20) == 0
+
+
+@pytest.mark.parametrize("options", [(), ("--warm",)])
+def test_limits_that_cannot_be_read_keep_the_server_from_starting(tmp_path, options):
+    with pytest.raises(RuntimeError, match="the server ended"):
+        with serve(tmp_path, *options, GRANFORCE_LIMITS="disks=4") as _:
+            pass
+    (line,) = (tmp_path / "log").read_text().splitlines()
+    assert line.startswith("GRANFORCE_LIMITS: 'disks=4' is none of n, states, upload")

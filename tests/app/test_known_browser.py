@@ -1,0 +1,104 @@
+"""In a browser: forces are held, intervals shrink, stresses, photoelastic frames."""
+
+import pytest
+from frames import frame, write
+from serving import CHROMIUM, MODEL, column, painted, scene
+from small_store import ROOT
+
+ARTEFACTS = ROOT / "artefacts" / "known"
+PATIENCE = 60_000  # ms, on a busy machine
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+def select(page, contact):
+    """Select a contact as a click on its chain does."""
+    page.locator(".scene").evaluate("(e, c) => e.scene.onSelect(c)", contact)
+    page.locator(".stage.chosen").wait_for()
+
+
+def chips(page, count):
+    """Wait for so many chips, and for what they leave open."""
+    if not count:
+        page.get_by_text("all other intervals shrink").wait_for()
+        return
+    page.locator(".known .chip").nth(count - 1).wait_for()
+    page.locator(".known .chip").nth(count).wait_for(state="detached")
+    page.locator(".known .words", has_text="on average").wait_for()
+
+
+def span(page, name):
+    """Sum of the intervals that the plot shows: exact, or whole, without what is known."""
+    low, high = (column(page, "bars", f"{name}_{side}") for side in ("low", "high"))
+    return sum(high) - sum(low)
+
+
+def picture(page, name):
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=ARTEFACTS / f"{name}.png")
+
+
+def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
+    page = visit()
+    select(page, 4)
+    page.keyboard.press("h")
+    chips(page, 1)
+    assert scene(page, "scene.hand.player.pins.has(4)")
+    page.wait_for_function(f"() => {MODEL}('bars').get_column('whole_low').every(Number.isFinite)")
+    assert span(page, "exact") < 0.99 * span(page, "whole")
+    select(page, 9)
+    page.locator("input.error").fill("0.2")
+    page.locator("button.hold").click()
+    chips(page, 2)
+    picture(page, "held")
+    page.wait_for_url("**known=4*~9*")
+    page.reload()
+    painted(page, PATIENCE)
+    chips(page, 2)
+    assert scene(page, "scene.hand.player.pins.has(9)")
+    page.locator(".chip .release").first.click()
+    chips(page, 1)
+    select(page, 9)
+    page.keyboard.press("h")
+    chips(page, 0)
+    page.wait_for_function(f"() => {MODEL}('bars').get_column('whole_low').every(Number.isNaN)")
+
+
+def test_contacts_worth_measuring_are_numbered(visit):
+    page = visit()
+    page.get_by_role("button", name="Which measurement next?").click()
+    page.locator(".ranked li").first.wait_for()
+    page.get_by_text("mean interval").first.wait_for()
+    assert scene(page, "scene.hand.player.pins.pins.ranked.length") == 10
+    page.locator(".ranked button").first.click()
+    page.locator(".stage.chosen").wait_for()
+    picture(page, "next")
+
+
+def test_a_contradiction_in_a_link_is_one_line(visit):
+    page = visit("?known=4:0.5~9:80")
+    page.get_by_role("alert").filter(has_text="agrees with").wait_for()
+    chips(page, 0)
+
+
+def test_the_plane_of_stresses(visit):
+    page = visit("?tab=plane")
+    page.get_by_role("button", name="stresses").click()
+    page.get_by_text("The pressure alone is held").wait_for()
+    assert len(column(page, "outer", "x")) > 3
+    picture(page, "stresses")
+
+
+def test_a_photoelastic_frame_is_compared(visit, tmp_path):
+    grains, rows, _ = frame(60, missing=0.1, noise=0.05)
+    write(tmp_path, grains, rows)
+    page = visit("?tab=upload")
+    page.locator("input[type=file]").set_input_files(
+        [tmp_path / "positions.txt", tmp_path / "adjacency.txt"]
+    )
+    page.get_by_text("Listed are").wait_for()
+    page.wait_for_function(f"() => {MODEL}('photoelastic_n')?.get_length() > 20")
+    picture(page, "photoelastic")

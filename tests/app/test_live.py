@@ -1,0 +1,355 @@
+"""What is computed is seen while it is computed: pictures of the compaction, states of the walk."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from small_store import DISKS
+
+from app import live, planes
+from app.selection import select
+from app.state import AppState
+from app.views import plane
+from app.views.controls import Controls
+from app.views.explanation import Explanation
+from app.views.intervals import View
+from app.views.packing import PackingView
+from app.views.stream import Stream
+
+
+class Browser:
+    """What a browser does with what it is sent: it paints each message and says so, if awake."""
+
+    def __init__(self, state, awake=True):
+        self.state, self.awake, self.got = state, awake, []
+        self.player = PackingView(state).player
+        self.stream = Stream(state, self.player)
+        self.player.hand_over = self._take
+        self.player._handle_msg({"live": {"anew": True, "seen": awake}})
+
+    def _take(self, news):
+        self.got.append(news)
+        if self.awake:
+            self.player._handle_msg({"live": {"painted": news["number"]}})
+
+    def look(self, awake):
+        self.awake = awake
+        self.player._handle_msg({"live": {"seen": awake}})
+
+    def parts(self, name):
+        return [news[name] for news in self.got if name in news]
+
+    def run(self, until=lambda: False, seconds=120):
+        """Tick and poll as a page does until nothing runs any more."""
+        end = time.monotonic() + seconds
+        while self.state.busy and not until() and time.monotonic() < end:
+            time.sleep(0.005)
+            self.stream.tick()
+            self.state.poll()
+        assert until() or not self.state.busy
+
+
+def asked(mu, states=20, **others):
+    return select(DISKS, mu, 1, states=states, relax="nearest", **others)
+
+
+def test_compaction_and_walk_are_seen_as_they_go(state):
+    browser, old = Browser(state), state.replay
+    tab = View(state)
+    state.ask(asked(0.23), at_once=True)
+    assert state.asked.startswith("asked for: μ = 0.23") and browser.player.asked == state.asked
+    assert browser.player.live and state.seen is old
+    browser.run(lambda: state.growing is not None)
+    pictures = browser.parts("picture")
+    fractions = [picture["fraction"] for picture in pictures]
+    # The gas has φ = 0.5; a page that is behind leaves pictures out.
+    assert len(pictures) > 30 and 0.5 - 1e-6 < fractions[0] < 0.55
+    assert fractions[-1] > 0.75 and pictures[0]["box"][0] > 1.15 * pictures[-1]["box"][0]
+    assert len(pictures[0]["x"]) == 2 * DISKS and pictures[-1]["mu"] == 0.23
+    assert state.seen is state.growing and state.replay is old
+    assert "as they are found" in state.source
+    begun = browser.player.walk
+    assert begun["room"] == 21 and len(begun["number"]) == 1 and begun["mu"] == 0.23
+    assert len(tab.growth.data["state"]) == 21
+    browser.run()
+    assert state.growing is None and state.live is None and not state.asked
+    assert not browser.player.live and browser.player.walk["room"] == 0
+    states = browser.parts("states")
+    normal = np.concatenate([part["normal"] for part in states]).reshape(-1, begun["contacts"])
+    np.testing.assert_array_equal(normal, state.replay.normal[1 : len(normal) + 1])
+    for name in ("eta1", "eta2", "eta3"):
+        sent = np.concatenate([part[name] for part in states])
+        np.testing.assert_allclose(sent, state.replay.growth[name][1 : len(sent) + 1], atol=1e-5)
+    np.testing.assert_array_equal(begun["x0"], browser.player.walk["x0"])
+
+
+def test_what_is_computed_at_once_is_never_offered_to_be_computed(state):
+    """A button that came and went would have the whole page laid out twice."""
+    controls, offered = Controls(state), []
+    controls.go.param.watch(lambda event: offered.append(event.new), "visible")
+    browser = Browser(state)
+    state.ask(asked(0.38), at_once=True)
+    assert state.missing and state.busy and not offered
+    browser.run()
+    assert not offered and state.replay.summary["mu"] == 0.38
+
+
+def test_force_space_has_axes_of_the_states_found_so_far(state, wait_for):
+    """New ones when the walk has grown fourfold; those of all states and an outline at its end."""
+    state.tab = "plane"
+    browser, tab = Browser(state), plane.View(state)
+    wait_for(state)
+    state.ask(asked(0.36, 400), at_once=True)
+    browser.run(lambda: state.growing is not None)
+    assert state.plane is None and not len(tab.path.data["x"]) and not len(tab.outer.data["x"])
+    browser.run(lambda: state.plane is not None)
+    first, states = state.plane, state.live.states().astype(float)
+    assert len(states) >= 4 and len(tab.path.data["x"]) == 401
+    x, y = (tab.path.data[name] for name in "xy")
+    assert np.isfinite([x[0], y[0]]).all() and np.isnan(x[1:]).all()  # the player fills them in
+    np.testing.assert_allclose(np.linalg.norm(first.axes, axis=(1, 2)), 1)
+    assert not len(tab.outer.data["x"])
+    browser.run(lambda: state.plane is not first)
+    assert state.growing is None or state.fourfold > 1
+    browser.run()
+    assert np.isfinite(tab.path.data["x"]).all() and len(tab.outer.data["x"])
+    assert len(state.replay.normal) == len(tab.path.data["x"])
+    same = (planes.principal(state.replay).axes * state.plane.axes).sum(axis=(1, 2))
+    np.testing.assert_allclose(np.abs(same), 1, atol=1e-6)
+
+
+def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state, wait_for):
+    state.tab = "plane"
+    browser, tab = Browser(state), plane.View(state)
+    wait_for(state)
+    tab.planes.value = "contact"
+    state.ask(asked(0.37, 20_000), at_once=True)
+    browser.run(lambda: state.growing is not None)
+    kept = state.plane
+    assert kept.components and len(tab.path.data["x"]) == len(live.numbers(state.growing.summary))
+    browser.run(lambda: state.fourfold > 1)
+    assert state.plane is kept
+    state.cancel()
+    browser.run()
+    browser.stream.tick()
+    wait_for(state)
+    assert np.isfinite(tab.path.data["x"]).all() and len(tab.outer.data["x"])
+
+
+def test_a_page_that_comes_later_joins_and_both_end_with_the_same(library, wait_for):
+    first, second = AppState(library), AppState(library)
+    for state in (first, second):
+        wait_for(state)
+    one, two = Browser(first), Browser(second)
+    first.ask(asked(0.24, 400), at_once=True)
+    one.run(lambda: len(one.parts("states")) > 0)
+    second.ask(asked(0.24, 400), at_once=True)
+    assert second.live is not first.live
+    two.run(lambda: second.growing is not None)
+    assert second.growing is first.growing  # not computed anew
+    two.run(lambda: "another page" in second.computation.stage or not second.busy)
+    while first.busy or second.busy:
+        one.run(lambda: True)
+        two.run(lambda: True)
+        for browser in (one, two):
+            browser.stream.tick()
+            browser.state.poll()
+    assert second.replay.summary["states"] == 400
+    np.testing.assert_array_equal(first.replay.normal, second.replay.normal)
+
+
+@pytest.mark.parametrize(("leave", "mu"), [(AppState.cancel, 0.33), (AppState.close, 0.34)])
+def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, mu):
+    first, second = AppState(library), AppState(library)
+    for state in (first, second):
+        wait_for(state)
+    one, two = Browser(first), Browser(second)
+    wanted = asked(mu, 20_000)
+    first.ask(wanted, at_once=True)
+    one.run(lambda: len(one.parts("states")) > 0)
+    second.ask(wanted, at_once=True)
+    two.run(lambda: second.growing is not None)
+    walk = live.shared(live.Walking, wanted.parameters())
+    run, found = walk.run, walk._found
+    leave(first)
+    one.run(seconds=1)  # at once for who leaves
+    assert not first.busy and not second.computation.message
+    two.run(lambda: walk._found > found + 20)
+    assert walk.run == run and second.computation.running  # not begun anew
+    second.cancel()
+    two.run(seconds=60)
+    found = walk._found
+    time.sleep(0.3)
+    assert not second.busy and walk._found <= found + 1  # nobody wants it any more
+
+
+def test_while_it_is_compressed_the_words_say_that_it_moves(state):
+    browser = Browser(state)
+    view, words = PackingView(state), Explanation(state)
+    assert "never move.</b>" in words.first and " largest radii" in view.legend.object
+    state.ask(asked(0.35, 20_000), at_once=True)
+    browser.run(lambda: state.moving)
+    assert "move until they jam" in words.first and "which shrinks" in view.legend.object
+    browser.run(lambda: state.growing is not None)
+    assert "never move.</b>" in words.first and " largest radii" in view.legend.object
+    state.cancel()
+    browser.run()
+
+
+def test_a_picture_on_screen_is_soon_that_which_is_computed(monkeypatch):
+    """Who paints a little faster than pictures come is not behind for long, whatever came first."""
+    seen, run, place = live.Compaction(), 0, 0
+    for k in range(100):
+        seen.add(Glimpse(10 * 0.99**k))
+    for k in range(100, 150):
+        seen.add(Glimpse(10 * 0.99**k))
+        run, place, _ = seen.after(run, place)
+        run, place, _ = seen.after(run, place)
+    assert seen.total - place < 5
+
+
+def test_hidden_pages_are_sent_nothing(state):
+    browser = Browser(state, awake=False)
+    state.ask(asked(0.25), at_once=True)
+    browser.run()
+    assert not browser.got and state.replay.summary["mu"] == 0.25
+
+
+def test_a_browser_that_stops_painting_is_sent_no_more(state):
+    browser = Browser(state)
+    browser.awake = False  # it says nothing any more
+    state.ask(asked(0.26), at_once=True)
+    browser.run()
+    assert 1 <= len(browser.got) <= 2
+
+
+def test_cancelled_the_old_picture_is_back_and_says_what_is_not_computed(state, wait_for):
+    browser, old = Browser(state), state.replay
+    state.ask(asked(0.27, 20_000), at_once=True)
+    browser.run(lambda: state.growing is not None)
+    state.cancel()
+    browser.run()
+    browser.stream.tick()
+    assert state.seen is old and state.live is None and state.missing
+    assert state.asked.startswith("of μ = 0.1; not computed: μ = 0.27")
+    assert "finished results" in state.source
+    assert browser.player.walk["room"] == 0 and browser.player.walk["mu"] == 0.1
+
+
+def test_another_question_takes_the_place_of_the_first(state):
+    browser = Browser(state)
+    state.ask(asked(0.28, 20_000), at_once=True)
+    browser.run(lambda: bool(browser.got))
+    state.ask(asked(0.29), at_once=True)
+    browser.run()
+    assert state.replay.summary["mu"] == 0.29 and not state.missing
+
+
+def test_what_is_in_the_store_ends_what_is_computed(state, wait_for):
+    state.ask(asked(0.31, 20_000), at_once=True)
+    state.choose(mu=1)
+    wait_for(state)
+    assert state.replay.summary["mu"] == 1 and not state.missing and state.live is None
+
+
+def test_a_point_is_seen_to_be_compressed_and_needs_no_walk(state):
+    browser = Browser(state)
+    state.ask(select(20, 0, 5, states=5), at_once=True)
+    browser.run()
+    assert browser.parts("picture") and state.replay.summary["dimension"] == 0
+
+
+def test_exact_bounds_are_seen_as_they_are_found(state, monkeypatch):
+    monkeypatch.setattr(live, "BOUNDS_S", 0)
+    browser = Browser(state)
+    state.compute_exact()
+    assert state.arriving is not None and not browser.player.live
+    browser.run()
+    browser.stream.tick()
+    assert state.arriving is None and browser.stream._sent
+    seen = browser.parts("bounds")
+    known = [np.isfinite(np.stack([part["low"], part["high"]])).sum(axis=1) for part in seen]
+    assert np.all(np.diff(known, axis=0) >= 0) and known[0][1] < len(state.replay.backbone)
+    exact = state.exact["high"].values[:, 0] / state.replay.force_scale
+    for part in seen:
+        there = np.isfinite(part["high"])
+        np.testing.assert_array_equal(part["high"][there], exact[there].astype(np.float32))
+
+
+class Glimpse:
+    """A packing as `gf.pack` shows it, of so many grains in a box of this side."""
+
+    def __init__(self, side, grains=1):
+        self.box = np.full(2, side)
+        self.x, self.r = np.zeros((grains, 2)), np.ones(grains)
+        self.i = self.j = np.zeros(0, np.int64)
+        self.reach = self.forces = np.zeros((0, 2))
+        self.step, self.packing_fraction, self.unbalance = 0, 0.5, np.inf
+
+
+def test_pictures_are_kept_as_the_box_shrinks_and_as_time_goes(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(live.time, "perf_counter", lambda: clock[0])
+    seen = live.Compaction()
+    for side in (10, 9.99, 9.9, 9.9, 9.9):
+        seen.add(Glimpse(side))
+    assert seen.total == 2
+    clock[0] += 2 * live.EVERY_S
+    seen.add(Glimpse(9.9))
+    assert seen.total == 3
+
+
+def test_who_is_far_behind_leaves_pictures_out_and_misses_none_of_the_newest(monkeypatch):
+    seen = live.Compaction()
+    for k in range(200):
+        seen.add(Glimpse(10 * 0.99**k))
+    run, place, sides = 0, 0, []
+    while True:
+        run, place, picture = seen.after(run, place)
+        if picture is None:
+            break
+        sides.append(picture["box"][0])
+    assert 30 < len(sides) < 60 and sides == sorted(sides, reverse=True)
+    assert sides[-1] == pytest.approx(10 * 0.99**199)
+    seen.restart()
+    seen.add(Glimpse(7))
+    assert seen.after(run, place)[2]["box"][0] == 7
+
+
+def test_old_pictures_are_dropped_beyond_a_limit(monkeypatch):
+    monkeypatch.setattr(live, "PICTURE_BYTES", 2000)
+    seen = live.Compaction()
+    for k in range(50):
+        seen.add(Glimpse(10 * 0.99**k, 20))
+    _, place, picture = seen.after(0, 0)
+    assert place > 40 and picture is not None
+
+
+def test_of_many_states_as_many_are_sent_as_a_page_can_hold(library, monkeypatch):
+    replay = library.shown(library.cells()[1]).replay
+    summary = replay.summary | {"states": 95}
+    monkeypatch.setattr(live, "FRAME_BYTES", 8 * replay.normal.shape[1] * 10)
+    numbers = live.numbers(summary)
+    assert numbers[0] == 0 and numbers[1] == 1 and np.ptp(np.diff(numbers[1:])) == 0
+    assert len(numbers) <= 11 and numbers[-1] <= 95
+
+
+def test_readers_may_come_from_any_thread():
+    seen, stop = live.Compaction(), threading.Event()
+
+    def read():
+        run = place = 0
+        while not stop.is_set():
+            run, place, _ = seen.after(run, place)
+
+    readers = [threading.Thread(target=read) for _ in range(3)]
+    for reader in readers:
+        reader.start()
+    for k in range(300):
+        seen.add(Glimpse(10 * 0.99**k, 50))
+    stop.set()
+    for reader in readers:
+        reader.join(10)
+        assert not reader.is_alive()
+    assert seen.total == 300

@@ -1,0 +1,429 @@
+"""In a browser: it is seen to jam and to walk, and its forces can be taken in hand."""
+
+import numpy as np
+import pytest
+from serving import CHROMIUM, MODEL, bars_drawn, column, laid_out, scene
+from small_store import KEPT, ROOT
+
+ARTEFACTS = ROOT / "artefacts" / "live"
+PATIENCE = 60_000  # ms, on a busy machine
+WATCH = """e => {
+    const {hand} = e.scene, {live} = hand.player, {hear} = live
+    window.seen = {pictures: [], states: 0, pale: 0}
+    live.hear = (news) => {
+        if (news.picture) {
+            const {picture} = news, box = picture.box ?? picture.get("box")
+            seen.pictures.push([...box][0])
+        } else seen.states += 1
+        hear.call(live, news)
+    }
+    new MutationObserver(() => { seen.pale += hand.player.buttons.root.matches(".pale") })
+        .observe(hand.player.buttons.root, {attributes: true})
+}"""
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture
+def visit(visit):
+    """The same with the intervals drawn."""
+
+    def drawn(*query, **options):
+        page = visit(*query, **options)
+        bars_drawn(page)
+        return page
+
+    return drawn
+
+
+def handle(page):
+    return page.locator(".scene").element_handle()
+
+
+def until(page, expression):
+    """Wait for an expression of the page's `scene`."""
+    page.wait_for_function(f"e => {{ const {{scene}} = e; return {expression} }}", arg=handle(page))
+
+
+def ask(page, mu):
+    page.locator("input.typed").fill(mu)
+    page.locator("input.typed").press("Enter")
+
+
+def ask_for_many_states(page):
+    """So many that the walk cannot end before the browser has seen it grow."""
+    page.get_by_label("States").first.fill("20000")
+    page.get_by_label("States").first.press("Enter")
+
+
+def chain(page):
+    """(contact, x, y): the middle of the strongest chain well inside the picture, on the page."""
+    return page.locator(".scene").evaluate(
+        """e => {
+            const {scene} = e, {geometry: g, size} = scene, box = e.getBoundingClientRect()
+            let best, most = 0
+            for (let k = 0; k < g.contact.length; k++) {
+                const [x, y] = scene.toPixel((g.x0[k] + g.x1[k]) / 2, (g.y0[k] + g.y1[k]) / 2)
+                const inside = [x, y].every((v) => v > 0.3 * size && v < 0.7 * size)
+                if (inside && scene.width[k] > most) {
+                    most = scene.width[k]
+                    best = [g.contact[k], box.x + x, box.y + y]
+                }
+            }
+            return best
+        }"""
+    )
+
+
+def normal(page):
+    return np.array(scene(page, "Array.from(scene.mixed.normal)"))
+
+
+def picture(page, name):
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=ARTEFACTS / f"{name}.png")
+
+
+# Seen while it is computed
+
+
+def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):
+    """Pale at once, then a shrinking box, then a walk that grows."""
+    page = visit()
+    page.locator(".scene").evaluate(WATCH)
+    ask_for_many_states(page)
+    ask(page, "0.41")
+    until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
+    until(page, "scene.geometry.mu === 0.41")
+    seen = page.evaluate("seen")
+    assert seen["pale"] and len(seen["pictures"]) >= 12 and seen["states"]
+    assert seen["pictures"][0] > 1.1 * seen["pictures"][-1]
+    # The walk is on screen, not the packing that moved before.
+    until(page, "!scene.hand.player.live.moves && scene.painted > 0")
+    page.get_by_role("button", name="Cancel").click()
+
+
+def test_computed_states_are_shown_to_the_last(visit):
+    page = visit("?mu=0.41&n=30&states=300&relax=nearest")
+    until(page, "scene.geometry.mu === 0.41 && !scene.hand.player.grows")
+    page.get_by_text("μ = 0.41, N = 30").wait_for()
+    # the player goes on to the last state, where all intervals have been seen
+    if scene(page, "!scene.hand.player.playing && !scene.hand.player.replay.atEnd"):
+        page.locator("button.play").click()
+    until(page, "scene.hand.player.replay.frame === scene.hand.player.replay.last")
+    page.wait_for_function(
+        f"() => {MODEL}('growth').get_column('eta1').every((v, k) => !k || Number.isFinite(v))"
+    )
+    assert page.locator(".stage.pale").count() == 0
+    assert not page.locator(".asked").inner_text()
+
+
+def test_cancelled_the_old_packing_is_back_and_says_so(visit):
+    page = visit()
+    ask_for_many_states(page)
+    until(page, "scene.hand.player.grows")
+    page.get_by_role("button", name="Cancel").click()
+    until(page, "!scene.hand.player.grows && scene.geometry.states === 30")
+    page.locator(".stage.pale").wait_for()
+    assert "not computed" in page.locator(".asked").inner_text()
+    page.get_by_role("button", name="Compute").first.wait_for()
+
+
+def test_two_pages_see_the_same_walk(visit):
+    query = "?mu=0.42&n=30&states=20000&relax=nearest"
+    one = visit(query)
+    until(one, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
+    two = visit(query)
+    until(two, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
+    walked = "scene.hand.player.replay.walk"
+    first, second = (
+        np.array(scene(page, f"Array.from({walked}.normal.subarray(0, 5 * {walked}.contacts))"))
+        for page in (one, two)
+    )
+    np.testing.assert_array_equal(first, second)
+    for page in (one, two):
+        page.get_by_role("button", name="Cancel").click()
+
+
+def test_a_hidden_tab_is_sent_nothing(visit):
+    page = visit()
+    page.locator(".scene").evaluate(WATCH)
+    page.evaluate("""() => {
+        Object.defineProperty(document, "hidden", {value: true, configurable: true})
+        document.dispatchEvent(new Event("visibilitychange"))
+    }""")
+    ask(page, "0.43")
+    until(page, "scene.geometry.mu === 0.43")
+    seen = page.evaluate("seen")
+    assert not seen["pictures"] and not seen["states"]
+
+
+# In the hand
+
+
+def pulled(page, up=60):
+    """Drag the strongest chain upwards; returns it and what was there before."""
+    contact, x, y = chain(page)
+    before = normal(page)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 5)
+    until(page, "scene.hand.rail !== null")
+    for k in range(6):
+        page.mouse.move(x, y - 5 - up * (k + 1) / 6)
+    page.wait_for_function("e => e.scene.hand.frames > 0", arg=handle(page))
+    return contact, before
+
+
+def test_a_dragged_chain_follows_the_hand_and_stays(visit):
+    page = visit()
+    contact, before = pulled(page)
+    until(page, f"Math.abs(scene.mixed.normal[{contact}] - scene.hand.value) < 1e-6")
+    rail = scene(page, "({lower: scene.hand.rail.lower, upper: scene.hand.rail.upper})")
+    during = normal(page)
+    assert before[contact] < during[contact] <= rail["upper"] + 1e-6
+    assert np.abs(during - before).max() > 0 and np.all(during > -1e-6)
+    assert "pulled to" in page.locator(".source").inner_text()
+    picture(page, "dragging")
+    page.mouse.up()
+    page.wait_for_function("() => location.search.includes('pulls=')")
+    assert normal(page)[contact] == pytest.approx(during[contact], abs=1e-5)
+    assert float(page.locator("b.residual").inner_text()) < 1e-9
+    until(page, f"scene.selected === {contact}")
+    # what was pulled is coloured by what it changed
+    change = normal(page) - before
+    shown = np.array(scene(page, "Array.from(scene.style.bin)"))
+    np.testing.assert_allclose(shown, 32 * np.clip(0.5 + change, 0, 1), atol=0.51)
+    page.keyboard.press("z")
+    page.wait_for_function("() => !location.search.includes('pulls=')")
+    until(page, "scene.hand.player.replay.held === null")
+    np.testing.assert_allclose(normal(page), before, atol=1e-6)
+
+
+def test_at_the_end_of_the_rail_the_page_says_why(visit):
+    page = visit()
+    contact, _ = pulled(page, up=600)
+    until(page, "scene.hand.end === 1")
+    page.get_by_text("held there by").wait_for()
+    assert normal(page)[contact] == pytest.approx(scene(page, "scene.hand.rail.upper"), abs=1e-4)
+    picture(page, "end")
+    page.mouse.up()
+
+
+def test_brackets_move_the_selected_force_and_escape_lets_go(visit):
+    page = visit()
+    contact, x, y = chain(page)
+    page.mouse.click(x, y)
+    until(page, f"scene.selected === {contact}")
+    before = normal(page)
+    for key in "[[":
+        page.keyboard.press(key)
+    page.wait_for_function("() => location.search.includes('pulls=')")
+    assert normal(page)[contact] < before[contact]
+    page.keyboard.press("Escape")
+    page.wait_for_function("() => !location.search.includes('pulls=')")
+    np.testing.assert_allclose(normal(page), before, atol=1e-6)
+
+
+def test_a_contact_selected_and_taken_in_one_moment_is_in_the_hand(visit):
+    """The server hears of both before it has answered the first."""
+    page = visit()
+    contact, _, _ = chain(page)
+    for _ in range(5):
+        page.locator(".scene").evaluate(
+            """(e, contact) => {
+                const {hand} = e.scene
+                hand.player.model.contact = contact
+                hand.take(contact, () => 0)
+            }""",
+            contact,
+        )
+        until(page, "scene.hand.rail !== null")
+        page.keyboard.press("Escape")
+        page.locator(".scene").evaluate("e => { e.scene.hand.player.model.contact = null }")
+
+
+def test_a_link_holds_what_was_pulled(visit):
+    page = visit()
+    pulled(page)
+    page.mouse.up()
+    page.wait_for_function("() => location.search.includes('pulls=')")
+    until(page, "scene.hand.player.replay.held.pull !== undefined")
+    again = visit(page.evaluate("location.search"))
+    until(again, "scene.hand.player.replay.held !== null")
+    np.testing.assert_allclose(normal(again), normal(page), atol=1e-4)
+
+
+def test_a_drag_beside_the_chains_moves_the_view(visit):
+    page = visit()
+    x, y = page.locator(".scene").evaluate(
+        """e => {
+            const box = e.getBoundingClientRect(), {scene} = e, side = scene.size
+            for (let a = 0.2; a < 0.8; a += 0.01) for (let b = 0.2; b < 0.8; b += 0.01) {
+                const [px, py] = [a * side, b * side]
+                if (scene.linkAt(px, py, 12) < 0) return [box.x + px, box.y + py]
+            }
+        }"""
+    )
+    before = scene(page, "scene.view.x")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y)
+    page.mouse.up()
+    assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
+
+
+def test_a_finger_pulls_the_selected_contact(visit):
+    page = visit("", 400, 900, has_touch=True, is_mobile=True)
+    page.keyboard.press("Escape")
+    page.locator(".scene").scroll_into_view_if_needed()
+    contact, x, y = chain(page)
+    page.touchscreen.tap(x, y)
+    until(page, f"scene.selected === {contact}")
+    before, wire = normal(page), page.context.new_cdp_session(page)
+
+    def touch(kind, *points):
+        wire.send(
+            "Input.dispatchTouchEvent",
+            {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]},
+        )
+
+    touch("touchStart", (x, y))
+    for k in range(1, 8):
+        touch("touchMove", (x, y - 2 * k))
+    until(page, "scene.hand.rail !== null")
+    for k in range(8, 20):
+        touch("touchMove", (x, y - 2 * k))
+    until(page, f"scene.mixed.normal[{contact}] > {before[contact] + 1e-3}")
+    touch("touchEnd")
+    page.wait_for_function("() => location.search.includes('pulls=')")
+
+
+def test_a_grip_without_a_pull_leaves_what_is_told(visit):
+    """Let go before its rail is there, a contact is only selected."""
+    page = visit()
+    before = page.locator(".source").inner_text()
+    told = page.locator(".scene").evaluate(
+        """(e, contact) => {
+            const {hand} = e.scene, source = hand.player.buttons.part("source")
+            hand.take(contact, () => 0)
+            const told = source.textContent
+            hand.leave()
+            return told
+        }""",
+        chain(page)[0],
+    )
+    assert "Finding" in told and page.locator(".source").inner_text() == before
+
+
+def test_playing_on_lets_go(visit):
+    page = visit()
+    pulled(page)
+    page.mouse.up()
+    page.wait_for_function("() => location.search.includes('pulls=')")
+    page.locator("button.step").click()
+    page.wait_for_function("() => !location.search.includes('pulls=')")
+    until(page, "scene.hand.player.replay.held === null")
+    frames = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
+    np.testing.assert_allclose(normal(page), frames[1], atol=1e-6)
+    assert column(page, "bars", "now")
+
+
+def dot(page, contact):
+    """Where the dot of a contact lies among the intervals, on the page."""
+    return page.evaluate(
+        """contact => {
+            const page = Bokeh.documents[0], bars = page.get_model_by_name("bars")
+            const k = Array.from(bars.get_column("at")).indexOf(contact)
+            const view = page.views_manager.find_one(page.get_model_by_name("bars_figure"))
+            const box = view.canvas_view.el.getBoundingClientRect(), {x_scale, y_scale} = view.frame
+            return [box.x + x_scale.compute(bars.get_column("rank")[k]),
+                    box.y + y_scale.compute(bars.get_column("now")[k])]
+        }""",
+        contact,
+    )
+
+
+def test_a_dot_of_the_intervals_is_dragged_along_its_bar(visit):
+    page = visit()
+    contact, _, _ = chain(page)
+    page.wait_for_function(f"() => {MODEL}('bars').get_column('at').length > 0")
+    laid_out(page, "bars_figure")
+    before, (x, y) = normal(page), dot(page, contact)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y + 12)
+    until(page, "scene.hand.rail !== null")
+    page.mouse.move(x, y + 15)
+    until(page, f"scene.mixed.normal[{contact}] < {before[contact]} - 1e-3")
+    until(page, f"Math.abs(scene.mixed.normal[{contact}] - scene.hand.value) < 1e-6")
+    low = scene(page, "scene.hand.rail.lower")
+    if scene(page, "scene.hand.value") > low + 1e-3:  # the dot is where the hand is
+        assert dot(page, contact)[1] == pytest.approx(y + 15, abs=3)
+    page.mouse.up()
+    page.wait_for_function("() => location.search.includes('pulls=')")
+
+
+def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(visit):
+    page = visit()
+    laid_out(page, "bars_figure")
+    drawn = f"{MODEL}('bars_figure').renderers.map(r => r.visible)"
+    visible = page.evaluate(f"() => JSON.stringify({drawn})")
+    page.evaluate("""() => {
+        const page = Bokeh.documents[0], view = page.views_manager.find_one(
+            page.get_model_by_name("bars_figure")), paint = view.paint
+        window.painted = 0
+        view.paint = function (...given) { window.painted += 1; return paint.apply(this, given) }
+    }""")
+    page.locator("input.speed").fill("1")
+    page.locator("button.play").click()
+    until(page, "scene.hand.player.plots.layers.bars?.on")
+    page.wait_for_function("() => painted >= 0")
+    before, frames = page.evaluate("painted"), scene(page, "scene.painted")
+    until(page, f"scene.painted > {frames} + 20")
+    assert page.evaluate("painted") - before <= 4  # as it begins
+    page.locator("button.play").click()
+    until(page, "!scene.hand.player.plots.layers.bars.on")
+    page.wait_for_function("before => painted > before", arg=before)
+    page.wait_for_function(f"visible => JSON.stringify({drawn}) === visible", arg=visible)
+
+
+def inside(page, selector):
+    """Whether what is shown by a selector lies on screen without scrolling."""
+    box, size = page.locator(selector).first.bounding_box(), page.viewport_size
+    right, bottom = box["x"] + box["width"], box["y"] + box["height"]
+    return box["x"] >= 0 and box["y"] >= 0 and right <= size["width"] and bottom <= size["height"]
+
+
+def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
+    page = visit("", 1920, 1080)
+    page.wait_for_function(f"() => {MODEL}('path')?.get_length() > 2")
+    laid_out(page, "path_figure")
+    assert inside(page, ".scene") and page.get_by_role("tab", name="Force space").count() == 0
+    for name in ("path_figure", "bars_figure", "growth_figure"):
+        box = page.evaluate(
+            """name => {
+                const page = Bokeh.documents[0], view = page.views_manager.find_one(
+                    page.get_model_by_name(name))
+                const {x, y, right, bottom} = view.el.getBoundingClientRect()
+                return [x, y, right, bottom]
+            }""",
+            name,
+        )
+        assert min(box) >= 0 and box[2] <= 1920 and box[3] <= 1080
+    # the state on screen moves in all three
+    before = column(page, "here", "x")[0]
+    page.locator("button.step").click()
+    page.wait_for_function(f"b => {MODEL}('here').get_column('x')[0] !== b", arg=before)
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.get_by_role("tab", name="Force space").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
+
+
+def test_on_a_phone_the_player_is_below_the_packing(visit):
+    page = visit("", 400, 900)
+    above, below = (page.locator(f".stage .{name}").bounding_box() for name in ("scene", "bar"))
+    assert above["y"] + above["height"] <= below["y"] + 1

@@ -1,0 +1,207 @@
+"""What somebody stumbled over who saw the page for the first time, one test each."""
+
+import pytest
+from serving import CHROMIUM, MODEL, painted, scene
+from small_store import ROOT
+
+from granforce.glossary import TERMS
+
+# Pictures to be looked at; ignored by git.
+ARTEFACTS = ROOT / "artefacts" / "newcomer"
+AT = "?mu=0.1&n=30&states=30&relax=nearest"
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+# Whether an element lies over no text of the page's main part.
+COVERS = """(found) => {
+    const box = found.getBoundingClientRect()
+    const all = (root) => [...root.querySelectorAll("*")].flatMap(
+        (e) => [e, ...(e.shadowRoot ? all(e.shadowRoot) : [])])
+    const main = all(document).find((e) => e.matches(".main-content")).getBoundingClientRect()
+    return box.height > 0 && box.bottom > main.top && box.top < main.bottom
+}"""
+
+
+def picture(page, name):
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=ARTEFACTS / f"{name}.png")
+
+
+def shows(page, mu):
+    """Wait until the packing at μ is on screen."""
+    handle = page.locator(".scene").element_handle()
+    page.wait_for_function(f"e => e.scene.geometry.mu === {mu}", arg=handle)
+
+
+def computing(page):
+    """Ask for a packing that takes longer than any test, and wait until it is computed."""
+    disks = page.get_by_role("spinbutton", name="Disks N")
+    disks.fill("9000")
+    disks.press("Enter")
+    bar = page.locator(".task").filter(visible=True).first
+    bar.wait_for()
+    return bar
+
+
+@pytest.fixture
+def cancelled():
+    """Pages whose computation is ended after the test."""
+    pages = []
+    yield pages.append
+    for page in pages:
+        page.get_by_role("button", name="Cancel").filter(visible=True).first.click()
+        page.locator(".task").filter(visible=True).first.wait_for(state="detached")
+
+
+# 1: what is shown at a friction is of that friction
+
+
+def test_where_a_series_has_no_states_none_of_another_friction_is_named(visit, cancelled):
+    page = visit(AT)
+    shows(page, 0.1)
+    chosen = page.get_by_role("combobox", name="Finished results")
+    assert chosen.inner_text().endswith("3 μ from 0 to 1")
+    computing(page)
+    cancelled(page)
+    page.get_by_role("combobox", name="Finished results").filter(
+        has_text="none with N = 9000"
+    ).wait_for()
+
+
+# 2: what was opened stays open
+
+
+def test_the_explanation_stays_open_when_another_packing_comes(visit):
+    page = visit(AT)
+    page.get_by_text("What am I seeing?").click()
+    why = page.locator("details[open] p").first
+    why.wait_for()
+    before = why.inner_text()
+    page.locator("input.typed").fill("1")
+    page.locator("input.typed").press("Enter")
+    shows(page, 1)
+    page.wait_for_function("([e, text]) => e.isConnected ? e.innerText !== text : true",
+        arg=[why.element_handle(), before])  # fmt: skip
+    assert page.locator("details[open] p").first.inner_text() != before
+
+
+# 3: nothing lies over the page's text
+
+
+@pytest.mark.parametrize("width, height", [(1280, 900), (1920, 1080)])
+def test_progress_and_tour_cover_nothing(visit, cancelled, width, height):
+    page = visit(AT, width, height)
+    tour = page.get_by_role("button", name="Tour", exact=True)
+    tour.wait_for()
+    assert not tour.evaluate(COVERS)
+    bar = computing(page)
+    cancelled(page)
+    assert not bar.evaluate(COVERS)
+    picture(page, f"computing-{width}")
+
+
+def test_on_a_narrow_page_there_is_room_below_the_text_for_what_is_computed(visit, cancelled):
+    page = visit(AT, 390, 844)
+    page.locator("input.typed").wait_for()
+    page.get_by_role("button", name="Open drawer").click()
+    bar = computing(page)
+    cancelled(page)
+    page.keyboard.press("Escape")  # which closes the sidebar
+    height = bar.evaluate("e => e.offsetHeight")
+    page.wait_for_function(
+        """height => {
+            const all = (root) => [...root.querySelectorAll("*")].flatMap(
+                (e) => [e, ...(e.shadowRoot ? all(e.shadowRoot) : [])])
+            const main = all(document).find((e) => e.matches(".main-content"))
+            return parseFloat(getComputedStyle(main).paddingBottom) >= height
+        }""",
+        arg=height,
+    )
+    picture(page, "computing-390")
+
+
+# 6: the tour points at what it speaks of, as long as it does
+
+
+def ring(page):
+    """What the tour's ring is around, once it is seen: (left, top, right, bottom)."""
+    found = page.locator(".ring").filter(visible=True)
+    found.wait_for()
+    box = found.bounding_box()
+    return box["x"], box["y"], box["x"] + box["width"], box["y"] + box["height"]
+
+
+@pytest.mark.parametrize("width, height", [(1280, 900), (1920, 1080), (390, 844)])
+def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height):
+    page = visit(AT + "&tour=4", width, height)
+    page.wait_for_function(f"() => {MODEL}('path_figure')")
+    left, top, right, bottom = ring(page)
+    picture(page, f"tour-4-{width}")
+    assert right - left > 0.25 * width and bottom - top > 100
+    page.get_by_role("dialog").get_by_role("button", name="Next").click()
+    page.get_by_role("dialog").get_by_text("5 of 6").wait_for()
+    slider = page.locator(".friction")
+    slider.wait_for()
+    page.wait_for_function(
+        """([ring, slider]) => {
+            const a = ring.getBoundingClientRect(), b = slider.getBoundingClientRect()
+            return b.height > 0 && Math.abs(a.top - b.top) < 2 && Math.abs(a.bottom - b.bottom) < 2
+        }""",
+        arg=[page.locator(".ring").element_handle(), slider.element_handle()],
+    )
+    card = page.get_by_role("dialog").bounding_box()
+    assert ring(page)[3] <= card["y"] or ring(page)[0] >= card["x"] + card["width"]
+    picture(page, f"tour-5-{width}")
+    page.locator("input.typed").fill("1")  # what the step asks for can be done at once
+    page.locator("input.typed").press("Enter")
+    shows(page, 1)
+    page.get_by_role("dialog").get_by_role("button", name="Close").click()
+    page.locator(".ring").wait_for(state="hidden")
+
+
+# 8: words are explained where they stand
+
+
+@pytest.mark.parametrize(
+    "where, term",
+    [
+        (".skips", "segment"),
+        (".rest .term", "rattler"),
+        (".tile[data-term=eta3]", "eta3"),
+        (".source ~ * .eta3, .read [data-term=eta3]", "eta3"),
+    ],
+)
+def test_words_that_were_not_understood_are_explained(visit, where, term):
+    page = visit(AT)
+    page.locator(where).first.hover()
+    tip = page.get_by_role("tooltip").filter(visible=True)
+    tip.get_by_text(TERMS[term].sentence).wait_for()
+
+
+# 9: colour and width by what was measured
+
+
+def test_what_is_known_colours_the_chains_and_goes_into_pictures(visit):
+    page = visit(AT)
+    value = scene(page, "scene.mixed.normal[4]")
+    link = f"{AT}&known=4:{value:.6f}~9:{scene(page, 'scene.mixed.normal[9]'):.6f}:0.05"
+    page = visit(link + "&colour=known&thickness=known&tab=export")
+    handle = page.locator(".scene").element_handle()
+    page.wait_for_function("e => e.scene.style.width.some((w) => w > 0)", arg=handle)
+    page.wait_for_function("e => e.scene.style.bin[4] === 32", arg=handle)  # held: all of it
+    page.get_by_text("colour: what is known").wait_for()
+    picture(page, "known")
+    text = scene(
+        page,
+        'scene.picture({ background: "", ink: "", lines: [],'
+        ' bar: { low: "", high: "", stops: [] } })',
+    )
+    colour = scene(page, "scene.palette.known")
+    assert text.count(f'stroke="{colour}"') >= 2  # a spot on each contact that is known
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="SVG", exact=True).click()
+    assert "Known: contact " in (saved.value.path()).read_text()
+    painted(page)

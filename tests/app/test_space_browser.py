@@ -1,0 +1,252 @@
+"""In a browser: the point in force space is pulled, and two networks are seen side by side."""
+
+import numpy as np
+import pytest
+from serving import CHROMIUM, MODEL, bars_drawn, column, laid_out, scene
+from test_live_browser import ask, normal, pulled, until
+
+# The outermost element of force space that is ever made pale.
+VIEW_ABOVE = """(() => {
+    const page = Bokeh.documents[0], view = page.views_manager.find_one(
+        page.get_model_by_name("path_figure"))
+    let pale = view.el
+    for (let at = view.el; at; at = at.parentNode ?? at.host) {
+        if (at instanceof Element && getComputedStyle(at).opacity < 1) return at
+        if (at instanceof Element) pale = at
+    }
+    return pale
+})()"""
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+def place(page, x, y):
+    """Where a point of force space is on the page."""
+    return page.evaluate(
+        """([x, y]) => {
+            const page = Bokeh.documents[0]
+            const view = page.views_manager.find_one(page.get_model_by_name("path_figure"))
+            const box = view.canvas_view.el.getBoundingClientRect(), {x_scale, y_scale} = view.frame
+            return [box.x + x_scale.compute(x), box.y + y_scale.compute(y)]
+        }""",
+        [x, y],
+    )
+
+
+def here(page):
+    return [column(page, "here", name)[0] for name in "xy"]
+
+
+def ready(page):
+    page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 4")
+    laid_out(page, "path_figure")
+    page.wait_for_timeout(200)  # the axes take their place
+    until(page, "scene.hand.player.plots.plane.xn?.length > 0")
+
+
+@pytest.mark.parametrize("query", ["", "?contact=3&second=8"])
+def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
+    page = visit(query, 1600, 1000)
+    ready(page)
+    if not query:  # a chain first; in the plane of a pair it would become one of the two
+        pulled(page)
+        page.mouse.up()
+        page.wait_for_function("() => location.search.includes('pulls=')")
+        until(page, "scene.hand.player.replay.held.pull !== undefined")
+    before, start = normal(page), here(page)
+    middle = [np.mean(column(page, "outer", name)) for name in "xy"]
+    (x, y), (u, v) = place(page, *start), place(page, *middle)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 2, y + 2)
+    until(page, "scene.hand.spot.fan !== null")
+    page.mouse.move(u, v)
+    until(page, "scene.hand.spot.at !== null && scene.hand.frames > 0")
+    page.wait_for_function(
+        f"([u, v]) => Math.abs({MODEL}('here').get_column('x')[0] - u) < 1e-2 * (1 + Math.abs(u))",
+        arg=middle,
+    )
+    during = normal(page)
+    assert np.abs(during - before).max() > 1e-3 and during.min() > -1e-6
+    assert "point in force space pulled" in page.locator(".source").inner_text()
+    # beyond the outline it stays on it
+    page.mouse.move(u + 5000, v)
+    until(page, "scene.hand.spot.at[0] < 1e3")
+    edge = max(column(page, "outer", "x"))
+    page.wait_for_function(f"() => {MODEL}('here').get_column('x')[0] <= {edge} + 1e-6")
+    page.mouse.move(u, v)
+    page.mouse.up()
+    page.wait_for_function("() => /pulls=.*[pn]%3A/.test(location.search)")
+    until(page, "scene.hand.player.replay.held.pull?.length === 3")
+    assert float(page.locator("b.residual").inner_text()) < 1e-9
+    np.testing.assert_allclose(normal(page), during, atol=2e-3)
+    page.keyboard.press("z")
+    until(page, "scene.hand.player.replay.held?.pull?.length !== 3")
+    np.testing.assert_allclose(normal(page), before, atol=1e-6)
+
+
+@pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1600)])
+def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
+    """Every state that has arrived has its place, on axes of those found before."""
+    page = visit(f"?mu=0.44&n=30&states=20000&relax=nearest{query}", width, 1000)
+    until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 30")
+    there = f"{MODEL}('path')?.get_column('x')?.filter(Number.isFinite).length"
+    page.wait_for_function(f"() => {there} > 20")
+    count = page.evaluate(there)
+    page.wait_for_function(f"() => {there} > {count} + 5")
+    page.wait_for_function(f"() => getComputedStyle({VIEW_ABOVE}).opacity === '1'")
+    page.keyboard.press(" ")  # a rest, in which all that came is drawn
+    until(page, "!scene.hand.player.playing")
+    until(page, "scene.hand.player.plots.placed.drawn > 20")
+    off = scene(
+        page,
+        f"""(() => {{
+            const {{plots, replay: {{walk}}}} = scene.hand.player, path = {MODEL}("path"), off = []
+            for (let k = 0; k < plots.placed.count; k++) {{
+                const cut = (name) =>
+                    walk[name].subarray(k * walk.contacts, (k + 1) * walk.contacts)
+                const [x, y] = plots.projected(
+                    {{normal: cut("normal"), tangential: cut("tangential")}})
+                off.push(x - path.get_column("x")[k], y - path.get_column("y")[k])
+            }}
+            return off
+        }})()""",
+    )
+    assert len(off) > 40 and np.abs(off).max() < 1e-5
+    x, y = (column(page, "path", name) for name in "xy")
+    seen = np.isfinite(x)
+    assert np.ptp(np.array(x)[seen]) > 1e-3 and np.ptp(np.array(y)[seen]) > 1e-3
+    assert len(x) > seen.sum()  # there is room for more
+    page.get_by_role("button", name="Cancel").first.click()
+    until(page, "!scene.hand.player.grows")
+    page.wait_for_function(f"() => {MODEL}('path').get_column('x').every(Number.isFinite)")
+
+
+def test_two_networks_side_by_side_with_one_player(visit):
+    page = visit("?frame=3&reference=1")
+    page.locator("button.split").click()
+    page.wait_for_function("() => location.search.includes('split=1')")
+    until(page, "scene.hand.player.split.twin.painted > 0 && scene.hand.player.split.on")
+    boxes = [page.locator(f".{name}").bounding_box() for name in ("twin", "scene")]
+    assert boxes[0]["width"] == pytest.approx(boxes[1]["width"], abs=1)
+    assert boxes[0]["y"] == boxes[1]["y"] and boxes[0]["x"] < boxes[1]["x"]
+    assert "state" in page.locator(".twin .caption").inner_text()
+    widths = "Array.from(scene.hand.player.split.twin.style.width)"
+    pinned, contacts = scene(page, widths), scene(page, "scene.geometry.contacts")
+    normals = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(-1, contacts)
+    shown = np.argsort(pinned)
+    assert np.all(np.diff(normals[1][shown]) >= -1e-6)
+    # the view is one, and the player moves only the network that is not pinned
+    page.mouse.move(boxes[0]["x"] + 50, boxes[0]["y"] + 50)
+    page.mouse.wheel(0, -200)
+    until(page, "scene.view.half < 0.49 * (scene.geometry.window[1] - scene.geometry.window[0])")
+    assert scene(page, "scene.view === scene.hand.player.split.twin.view")
+    page.locator("button.step").click()
+    until(page, "scene.hand.player.replay.frame === 4")
+    assert scene(page, widths) == pinned
+    page.locator("button.pin").click()
+    page.wait_for_function("() => location.search.includes('reference=4')")
+    until(page, f"scene.hand.player.split.twin.style.width.some((v, k) => v !== {pinned}[k])")
+    page.locator("button.split").click()
+    until(page, "!scene.hand.player.split.on")
+    assert page.locator(".twin").is_hidden()
+
+
+def widths(page, of):
+    return np.array(scene(page, f"Array.from({of}.style.width)"))
+
+
+def test_another_mu_comes_beside_the_packing_of_the_first(visit):
+    """Both keep their own packing; one player, one view, and a link that opens the same."""
+    page, twin = visit(), "scene.hand.player.split.twin"
+    page.locator("button.split").click()
+    until(page, f"scene.hand.player.split.on && {twin}.painted > 0")
+    ask(page, "1")
+    page.wait_for_function("() => /split=1&beside=0.1/.test(location.search)")
+    until(page, f"scene.geometry.mu === 1 && {twin}.geometry.mu === 0.1")
+    query = page.evaluate("location.search")
+    for at in (page, visit(query)):
+        until(at, f"scene.geometry.mu === 1 && {twin}.geometry?.mu === 0.1")
+        captions = [at.locator(f".{name} .caption").inner_text() for name in ("twin", "scene")]
+        assert captions == ["μ = 0.1: original", "μ = 1"]
+        assert scene(at, "scene.geometry.box[0]") != scene(at, f"{twin}.geometry.box[0]")
+        before = widths(at, "scene"), widths(at, twin)
+        at.locator("button.step").click()
+        until(at, "scene.hand.player.split.other.frame === 1")
+        until(at, "scene.hand.player.replay.frame === 1")
+        after = widths(at, "scene"), widths(at, twin)
+        contacts = [scene(at, f"{of}.geometry.contacts") for of in ("scene", twin)]
+        for old, new, count in zip(before, after, contacts, strict=True):
+            assert len(old) == len(new) == count and np.abs(old - new).max() > 1e-4
+        normal_of_twin = np.array(scene(at, f"Array.from({twin}.geometry.normal)"))[contacts[1] :]
+        order = np.argsort(after[1])
+        assert np.all(np.diff(normal_of_twin[order]) >= -1e-6)
+        # what fills one picture fills the other, and so does a part of it
+        box = at.locator(".twin").bounding_box()
+        at.mouse.move(box["x"] + 60, box["y"] + 60)
+        at.mouse.wheel(0, -300)
+        part = "{0}.view.half / ({0}.geometry.window[1] - {0}.geometry.window[0])"
+        until(at, f"{part.format('scene')} < 0.45")
+        assert scene(at, part.format(twin)) == pytest.approx(scene(at, part.format("scene")))
+    # pinned, a state of this packing is beside it again
+    page.locator("button.pin").click()
+    page.wait_for_function("() => !location.search.includes('beside')")
+    until(page, f"{twin}.geometry.mu === 1 && scene.hand.player.split.other === null")
+    assert page.locator(".twin .caption").inner_text() == "pinned: state 1"
+
+
+def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
+    page = visit("?split=1&frame=2")
+    until(page, "scene.hand.player.split.on")
+    page.locator(".scene").evaluate(
+        """e => {
+            const {live, split} = e.scene.hand.player, {show} = live
+            window.beside = []
+            live.show = (picture) => {
+                show.call(live, picture)
+                beside.push([split.on, split.other?.walk.mu, split.twin.counts.drawn])
+            }
+        }"""
+    )
+    ask(page, "0.45")
+    until(page, "scene.geometry.mu === 0.45 && !scene.hand.player.grows")
+    seen = page.evaluate("beside")
+    assert seen and all(on and mu == 0.1 and drawn > 20 for on, mu, drawn in seen)
+    assert page.locator(".twin").is_visible()
+
+
+def test_exact_bounds_are_drawn_as_they_come(visit):
+    """Of a bar that has one bound only, the other end is what was seen."""
+    page = visit()
+    bars_drawn(page)
+    page.locator(".scene").evaluate(
+        """e => {
+            const {player} = e.scene.hand, {walk} = player.replay
+            const low = new Float32Array(walk.contacts).fill(NaN), high = low.slice()
+            high[0] = 7; high[1] = 8; low[1] = 0.25
+            player.arrive({low, high})
+        }"""
+    )
+    at, low, high = (column(page, "bars", name) for name in ("at", "exact_low", "exact_high"))
+    seen = scene(page, "scene.geometry.low[0]")
+    assert high[at.index(0)] == 7 and low[at.index(0)] == pytest.approx(seen)
+    assert (low[at.index(1)], high[at.index(1)]) == (0.25, 8)
+    there = f"() => {MODEL}('bars').get_column('exact_high').filter(Number.isFinite).length"
+    assert page.evaluate(there) == 2
+    # bars in another order get them, too
+    page.evaluate(
+        f"""() => {{
+            const bars = {MODEL}("bars"), turned = {{}}
+            for (const [name, values] of Object.entries(bars.data)) {{
+                const copy = values.slice().reverse()
+                turned[name] = name.startsWith("exact") ? copy.fill(NaN) : copy
+            }}
+            bars.data = turned
+        }}"""
+    )
+    page.wait_for_function(f"() => ({there})() === 2")
+    turned, high = (column(page, "bars", name) for name in ("at", "exact_high"))
+    assert turned == at[::-1] and high[turned.index(0)] == 7

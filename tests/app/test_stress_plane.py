@@ -1,0 +1,67 @@
+"""The plane of stresses in force space: outline, own network, states."""
+
+import numpy as np
+import pytest
+from test_panels import opened, settled
+
+import granforce as gf
+from app import planes
+from app.grabs import Hand
+from app.jobs import reading
+from app.views.plane import View
+
+
+def test_states_lie_in_the_plane_where_their_stress_says(state):
+    replay = opened(state).replay
+    packing = state.library.packing(state.cell.params["packing"])
+    S = gf.ensemble(packing, state.cell.mu)
+    plane = planes.stress(state.library, state.cell.selection, replay)
+    frames = np.stack([replay.normal, replay.tangential], axis=2) * replay.force_scale
+    np.testing.assert_allclose(plane.path, gf.stress_plane(S, frames), atol=1e-5)
+    assert planes.name(plane) == "s" and planes.read("s") == ()
+    again = planes.named(state.library, state.cell, replay, "s")
+    np.testing.assert_array_equal(again.axes, plane.axes)
+
+
+def test_the_outline_of_stresses_holds_all_and_is_kept(state):
+    opened(state)
+    view = View(state)
+    view.planes.value = "stress"
+    state.tab = view.name
+    settled(state, done=lambda: "shear" in view.told.object)
+    corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
+    path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
+    merged = planes.hull(np.concatenate([corners, path]))
+    assert planes.area(merged) == pytest.approx(planes.area(corners), rel=1e-6)
+    (entry,) = state.library.cache.find("stress")
+    friction = state.library.cache[entry.name]["friction"].item()
+    assert f"{friction:.3f}" in view.told.object
+    assert "σ" in view.figure.xaxis.axis_label and view.figure.match_aspect
+    state.contact = 4  # the same plane
+    assert not view.task.running and len(view.outer.data["x"])
+
+
+def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):
+    opened(state)
+    view, told = View(state), []
+    hand = Hand(state, state.task(reading), told.append)
+    view.planes.value = "stress"
+    state.tab = view.name
+    settled(state, done=lambda: "shear" in view.told.object)
+    value = float(state.replay.normal[0, 4])
+    state.knowledge.hold(4, value)
+    settled(state)
+    hand.heard({"point": True})
+    settled(state)
+    fan = told[-1]["fan"]
+    here = state.plane.path[0]
+    there = (0.5 * (here[0] + fan["x"].mean()), 0.5 * (here[1] + fan["y"].mean()))
+    hand.heard({"hold_point": [float(there[0]), float(there[1])]})
+    settled(state)
+    held = told[-1]["held"]
+    network = np.stack([held["normal"], held["tangential"]], axis=1)
+    np.testing.assert_allclose(
+        np.tensordot(state.plane.axes, network, ((1, 2), (0, 1))), there, atol=1e-5
+    )
+    assert held["normal"][4] == pytest.approx(value, abs=1e-3) and held["residual"] < 1e-9
+    assert "s:" in state.link() or "s%3A" in state.link()

@@ -1,0 +1,115 @@
+"""What visitors take along: a page in one file, movies, all states, pictures with captions."""
+
+import io
+
+import numpy as np
+import pytest
+import xarray as xr
+from PIL import Image
+from serving import CHROMIUM, column, painted, scene
+from small_store import KEPT, ROOT, STATES
+
+from app import movies
+
+# Pictures to be looked at; ignored by git.
+ARTEFACTS = ROOT / "artefacts" / "along"
+PATIENCE = 60_000  # ms, on a busy machine
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture
+def page(chromium, address):
+    """A page with the buttons; at the end no error was told."""
+    errors = []
+    page = chromium.new_page(viewport={"width": 1280, "height": 1000})
+    page.set_default_timeout(PATIENCE)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(address + "?tab=export&frame=3&colour=extent")
+    painted(page, PATIENCE)
+    yield page
+    page.context.close()
+    assert not errors
+
+
+def taken(page, words, folder):
+    button = page.get_by_role("button", name=words, exact=True)
+    with page.expect_download(timeout=2 * PATIENCE) as saved:
+        button.click()
+    path = folder / saved.value.suggested_filename
+    saved.value.save_as(path)
+    return path
+
+
+def test_the_page_as_one_file_works_without_server_and_network(page, chromium, tmp_path):
+    normal = scene(page, "Array.from(scene.mixed.normal)")
+    path = taken(page, "This view as a page (HTML)", tmp_path)
+    assert path.stat().st_size < 10e6
+    context = chromium.new_context(viewport={"width": 1280, "height": 1000}, offline=True)
+    alone, problems = context.new_page(), []
+    alone.on("pageerror", lambda error: problems.append(str(error)))
+    alone.on("request", lambda sent: sent.url.startswith("http") and problems.append(sent.url))
+    alone.goto(path.as_uri())
+    painted(alone, PATIENCE)
+    assert scene(alone, "Array.from(scene.mixed.normal)") == pytest.approx(normal, abs=1e-6)
+    assert alone.locator("b.state").inner_text() != "original"  # the state that was on screen
+    alone.locator("button.restart").click()
+    before = column(alone, "bars", "now"), column(alone, "here", "x")
+    alone.locator("button.step").click()
+    after = column(alone, "bars", "now"), column(alone, "here", "x")
+    assert before[0] != after[0] and before[1] != after[1]
+    assert len(column(alone, "outer", "x")) > 3  # the exact outline of S
+    alone.locator("button.play").click()
+    alone.locator(".stage.playing").wait_for()
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    alone.screenshot(path=ARTEFACTS / "standalone.png", full_page=True)
+    context.close()
+    assert problems == []
+
+
+def test_a_movie_is_recorded_in_the_browser(page, tmp_path):
+    page.locator("input.speed").fill("5")
+    path = taken(page, "Movie (WebM)", tmp_path)
+    content = path.read_bytes()
+    assert path.suffix == ".webm" and content[:4] == b"\x1a\x45\xdf\xa3" and len(content) > 5000
+    assert page.get_by_role("button", name="Movie (WebM)", exact=True).is_visible()
+
+
+def test_a_movie_for_slides_is_drawn_by_the_server(page, tmp_path):
+    path = taken(page, "Movie (GIF)", tmp_path)
+    assert path.stat().st_size <= movies.MOST_BYTES
+    with Image.open(path) as movie:
+        assert movie.n_frames > movies.FRAMES / 2 and movie.width == movie.height
+        first = np.asarray(movie.convert("RGB")).copy()
+        movie.seek(movie.n_frames // 2)
+        later = np.asarray(movie.convert("RGB"))
+    assert (first != later).any()
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(later).save(ARTEFACTS / "movie.png")
+
+
+def test_all_states_are_exported_not_only_those_kept(page, tmp_path):
+    path = taken(page, "States (NetCDF)", tmp_path)
+    with xr.open_dataset(io.BytesIO(path.read_bytes()), engine="scipy") as whole:
+        states = whole["states"].values / whole["force_scale"].item()
+    assert len(states) == STATES > KEPT
+    kept = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)[1:]
+    pick = np.linspace(0, STATES - 1, KEPT).astype(int)
+    assert np.allclose(kept, states[pick, :, 0], atol=1e-5)
+
+
+def test_pictures_say_what_they_are(page, tmp_path):
+    text = taken(page, "SVG", tmp_path).read_text()
+    for words in (
+        "5 largest radii",
+        "colour: length of the interval",
+        "granforce ?",
+        "linearGradient",
+    ):
+        assert words in text
+    png = taken(page, "PNG", tmp_path)
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    (ARTEFACTS / "picture.png").write_bytes(png.read_bytes())

@@ -1,0 +1,233 @@
+"""What somebody sees who was never here: a page that moves, a tour, words that are explained."""
+
+from functools import partial
+
+import pytest
+from serving import CHROMIUM, painted, scene
+from small_store import ROOT
+
+from app.selection import SOLVERS
+from granforce.glossary import TERMS
+
+# Pictures to be looked at; ignored by git.
+ARTEFACTS = ROOT / "artefacts" / "tour"
+PATIENCE = 60_000  # ms, on a busy machine
+STEPS = 6
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture
+def visit(visit):
+    """The same, of a first visit."""
+    return partial(visit, first=True)
+
+
+def card(page):
+    return page.get_by_role("dialog")
+
+
+def press(page, name):
+    card(page).get_by_role("button", name=name, exact=True).click()
+
+
+def handle(page):
+    return page.locator(".scene").element_handle()
+
+
+def at_step(page, number):
+    card(page).get_by_text(f"{number} of {STEPS}").wait_for()
+
+
+def dragged(page):
+    """Take the selected contact in hand, and let go: its force stays."""
+    contact, x, y = page.locator(".scene").evaluate(
+        """(element) => {
+            const { scene } = element, { x0, y0, x1, y1, contact } = scene.geometry
+            const { left, top } = element.getBoundingClientRect()
+            const seen = Array.from(contact.keys()).filter((k) => contact[k] === scene.selected)
+                .map((k) => scene.toPixel((x0[k] + x1[k]) / 2, (y0[k] + y1[k]) / 2))
+                .filter(([x, y]) => x > 0 && y > 0 && x < scene.size && y < scene.size)
+            return [scene.selected, seen[0][0] + left, seen[0][1] + top]
+        }"""
+    )
+    before = scene(page, f"scene.mixed.normal[{contact}]")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 12, steps=3)
+    page.wait_for_function("e => e.scene.hand.rail !== null", arg=handle(page))
+    page.mouse.move(x, y - 60, steps=6)
+    page.wait_for_function(
+        f"e => Math.abs(e.scene.mixed.normal[{contact}] - {before}) > 1e-3", arg=handle(page)
+    )
+    page.mouse.up()
+    page.keyboard.press("z")
+
+
+# The tour
+
+
+@pytest.mark.parametrize("width, height", [(1280, 900), (1920, 1080), (390, 844)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_tour_is_walked_through_and_closes_into_the_page(visit, width, height, scheme):
+    if scheme == "dark" and width == 1920:
+        pytest.skip("the same as at 1280")
+    page = visit("?dark=1&tour=1" if scheme == "dark" else "", width, height)
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    for step in range(1, STEPS + 1):
+        at_step(page, step)
+        assert card(page).bounding_box()["height"] < 0.5 * height
+        if step == 2:  # it goes to another network and back
+            page.wait_for_function(
+                "e => e.closest('.stage').classList.contains('playing')", arg=handle(page)
+            )
+            page.wait_for_function("() => location.search.includes('between=0-')")
+        if step == 3:
+            page.wait_for_function("e => e.scene.selected !== null", arg=handle(page))
+            if width > 400:  # what the step asks for can be done at once
+                dragged(page)
+        if step in (4, 5, 6):
+            tab = {4: "plane", 5: "statistics", 6: "perturb"}[step]
+            if tab != "plane" or width < 1440:  # on a wide page it is seen anyway
+                page.wait_for_function(f"() => location.search.includes('tab={tab}')")
+        page.locator(".ring").filter(visible=True).wait_for()
+        page.wait_for_timeout(700)  # what scrolls comes to rest: for the picture only
+        page.screenshot(path=ARTEFACTS / f"{width}-{scheme}-{step}.png")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        press(page, "Next" if step < STEPS else "Finish")
+    card(page).wait_for(state="hidden")
+    assert "tab=perturb" in page.evaluate("location.search")  # the page as it is
+    page.get_by_role("button", name="Push", exact=True).wait_for()
+
+
+def test_on_a_narrow_page_the_sidebar_waits_until_it_is_asked_for(visit):
+    """It lies over the page there: nothing of it is seen while the page comes."""
+    page = visit("?tour=1", 390, 844)
+    at_step(page, 1)
+    page.wait_for_function(
+        "() => document.documentElement.style.getPropertyValue('--sidebar') === 'visible'"
+    )
+    press(page, "Close")
+    card(page).wait_for(state="hidden")
+    page.get_by_role("button", name="Open drawer").click()
+    page.get_by_role("dialog").get_by_text("Disks N").first.wait_for()
+
+
+def test_the_tour_comes_once_by_itself_and_then_by_its_button(visit):
+    page = visit()
+    at_step(page, 1)
+    press(page, "Close")
+    card(page).wait_for(state="hidden")
+    page.goto(page.url.split("?")[0])
+    painted(page, PATIENCE)
+    button = page.get_by_role("button", name="Tour", exact=True)
+    button.wait_for()
+    assert not card(page).is_visible()
+    button.click()
+    at_step(page, 1)
+
+
+@pytest.mark.parametrize("number", [2, 6])
+def test_a_link_opens_a_step(visit, number):
+    at_step(visit(f"?tour={number}"), number)
+
+
+def test_the_tour_goes_by_keyboard_and_is_told_to_screen_readers(visit):
+    page = visit("?tour=1", reduced_motion="reduce")
+    at_step(page, 1)
+    # The focus is on the title, which names the dialog.
+    title = card(page).get_by_role("heading")
+    focused = "e => e.getRootNode().activeElement === e"
+    page.wait_for_function(focused, arg=title.element_handle())
+    name = card(page).evaluate(
+        "e => e.getRootNode().getElementById(e.getAttribute('aria-labelledby')).textContent"
+    )
+    assert name == title.inner_text()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")  # Next: Back is disabled at the beginning
+    at_step(page, 2)
+    page.keyboard.press("Escape")
+    card(page).wait_for(state="hidden")
+
+
+# The page opens moving
+
+
+def test_the_page_plays_slowly_until_it_is_touched(visit):
+    page = visit("?mu=0.1&n=30&states=30&relax=nearest")
+    page.wait_for_function(
+        "e => e.closest('.stage').classList.contains('playing')", arg=handle(page)
+    )
+    assert page.locator(".rate").inner_text() == "1.0 /s"
+    page.locator(".legend, .skips").first.click()
+    page.wait_for_function(
+        "e => !e.closest('.stage').classList.contains('playing')", arg=handle(page)
+    )
+    assert page.locator(".rate").inner_text() == "1.0 /s"  # nor does the speed jump
+
+
+@pytest.mark.parametrize("action", ["button", "space"])
+def test_what_pauses_does_not_start_again(visit, action):
+    page = visit("?mu=0.1&n=30&states=30&relax=nearest")
+    page.wait_for_function(
+        "e => e.closest('.stage').classList.contains('playing')", arg=handle(page)
+    )
+    if action == "button":
+        page.locator("button.play").click()
+    else:
+        page.keyboard.press(" ")
+    page.wait_for_function(
+        "e => !e.closest('.stage').classList.contains('playing')", arg=handle(page)
+    )
+    count = scene(page, "scene.painted")
+    page.wait_for_timeout(1000)  # longer than the page rests at an end
+    assert scene(page, "scene.painted") <= count + 2
+
+
+def test_nothing_moves_by_itself_where_motion_is_reduced_or_one_moment_is_shown(visit):
+    for query, options in (
+        ("?frame=3&mu=0.1&n=30&states=30&relax=nearest", {}),
+        ("?tour=1", {"reduced_motion": "reduce"}),
+    ):
+        page = visit(query, **options)
+        page.wait_for_timeout(1000)
+        assert page.locator(".stage.playing").count() == 0
+
+
+# The glossary where words stand
+
+
+def hint(page):
+    return page.get_by_role("tooltip").filter(visible=True)
+
+
+def test_words_explain_themselves_on_hover_focus_and_touch(visit):
+    page = visit("?mu=0.1&n=30&states=30&relax=nearest", reduced_motion="reduce")
+    tile = page.locator(".tile[data-term=h]")
+    tile.hover()
+    hint(page).get_by_text(TERMS["h"].sentence).wait_for()
+    page.mouse.move(640, 500)
+    hint(page).wait_for(state="hidden")
+    page.locator(".tile[data-term=z]").focus()
+    page.keyboard.press("Tab")
+    hint(page).get_by_text(TERMS["h"].sentence).wait_for()
+    page.keyboard.press("Escape")
+    hint(page).wait_for(state="hidden")
+    page.get_by_role("combobox", name="Relaxation").hover()
+    hint(page).get_by_text(TERMS["nearest"].sentence).wait_for()
+    page.get_by_role("combobox", name="Relaxation").click()
+    page.get_by_role("menuitem", name=SOLVERS["gauss_seidel"]).hover()
+    hint(page).get_by_text(TERMS["gauss_seidel"].sentence).wait_for()
+
+
+def test_a_finger_on_a_word_explains_it(visit):
+    page = visit(
+        "?mu=0.1&n=30&states=30&relax=nearest", 390, 844, has_touch=True, reduced_motion="reduce"
+    )
+    page.locator(".tile[data-term=eta1]").tap()
+    hint(page).get_by_text(TERMS["eta1"].sentence).wait_for()
+    box = hint(page).bounding_box()
+    assert box["x"] >= 0 and box["x"] + box["width"] <= 390

@@ -1,0 +1,39 @@
+"""The glossary: every word of the page and of the README has its sentence, in one place."""
+
+import re
+from html import unescape
+
+from small_store import ROOT
+
+from app.selection import KINDS, SOLVERS
+from app.state import COLOURS, SCALES, SORTS, WIDTHS
+from app.views import hints
+from app.views.perturb import WHAT as PERTURB
+from app.views.plane import PLANES
+from app.views.statistics import WHAT as STATISTICS
+from app.views.summary import TILES
+from granforce import glossary, notebook
+from granforce.glossary import TERMS
+
+
+def test_every_symbol_and_option_has_its_sentence():
+    known = hints.labels()
+    assert set(known.values()) <= set(TERMS)
+    for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, PLANES, PERTURB, STATISTICS):
+        for words in options.values():
+            assert words in known, words
+    for _, _, _, term in TILES:
+        assert term in TERMS
+    for word, _, sentence in TERMS.values():
+        assert re.fullmatch(r"[^.].*\.", sentence) and len(sentence) < 320, word
+
+
+def test_the_readme_lists_the_symbols_of_the_glossary():
+    assert glossary.markdown() in (ROOT / "README.md").read_text()
+
+
+def test_tables_in_notebooks_explain_their_names():
+    table = notebook.table("Walk", {"η1": 0.1, "acceptance": 1.0, "mean coordination z": 3.6})
+    table = unescape(table)
+    assert TERMS["eta1"].sentence in table and TERMS["z"].sentence in table
+    assert "<td" in table and "title=" in table
