@@ -10,8 +10,8 @@ import xarray as xr
 import zarr
 
 from granforce.packing import importers
+from granforce.study.keys import canonical
 from granforce.study.schema import packing_dataset
-from granforce.study.store import canonical
 
 from .selection import command
 

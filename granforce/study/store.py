@@ -5,10 +5,7 @@ xarray open too. The key is a hash of kind, parameters (seed among them), algori
 version, so an entry is never changed: it is there and whole, or it is not there.
 """
 
-import functools
-import hashlib
 import json
-import math
 import os
 import re
 import secrets
@@ -19,35 +16,17 @@ import time
 import warnings
 from collections.abc import Mapping
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import platformdirs
-import xarray as xr
-import zarr
-from zarr.codecs import ZstdCodec
-from zarr.core.metadata import ArrayV3Metadata
 
 from granforce.records import InputError
-from granforce.study.schema import VARIABLES, declared, to_builtin
+from granforce.study import entries, keys
 from granforce.system.files import expanded
-from granforce.tolerances import MU_DIGITS
-
-# Raised when the meaning of a stored array changes; entries of another schema are never found.
-SCHEMA_VERSION = 1
 
 LOCATION_VARIABLE = "GRANFORCE_CACHE"  # environment variable naming the store's folder
-KEY_DIGITS = 20  # 80 bits: no collision among any number of entries that fits a disk
-STATES_PER_CHUNK = 100  # frames are read one by one; 100 × 700 contacts are 1.1 MB
 STALE_SECONDS = 3600.0  # a temporary untouched for this long has lost its writer
-
-_ENTRY = re.compile(rf"[a-z][a-z0-9_]*-[0-9a-f]{{{KEY_DIGITS}}}")
-_LIBRARIES = ("granforce", "numpy", "numba", "xarray", "zarr")
-_IDENTITY = ("kind", "parameters", "seed", "algorithm_version", "schema_version")
-_PROVENANCE = ("created", "checksum", *(f"{library}_version" for library in _LIBRARIES))
 
 
 class Entry(NamedTuple):
@@ -67,43 +46,6 @@ class Verdict(NamedTuple):
     name: str
     ok: bool
     reason: str
-
-
-def canonical(value):
-    """Canonical JSON of parameters: equal values give equal text.
-
-    Floats are rounded to 9 significant digits and 1.0 is 1; numpy scalars, tuples and nested
-    dicts are taken. Raises TypeError for anything else, non-finite numbers included.
-    """
-    return json.dumps(_plain(value, "parameters"), sort_keys=True, separators=(",", ":"))
-
-
-def _plain(value, where):
-    if value is None or isinstance(value, (bool, str)):
-        return value
-    if isinstance(value, np.bool_):
-        return bool(value)
-    if isinstance(value, (int, np.integer)):
-        return int(value)
-    if isinstance(value, (float, np.floating)):
-        return _quantised(value, where)
-    if isinstance(value, (list, tuple)):
-        return [_plain(item, f"{where}[{k}]") for k, item in enumerate(value)]
-    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
-        return {key: _plain(item, f"{where}[{key!r}]") for key, item in value.items()}
-    raise TypeError(
-        f"{where} cannot enter a key: {type(value).__name__} {value!r:.60} "
-        "(use numbers, strings, None, lists, or dicts with string keys)"
-    )
-
-
-def _quantised(value, where):
-    # The shortest text first: a float32 0.1 means 0.1, not 0.100000001.
-    number = float(str(value)) if isinstance(value, np.floating) else value
-    if not math.isfinite(number):
-        raise TypeError(f"{where} cannot enter a key: {value} is not finite")
-    number = float(f"{number:.{MU_DIGITS}g}")
-    return int(number) if number.is_integer() and abs(number) < 2**53 else number
 
 
 def default_path():
@@ -165,10 +107,10 @@ def _schema(path):
 def _refuse_newer(path):
     """Raise InputError for a store of a newer schema: what it may hold is not known here."""
     schema = _schema(path)
-    if schema is not None and schema > SCHEMA_VERSION:
+    if schema is not None and schema > keys.SCHEMA_VERSION:
         raise InputError(
             f"the store {path} was made by a newer granforce (schema {schema}, here "
-            f"{SCHEMA_VERSION}): update granforce, or give another folder"
+            f"{keys.SCHEMA_VERSION}): update granforce, or give another folder"
         )
 
 
@@ -183,8 +125,8 @@ def _refuse_foreign(path):
         visible = [item.name for item in path.iterdir() if not item.name.startswith(".")]
     except OSError as error:
         raise InputError(f"the folder {path} cannot be read: {error.strerror}") from None
-    entries = [name for name in visible if _ENTRY.fullmatch(name)]
-    others = set(visible) - set(entries) - ({"zarr.json"} if entries else set())
+    ours = {name for name in visible if keys.ENTRY.fullmatch(name)}
+    others = set(visible) - ours - ({"zarr.json"} if ours else set())
     if others:
         raise InputError(
             f"{path} is not a store: it holds {min(others)!r}; give an empty or a new folder"
@@ -196,7 +138,7 @@ def _create_root(path):
     root = {
         "zarr_format": 3,
         "node_type": "group",
-        "attributes": {"granforce_store": SCHEMA_VERSION},
+        "attributes": {"granforce_store": keys.SCHEMA_VERSION},
     }
     temporary = path / _temporary_name()
     temporary.write_text(json.dumps(root, indent=2))
@@ -223,19 +165,19 @@ class Store(Mapping):
         return sum(1 for _ in self)
 
     def __contains__(self, name):
-        return isinstance(name, str) and _ENTRY.fullmatch(name) and self._attrs(name) is not None
+        return isinstance(name, str) and self._attrs(name) is not None
 
     def __getitem__(self, name):
         if name not in self:
             raise KeyError(name)
-        return self._open(name)
+        return entries.opened(self.path / name)
 
     def name(self, kind, params, *, version):
         """Name of the entry for these parameters: <kind>-<20 hexadecimal digits>.
 
-        Raises TypeError for parameters that have no canonical form (see `canonical`).
+        Raises TypeError for parameters that have no canonical form (see `keys.canonical`).
         """
-        return _entry_name(kind, params, version, SCHEMA_VERSION)
+        return keys.entry_name(kind, params, version, keys.SCHEMA_VERSION)
 
     def load(self, kind, params, *, version):
         """The entry's dataset, read and checked in full, or None where there is none.
@@ -246,7 +188,7 @@ class Store(Mapping):
         name = self.name(kind, params, version=version)
         if not (self.path / name).is_dir():
             return None
-        dataset, reason = self._checked(name)
+        dataset, reason = entries.checked(self.path / name)
         if reason:
             self._warn(name, reason)
         return dataset
@@ -261,19 +203,18 @@ class Store(Mapping):
         attributes that are not plain values, InputError if the store cannot be written.
         """
         name = self.name(kind, params, version=version)
-        variables = _conforming(dataset, dtypes or {})
-        attrs = _attributes(kind, params, version, dataset.attrs)
-        attrs["checksum"] = _checksum(variables, attrs)
+        variables = entries.conforming(dataset, dtypes or {})
+        attrs = entries.attributes(kind, params, version, dataset.attrs, variables)
         with self._writing():
             if _schema(self.path) is None:
                 _create_root(self.path)
-            if not (self.path / name).is_dir() or self._checked(name)[1]:
+            if not (self.path / name).is_dir() or entries.checked(self.path / name)[1]:
                 self._publish(name, variables, attrs)
         return name
 
     def entry(self, name):
         """The `Entry` of this name, or None if there is none that can be read; reads no arrays."""
-        attrs = self._attrs(name) if _ENTRY.fullmatch(name) else None
+        attrs = self._attrs(name)
         if attrs is None:
             return None
         params = json.loads(attrs["parameters"])
@@ -295,13 +236,13 @@ class Store(Mapping):
 
     def find(self, kind=None, **params):
         """The entries of a kind whose parameters include the given ones (compared as in keys)."""
-        wanted = {key: canonical(value) for key, value in params.items()}
+        wanted = {key: keys.canonical(value) for key, value in params.items()}
         return [
             entry
             for entry in self.entries()
             if kind in (None, entry.kind)
             and all(
-                key in entry.params and canonical(entry.params[key]) == value
+                key in entry.params and keys.canonical(entry.params[key]) == value
                 for key, value in wanted.items()
             )
         ]
@@ -336,7 +277,7 @@ class Store(Mapping):
         """A list of `Verdict`: every entry read in full and compared with its checksum."""
         verdicts = []
         for name in self._names():
-            reason = self._checked(name)[1]
+            reason = entries.checked(self.path / name)[1]
             verdicts.append(Verdict(name, not reason, reason))
         return verdicts
 
@@ -345,40 +286,10 @@ class Store(Mapping):
         if not self.path.is_dir():
             return []
         with os.scandir(self.path) as items:
-            return sorted(i.name for i in items if _ENTRY.fullmatch(i.name) and i.is_dir())
+            return sorted(i.name for i in items if keys.ENTRY.fullmatch(i.name) and i.is_dir())
 
     def _attrs(self, name):
-        """An entry's attributes, or None where they are unreadable or belong to another name."""
-        try:
-            attrs = json.loads((self.path / name / "zarr.json").read_bytes())["attributes"]
-            params = json.loads(attrs["parameters"])
-            versions = attrs["algorithm_version"], attrs["schema_version"]
-            ours = name == _entry_name(attrs["kind"], params, *versions)
-            return attrs if ours and {"created", "checksum"} <= attrs.keys() else None
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
-
-    def _open(self, name):
-        damaged = _damaged_array(self.path / name)
-        if damaged:
-            raise InputError(f"entry {name} in {self.path} is damaged ({damaged})")
-        # Not decoded: what was saved are plain numbers, and "units" must not turn them into times.
-        return xr.open_zarr(self.path / name, consolidated=False, chunks=None, decode_cf=False)
-
-    def _checked(self, name):
-        """(dataset in memory, "") if the entry is whole, else (None, reason)."""
-        if self._attrs(name) is None:
-            return None, "its metadata cannot be read"
-        damaged = _damaged_array(self.path / name)
-        if damaged:
-            return None, damaged
-        try:
-            dataset = self._open(name).load()
-        except Exception as error:  # what damage raises depends on codec, zarr and xarray
-            return None, f"an array cannot be read: {type(error).__name__}"
-        if _checksum(dataset.variables, dataset.attrs) != dataset.attrs["checksum"]:
-            return None, "its data do not match its checksum"
-        return dataset, ""
+        return entries.read_attributes(self.path / name) if keys.ENTRY.fullmatch(name) else None
 
     def _warn(self, name, reason):
         message = f"entry {name} in {self.path} is damaged ({reason}) and counts as missing"
@@ -388,7 +299,7 @@ class Store(Mapping):
         """Write under a temporary name, then rename: at no moment is a part of it visible."""
         temporary = self.path / _temporary_name()
         try:
-            _write(temporary, variables, attrs)
+            entries.write(temporary, variables, attrs)
             while True:
                 try:
                     os.rename(temporary, self.path / name)
@@ -397,7 +308,7 @@ class Store(Mapping):
                     if not (self.path / name).is_dir():
                         raise
                 # Someone was faster. An intact copy is as good as ours; a damaged one goes.
-                if not self._checked(name)[1]:
+                if not entries.checked(self.path / name)[1]:
                     return
                 self._retire(name)
         finally:
@@ -425,99 +336,6 @@ class Store(Mapping):
                 f"cannot write to the store {self.path}: {reason}; "
                 f"give another folder or set {LOCATION_VARIABLE}"
             ) from error
-
-
-def _damaged_array(folder):
-    """Which array's metadata is damaged, in words, or "" if none is seen to be.
-
-    Asked before zarr reads them all at once: of several that fail it tells one, and asyncio prints
-    the tracebacks of the others.
-    """
-    with os.scandir(folder) as items:
-        names = sorted(item.name for item in items if item.is_dir())
-    for name in names:
-        try:
-            ArrayV3Metadata.from_dict(json.loads((folder / name / "zarr.json").read_bytes()))
-        except Exception:  # what damage raises depends on zarr
-            return f"the metadata of its array {name} cannot be read"
-    return ""
-
-
-def _entry_name(kind, params, version, schema):
-    content = canonical({"kind": kind, "params": params, "version": version, "schema": schema})
-    name = f"{kind}-{hashlib.sha256(content.encode()).hexdigest()[:KEY_DIGITS]}"
-    if not _ENTRY.fullmatch(name):
-        raise ValueError(f"kind must be a lower-case word, got {kind!r}")
-    return name
-
-
-def _conforming(dataset, dtypes):
-    """The dataset's variables as they will be stored; ValueError where VARIABLES says otherwise."""
-    stored = {}
-    for name, variable in dataset.variables.items():
-        row = declared(name)
-        dtype = np.dtype(dtypes.get(name, row.dtype))
-        if variable.dims != row.dims:
-            raise ValueError(f"{name!r} must have dims {row.dims}, got {variable.dims}")
-        if dtype != row.dtype and (dtype.kind, np.dtype(row.dtype).kind) != ("f", "f"):
-            raise ValueError(f"{name!r} is {row.dtype} and cannot be stored as {dtype}")
-        if variable.dtype not in (dtype, np.dtype(row.dtype)):
-            raise ValueError(f"{name!r} must be {row.dtype}, got {variable.dtype}")
-        stored[name] = xr.Variable(variable.dims, np.asarray(variable.values, dtype, order="C"))
-    return stored
-
-
-def _attributes(kind, params, version, given):
-    """Attributes of an entry: the caller's own, what it is, and what made it when."""
-    attrs = {key: value for key, value in given.items() if key not in (*_IDENTITY, *_PROVENANCE)}
-    attrs |= {"kind": kind, "parameters": canonical(params)}
-    if "seed" in params:
-        attrs["seed"] = params["seed"]
-    attrs |= {"algorithm_version": version, "schema_version": SCHEMA_VERSION}
-    attrs |= {"created": datetime.now(UTC).isoformat(timespec="seconds"), **_library_versions()}
-    # What comes back from JSON is what the checksum must see.
-    return json.loads(json.dumps(attrs, default=to_builtin))
-
-
-@functools.cache
-def _library_versions():
-    return {f"{library}_version": metadata.version(library) for library in _LIBRARIES}
-
-
-def _checksum(variables, attrs):
-    """sha256 over arrays and attributes; the same for the same result made elsewhere or later."""
-    lasting = {key: value for key, value in attrs.items() if key not in _PROVENANCE}
-    digest = hashlib.sha256(json.dumps(lasting, sort_keys=True).encode())
-    for name in sorted(variables):
-        variable = variables[name]
-        header = [name, variable.dims, variable.dtype.str, variable.shape]
-        digest.update(json.dumps(header).encode())
-        digest.update(np.ascontiguousarray(variable.values))
-    return digest.hexdigest()
-
-
-def _write(folder, variables, attrs):
-    group = zarr.create_group(folder, zarr_format=3, attributes=attrs)
-    for name, variable in variables.items():
-        array = group.create_array(
-            name,
-            shape=variable.shape,
-            dtype=variable.dtype,
-            chunks=_chunks(variable),
-            compressors=(ZstdCodec(level=3),),
-            dimension_names=variable.dims,
-            attributes={"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
-            config={"write_empty_chunks": True},  # else Zarr 3.0 loses a chunk of −0.0
-        )
-        array[...] = variable.values
-
-
-def _chunks(variable):
-    """Whole arrays, but a hundred states at a time."""
-    chunks = [max(1, size) for size in variable.shape]
-    if variable.ndim > 1 and variable.dims[0] == "state":
-        chunks[0] = min(chunks[0], STATES_PER_CHUNK)
-    return tuple(chunks)
 
 
 def _host():

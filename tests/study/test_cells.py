@@ -11,7 +11,8 @@ from granforce.forces.ensemble import ensemble
 from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds
-from granforce.study.store import canonical, open_store
+from granforce.study.keys import canonical
+from granforce.study.store import open_store
 
 
 def cell(mu=0.3, seed=1, states=6, n=20, **options):

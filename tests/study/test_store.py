@@ -20,8 +20,9 @@ import zarr
 
 from granforce.records import Contacts, InputError, Packing, make_contacts, make_packing
 from granforce.study import store as store_module
+from granforce.study.keys import canonical
 from granforce.study.schema import VARIABLES, dataset_packing, labelled, packing_dataset
-from granforce.study.store import canonical, default_path, open_store
+from granforce.study.store import default_path, open_store
 
 PARAMS = {"mu": 0.1, "grains": 400, "seed": 3}
 
@@ -116,7 +117,7 @@ def test_different_parameters_have_different_keys(store, kind, params, version):
 
 def test_schema_version_enters_the_key(store, monkeypatch):
     name = store.name("walk", PARAMS, version=1)
-    monkeypatch.setattr(store_module, "SCHEMA_VERSION", 99)
+    monkeypatch.setattr(store_module.keys, "SCHEMA_VERSION", 99)
     assert store.name("walk", PARAMS, version=1) != name
 
 
@@ -174,7 +175,7 @@ def test_walk_round_trip_and_labels(store):
     assert json.loads(attrs["parameters"]) == PARAMS
     assert (attrs["kind"], attrs["seed"], attrs["algorithm_version"]) == ("walk", 3, "a1")
     assert (attrs["note"], attrs["count"]) == ("µ = 0.1", 3)
-    assert attrs["schema_version"] == store_module.SCHEMA_VERSION
+    assert attrs["schema_version"] == store_module.keys.SCHEMA_VERSION
     assert attrs["numpy_version"] == np.__version__ and attrs["zarr_version"] == zarr.__version__
     assert {"granforce_version", "numba_version", "xarray_version", "created"} <= attrs.keys()
     assert store.load("walk", PARAMS, version="a2") is None
@@ -205,7 +206,7 @@ def test_checksum_is_that_of_the_result(tmp_path):
 
 def test_saving_twice_keeps_the_first(store, monkeypatch):
     name = store.save("walk", PARAMS, walk_dataset(0), version=1)
-    monkeypatch.setattr(store_module, "_write", None)
+    monkeypatch.setattr(store_module.entries, "write", None)
     assert store.save("walk", PARAMS, walk_dataset(1), version=1) == name
     xr.testing.assert_equal(store.load("walk", PARAMS, version=1), walk_dataset(0))
 
@@ -267,7 +268,7 @@ def test_every_row_of_the_schema_is_complete():
 def test_entries_are_read_without_arrays(store, monkeypatch):
     store.save("walk", PARAMS, walk_dataset(), version=1)
     store.save("packing", PARAMS, packing_dataset(awkward_packing()), version=1)
-    monkeypatch.setattr(store, "_open", None)
+    monkeypatch.setattr(store_module.entries, "opened", None)
     packing, walk = store.entries()
     assert (walk.kind, walk.params, walk.version) == ("walk", PARAMS, 1)
     on_disk = [f.stat().st_size for f in (store.path / walk.name).rglob("*") if f.is_file()]
@@ -628,14 +629,14 @@ def test_concurrent_writers(tmp_path, same):
 def test_loser_of_the_race_discards_its_copy(store, monkeypatch):
     """Another writer finishes the same entry between our check and our rename."""
     rival = open_store(store.path)
-    write = store_module._write
+    write = store_module.entries.write
 
     def overtaken(*args):
         write(*args)
-        monkeypatch.setattr(store_module, "_write", write)
+        monkeypatch.setattr(store_module.entries, "write", write)
         rival.save("walk", PARAMS, walk_dataset(0), version=1)
 
-    monkeypatch.setattr(store_module, "_write", overtaken)
+    monkeypatch.setattr(store_module.entries, "write", overtaken)
     store.save("walk", PARAMS, walk_dataset(1), version=1)
     xr.testing.assert_equal(store.load("walk", PARAMS, version=1), walk_dataset(0))
     assert list(store.path.glob(".tmp-*")) == []

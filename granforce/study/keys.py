@@ -1,0 +1,63 @@
+"""What names a result in a store: its kind, its parameters in canonical form, and their hash."""
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from granforce.tolerances import MU_DIGITS
+
+# Raised when the meaning of a stored array changes; entries of another schema are never found.
+SCHEMA_VERSION = 1
+
+KEY_DIGITS = 20  # 80 bits: no collision among any number of entries that fits a disk
+ENTRY = re.compile(rf"[a-z][a-z0-9_]*-[0-9a-f]{{{KEY_DIGITS}}}")
+
+
+def canonical(value):
+    """Canonical JSON of parameters: equal values give equal text.
+
+    Floats are rounded to 9 significant digits and 1.0 is 1; numpy scalars, tuples and nested
+    dicts are taken. Raises TypeError for anything else, non-finite numbers included.
+    """
+    return json.dumps(_plain(value, "parameters"), sort_keys=True, separators=(",", ":"))
+
+
+def _plain(value, where):
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return _quantised(value, where)
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, f"{where}[{k}]") for k, item in enumerate(value)]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain(item, f"{where}[{key!r}]") for key, item in value.items()}
+    raise TypeError(
+        f"{where} cannot enter a key: {type(value).__name__} {value!r:.60} "
+        "(use numbers, strings, None, lists, or dicts with string keys)"
+    )
+
+
+def _quantised(value, where):
+    # The shortest text first: a float32 0.1 means 0.1, not 0.100000001.
+    number = float(str(value)) if isinstance(value, np.floating) else value
+    if not math.isfinite(number):
+        raise TypeError(f"{where} cannot enter a key: {value} is not finite")
+    number = float(f"{number:.{MU_DIGITS}g}")
+    return int(number) if number.is_integer() and abs(number) < 2**53 else number
+
+
+def entry_name(kind, params, version, schema):
+    """Name of an entry: <kind>-<20 hexadecimal digits>; TypeError as for `canonical`."""
+    content = canonical({"kind": kind, "params": params, "version": version, "schema": schema})
+    name = f"{kind}-{hashlib.sha256(content.encode()).hexdigest()[:KEY_DIGITS]}"
+    if not ENTRY.fullmatch(name):
+        raise ValueError(f"kind must be a lower-case word, got {kind!r}")
+    return name
