@@ -21,7 +21,7 @@ from .views.packing import PackingView
 from .views.parts import (
     PLAIN,
     answer_with_lock,
-    leave_unmounted_plots,
+    mend_late_views,
     send_what_waits,
     together,
 )
@@ -78,7 +78,7 @@ def page():
     """One visitor's page."""
     pn.extension()
     document = pn.state.curdoc
-    leave_unmounted_plots(document)
+    mend_late_views(document)
     answer_with_lock()
     query = pn.state.location.search if pn.state.location else ""
     state = AppState(pn.state.as_cached("library", _open_library), _turns(document), query)

@@ -40,10 +40,25 @@ for (const name of ["measure_layout", "after_layout"]) {
 }
 """
 
+# Panel's React components listen to changes only some time after they were first drawn: what came
+# in between would never be seen.
+LATE_LISTENERS = """
+const {prototype} = Bokeh.Models.get("panel.models.esm.ReactComponent")
+const {watch} = prototype
+prototype.watch = function (view, name, changed, state) {
+  watch.call(this, view, name, changed, state)
+  if (state) changed()  // what a component draws, which costs nothing where it is the same
+}
+"""
 
-def leave_unmounted_plots(document):
-    """Have the browser pass over plots that are not on the page yet where it lays the page out."""
-    document.js_on_event("document_ready", CustomJS(code=UNMOUNTED))
+
+def mend_late_views(document):
+    """Have the browser bear with what is told to it of views that it has not mounted yet.
+
+    Plots that are not on the page yet are passed over where it lays the page out, and components
+    that begin to listen take over what has changed since they were drawn.
+    """
+    document.js_on_event("document_ready", CustomJS(code=UNMOUNTED), CustomJS(code=LATE_LISTENERS))
 
 
 def answer_with_lock():

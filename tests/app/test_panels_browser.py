@@ -190,6 +190,24 @@ def test_dumps_are_dropped_reported_and_shown(visit):
     page.wait_for_function("() => /packing=/.test(location.search)")
 
 
+# The server tells of another title just before a component begins to listen.
+CHANGED_EARLY = """() => {
+    const {prototype} = Bokeh.Models.get("panel.models.esm.ReactComponent")
+    const {watch} = prototype
+    prototype.watch = function (view, name, ...others) {
+        if (this.class_name === "Alert" && name === "title") this.data.title = "told early"
+        watch.call(this, view, name, ...others)
+    }
+}"""
+
+
+def test_a_change_that_comes_before_a_component_listens_is_seen(visit):
+    page = visit("")
+    page.evaluate(CHANGED_EARLY)
+    page.get_by_role("tab", name="Your packing").click()
+    page.get_by_text("told early").first.wait_for(state="attached")
+
+
 def test_what_is_no_packing_is_refused_in_one_line(visit, tmp_path):
     page = visit("?tab=upload")
     (tmp_path / "notes.txt").write_text("no packing at all")
