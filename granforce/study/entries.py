@@ -112,6 +112,10 @@ def opened(folder):
     damaged = _damaged_array(folder)
     if damaged:
         raise InputError(f"entry {folder.name} in {folder.parent} is damaged ({damaged})")
+    return _lazily(folder)
+
+
+def _lazily(folder):
     # Not decoded: what was saved are plain numbers, and "units" must not turn them into times.
     return xr.open_zarr(folder, consolidated=False, chunks=None, decode_cf=False)
 
@@ -124,7 +128,7 @@ def checked(folder):
     if damaged:
         return None, damaged
     try:
-        dataset = opened(folder).load()
+        dataset = _lazily(folder).load()
     except Exception as error:  # what damage raises depends on codec, zarr and xarray
         return None, f"an array cannot be read: {type(error).__name__}"
     if _checksum(dataset.variables, dataset.attrs) != dataset.attrs["checksum"]:
