@@ -40,6 +40,14 @@ NARROW = """
 }
 @media (max-width: 599.95px) { .header .title { font-size: 15px !important } }
 """
+# Material UI is fetched and run as soon as the page can, not after the page's contents have come:
+# 0.13 s. Its address must be the one that Panel asks for, or it would be run twice.
+EARLY = """{%% extends "base.html" %%}
+{%% block preamble %%}{{ super() }}<script>
+  document.addEventListener("load", (event) => {
+    if (event.target.src?.includes("es-module-shims")) importShim("%s")
+  }, true)
+</script>{%% endblock %%}"""
 # Packing and tabs; under each other where there is no room.
 SIDE_BY_SIDE = {
     "& .main-content": {
@@ -101,6 +109,7 @@ def page():
         sidebar_resizable=False,  # its handle has a name but no role
         main=[left, middle, right],
         sx=SIDE_BY_SIDE,
+        template=EARLY % pmui.Page._render_esm(server=True),
         stylesheets=[UNSEEN, NARROW],
         dark_theme=state.dark,
         busy_indicator=None,  # but the player's: for this one Bokeh looks through the whole page

@@ -3,16 +3,15 @@
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
 from ..state import VIEW
-from .scripts import FOLDER, joined
+from .scripts import FOLDER, Scripted, joined
 
 # Nobody goes back to the frame before, or to the other theme.
 PASSING = ("frame", "dark")
 
 
-class Address(JSComponent):
+class Address(Scripted):
     """Keeps the address like the state and the state like the address; see address.js.
 
     It also says when the server is gone, and reopens the view when there is one again. Not Panel's

@@ -1,19 +1,16 @@
 """A place to drop files on; their content stays in memory and is handed over when all are there."""
 
-from pathlib import Path
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
-from .scripts import joined
+from .scripts import FOLDER, Scripted, joined
 
-FOLDER = Path(__file__).parent
 NAME_LENGTH = 120  # of a file's name, as shown in messages
 MOST_FILES = 16  # of one drop; a packing has two at most
 
 
-class Dropper(JSComponent):
+class Dropper(Scripted):
     """Collects files, up to `most` bytes a drop, for `on_files([(name, content), …])`.
 
     Not Panel's FileInput: told to take 1 kB, it held 100 MB of unfinished files sent to it.

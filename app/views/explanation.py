@@ -3,10 +3,9 @@
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
 from .hints import term
-from .scripts import joined
+from .scripts import Scripted, joined
 
 QUESTION = "What am I seeing? Why are there many?"
 STYLE = """
@@ -91,7 +90,7 @@ def text(summary):
     return first(summary) + more.format(QUESTION, rest(summary))
 
 
-class Explanation(JSComponent):
+class Explanation(Scripted):
     """Sentences below the packing; what was opened stays open, see explanation.js."""
 
     first = param.String(doc="HTML")

@@ -1,17 +1,16 @@
 """Slider for the friction coefficient."""
 
-from pathlib import Path
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
 from ..data import LEAST_PLACE
+from .scripts import FOLDER, Scripted, joined
 
 MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
 
 
-class FrictionSlider(JSComponent):
+class FrictionSlider(Scripted):
     """μ on a logarithmic scale; jumps to values in `stored`; see friction.js."""
 
     mu = param.Number(default=0.1)
@@ -20,8 +19,8 @@ class FrictionSlider(JSComponent):
     most = param.Number(default=MOST_PLACE, constant=True)
     on_narrow = param.Boolean(doc="whether it is for narrow pages, else for all others")
 
-    _esm = Path(__file__).with_name("friction.js")
-    _stylesheets: ClassVar = [Path(__file__).with_name("friction.css")]
+    _esm = joined("friction")
+    _stylesheets: ClassVar = [FOLDER / "friction.css"]
 
     def __init__(self, on_typed=None, **params):
         """on_typed(text): what to do with a value that was typed, sensible or not."""

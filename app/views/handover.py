@@ -3,12 +3,11 @@
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
-from .scripts import joined
+from .scripts import Scripted, joined
 
 
-class Handover(JSComponent):
+class Handover(Scripted):
     """A button for each of `files`; `on_ask(key)` has `hand_over` called in time.
 
     Not Panel's FileDownload: it makes files on the page's thread, and seven take 107 ms, this 5 ms.

@@ -4,11 +4,10 @@ from html import escape
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
 from granforce.glossary import TERMS, title
 
-from .scripts import FOLDER, joined
+from .scripts import FOLDER, Scripted, joined
 
 # Words on the page that are not the glossary's own: what stands there → key of the glossary.
 LABELS = {
@@ -70,7 +69,7 @@ def term(key, words=None):
     return f'<span class="term" tabindex="0" data-term="{key}">{shown}</span>'
 
 
-class Hints(JSComponent):
+class Hints(Scripted):
     """Shows a sentence beside the word pointed at, focused or touched; see hints.js."""
 
     terms = param.Dict(default={key: [title(key), t.sentence] for key, t in TERMS.items()})

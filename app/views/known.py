@@ -4,16 +4,15 @@ from typing import ClassVar
 
 import numpy as np
 import param
-from panel.custom import JSComponent
 
 from .hints import term
-from .scripts import FOLDER, joined
+from .scripts import FOLDER, Scripted, joined
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
 ASK = "Hold a contact's force (press H, or the needle): all other intervals shrink."
 
 
-class Known(JSComponent):
+class Known(Scripted):
     """Chips of what is known; see known.js. Contacts are positions in the backbone."""
 
     chips = param.List(doc="pairs (contact, words)")

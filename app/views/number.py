@@ -3,12 +3,11 @@
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
-from .scripts import FOLDER, joined
+from .scripts import FOLDER, Scripted, joined
 
 
-class NumberField(JSComponent):
+class NumberField(Scripted):
     """A whole number, taken over by Enter or on leaving the field; see number.js.
 
     Not panel-material-ui's IntInput: after Enter it took no more typing until it lost focus, and

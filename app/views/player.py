@@ -1,18 +1,14 @@
 """The player: draws the packing and replays states in the browser; no server work per frame."""
 
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import param
-from panel.custom import JSComponent
 
-from .scripts import joined
-
-FOLDER = Path(__file__).parent
+from .scripts import FOLDER, Scripted, joined
 
 
-class Player(JSComponent):
+class Player(Scripted):
     """Packing on canvases, with buttons, scrub slider and live numbers.
 
     Its script is of parts: what is replayed (replay.js), how it looks (look.js), where it is drawn

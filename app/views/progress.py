@@ -3,12 +3,11 @@
 from typing import ClassVar
 
 import param
-from panel.custom import JSComponent
 
-from .scripts import joined
+from .scripts import Scripted, joined
 
 
-class Progress(JSComponent):
+class Progress(Scripted):
     """Bar, stage, time left and Cancel of a jobs.Task: of several, the first that is running.
 
     Not Panel's LinearProgress, text and button: they keep the page's thread for 40 ms, this 4 ms.

@@ -6,9 +6,8 @@ from urllib.parse import parse_qsl
 
 import numpy as np
 import param
-from panel.custom import JSComponent
 
-from .scripts import FOLDER, joined
+from .scripts import FOLDER, Scripted, joined
 
 # Title and two sentences of each step, and the part of the page that it is about, see tour.js.
 STEPS = (
@@ -57,7 +56,7 @@ STEPS = (
 TABS = {3: "intervals", 4: "plane", 5: "statistics", 6: "perturb"}
 
 
-class Tour(JSComponent):
+class Tour(Scripted):
     """A card with the steps, which closes into the page as it is; see tour.js."""
 
     step = param.Integer(default=0, doc="1 … 6 while the tour is on, else 0")

@@ -489,6 +489,22 @@ def test_wrong_mu_is_one_clear_line(page):
     page.get_by_text("friction coefficient must be finite and ≥ 0").wait_for(timeout=10_000)
 
 
+def test_scripts_are_fetched_once_and_run_as_they_are(visit):
+    """What is fetched early is what Panel asks for later, and nothing is translated in the page."""
+    page = visit()
+    fetched = page.evaluate(
+        "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => /[.]js/.test(n))"
+    )
+    assert any("panel-material-ui" in name for name in fetched)
+    assert len(fetched) == len(set(fetched))
+    own = page.evaluate(
+        """() => [...Bokeh.documents[0]._all_models.values()]
+        .filter((model) => model.esm).map((model) => [model.class_name, model.bundle])"""
+    )
+    assert {"Player", "FrictionSlider", "Tour"} <= {name for name, _ in own}
+    assert all(bundle for _, bundle in own)
+
+
 def test_a_copied_link_reopens_the_view(page, visit):
     page.locator("input.scrub").fill("4")
     page.keyboard.press("Tab")
