@@ -30,9 +30,13 @@ class Stage:
     def __init__(self, folder, address, server, browser):
         self.folder, self.address, self.server, self.browser = folder, address, server, browser
 
-    def open(self, query=""):
-        """A new page without anything cached, painted; and the seconds that took."""
-        page = self.browser.new_context(viewport=SIZE).new_page()
+    def open(self, query="", still=False):
+        """A new page without anything cached, painted; and the seconds that took.
+
+        still: it does not play by itself.
+        """
+        motion = "reduce" if still else "no-preference"
+        page = self.browser.new_context(viewport=SIZE, reduced_motion=motion).new_page()
         page.bytes = 0
         page.on("websocket", lambda ws: ws.on("framereceived", lambda data: _count(page, data)))
         page.goto(self.address + query)
@@ -356,8 +360,11 @@ def memory(stage, cycles=50):
 
 
 def visitors(stage, count=10):
-    """Ten pages at once while two of them compute: time to change μ, and stalls."""
-    pages = [stage.open()[0] for _ in range(count)]
+    """Ten pages at once while two of them compute: time to change μ, and stalls.
+
+    They stand still: visitors paint on machines of their own, these ten on that of the server.
+    """
+    pages = [stage.open(still=True)[0] for _ in range(count)]
     for page, mu in zip(pages, ("0.15", "0.25"), strict=False):
         page.locator("input.typed").fill(mu)
         page.locator("input.typed").press("Enter")
