@@ -30,6 +30,8 @@ from granforce.numerics.lanes import (
 
 # A pivot that rounding has driven to zero or below belongs to a direction without weight.
 NO_PIVOT, _NO_WEIGHT = 1e-40, 1e64
+# Where a 3×3 block has the numbers 10, 20, 21 of a lower triangle, and of an upper one transposed.
+_LOWER, _UPPER = (3, 6, 7), (1, 2, 5)
 
 
 class Network(NamedTuple):
@@ -275,7 +277,7 @@ def factor(network, least, factors, stop, lanes):
             first, last = start[k] + 1, start[k + 1]
             _factor_diagonal(L, 9 * start[k], least, 3 * k, lanes)
             for a in range(first, last):
-                _divide(L, 9 * a, L, 9 * start[k], lanes)
+                _divide(L, 9 * a, L, 9 * start[k], _LOWER, lanes)
             for q in range(k + 1, end):
                 a = start[k] + q - k
                 _subtract_column(L, 9 * start[q], L, 9 * a, last - a, L, 9 * a, lanes)
@@ -283,7 +285,7 @@ def factor(network, least, factors, stop, lanes):
     m, rows = network.border.shape[1] // 2, 3 * (len(start) - 1)
     sides, corner = factors.sides, factors.corner
     for a in range(m):
-        _forward(layout, L, sides, rows * a, lanes)
+        _forward(layout, L, _LOWER, L, sides, rows * a, lanes)
         for b in range(a + 1):
             value = load(corner, m * a + b, lanes)
             value = _less_product(value, sides, rows * a, sides, rows * b, rows, lanes)
@@ -326,10 +328,11 @@ def _factor_diagonal(L, d, least, k, lanes):
 
 
 @within
-def _divide(X, x, L, d, lanes):
-    """x ← x d⁻ᵀ for a block x of X, and the factored diagonal block d of L."""
+def _divide(X, x, L, d, side, lanes):
+    """x ← x d⁻ᵀ for a block x of X, and the triangle on one side of the diagonal block d of L."""
     r0, r1, r2 = load(L, d, lanes), load(L, d + 4, lanes), load(L, d + 8, lanes)
-    l10, l20, l21 = load(L, d + 3, lanes), load(L, d + 6, lanes), load(L, d + 7, lanes)
+    l10, l20 = load(L, d + side[0], lanes), load(L, d + side[1], lanes)
+    l21 = load(L, d + side[2], lanes)
     for a in range(x, x + 9, 3):
         x0 = load(X, a, lanes) * r0
         x1 = fma(-l10, x0, load(X, a + 1, lanes)) * r1
@@ -438,7 +441,7 @@ def solve(network, factors, x, y, lanes):
     """x, y ← (L Lᵀ)⁻¹ (x, y) for factored L; x (rows, W), y (m, W) of the global rows."""
     layout = network.layout
     m, rows = network.border.shape[1] // 2, 3 * (len(layout.start) - 1)
-    _forward(layout, factors.lower, x, 0, lanes)
+    _forward(layout, factors.lower, _LOWER, factors.lower, x, 0, lanes)
     sides, corner = factors.sides, factors.corner
     for a in range(m):
         value = _less_product(load(y, a, lanes), sides, rows * a, x, 0, rows, lanes)
@@ -452,19 +455,19 @@ def solve(network, factors, x, y, lanes):
         store(y, a, lanes, value)
         for k in range(rows):
             store(x, k, lanes, fma(-load(sides, rows * a + k, lanes), value, load(x, k, lanes)))
-    _backward(layout, factors.lower, x, lanes)
+    _backward(layout, factors.lower, _LOWER, factors.lower, x, lanes)
 
 
 @within
-def _forward(layout, L, x, first, lanes):
-    """x ← L⁻¹ x for the rows of x from `first` on."""
+def _forward(layout, D, side, L, x, first, lanes):
+    """x ← L⁻¹ x for the rows of x from `first` on; of L's diagonal blocks one side is in D."""
     start = layout.start
     for k in range(len(start) - 1):
         d, v = 9 * start[k], first + 3 * k
-        v0 = load(x, v, lanes) * load(L, d, lanes)
-        v1 = fma(-load(L, d + 3, lanes), v0, load(x, v + 1, lanes)) * load(L, d + 4, lanes)
-        v2 = fma(-load(L, d + 6, lanes), v0, load(x, v + 2, lanes))
-        v2 = fma(-load(L, d + 7, lanes), v1, v2) * load(L, d + 8, lanes)
+        v0 = load(x, v, lanes) * load(D, d, lanes)
+        v1 = fma(-load(D, d + side[0], lanes), v0, load(x, v + 1, lanes)) * load(D, d + 4, lanes)
+        v2 = fma(-load(D, d + side[1], lanes), v0, load(x, v + 2, lanes))
+        v2 = fma(-load(D, d + side[2], lanes), v1, v2) * load(D, d + 8, lanes)
         _spread(layout, k, L, v0, v1, v2, x, first, lanes)
 
 
@@ -487,15 +490,15 @@ def _spread(layout, k, L, v0, v1, v2, x, first, lanes):
 
 
 @within
-def _backward(layout, L, x, lanes):
-    """x ← L⁻ᵀ x."""
+def _backward(layout, D, side, L, x, lanes):
+    """x ← L⁻ᵀ x; of L's diagonal blocks one side is in D."""
     for k in range(len(layout.start) - 2, -1, -1):
         d, v = 9 * layout.start[k], 3 * k
         v0, v1, v2 = _gathered(layout, k, L, x, lanes)
-        v2 = v2 * load(L, d + 8, lanes)
-        v1 = fma(-load(L, d + 7, lanes), v2, v1) * load(L, d + 4, lanes)
-        v0 = fma(-load(L, d + 6, lanes), v2, fma(-load(L, d + 3, lanes), v1, v0))
-        store(x, v, lanes, v0 * load(L, d, lanes))
+        v2 = v2 * load(D, d + 8, lanes)
+        v1 = fma(-load(D, d + side[2], lanes), v2, v1) * load(D, d + 4, lanes)
+        v0 = fma(-load(D, d + side[1], lanes), v2, fma(-load(D, d + side[0], lanes), v1, v0))
+        store(x, v, lanes, v0 * load(D, d, lanes))
         store(x, v + 1, lanes, v1)
         store(x, v + 2, lanes, v2)
 
@@ -534,7 +537,7 @@ def factor_lu(network, factors, stop, lanes):
             first, last, d = start[k] + 1, start[k + 1], 9 * start[k]
             _factor_skew_diagonal(L, d, lanes)
             for a in range(first, last):
-                _divide_by_upper(L, 9 * a, d, lanes)
+                _divide(L, 9 * a, L, d, _UPPER, lanes)
                 _divide_by_unit(U, 9 * a, L, d, lanes)
             for q in range(k + 1, end):
                 a, z = start[k] + q - k, 9 * start[q]
@@ -546,7 +549,7 @@ def factor_lu(network, factors, stop, lanes):
     corner = factors.corner
     for a in range(m):
         _forward_unit(layout, L, factors.tops, rows * a, lanes)
-        _forward_upper(layout, L, U, factors.sides, rows * a, lanes)
+        _forward(layout, L, _UPPER, U, factors.sides, rows * a, lanes)
     for a in range(m):
         for b in range(m):
             value = _less_product(
@@ -600,19 +603,6 @@ def _factor_skew_diagonal(L, d, lanes):
 
 
 @within
-def _divide_by_upper(L, x, d, lanes):
-    """x ← x U⁻¹ for a block x of L, and the upper triangle U of its diagonal block d."""
-    for a in range(x, x + 9, 3):
-        x0 = load(L, a, lanes) * load(L, d, lanes)
-        x1 = fma(-x0, load(L, d + 1, lanes), load(L, a + 1, lanes)) * load(L, d + 4, lanes)
-        x2 = fma(-x0, load(L, d + 2, lanes), load(L, a + 2, lanes))
-        x2 = fma(-x1, load(L, d + 5, lanes), x2) * load(L, d + 8, lanes)
-        store(L, a, lanes, x0)
-        store(L, a + 1, lanes, x1)
-        store(L, a + 2, lanes, x2)
-
-
-@within
 def _divide_by_unit(U, x, L, d, lanes):
     """x ← x L⁻ᵀ for a block x of U, and the unit lower triangle of the diagonal block d."""
     for a in range(x, x + 9, 3):
@@ -636,32 +626,6 @@ def _forward_unit(layout, L, x, first, lanes):
 
 
 @within
-def _forward_upper(layout, L, U, x, first, lanes):
-    """x ← U⁻ᵀ x."""
-    for k in range(len(layout.start) - 1):
-        d, v = 9 * layout.start[k], first + 3 * k
-        v0 = load(x, v, lanes) * load(L, d, lanes)
-        v1 = fma(-load(L, d + 1, lanes), v0, load(x, v + 1, lanes)) * load(L, d + 4, lanes)
-        v2 = fma(-load(L, d + 2, lanes), v0, load(x, v + 2, lanes))
-        v2 = fma(-load(L, d + 5, lanes), v1, v2) * load(L, d + 8, lanes)
-        _spread(layout, k, U, v0, v1, v2, x, first, lanes)
-
-
-@within
-def _backward_upper(layout, L, U, x, lanes):
-    """x ← U⁻¹ x."""
-    for k in range(len(layout.start) - 2, -1, -1):
-        d, v = 9 * layout.start[k], 3 * k
-        v0, v1, v2 = _gathered(layout, k, U, x, lanes)
-        v2 = v2 * load(L, d + 8, lanes)
-        v1 = fma(-load(L, d + 5, lanes), v2, v1) * load(L, d + 4, lanes)
-        v0 = fma(-load(L, d + 2, lanes), v2, fma(-load(L, d + 1, lanes), v1, v0))
-        store(x, v, lanes, v0 * load(L, d, lanes))
-        store(x, v + 1, lanes, v1)
-        store(x, v + 2, lanes, v2)
-
-
-@within
 def solve_lu(network, factors, x, y, lanes):
     """x, y ← (L U)⁻¹ (x, y); shapes as for `solve`."""
     layout, corner = network.layout, factors.corner
@@ -678,4 +642,4 @@ def solve_lu(network, factors, x, y, lanes):
         for k in range(rows):
             top = load(factors.tops, rows * a + k, lanes)
             store(x, k, lanes, fma(-top, value, load(x, k, lanes)))
-    _backward_upper(layout, factors.lower, factors.upper, x, lanes)
+    _backward(layout, factors.lower, _UPPER, factors.upper, x, lanes)
