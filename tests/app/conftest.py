@@ -13,6 +13,13 @@ from granforce.study.store import open_store
 PATIENCE = 60_000  # ms, on a busy machine
 
 
+def pytest_collection_modifyitems(items):
+    """Tests in a browser are left out where there is none."""
+    for item in items:
+        if item.get_closest_marker("browser") and not CHROMIUM.exists():
+            item.add_marker(pytest.mark.skip(reason=f"needs chromium at {CHROMIUM}"))
+
+
 @pytest.fixture(scope="session")
 def shipped(tmp_path_factory):
     """A folder with finished walks at three values of μ, float32 as in the shipped store."""

@@ -1,7 +1,7 @@
 """The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
 
 import pytest
-from serving import CHROMIUM, painted
+from serving import painted
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
@@ -9,10 +9,7 @@ PATIENCE = 60_000  # ms, on a busy machine
 GRAVE = ("serious", "critical")
 TABS = ("intervals", "statistics", "plane", "perturb", "upload", "export")
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 def findings(page):

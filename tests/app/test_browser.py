@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import CHROMIUM, MODEL, column, painted, scene, serve
+from serving import MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 from granforce import measures
@@ -15,10 +15,7 @@ from granforce.study.store import open_store
 # Pictures to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts"
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")

@@ -5,17 +5,14 @@ import time
 
 import numpy as np
 import pytest
-from serving import CHROMIUM, MODEL, column, free_port, painted, scene, serve
+from serving import MODEL, column, free_port, painted, scene, serve
 from small_store import KEPT, ROOT
 
 # Pictures to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "defects"
 PATIENCE = 60_000  # ms, on a busy machine
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")

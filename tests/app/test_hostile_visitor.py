@@ -6,17 +6,14 @@ Whatever they do, the next visitor's computation begins and ends, and no thread 
 import urllib.request
 
 import pytest
-from serving import CHROMIUM, CLOSED, free_port, painted, serve
+from serving import CLOSED, free_port, painted, serve
 
 PATIENCE = 180_000  # ms, on a busy machine
 LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, unless it is ended
 LIMITS = "n=60,states=20000"
 LARGEST = "9" * 300
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")

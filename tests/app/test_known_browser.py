@@ -2,16 +2,13 @@
 
 import pytest
 from frames import frame, write
-from serving import CHROMIUM, MODEL, column, painted, scene
+from serving import MODEL, column, painted, scene
 from small_store import ROOT
 
 ARTEFACTS = ROOT / "artefacts" / "known"
 PATIENCE = 60_000  # ms, on a busy machine
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 def select(page, contact):

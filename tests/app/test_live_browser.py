@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from serving import CHROMIUM, MODEL, bars_drawn, column, laid_out, scene
+from serving import MODEL, bars_drawn, column, laid_out, scene
 from small_store import KEPT, ROOT
 
 ARTEFACTS = ROOT / "artefacts" / "live"
@@ -21,10 +21,7 @@ WATCH = """e => {
         .observe(hand.player.buttons.root, {attributes: true})
 }"""
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """What somebody stumbled over who saw the page for the first time, one test each."""
 
 import pytest
-from serving import CHROMIUM, MODEL, painted, scene
+from serving import MODEL, painted, scene
 from small_store import ROOT
 
 from granforce.glossary import TERMS
@@ -10,10 +10,7 @@ from granforce.glossary import TERMS
 ARTEFACTS = ROOT / "artefacts" / "newcomer"
 AT = "?mu=0.1&n=30&states=30&relax=nearest"
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 # Whether an element lies over no text of the page's main part.
 COVERS = """(found) => {

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from packings import REFERENCE
-from serving import CHROMIUM, CLOSED, MODEL, column, painted, scene, serve
+from serving import CLOSED, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 import granforce as gf
@@ -18,10 +18,7 @@ ARTEFACTS = ROOT / "artefacts" / "panels"
 LAMMPS = REFERENCE.parent / "lammps"
 PATIENCE = 60_000  # ms, on a busy machine
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture

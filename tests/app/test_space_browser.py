@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from serving import CHROMIUM, MODEL, bars_drawn, column, laid_out, scene
+from serving import MODEL, bars_drawn, column, laid_out, scene
 from test_live_browser import ask, normal, pulled, until
 
 # The outermost element of force space that is ever made pale.
@@ -17,10 +17,7 @@ VIEW_ABOVE = """(() => {
     return pale
 })()"""
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 def place(page, x, y):

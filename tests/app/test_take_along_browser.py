@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from PIL import Image
-from serving import CHROMIUM, column, painted, scene
+from serving import column, painted, scene
 from small_store import KEPT, ROOT, STATES
 
 from app import movies
@@ -15,10 +15,7 @@ from app import movies
 ARTEFACTS = ROOT / "artefacts" / "along"
 PATIENCE = 60_000  # ms, on a busy machine
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from functools import partial
 
 import pytest
-from serving import CHROMIUM, painted, scene
+from serving import painted, scene
 from small_store import ROOT
 
 from app.selection import SOLVERS
@@ -14,10 +14,7 @@ ARTEFACTS = ROOT / "artefacts" / "tour"
 PATIENCE = 60_000  # ms, on a busy machine
 STEPS = 6
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="needs chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.browser
 
 
 @pytest.fixture
