@@ -102,7 +102,7 @@ def crowd(stage):
 
 
 def _play(stage, query, words):
-    page, _ = stage.open(query)
+    page, _ = stage.open(query, still=True)
     page.wait_for_timeout(4000)
     page.locator("input.speed").fill("1")
     print(f"{words}: segments {scene(page, 'scene.counts')}")
