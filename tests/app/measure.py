@@ -96,7 +96,11 @@ def crowd(stage):
     """The same of 10,000 disks."""
     query = "?n=10000&seed=1&mu=0.1&source=walk&states=20&relax=accelerated"
     page, _ = stage.open(query)
-    page.get_by_text("N = 10000").first.wait_for(timeout=1_000_000)
+    computed = (
+        f"() => {{ const {{ live, walk }} = {MODEL}('player').data;"
+        " return !live && walk.get('contacts') > 10000 }"
+    )
+    page.wait_for_function(computed, timeout=1_000_000)
     page.context.close()
     _play(stage, query, "10,000 disks")
 
