@@ -96,11 +96,9 @@ def crowd(stage):
     """The same of 10,000 disks."""
     query = "?n=10000&seed=1&mu=0.1&source=walk&states=20&relax=accelerated"
     page, _ = stage.open(query)
-    computed = (
-        f"() => {{ const {{ live, walk }} = {MODEL}('player').data;"
-        " return !live && walk.get('contacts') > 10000 }"
-    )
-    page.wait_for_function(computed, timeout=1_000_000)
+    player = "Bokeh.documents[0].get_model_by_name('player')?.player"
+    contacts = f"() => {player}?.replay?.walk.contacts > 10000"
+    page.wait_for_function(contacts, timeout=1_000_000)
     page.context.close()
     _play(stage, query, "10,000 disks")
 
