@@ -359,9 +359,11 @@ class Scene {
     root.addEventListener("pointerleave", () => this.tip.classList.remove("on"))
   }
 
-  /** The contact that a pointer takes in hand, or null where it moves the view. */
+  /** The contact that a pointer takes in hand, or null where it moves the view.
+
+   * Where disks are so small that a chain lies under every point, the view could not be moved. */
   takenAt(event, touch) {
-    if (!this.geometry || this.frozen || !this.hand) return null
+    if (!this.geometry || this.frozen || !this.hand || this.scale < GRAB) return null
     const k = this.linkAt(...this.place(event), touch ? 3 * GRAB : GRAB)
     if (k < 0 || (touch && this.geometry.contact[k] !== this.selected)) return null
     return this.geometry.contact[k]

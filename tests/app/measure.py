@@ -22,6 +22,9 @@ from playwright.sync_api import sync_playwright  # noqa: E402
 from serving import CHROMIUM, CLOSED, FLAGS, MODEL, painted, scene, serve  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
+# A place in the packing where a drag moves the view.
+FREE = """[...Array(400).keys()].map((k) => [150 + 5 * (k % 20), 150 + 5 * Math.floor(k / 20)])
+    .find(([x, y]) => scene.scale < 6 || scene.linkAt(x, y) < 0)"""
 
 
 class Stage:
@@ -115,7 +118,8 @@ def _play(stage, query, words):
     sent = (page.bytes - before) / frames
     print(f"{words}: playing: {rate:.1f} painted frames a second, {sent:.0f} bytes a frame")
     box = page.locator(".scene").bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + 200
+    free = scene(page, FREE)  # of chains, which would be pulled
+    x, y = box["x"] + free[0], box["y"] + free[1]
     page.mouse.move(x, y)
     page.mouse.down()
 

@@ -273,6 +273,18 @@ def test_a_drag_beside_the_chains_moves_the_view(visit):
     assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
 
 
+def test_a_drag_moves_the_view_where_every_point_lies_near_a_chain(visit):
+    page = visit()
+    scene(page, "scene.view.half *= 40, scene.changed()")  # as small as disks are in a crowd
+    _, x, y = chain(page)
+    before = scene(page, "scene.view.x")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y)
+    page.mouse.up()
+    assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
+
+
 def test_a_finger_pulls_the_selected_contact(visit):
     page = visit("", 400, 900, has_touch=True, is_mobile=True)
     page.keyboard.press("Escape")
