@@ -277,7 +277,7 @@ def factor(network, least, factors, stop, lanes):
             first, last = start[k] + 1, start[k + 1]
             _factor_diagonal(L, 9 * start[k], least, 3 * k, lanes)
             for a in range(first, last):
-                _divide(L, 9 * a, L, 9 * start[k], _LOWER, lanes)
+                _divide(L, 9 * a, 9 * start[k], _LOWER, lanes)
             for q in range(k + 1, end):
                 a = start[k] + q - k
                 _subtract_column(L, 9 * start[q], L, 9 * a, last - a, L, 9 * a, lanes)
@@ -328,18 +328,18 @@ def _factor_diagonal(L, d, least, k, lanes):
 
 
 @within
-def _divide(X, x, L, d, side, lanes):
-    """x ← x d⁻ᵀ for a block x of X, and the triangle on one side of the diagonal block d of L."""
+def _divide(L, x, d, side, lanes):
+    """x ← x d⁻ᵀ for a block x of L, and the triangle on one side of its diagonal block d."""
     r0, r1, r2 = load(L, d, lanes), load(L, d + 4, lanes), load(L, d + 8, lanes)
     l10, l20 = load(L, d + side[0], lanes), load(L, d + side[1], lanes)
     l21 = load(L, d + side[2], lanes)
     for a in range(x, x + 9, 3):
-        x0 = load(X, a, lanes) * r0
-        x1 = fma(-l10, x0, load(X, a + 1, lanes)) * r1
-        x2 = fma(-l21, x1, fma(-l20, x0, load(X, a + 2, lanes))) * r2
-        store(X, a, lanes, x0)
-        store(X, a + 1, lanes, x1)
-        store(X, a + 2, lanes, x2)
+        x0 = load(L, a, lanes) * r0
+        x1 = fma(-l10, x0, load(L, a + 1, lanes)) * r1
+        x2 = fma(-l21, x1, fma(-l20, x0, load(L, a + 2, lanes))) * r2
+        store(L, a, lanes, x0)
+        store(L, a + 1, lanes, x1)
+        store(L, a + 2, lanes, x2)
 
 
 @inline
@@ -537,7 +537,7 @@ def factor_lu(network, factors, stop, lanes):
             first, last, d = start[k] + 1, start[k + 1], 9 * start[k]
             _factor_skew_diagonal(L, d, lanes)
             for a in range(first, last):
-                _divide(L, 9 * a, L, d, _UPPER, lanes)
+                _divide(L, 9 * a, d, _UPPER, lanes)
                 _divide_by_unit(U, 9 * a, L, d, lanes)
             for q in range(k + 1, end):
                 a, z = start[k] + q - k, 9 * start[q]
