@@ -254,6 +254,16 @@ def test_a_link_holds_what_was_pulled(visit):
     np.testing.assert_allclose(normal(again), normal(page), atol=1e-4)
 
 
+def moves_the_view(page, x, y):
+    """A drag from this place to the right does, and pulls nothing."""
+    before = scene(page, "scene.view.x")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y)
+    page.mouse.up()
+    assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
+
+
 def test_a_drag_beside_the_chains_moves_the_view(visit):
     page = visit()
     x, y = page.locator(".scene").evaluate(
@@ -265,24 +275,14 @@ def test_a_drag_beside_the_chains_moves_the_view(visit):
             }
         }"""
     )
-    before = scene(page, "scene.view.x")
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 30, y)
-    page.mouse.up()
-    assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
+    moves_the_view(page, x, y)
 
 
 def test_a_drag_moves_the_view_where_every_point_lies_near_a_chain(visit):
     page = visit()
     scene(page, "scene.view.half *= 40, scene.changed()")  # as small as disks are in a crowd
     _, x, y = chain(page)
-    before = scene(page, "scene.view.x")
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 30, y)
-    page.mouse.up()
-    assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
+    moves_the_view(page, x, y)
 
 
 def test_a_finger_pulls_the_selected_contact(visit):
