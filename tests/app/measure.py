@@ -22,9 +22,12 @@ from playwright.sync_api import sync_playwright  # noqa: E402
 from serving import CHROMIUM, CLOSED, FLAGS, MODEL, painted, scene, serve  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
-# A place in the packing where a drag moves the view.
+# A place in the packing where a drag moves the view, and pulls nothing.
 FREE = """[...Array(400).keys()].map((k) => [150 + 5 * (k % 20), 150 + 5 * Math.floor(k / 20)])
-    .find(([x, y]) => scene.scale < 6 || scene.linkAt(x, y) < 0)"""
+    .find(([x, y]) => {
+        const box = scene.root.getBoundingClientRect()
+        return scene.takenAt({ clientX: box.x + x, clientY: box.y + y }, false) === null
+    })"""
 
 
 class Stage:
@@ -118,7 +121,7 @@ def _play(stage, query, words):
     sent = (page.bytes - before) / frames
     print(f"{words}: playing: {rate:.1f} painted frames a second, {sent:.0f} bytes a frame")
     box = page.locator(".scene").bounding_box()
-    free = scene(page, FREE)  # of chains, which would be pulled
+    free = scene(page, FREE)
     x, y = box["x"] + free[0], box["y"] + free[1]
     page.mouse.move(x, y)
     page.mouse.down()
