@@ -91,7 +91,7 @@ def _least(ensemble, places, forces, workers, progress):
     """Certified lower bounds (k,) of f_n, in ⟨f_n⟩, and counts."""
     seen = forces[:, 0] / ensemble.force_scale
 
-    def note(y):
+    def note(key, y):
         np.minimum(seen, y[: 2 * len(seen)].reshape(-1, 2).mean(axis=1), out=seen)
 
     solver = Solver(make_system(ensemble), workers=workers, seen=note)

@@ -105,7 +105,13 @@ def intervals(
     report = _counting(progress, total)
     found = _watched(ensemble, watch)
     system, options = make_system(ensemble), {"workers": workers, "report": report, "found": found}
-    solver, of_lower = Solver(system, seen=known.add, **options), Solver(system, **options)
+
+    def seen(key, y):
+        # What lower bounds attain counts as seen nowhere: the others alone tell which are needed.
+        if key[1:] != (0, 0):
+            known.add(y)
+
+    solver = Solver(system, seen=seen, **options)
     pinned = _pinned(ensemble, upper + tangential + lower)
     report(len(pinned))
     if ensemble.known is not None and ensemble.dimension == 0:
@@ -119,22 +125,20 @@ def intervals(
         """Whether f_n = 0 was seen there."""
         return skip and key not in pinned and known.least[key[0]] <= INTERVAL_GAP
 
-    def solve(solver, keys):
+    def solve(keys):
         keys = [key for key in keys if key not in pinned]
         return solver.solve(keys, [bound_of(ensemble, *key) for key in keys])
 
-    bounds = pinned | solve(solver, upper)
-    # Lower bounds come early for those who watch. What they attain counts as seen nowhere, and what
-    # is seen afterwards replaces them: the result is as if they had come last, for a program or two
-    # in a hundred more.
-    bounds |= solve(of_lower, [key for key in lower if not zero(key)])
-    bounds |= solve(solver, tangential)
-    seen = [key for key in lower if zero(key)]
-    for key in seen:
+    bounds = pinned | solve(upper)
+    # Lower bounds come early for those who watch. What is seen afterwards replaces them: the result
+    # is as if they had come last, for a program or two in a hundred more.
+    bounds |= solve([key for key in lower if not zero(key)] + tangential)
+    seen_zero = [key for key in lower if zero(key)]
+    for key in seen_zero:
         bounds[key] = (max(0.0, float(known.least[key[0]])), 0.0)
         found(key, *bounds[key])
-    counts = {name: solver.counts[name] + of_lower.counts[name] for name in solver.counts} | {
-        "f_n = 0 seen in a known state": len(seen),
+    counts = solver.counts | {
+        "f_n = 0 seen in a known state": len(seen_zero),
         "frictionless contact": 2 * len(places) if frictionless else 0,
     }
     if ensemble.known is not None:

@@ -23,6 +23,9 @@ from granforce.records import Cancelled
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
+# Gap at which a program is left when it has to be carried again.
+_CLOSER_GAP = 0.05 * linear_programs.LEAVE_GAP
+
 
 class System(NamedTuple):
     """A y = b in cone coordinates and units of ⟨f_n⟩, and what bounds y."""
@@ -83,7 +86,7 @@ class Solver:
     """Solves and certifies programs over one System; keeps count of what it did."""
 
     def __init__(self, system, *, workers=1, seen=None, report=None, found=None):
-        """seen(y): called with each y (n,) of S without load at which a value is attained.
+        """seen(key, y): called with each y (n,) of S without load at which a value is attained.
 
         report(count): called as so many programs end. found(key, attained, bound): called as each
         of them does. All come from one thread at a time.
@@ -106,43 +109,51 @@ class Solver:
         return bounds
 
     def _solve(self, keys, tasks, bounds, points):
+        self._carry(keys, tasks, range(len(keys)), linear_programs.LEAVE_GAP, bounds, points)
+        # Of thousands of contacts, rounding may leave the bound of one short: once more, closer.
+        self._carry(keys, tasks, self._open(keys, bounds), _CLOSER_GAP, bounds, points)
+        for number in self._open(keys, bounds):
+            cancelling.check()
+            outcome = from_scratch(self.system, number, tasks[number])
+            self.counts["again"] += 1
+            self._take([outcome], keys, tasks, bounds, points)
+
+    def _carry(self, keys, tasks, numbers, gap, bounds, points):
+        """Take what the interior-point method makes of the tasks of these numbers."""
+        problem, middle = self.system.problem, self.system.middle
+        if not middle.reached or not len(numbers):
+            return
 
         def finished(outcomes):
-            attained, bound = certify(self.system, outcomes, tasks)
-            with self.lock:
-                for k, outcome in enumerate(outcomes):
-                    key = keys[outcome.number]
-                    bounds[key] = (attained[k], bound[k])
-                    self.found(key, attained[k], bound[k])
-                    if points is not None:
-                        points[key] = outcome.y
-                    self.counts["iterations"] += outcome.steps
-                    if self.seen and outcome.loaded < 0 and np.isfinite(attained[k]):
-                        self.seen(outcome.y)
-                self.counts["programs"] += len(outcomes)
-                self.report(len(outcomes))
+            self._take(outcomes, keys, tasks, bounds, points)
 
-        problem, middle = self.system.problem, self.system.middle
-        if middle.reached and len(tasks):
-            linear_programs.run(problem, middle, tasks, workers=self.workers, finished=finished)
-        for number, key in enumerate(keys):
-            cancelling.check()
-            attained, bound = bounds.get(key, (np.inf, -np.inf))
-            if not attained - bound <= INTERVAL_GAP:
+        linear_programs.run(
+            problem, middle, tasks, numbers, gap=gap, workers=self.workers, finished=finished
+        )
+
+    def _open(self, keys, bounds):
+        """Numbers of the keys without a value and bound as close as they are to be."""
+        none = np.inf, -np.inf
+        value_and_bound = [bounds.get(key, none) for key in keys]
+        return [k for k, (a, b) in enumerate(value_and_bound) if not a - b <= INTERVAL_GAP]
+
+    def _take(self, outcomes, keys, tasks, bounds, points):
+        """Certify outcomes; of a key's outcomes keep the better value and the better bound."""
+        attained, bound = certify(self.system, outcomes, tasks)
+        with self.lock:
+            for k, outcome in enumerate(outcomes):
+                key = keys[outcome.number]
                 if key not in bounds:
                     self.counts["programs"] += 1
                     self.report(1)
-                bounds[key] = self._again(key, number, tasks, attained, bound, points)
+                before = bounds.get(key, (np.inf, -np.inf))
+                bounds[key] = min(before[0], attained[k]), max(before[1], bound[k])
                 self.found(key, *bounds[key])
-
-    def _again(self, key, number, tasks, attained, bound, points):
-        """Solve one program from scratch by HiGHS; keep the better of either side."""
-        outcome = from_scratch(self.system, number, tasks[number])
-        again = certify(self.system, [outcome], tasks)
-        self.counts["again"] += 1
-        if points is not None and again[0][0] < attained:
-            points[key] = outcome.y
-        return min(attained, again[0][0]), max(bound, again[1][0])
+                if points is not None and (key not in points or attained[k] < before[0]):
+                    points[key] = outcome.y
+                self.counts["iterations"] += outcome.steps
+                if self.seen and outcome.loaded < 0 and np.isfinite(attained[k]):
+                    self.seen(key, outcome.y)
 
 
 def certify(system, outcomes, tasks):

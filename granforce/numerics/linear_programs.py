@@ -11,7 +11,7 @@ import numpy as np
 
 from granforce.numerics import contact_program
 from granforce.numerics.contact_program import BALANCE, CENTRE, OPTIMUM
-from granforce.numerics.lanes import LANES, MANY, ONE
+from granforce.numerics.lanes import MANY, ONE
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
@@ -21,11 +21,13 @@ _CENTRING = 1.5
 # A program leaves its lane at this gap and unbalance, in ⟨f_n⟩; a Newton step or two on the
 # balance afterwards bring the unbalance to rounding error. Further steps towards the optimum would
 # make it worse, where many forces have bounds of their own.
-_LEAVE_GAP = 0.5 * INTERVAL_GAP
+LEAVE_GAP = 0.5 * INTERVAL_GAP
 _LEAVE_UNBALANCE = 1e-5
 # A gap so far below that does not improve the balance any more (large μ, degenerate vertices).
 _HOPELESS = 1e-3
 _MOST_STEPS = 60
+# So few programs are faster one after the other than beside idle lanes.
+_FEW = 2
 _MOST_BALANCING = 4
 
 
@@ -76,59 +78,61 @@ def centre(problem):
     return Centre(at.y[:-1, 0], at.z[:-1, 0], at.v[:, 0], at.v_border[:, 0], reached)
 
 
-def run(problem, middle, programs, *, workers=1, finished):
-    """Carry programs from the centre to their optimum on ``workers`` threads.
+def run(problem, middle, programs, numbers, *, gap=LEAVE_GAP, workers=1, finished):
+    """Carry the programs of these numbers from the centre to a gap, on ``workers`` threads.
 
     finished(list of Outcome) is called from the threads, at most LANES outcomes at a time.
     Cancelling is asked for before every step. An outcome does not depend on the number of threads,
     bit for bit.
     """
-    waiting = deque(enumerate(programs))
+    given = problem, middle, programs, deque(numbers), gap, finished
     if workers == 1:
-        _work(problem, middle, programs, waiting, finished)
+        _work(*given)
         return
     with cancelling.threads(workers) as pool:
-        tasks = [
-            pool.submit(_work, problem, middle, programs, waiting, finished) for _ in range(workers)
-        ]
-        for task in tasks:
+        for task in [pool.submit(_work, *given) for _ in range(workers)]:
             task.result()
 
 
-def _work(problem, middle, programs, waiting, finished):
+def _work(problem, middle, programs, waiting, least, finished):
     """One thread: fill lanes from the queue, step, hand over what has arrived."""
-    at = contact_program.make_iterate(problem, LANES)
-    work = contact_program.make_workspace(problem, LANES)
-    steps = np.zeros(LANES, dtype=np.int64)
-    number = np.array([_fill(middle, at, lane, waiting) for lane in range(LANES)])
+    if not waiting:
+        return
+    lanes = MANY if len(waiting) > _FEW else ONE
+    width = len(lanes)
+    at = contact_program.make_iterate(problem, width)
+    work = contact_program.make_workspace(problem, width)
+    steps = np.zeros(width, dtype=np.int64)
+    number = np.array([_fill(middle, at, lane, programs, waiting) for lane in range(width)])
     arrived = []
     while True:
         cancelling.check()
-        contact_program.look(problem, True, at, work, MANY)
+        contact_program.look(problem, True, at, work, lanes)
         gap, unbalance = work.product[0], work.unbalance[0]
-        there = (gap <= _LEAVE_GAP) & (unbalance <= _LEAVE_UNBALANCE)
-        there |= (gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
+        there = (gap <= least) & (unbalance <= _LEAVE_UNBALANCE)
+        there |= (gap <= _HOPELESS * least) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
         left = np.flatnonzero(there & (number >= 0))
         for lane in left:
             loaded = programs[number[lane]].loaded
             arrived.append(_outcome(problem, at, lane, number[lane], loaded, steps[lane]))
-            number[lane] = _fill(middle, at, lane, waiting)
+            number[lane] = _fill(middle, at, lane, programs, waiting)
             steps[lane] = 0
-        while len(arrived) >= LANES or (arrived and not np.any(number >= 0)):
-            finished(balanced(problem, middle, arrived[:LANES], work))
-            arrived = arrived[LANES:]
+        while len(arrived) >= width or (arrived and not np.any(number >= 0)):
+            finished(balanced(problem, middle, arrived[:width], work, lanes))
+            arrived = arrived[width:]
         if not np.any(number >= 0):
             return
         if len(left):
-            contact_program.look(problem, True, at, work, MANY)
-        contact_program.advance(problem, True, OPTIMUM, at, work, MANY)
+            contact_program.look(problem, True, at, work, lanes)
+        contact_program.advance(problem, True, OPTIMUM, at, work, lanes)
         steps += 1
 
 
-def _fill(middle, at, lane, waiting):
+def _fill(middle, at, lane, programs, waiting):
     """Start the next program in a lane; its number, or −1 where none is waiting."""
     try:
-        number, program = waiting.popleft()
+        number = waiting.popleft()
+        program = programs[number]
     except IndexError:
         number, program = -1, Program([0], [1.0], -1)
     cost = np.zeros(len(middle.y) + 1)
@@ -170,27 +174,27 @@ def multipliers(problem, A, cost, balance, z):
     return np.concatenate([known, reaction[pinned]])
 
 
-def balanced(problem, middle, outcomes, work=None):
-    """Up to LANES outcomes moved into S, if they are close to it.
+def balanced(problem, middle, outcomes, work=None, lanes=ONE):
+    """As many outcomes as lanes, or fewer, moved into S, if they are close to it.
 
     First A y + a F = b is restored; what this drove below zero is then undone by mixing in as
     little as it takes of the centre, which is balanced and positive.
     """
-    work = work or contact_program.make_workspace(problem, LANES)
-    at = contact_program.make_iterate(problem, LANES)
+    work = work or contact_program.make_workspace(problem, len(lanes))
+    at = contact_program.make_iterate(problem, len(lanes))
     for lane, outcome in enumerate(outcomes):
         at.y[:-1, lane] = outcome.y
         at.loaded[lane] = outcome.loaded
         if outcome.loaded >= 0:
             at.y[-1, lane] = outcome.load
     for _ in range(_MOST_BALANCING):
-        contact_program.look(problem, True, at, work, MANY)
+        contact_program.look(problem, True, at, work, lanes)
         done = work.unbalance[0] <= 0.1 * BALANCED
         if done[: len(outcomes)].all():
             break
         # Those are put back, so that no outcome depends on the company it came in.
         kept = at.y[:, done].copy()
-        contact_program.advance(problem, True, BALANCE, at, work, MANY)
+        contact_program.advance(problem, True, BALANCE, at, work, lanes)
         at.y[:, done] = kept
     y, load = at.y[:-1], at.y[-1]
     if middle.reached:

@@ -11,7 +11,7 @@ from granforce.explore import intervals as module
 from granforce.explore.intervals import intervals, limit_load_bounds, limit_loads
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import ensemble
-from granforce.numerics import certified_values
+from granforce.numerics import certified_values, linear_programs
 from granforce.numerics import highs as programs
 from granforce.records import InputError, make_contacts, make_packing
 from granforce.tolerances import INTERVAL_GAP
@@ -135,6 +135,15 @@ def test_bounds_are_told_as_they_are_found_the_widest_first_and_stay_the_same(fi
     )
     early = [k for k in normal if k < np.median(tangential)]
     assert len(early) > 2 * len(place) - 1.5 * again.counts["f_n = 0 seen in a known state"]
+
+
+def test_what_was_left_too_early_is_carried_on_without_another_solver(first, monkeypatch):
+    system, found = first
+    monkeypatch.setattr(linear_programs, "LEAVE_GAP", 1e-4)
+    again = intervals(system)
+    assert again.converged and again.counts["again"] == 0
+    assert again.counts["iterations"] > 1.5 * found.counts["iterations"]
+    agree(system, again, found.lower, found.upper, 2 * INTERVAL_GAP)
 
 
 def test_certificates_see_a_wrong_optimum(first):
