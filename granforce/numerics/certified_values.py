@@ -23,9 +23,6 @@ from granforce.records import Cancelled
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
-# Gap at which a program is left when it has to be carried again.
-_CLOSER_GAP = 0.05 * linear_programs.LEAVE_GAP
-
 
 class System(NamedTuple):
     """A y = b in cone coordinates and units of ⟨f_n⟩, and what bounds y."""
@@ -109,16 +106,16 @@ class Solver:
         return bounds
 
     def _solve(self, keys, tasks, bounds, points):
-        self._carry(keys, tasks, range(len(keys)), linear_programs.LEAVE_GAP, bounds, points)
-        # Of thousands of contacts, rounding may leave the bound of one short: once more, closer.
-        self._carry(keys, tasks, self._open(keys, bounds), _CLOSER_GAP, bounds, points)
+        self._carry(keys, tasks, range(len(keys)), False, bounds, points)
+        # Of thousands of contacts, rounding may leave the bound of one or two short.
+        self._carry(keys, tasks, self._open(keys, bounds), True, bounds, points)
         for number in self._open(keys, bounds):
             cancelling.check()
             outcome = from_scratch(self.system, number, tasks[number])
             self.counts["again"] += 1
             self._take([outcome], keys, tasks, bounds, points)
 
-    def _carry(self, keys, tasks, numbers, gap, bounds, points):
+    def _carry(self, keys, tasks, numbers, refined, bounds, points):
         """Take what the interior-point method makes of the tasks of these numbers."""
         problem, middle = self.system.problem, self.system.middle
         if not middle.reached or not len(numbers):
@@ -127,9 +124,8 @@ class Solver:
         def finished(outcomes):
             self._take(outcomes, keys, tasks, bounds, points)
 
-        linear_programs.run(
-            problem, middle, tasks, numbers, gap=gap, workers=self.workers, finished=finished
-        )
+        options = {"refined": refined, "workers": self.workers, "finished": finished}
+        linear_programs.run(problem, middle, tasks, numbers, **options)
 
     def _open(self, keys, bounds):
         """Numbers of the keys without a value and bound as close as they are to be."""

@@ -47,14 +47,17 @@ from granforce.system import cancelling
 _INSIDE, _CENTRING = 0.9995, 0.95
 # A row whose pivot, relative to its diagonal, is below this follows from those eliminated before.
 _DEPENDENT = 1e-11
+# How often a step is solved again for what rounding left.
+_REFINEMENTS = 3
 # What d − E f − s may be off by rounding, for forces of order 1.
 _ROUNDING = 1e-13
 # Weight of y that are zero when the balance is restored (1: those of size ⟨f_n⟩).
 _LIGHT = 1e-10
 
-# What `advance` does: a step towards the optimum, towards y z = 1, to A T y + a F = b alone, or one
-# of Newton's method on v alone, after `project`.
-OPTIMUM, CENTRE, BALANCE, PROJECTED = range(4)
+# What `advance` does: a step towards the optimum, towards y z = 1, to A T y + a F = b alone, one of
+# Newton's method on v alone, after `project`, or one towards the optimum that is solved twice: the
+# second time for what rounding left of A T δy + a δF.
+OPTIMUM, CENTRE, BALANCE, PROJECTED, REFINED = range(5)
 
 # Stiffness of a component that stays where it is: its conductance is below any pivot.
 PINNED = 1e60
@@ -342,24 +345,30 @@ def _worst(values, worst, lanes):
 @within
 def _unbalance(problem, at, work, lanes):
     """r ← b − A T y − a F, rest ← d − E f − s."""
-    half, n, last = same(lanes, 0.5), len(problem.w), len(at.y) - 1
-    zero, one = same(lanes, 0.0), same(lanes, 1.0)
+    n, zero, one = len(problem.w), same(lanes, 0.0), same(lanes, 1.0)
     for k in range(len(problem.b)):
         store(work.r, k, lanes, same(lanes, problem.b[k]))
     for k in range(len(problem.b_border)):
         store(work.r_border, k, lanes, same(lanes, problem.b_border[k]))
-    for k in range(0, n, 2):
-        y0, y1 = load(at.y, k, lanes), load(at.y, k + 1, lanes)
-        normal, tangential = half * (y0 + y1), half * (y0 - y1)
-        push(problem.network, k // 2, -normal, -tangential, work.r, work.r_border, lanes)
-    for lane in range(len(at.loaded)):
-        _push_one(problem.network, -at.y[last, lane], work.r, work.r_border, at.loaded[lane], lane)
+    _less_pushed(problem, at, at.y, work, lanes)
     for a in range(len(problem.side)):
         limit = same(lanes, problem.limit[a])
         rest = limit - load(at.y, n + a, lanes) - _beside(problem, a, at.y, lanes)
         # Rounding of f is none of s, which may be much smaller.
         least = same(lanes, _ROUNDING) * (one + size(limit))
         store(work.rest, a, lanes, pick(size(rest), least, rest, zero))
+
+
+@within
+def _less_pushed(problem, at, y, work, lanes):
+    """r ← r − A T y − a F."""
+    half, last = same(lanes, 0.5), len(y) - 1
+    for k in range(0, len(problem.w), 2):
+        y0, y1 = load(y, k, lanes), load(y, k + 1, lanes)
+        normal, tangential = -half * (y0 + y1), -half * (y0 - y1)
+        push(problem.network, k // 2, normal, tangential, work.r, work.r_border, lanes)
+    for lane in range(len(at.loaded)):
+        _push_one(problem.network, -y[last, lane], work.r, work.r_border, at.loaded[lane], lane)
 
 
 @within
@@ -499,6 +508,27 @@ def _towards(problem, mode, at, work, lanes):
 
 
 @within
+def _refine(problem, at, work, lanes):
+    """δy, δv ← with the steps added that take off what is left of the unbalance.
+
+    Near a vertex y/z are so far apart that a step alone may leave more than it takes off.
+    """
+    dy, dv, dv_border = work.dy.copy(), work.dv.copy(), work.dv_border.copy()
+    one = same(lanes, 1.0)
+    work.h[:] = 0.0
+    work.rest[:] = 0.0
+    for _ in range(_REFINEMENTS):
+        _less_pushed(problem, at, work.dy, work, lanes)
+        _towards(problem, REFINED, at, work, lanes)
+        _move(dy, work.dy, one, len(dy), lanes)
+        _move(dv, work.dv, one, len(dv), lanes)
+        _move(dv_border, work.dv_border, one, len(dv_border), lanes)
+    _set(work.dy, dy, lanes)
+    _set(work.dv, dv, lanes)
+    _set(work.dv_border, dv_border, lanes)
+
+
+@within
 def _step_beside(problem, a, mode, at, work, lanes):
     """E δf of side a, to its own relative precision: δy, as a difference, would lose it."""
     quarter = same(lanes, 0.25)
@@ -572,6 +602,12 @@ def _measure(pairs, inside, at, work, lanes):
 
 
 @within
+def _set(values, given, lanes):
+    for k in range(len(values)):
+        store(values, k, lanes, load(given, k, lanes))
+
+
+@within
 def _move(values, step, length, count, lanes):
     for k in range(count):
         store(values, k, lanes, fma(length, load(step, k, lanes), load(values, k, lanes)))
@@ -589,14 +625,17 @@ def advance(problem, loads, mode, at, work, lanes):
         work.target[:] = 1.0
         _aim(problem, pairs, at, work, lanes)
     _factor(problem, mode, at, work, lanes)
-    for attempt in range(2 if mode == OPTIMUM else 1):
+    optimum = mode == OPTIMUM or mode == REFINED
+    for attempt in range(2 if optimum else 1):
         if attempt == 1:
             _predict(pairs, at, work, lanes)
             _aim(problem, pairs, at, work, lanes)
         _towards(problem, mode, at, work, lanes)
+    if mode == REFINED:
+        _refine(problem, at, work, lanes)
     primal = dual = load(work.going, 0, lanes)
-    if mode == OPTIMUM or mode == CENTRE:
-        _measure(pairs, _INSIDE if mode == OPTIMUM else _CENTRING, at, work, lanes)
+    if optimum or mode == CENTRE:
+        _measure(pairs, _INSIDE if optimum else _CENTRING, at, work, lanes)
         primal, dual = load(work.primal, 0, lanes), load(work.dual, 0, lanes)
         _move(at.z, work.turn, dual, pairs, lanes)
     if mode != PROJECTED:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.numerics import contact_program
-from granforce.numerics.contact_program import BALANCE, CENTRE, OPTIMUM
+from granforce.numerics.contact_program import BALANCE, CENTRE, OPTIMUM, REFINED
 from granforce.numerics.lanes import MANY, ONE
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
@@ -21,7 +21,7 @@ _CENTRING = 1.5
 # A program leaves its lane at this gap and unbalance, in ⟨f_n⟩; a Newton step or two on the
 # balance afterwards bring the unbalance to rounding error. Further steps towards the optimum would
 # make it worse, where many forces have bounds of their own.
-LEAVE_GAP = 0.5 * INTERVAL_GAP
+_LEAVE_GAP = 0.5 * INTERVAL_GAP
 _LEAVE_UNBALANCE = 1e-5
 # A gap so far below that does not improve the balance any more (large μ, degenerate vertices).
 _HOPELESS = 1e-3
@@ -78,14 +78,16 @@ def centre(problem):
     return Centre(at.y[:-1, 0], at.z[:-1, 0], at.v[:, 0], at.v_border[:, 0], reached)
 
 
-def run(problem, middle, programs, numbers, *, gap=LEAVE_GAP, workers=1, finished):
-    """Carry the programs of these numbers from the centre to a gap, on ``workers`` threads.
+def run(problem, middle, programs, numbers, *, refined=False, workers=1, finished):
+    """Carry the programs of these numbers from the centre to their optimum on ``workers`` threads.
 
+    refined: each step is solved again and again until rounding leaves nothing of the unbalance.
     finished(list of Outcome) is called from the threads, at most LANES outcomes at a time.
     Cancelling is asked for before every step. An outcome does not depend on the number of threads,
     bit for bit.
     """
-    given = problem, middle, programs, deque(numbers), gap, finished
+    mode = REFINED if refined else OPTIMUM
+    given = problem, middle, programs, deque(numbers), mode, finished
     if workers == 1:
         _work(*given)
         return
@@ -94,7 +96,7 @@ def run(problem, middle, programs, numbers, *, gap=LEAVE_GAP, workers=1, finishe
             task.result()
 
 
-def _work(problem, middle, programs, waiting, least, finished):
+def _work(problem, middle, programs, waiting, mode, finished):
     """One thread: fill lanes from the queue, step, hand over what has arrived."""
     if not waiting:
         return
@@ -109,8 +111,8 @@ def _work(problem, middle, programs, waiting, least, finished):
         cancelling.check()
         contact_program.look(problem, True, at, work, lanes)
         gap, unbalance = work.product[0], work.unbalance[0]
-        there = (gap <= least) & (unbalance <= _LEAVE_UNBALANCE)
-        there |= (gap <= _HOPELESS * least) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
+        there = (gap <= _LEAVE_GAP) & (unbalance <= _LEAVE_UNBALANCE)
+        there |= (gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
         left = np.flatnonzero(there & (number >= 0))
         for lane in left:
             loaded = programs[number[lane]].loaded
@@ -124,7 +126,7 @@ def _work(problem, middle, programs, waiting, least, finished):
             return
         if len(left):
             contact_program.look(problem, True, at, work, lanes)
-        contact_program.advance(problem, True, OPTIMUM, at, work, lanes)
+        contact_program.advance(problem, True, mode, at, work, lanes)
         steps += 1
 
 

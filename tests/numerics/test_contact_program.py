@@ -1,0 +1,43 @@
+"""Steps of the interior-point method near a vertex of S."""
+
+from collections import deque
+
+import pytest
+from packings import packed
+
+from granforce.explore.intervals import bound_of
+from granforce.forces.contact_problem import independent_problem_of
+from granforce.forces.ensemble import ensemble
+from granforce.numerics import contact_program, linear_programs
+from granforce.numerics.contact_program import OPTIMUM, REFINED
+from granforce.numerics.lanes import MANY, ONE
+from granforce.tolerances import BALANCED
+
+
+def unbalances(S, mode, lanes=ONE):
+    """What one bound is out of balance by, step after step, until its gap is 1e-9."""
+    problem = independent_problem_of(S)
+    middle = linear_programs.centre(problem)
+    at = contact_program.make_iterate(problem, len(lanes))
+    work = contact_program.make_workspace(problem, len(lanes))
+    for lane in range(len(lanes)):
+        programs = [bound_of(S, (7 + lane) % len(S.index), 0, 1)]
+        linear_programs._fill(middle, at, lane, programs, deque([0]))
+    found = []
+    for _ in range(40):
+        contact_program.look(problem, True, at, work, lanes)
+        found.append((work.product[0, 0], work.unbalance[0, 0]))
+        if found[-1][0] < 1e-9:
+            return found
+        contact_program.advance(problem, True, mode, at, work, lanes)
+    raise AssertionError("no optimum after 40 steps")
+
+
+@pytest.mark.parametrize("mu", [0.01, 0.3])
+def test_refined_steps_leave_less_unbalance_on_the_same_way(mu):
+    S = ensemble(packed(100, mu))
+    plain, refined = unbalances(S, OPTIMUM), unbalances(S, REFINED)
+    assert abs(len(plain) - len(refined)) <= 1
+    assert max(off for gap, off in refined if gap > 1e-7) < 0.1 * BALANCED
+    assert sum(off for _, off in refined) < 0.1 * sum(off for _, off in plain)
+    assert unbalances(S, REFINED, MANY) == refined
