@@ -15,7 +15,6 @@ F_crit ≤ limit load. They are not equal: sliding contacts do not dilate (the l
 associated), so grains can set off although an equilibrium exists.
 """
 
-import time
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +51,7 @@ class CriticalForce(NamedTuple):
     moving: exact_step.Outcome | None  # the end under `high`; None where that was not tried
     converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
     counts: dict  # COUNTS
-    seconds: float
+    seconds: float  # of following flows, shared among those side by side
 
 
 class Response(NamedTuple):
@@ -72,45 +71,74 @@ class Response(NamedTuple):
     converged: bool  # breach ≤ STEADY
 
 
+class Protocol(NamedTuple):
+    """How loads are raised on a contact."""
+
+    precision: float = 0.01  # of the bracket, ⟨f_n⟩
+    rise: float = RISE  # part of the way from the last load at rest to the limit load
+    max_steps: int = MOST_STEPS  # of the flow per load
+
+
 @cancelling.cancellable
-def critical_force(
-    packing,
-    contact,
-    *,
-    mu=None,
-    limit_load=None,
-    precision=0.01,
-    rise=RISE,
-    max_steps=MOST_STEPS,
-    cancel=None,
-):
+def critical_force(packing, contact, *, mu=None, limit_load=None, cancel=None, **protocol):
     """F_crit of one contact (its number in the packing) with its bracket.
 
     packing: a Packing, or its Ensemble. mu: friction coefficient, by default the packing's.
-    limit_load: force, computed if not given. precision: of the bracket, ⟨f_n⟩. rise: part of the
-    way from the last load at rest to the limit load that the next load goes. max_steps: of the flow
-    per load. cancel() returning True raises Cancelled.
+    limit_load: force, computed if not given. protocol: fields of Protocol. cancel() returning True
+    raises Cancelled.
 
     Raises InputError for a contact that carries nothing in any state of S.
     """
-    begin = time.perf_counter()
-    precision = positive(precision, "precision")
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
-    (position,) = S.positions([contact])
-    if limit_load is None:
-        limit_load = limit_load_bounds(S, [contact]).load[0]
-    limit = float(limit_load) / S.force_scale
-    step = exact_step.make_step(S)
-    forces, low, high = starting_network(S) / S.force_scale, 0.0, limit
-    counts = dict.fromkeys(COUNTS, 0)
+    loads = None if limit_load is None else [limit_load]
+    (found,) = critical_forces(S, [contact], limit_loads=loads, **protocol)
+    return found
+
+
+@cancelling.cancellable
+def critical_forces(
+    ensemble, contacts, *, limit_loads=None, workers=1, finished=None, cancel=None, **protocol
+):
+    """F_crit of contacts (numbers in the packing), several side by side: a list of CriticalForce.
+
+    limit_loads (k,): force, computed if not given. workers: threads; no result depends on their
+    number, nor on the other contacts. finished(k, CriticalForce) is called from the threads as each
+    ends. Other options and errors as for `critical_force`.
+    """
+    S, protocol = ensemble, Protocol(**protocol)
+    protocol = protocol._replace(precision=positive(protocol.precision, "precision"))
+    positions = S.positions(contacts)
+    if limit_loads is None:
+        limit_loads = limit_load_bounds(S, contacts, workers=workers).load
+    step, start = exact_step.make_step(S), starting_network(S) / S.force_scale
+    works = [
+        _raised(S, step, int(contact), position, float(limit) / S.force_scale, start, protocol)
+        for contact, position, limit in zip(contacts, positions, limit_loads, strict=True)
+    ]
+    found = {}
+
+    def ended(k, critical):
+        found[k] = critical
+        if finished is not None:
+            finished(k, critical)
+
+    exact_step.follow(step, works, ended, workers)
+    return [found[k] for k in range(len(works))]
+
+
+def _raised(S, step, contact, position, limit, start, protocol):
+    """Work for `exact_step.follow`: the CriticalForce of a contact."""
+    counts = dict.fromkeys((*COUNTS, "seconds"), 0)
+    forces, low, high = start, 0.0, limit
     while True:
-        low, high, forces, moving = _bracket(
-            step, position, low, high, forces, precision, rise, max_steps, counts
+        low, high, forces, moving = yield from _bracket(
+            position, low, high, forces, protocol, counts
         )
         if moving is None or moving.breach <= STEADY:
             break
         # What was taken for motion is followed on: it may come to rest after all.
-        followed = _relax(step, moving.forces, position, high, counts, STEADY_STEPS, STEADY)
+        asked = exact_step.Push(moving.forces, position, high, STEADY_STEPS, STEADY)
+        followed = yield from _relaxed(asked, counts)
         if not followed.at_rest:
             moving = followed
             break
@@ -118,7 +146,7 @@ def critical_force(
     loaded = forces.copy()
     loaded[position, 0] += low
     return CriticalForce(
-        int(contact),
+        contact,
         low * S.force_scale,
         high * S.force_scale,
         limit * S.force_scale,
@@ -128,21 +156,21 @@ def critical_force(
         moving,
         bool(moving is None or moving.converged),
         counts,
-        time.perf_counter() - begin,
+        counts.pop("seconds"),
     )
 
 
-def _bracket(step, position, low, high, forces, precision, rise, max_steps, counts):
+def _bracket(position, low, high, forces, protocol, counts):
     """Loads raised from `low` until rest and motion are `precision` apart, or rest reaches `high`.
 
     Returns the bracket, the last equilibrium and the motion above it, None where there was none.
     """
-    moving = None
+    moving, precision = None, protocol.precision
     while high - low > precision:
-        cancelling.check("critical force")
-        load = low + (rise if moving is None else 0.5) * (high - low)
+        load = low + (protocol.rise if moving is None else 0.5) * (high - low)
         load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
-        outcome = _relax(step, forces, position, load, counts, max_steps)
+        asked = exact_step.Push(forces, position, load, protocol.max_steps, exact_step.STEADY)
+        outcome = yield from _relaxed(asked, counts)
         if outcome.at_rest:
             low, forces = load, outcome.forces
         else:
@@ -150,10 +178,12 @@ def _bracket(step, position, low, high, forces, precision, rise, max_steps, coun
     return low, high, forces, moving
 
 
-def _relax(step, forces, position, load, counts, max_steps, steady=exact_step.STEADY):
-    outcome = exact_step.relax(step, forces, position, load, steady=steady, max_steps=max_steps)
+def _relaxed(asked, counts):
+    """The outcome of what is asked, counted."""
+    outcome = yield asked
     counts["flow_steps"] += outcome.steps
     counts["linear_systems"] += outcome.iterations
+    counts["seconds"] += outcome.seconds
     if outcome.at_rest:
         counts["loads_at_rest"] += 1
     else:
@@ -185,7 +215,7 @@ def response(packing, contact, force=None, *, mu=None, critical=None, precision=
     if moving is None:
         start = critical.forces / scale
         moving = exact_step.relax(
-            step, start, position, load, steady=STEADY, max_steps=STEADY_STEPS
+            step, exact_step.Push(start, position, load, STEADY_STEPS, STEADY)
         )
     if moving.at_rest:
         raise InputError(

@@ -20,8 +20,14 @@ integrated implicitly for a whole network at a time, with steps of any length τ
 
 each by Newton's method on the states of the contacts (sticking, sliding either way, open). That is
 independent of any order of the contacts, and ends at rounding error.
+
+LANES of flows go side by side (see `lanes`), each with its own network, load, pace and Newton step;
+none changes a bit of another.
 """
 
+import threading
+import time
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -29,8 +35,19 @@ import numpy as np
 from granforce.forces.contact_problem import balance_of
 from granforce.forces.gauss_seidel import BOX_MASS
 from granforce.numerics import contact_matrix
-from granforce.numerics.contact_matrix import Network
-from granforce.numerics.lanes import ONE, compiled, within
+from granforce.numerics.contact_matrix import Factors, Network
+from granforce.numerics.lanes import (
+    MANY,
+    ONE,
+    compiled,
+    larger,
+    load,
+    pick,
+    same,
+    size,
+    store,
+    within,
+)
 from granforce.records import InputError
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
@@ -47,7 +64,12 @@ ROUNDING = 1e-14
 # Steady motion: what contacts still breach Coulomb's law by, relative to the fastest contact.
 STEADY = 1e-7
 
+# So few flows are faster one after the other than beside idle lanes.
+_FEW = 2
+
 OPEN, STICKING, SLIDING = range(3)  # and −SLIDING, where f_t = −μ f_n
+# How a Newton step ended: no equation is left, the unbalance fell, or neither.
+SOLVED, FELL, FAILED = range(3)
 
 
 class Step(NamedTuple):
@@ -57,8 +79,8 @@ class Step(NamedTuple):
     """
 
     network: Network
-    b: np.ndarray  # (rows, 1)
-    b_border: np.ndarray  # (m, 1)
+    b: np.ndarray  # (rows,)
+    b_border: np.ndarray  # (m,)
     mass: np.ndarray  # (rows,) M
     mass_border: np.ndarray  # (m,)
     stiffness: np.ndarray  # (N_c, 2) D: effective masses of the contacts
@@ -67,12 +89,52 @@ class Step(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Velocities U, and the unbalance A f − b − M U."""
+    """Rows of W flows: velocities, or what is out of balance."""
 
-    velocity: np.ndarray  # (rows, 1)
-    border: np.ndarray  # (m, 1)
-    unbalance: np.ndarray  # (rows, 1)
-    unbalance_border: np.ndarray  # (m, 1)
+    rows: np.ndarray  # (rows, W)
+    border: np.ndarray  # (m, W)
+
+
+class Flows(NamedTuple):
+    """Where W flows stand, and what a Newton step needs. Numbers are (1, W), counters (W,)."""
+
+    factors: Factors
+    load: Motion  # b, the pair included
+    forces: np.ndarray  # (2 N_c, W) f
+    following: np.ndarray  # (2 N_c, W) f⁺
+    state: np.ndarray  # (N_c, W) OPEN, STICKING, ±SLIDING
+    before: np.ndarray  # (N_c, W) the states that the last linear system was made for
+    velocity: Motion  # U
+    base: Motion  # U before the Newton step
+    kept: Motion  # U before the implicit step
+    rest: Motion  # A f⁺ − b − M U
+    direction: Motion  # the Newton step
+    pace: np.ndarray  # τ
+    length: np.ndarray  # of the Newton step
+    least: np.ndarray  # squared unbalance over masses, now,
+    merit: np.ndarray  # and before the Newton step
+    changed: np.ndarray  # largest |state − before|
+    heaviest: np.ndarray  # largest |M U|
+    breach: np.ndarray  # of Coulomb's law, relative to the fastest contact
+    lately: np.ndarray  # breach of the last implicit step
+    steady: np.ndarray  # breach at which motion counts as steady
+    newton: np.ndarray  # linear systems of the implicit step
+    steps: np.ndarray  # implicit steps
+    most: np.ndarray  # implicit steps that are allowed
+    iterations: np.ndarray  # linear systems
+    found: np.ndarray  # SOLVED, FELL, FAILED
+    going: np.ndarray  # bool
+    ended: np.ndarray  # bool: at rest, or in steady motion
+
+
+class Push(NamedTuple):
+    """What is asked of a flow: from forces, under a pair of `load` on a contact (its position)."""
+
+    forces: np.ndarray  # (N_c, 2) ⟨f_n⟩
+    contact: int
+    load: float  # ⟨f_n⟩
+    max_steps: int
+    steady: float  # breach of Coulomb's law, relative to the fastest contact, of steady motion
 
 
 class Outcome(NamedTuple):
@@ -85,6 +147,7 @@ class Outcome(NamedTuple):
     breach: float  # of Coulomb's law, relative to the fastest contact; 0 at rest
     steps: int  # implicit steps of the flow
     iterations: int  # linear systems solved
+    seconds: float  # its part of those that it was carried for beside others
 
 
 def make_step(ensemble):
@@ -107,9 +170,7 @@ def make_step(ensemble):
     yielding = np.einsum("cpgk,cgk->cp", columns**2, 1 / mass[rows])
     yielding += network.border.reshape(len(rows), 2, len(b_border)) ** 2 @ (1 / mass_border)
     stiffness = 1 / np.where(yielding > 0, yielding, 1.0)
-    return Step(
-        network, b[:, None], b_border[:, None], mass, mass_border, stiffness, ensemble.mu, place
-    )
+    return Step(network, b, b_border, mass, mass_border, stiffness, ensemble.mu, place)
 
 
 def _inertia(ensemble):
@@ -152,204 +213,356 @@ def _relative(network, velocity, border, relative):
         relative[c, 0], relative[c, 1] = pulled
 
 
-def relax(step, forces, contact, load, *, max_steps, steady=STEADY):
-    """Follow the flow from forces (N_c, 2) under a pair of `load` on a contact, to its end.
+def relax(step, asked):
+    """The Outcome of the flow that a Push asks for."""
 
-    All in ⟨f_n⟩. Ends at rest (unbalance below BALANCED), in steady motion (a breach of Coulomb's
-    law by at most `steady` of the fastest contact), or after max_steps.
+    def one():
+        return (yield asked)
+
+    found = []
+    follow(step, [one()], lambda _, outcome: found.append(outcome))
+    return found[0]
+
+
+def follow(step, works, finished, workers=1):
+    """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
+
+    A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
+    finished(number, value) is called, by one thread at a time, as a work returns its value. No
+    outcome depends on the number of threads, nor on what it is carried beside, bit for bit.
     """
-    loaded = step._replace(b=step.b.copy(), b_border=step.b_border.copy())
-    forces = np.array(forces, order="C")
-    motion = Motion(*(np.zeros_like(rows) for rows in (step.b, step.b_border) * 2))
-    ended, breach, steps, iterations = _follow(
-        loaded,
-        contact_matrix.make_factors(step.network, 1, symmetric=False),
-        contact,
-        load,
-        forces,
-        motion,
-        max_steps,
-        steady,
-        BALANCED / 10,
-        cancelling.flag(),
+    waiting, told = deque(enumerate(works)), threading.Lock()
+
+    def tell(number, value):
+        with told:
+            finished(number, value)
+
+    if workers == 1:
+        _carry(step, waiting, tell)
+        return
+    with cancelling.threads(workers) as pool:
+        for task in [pool.submit(_carry, step, waiting, tell) for _ in range(workers)]:
+            task.result()
+
+
+def _carry(step, waiting, finished):
+    """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
+    lanes = MANY if len(waiting) > _FEW else ONE
+    flows, stop = _make_flows(step, len(lanes)), cancelling.flag()
+    carried, seconds = [None] * len(lanes), np.zeros(len(lanes))
+    while True:
+        for lane in np.flatnonzero(~flows.going):
+            sent = _outcome(step, flows, lane, seconds[lane])
+            carried[lane] = _go_on(step, flows, lane, carried[lane], sent, waiting, finished)
+            seconds[lane] = 0.0
+        going = flows.going.copy()
+        if not going.any():
+            return
+        begin = time.perf_counter()
+        _follow(step, flows, BALANCED / 10, stop, lanes)
+        cancelling.check("perturbation")
+        seconds[going] += (time.perf_counter() - begin) / going.sum()
+
+
+def _go_on(step, flows, lane, carried, outcome, waiting, finished):
+    """Send a lane's work its outcome and start what it asks for next, or else what waits first.
+
+    carried: number and work of the lane, None without. Returns the same.
+    """
+    sent = None if carried is None else outcome
+    while True:
+        try:
+            number, work = carried or waiting.popleft()
+        except IndexError:
+            return None
+        try:
+            _start(step, flows, lane, work.send(sent))
+        except StopIteration as ended:
+            finished(number, ended.value)
+            carried = sent = None
+        else:
+            return number, work
+
+
+def _make_flows(step, width):
+    """The Flows of `width` lanes that rest."""
+    contacts, (rows, m) = len(step.stiffness), (len(step.b), len(step.b_border))
+
+    def motion():
+        return Motion(np.zeros((rows, width)), np.zeros((m, width)))
+
+    return Flows(
+        contact_matrix.make_factors(step.network, width, symmetric=False),
+        motion(),
+        *(np.zeros((2 * contacts, width)) for _ in range(2)),
+        *(np.zeros((contacts, width)) for _ in range(2)),
+        *(motion() for _ in range(5)),
+        *(np.ones((1, width)) for _ in range(9)),
+        *(np.zeros(width, dtype=np.int64) for _ in range(5)),
+        *(np.zeros(width, dtype=bool) for _ in range(2)),
     )
-    cancelling.check("perturbation")
-    at_rest = ended and breach == 0.0
-    velocity = np.concatenate([motion.velocity[:, 0], motion.border[:, 0]])[step.place]
-    return Outcome(forces, velocity, at_rest, ended, breach, steps, iterations)
+
+
+def _start(step, flows, lane, asked):
+    """Put what is asked into a lane."""
+    flows.load.rows[:, lane], flows.load.border[:, lane] = step.b, step.b_border
+    pair = np.ascontiguousarray(flows.load.rows[:, [lane]])
+    border = np.ascontiguousarray(flows.load.border[:, [lane]])
+    _pushed(step.network, asked.contact, -float(asked.load), pair, border)
+    flows.load.rows[:, [lane]], flows.load.border[:, [lane]] = pair, border
+    flows.forces[:, lane] = np.asarray(asked.forces).ravel()
+    for motion in (flows.velocity, flows.kept):
+        motion.rows[:, lane], motion.border[:, lane] = 0.0, 0.0
+    flows.pace[0, lane], flows.lately[0, lane], flows.steady[0, lane] = FIRST, np.inf, asked.steady
+    flows.newton[lane] = flows.steps[lane] = flows.iterations[lane] = 0
+    flows.most[lane], flows.going[lane] = asked.max_steps, True
 
 
 @compiled
-def _follow(step, factors, contact, load, forces, motion, max_steps, steady, rest, stop):
-    """Change forces and motion in place; whether it ended, breach, steps, linear systems."""
-    contact_matrix.push(step.network, contact, -load, 0.0, step.b, step.b_border, ONE)
-    pace, breach, iterations = FIRST, np.inf, 0
-    following = np.empty_like(forces)
-    for steps in range(1, max_steps + 1):
-        solved = False
-        kept, kept_border = motion.velocity.copy(), motion.border.copy()
-        while not solved and pace >= SHORTEST and not stop[0]:
-            solved, used = _implicit_step(step, factors, forces, pace, motion, following, stop)
-            iterations += used
-            if not solved:
-                _set(motion.velocity, kept)
-                _set(motion.border, kept_border)
-                pace *= CUT
-        if not solved:
-            return False, breach, steps, iterations
-        breach = _breach(step, forces, following, motion, pace)
-        _set(forces, following)
-        if _heaviest(step, motion) <= rest:
-            motion.velocity[:], motion.border[:] = 0.0, 0.0
-            return True, 0.0, steps, iterations
-        if breach <= steady:
-            return True, breach, steps, iterations
-        pace = min(LONGEST, pace * GROWTH)
-    return False, breach, max_steps, iterations
+def _pushed(network, contact, force, rows, border):
+    contact_matrix.push(network, contact, force, 0.0, rows, border, ONE)
+
+
+def _outcome(step, flows, lane, seconds):
+    rows = np.concatenate([flows.velocity.rows[:, lane], flows.velocity.border[:, lane]])
+    ended, breach = bool(flows.ended[lane]), float(flows.lately[0, lane])
+    return Outcome(
+        flows.forces[:, lane].reshape(-1, 2).copy(),
+        rows[step.place],
+        ended and breach == 0.0,
+        ended,
+        breach,
+        int(flows.steps[lane]),
+        int(flows.iterations[lane]),
+        float(seconds),
+    )
+
+
+@compiled
+def _follow(step, flows, rest, stop, lanes):
+    """Newton steps of all flows, until one that is going has ended."""
+    while not stop[0]:
+        _answer(step, flows, lanes)
+        _copy(flows.merit, flows.least, lanes)
+        _copy(flows.before, flows.state, lanes)
+        for to, given in (
+            (flows.base, flows.velocity),
+            (flows.direction, flows.rest),
+        ):
+            _copy(to.rows, given.rows, lanes)
+            _copy(to.border, given.border, lanes)
+        _factor(step, flows, stop, lanes)
+        direction = flows.direction
+        contact_matrix.solve_lu(
+            step.network, flows.factors, direction.rows, direction.border, lanes
+        )
+        _search(step, flows, lanes)
+        _measure(step, flows, lanes)
+        ended = False
+        for lane in range(len(lanes)):
+            if flows.going[lane]:
+                _judge(flows, lane, rest)
+                ended = ended or not flows.going[lane]
+        if ended:
+            return
 
 
 @within
-def _set(values, given):
-    """values ← given, number by number: arrays set to slices take numba a second to compile."""
-    for k in range(values.shape[0]):
-        for a in range(values.shape[1]):
-            values[k, a] = given[k, a]
+def _judge(flows, lane, rest):
+    """What comes after a lane's Newton step: the next, the next implicit step, or the end."""
+    flows.iterations[lane] += 1
+    flows.newton[lane] += 1
+    found = flows.found[lane]
+    if found == FELL and flows.newton[lane] < NEWTON:
+        return
+    flows.newton[lane] = 0
+    if found != SOLVED:
+        _copy_lane(flows.velocity.rows, flows.kept.rows, lane)
+        _copy_lane(flows.velocity.border, flows.kept.border, lane)
+        flows.pace[0, lane] *= CUT
+        if flows.pace[0, lane] < SHORTEST:
+            flows.steps[lane] += 1
+            flows.going[lane], flows.ended[lane] = False, False
+        return
+    flows.steps[lane] += 1
+    _copy_lane(flows.forces, flows.following, lane)
+    _copy_lane(flows.kept.rows, flows.velocity.rows, lane)
+    _copy_lane(flows.kept.border, flows.velocity.border, lane)
+    flows.lately[0, lane] = flows.breach[0, lane]
+    flows.pace[0, lane] = min(LONGEST, flows.pace[0, lane] * GROWTH)
+    resting = flows.heaviest[0, lane] <= rest
+    if resting:
+        _clear_lane(flows.velocity.rows, lane)
+        _clear_lane(flows.velocity.border, lane)
+        flows.lately[0, lane] = 0.0
+    flows.ended[lane] = resting or flows.lately[0, lane] <= flows.steady[0, lane]
+    flows.going[lane] = not flows.ended[lane] and flows.steps[lane] < flows.most[lane]
 
 
 @within
-def _step_along(values, given, length, direction):
+def _copy(values, given, lanes):
+    for k in range(len(values)):
+        store(values, k, lanes, load(given, k, lanes))
+
+
+@within
+def _copy_lane(values, given, lane):
+    for k in range(len(values)):
+        values[k, lane] = given[k, lane]
+
+
+@within
+def _clear_lane(values, lane):
+    for k in range(len(values)):
+        values[k, lane] = 0.0
+
+
+@within
+def _search(step, flows, lanes):
+    """Halve each lane's Newton step until the squared unbalance (over masses) falls.
+
+    It is solved where a whole one leaves every contact in its state: the equations are linear
+    there.
+    """
+    undecided = 0
+    for lane in range(len(lanes)):
+        flows.length[0, lane] = 1.0
+        flows.found[lane] = FAILED
+        undecided += flows.going[lane]
+    settled = ~flows.going
+    for _ in range(HALVINGS):
+        length = load(flows.length, 0, lanes)
+        _step_along(flows.velocity.rows, flows.base.rows, length, flows.direction.rows, lanes)
+        _step_along(flows.velocity.border, flows.base.border, length, flows.direction.border, lanes)
+        _answer(step, flows, lanes)
+        for lane in range(len(lanes)):
+            if settled[lane]:
+                continue
+            whole = flows.length[0, lane] == 1.0
+            if whole and flows.changed[0, lane] == 0.0 and _is_solved(flows, lane):
+                flows.found[lane] = SOLVED
+            elif flows.least[0, lane] < _wanted(flows, lane):
+                flows.found[lane] = FELL
+            else:
+                flows.length[0, lane] *= 0.5
+                continue
+            settled[lane] = True
+            undecided -= 1
+        if undecided == 0:
+            return
+
+
+@within
+def _wanted(flows, lane):
+    """The squared unbalance below which a Newton step is taken."""
+    return (1.0 - DECREASE * flows.length[0, lane]) * flows.merit[0, lane]
+
+
+@within
+def _is_solved(flows, lane):
+    """Whether rounding of the velocities, and no more, is left."""
+    fastest, rows, border = 0.0, flows.velocity.rows, flows.velocity.border
+    for k in range(len(rows)):
+        fastest = max(fastest, abs(rows[k, lane]))
+    for k in range(len(border)):
+        fastest = max(fastest, abs(border[k, lane]))
+    left = BALANCED / 10 + ROUNDING * flows.pace[0, lane] * fastest
+    return flows.least[0, lane] <= left**2
+
+
+@within
+def _step_along(values, given, length, direction, lanes):
     """values ← given + length · direction."""
     for k in range(len(values)):
-        values[k, 0] = given[k, 0] + length * direction[k, 0]
+        store(values, k, lanes, load(given, k, lanes) + length * load(direction, k, lanes))
 
 
 @within
-def _heaviest(step, motion):
-    """Largest |M U|."""
-    worst = 0.0
+def _measure(step, flows, lanes):
+    """Largest |M U|, and the relative velocities that forces still answer over the fastest one."""
+    zero, least, velocity = same(lanes, 0.0), same(lanes, 1e-300), flows.velocity
+    pace = load(flows.pace, 0, lanes)
+    heaviest = answered = fastest = zero
     for k in range(len(step.mass)):
-        worst = max(worst, abs(step.mass[k] * motion.velocity[k, 0]))
+        heaviest = larger(size(same(lanes, step.mass[k]) * load(velocity.rows, k, lanes)), heaviest)
     for k in range(len(step.mass_border)):
-        worst = max(worst, abs(step.mass_border[k] * motion.border[k, 0]))
-    return worst
+        moved = same(lanes, step.mass_border[k]) * load(velocity.border, k, lanes)
+        heaviest = larger(size(moved), heaviest)
+    for k in range(len(flows.forces)):
+        change = size(load(flows.following, k, lanes) - load(flows.forces, k, lanes))
+        stiffness = same(lanes, step.stiffness[k // 2, k % 2])
+        answered = larger(change / (pace * stiffness), answered)
+    for c in range(len(step.stiffness)):
+        w_n, w_t = contact_matrix.pull(step.network, c, velocity.rows, velocity.border, lanes)
+        fastest = larger(size(w_n), larger(size(w_t), fastest))
+    breach = pick(fastest, zero, larger(answered / fastest, least), least)
+    store(flows.heaviest, 0, lanes, heaviest)
+    store(flows.breach, 0, lanes, breach)
 
 
 @within
-def _breach(step, forces, following, motion, pace):
-    """Relative velocities that the forces still answer, relative to the fastest one."""
-    answered = fastest = 0.0
-    for c in range(len(forces)):
-        pulled = contact_matrix.pull(step.network, c, motion.velocity, motion.border, ONE)
-        fastest = max(fastest, abs(pulled[0]), abs(pulled[1]))
-        for component in range(2):
-            change = abs(following[c, component] - forces[c, component])
-            answered = max(answered, change / (pace * step.stiffness[c, component]))
-    return max(answered / fastest, 1e-300) if fastest > 0.0 else 1e-300
-
-
-@within
-def _implicit_step(step, factors, forces, pace, motion, following, stop):
-    """Whether Newton's method found f⁺ (in following) and U⁺ (in motion); linear systems solved.
-
-    It begins at the given U. The squared unbalance (over masses) must fall; otherwise the Newton
-    step is halved. It ends when a whole one leaves every contact in its state: the equations are
-    linear there, so that they are solved.
-    """
-    state = np.empty(len(forces), np.int8)
-    merit = _answer(step, forces, pace, motion, following, state)
-    for count in range(1, NEWTON + 1):
-        if stop[0]:
-            return False, count
-        before = state.copy()
-        velocity, border = motion.velocity.copy(), motion.border.copy()
-        _factor(step, state, pace, factors, stop)
-        direction, direction_border = motion.unbalance.copy(), motion.unbalance_border.copy()
-        contact_matrix.solve_lu(step.network, factors, direction, direction_border, ONE)
-        length = 1.0
-        falls = False
-        for _ in range(HALVINGS):
-            _step_along(motion.velocity, velocity, length, direction)
-            _step_along(motion.border, border, length, direction_border)
-            least = _answer(step, forces, pace, motion, following, state)
-            if length == 1.0 and np.array_equal(state, before):
-                # Rounding of the velocities, and no more, may be left.
-                left = BALANCED / 10 + ROUNDING * pace * _fastest(motion)
-                if least <= left**2:
-                    return True, count
-            if least < (1.0 - DECREASE * length) * merit:
-                falls = True
-                break
-            length *= 0.5
-        if not falls:
-            return False, count
-        merit = least
-    return False, NEWTON
-
-
-@within
-def _fastest(motion):
-    """Largest |U|."""
-    worst = 0.0
-    for k in range(len(motion.velocity)):
-        worst = max(worst, abs(motion.velocity[k, 0]))
-    for k in range(len(motion.border)):
-        worst = max(worst, abs(motion.border[k, 0]))
-    return worst
-
-
-@within
-def _factor(step, state, pace, factors, stop):
+def _factor(step, flows, stop, lanes):
     """Factor M + A (∂Π) τ D Aᵀ, not symmetric, as f_t of a sliding contact follows f_n."""
-    network, m = step.network, len(step.mass_border)
-    contact_matrix.begin(network, step.mass, factors, ONE)
+    network, m, factors = step.network, len(step.mass_border), flows.factors
+    contact_matrix.begin(network, step.mass, factors, lanes)
     for a in range(m):
-        factors.corner[m * a + a, 0] = step.mass_border[a]
-    for c in range(len(state)):
-        if state[c] == OPEN:
-            continue
-        normal, tangential = pace * step.stiffness[c, 0], 0.0
-        across = np.sign(state[c]) * step.mu * normal
-        if state[c] == STICKING:
-            tangential, across = pace * step.stiffness[c, 1], 0.0
-        contact_matrix.add_skew(network, c, normal, 0.0, across, tangential, factors, ONE)
-    contact_matrix.factor_lu(network, factors, stop, ONE)
+        store(factors.corner, m * a + a, lanes, same(lanes, step.mass_border[a]))
+    zero, half, pace = same(lanes, 0.0), same(lanes, 0.5), load(flows.pace, 0, lanes)
+    closed, sliding = same(lanes, 0.5), same(lanes, 1.5)
+    for c in range(len(step.stiffness)):
+        state = load(flows.before, c, lanes)
+        normal = pace * same(lanes, step.stiffness[c, 0])
+        tangential = pace * same(lanes, step.stiffness[c, 1])
+        across = half * state * same(lanes, step.mu) * normal
+        slides = size(state)
+        normal = pick(slides, closed, normal, zero)
+        across = pick(slides, sliding, across, zero)
+        tangential = pick(slides, sliding, zero, pick(slides, closed, tangential, zero))
+        contact_matrix.add_skew(network, c, normal, zero, across, tangential, factors, lanes)
+    contact_matrix.factor_lu(network, factors, stop, lanes)
 
 
 @within
-def _answer(step, forces, pace, motion, following, state):
+def _answer(step, flows, lanes):
     """Forces Π(f − τ D Aᵀ U), states of the contacts and A f⁺ − b − M U; the latter's Σ /M."""
-    network, mu, rest, rest_border = (
-        step.network,
-        step.mu,
-        motion.unbalance,
-        motion.unbalance_border,
-    )
+    velocity, rest = flows.velocity, flows.rest
     for k in range(len(step.mass)):
-        rest[k, 0] = -step.b[k, 0] - step.mass[k] * motion.velocity[k, 0]
+        moved = same(lanes, step.mass[k]) * load(velocity.rows, k, lanes)
+        store(rest.rows, k, lanes, -load(flows.load.rows, k, lanes) - moved)
     for k in range(len(step.mass_border)):
-        rest_border[k, 0] = -step.b_border[k, 0] - step.mass_border[k] * motion.border[k, 0]
-    for c in range(len(forces)):
-        w_n, w_t = contact_matrix.pull(network, c, motion.velocity, motion.border, ONE)
-        f_n = max(forces[c, 0] - pace * step.stiffness[c, 0] * w_n, 0.0)
-        f_t = forces[c, 1] - pace * step.stiffness[c, 1] * w_t
-        limit = mu * f_n
-        if f_n == 0.0:
-            state[c] = OPEN
-            f_t = 0.0
-        elif f_t > limit:
-            state[c] = SLIDING
-            f_t = limit
-        elif f_t < -limit:
-            state[c] = -SLIDING
-            f_t = -limit
-        else:
-            state[c] = STICKING
-        following[c, 0] = f_n
-        following[c, 1] = f_t
-        contact_matrix.push(network, c, f_n, f_t, rest, rest_border, ONE)
-    merit = 0.0
+        moved = same(lanes, step.mass_border[k]) * load(velocity.border, k, lanes)
+        store(rest.border, k, lanes, -load(flows.load.border, k, lanes) - moved)
+    store(flows.changed, 0, lanes, same(lanes, 0.0))
+    for c in range(len(step.stiffness)):
+        f_n, f_t = _followed(step, flows, c, lanes)
+        contact_matrix.push(step.network, c, f_n, f_t, rest.rows, rest.border, lanes)
+    merit = same(lanes, 0.0)
     for k in range(len(step.mass)):
-        merit += rest[k, 0] ** 2 / step.mass[k]
+        off = load(rest.rows, k, lanes)
+        merit = merit + off * off / same(lanes, step.mass[k])
     for k in range(len(step.mass_border)):
-        merit += rest_border[k, 0] ** 2 / step.mass_border[k]
-    return merit
+        off = load(rest.border, k, lanes)
+        merit = merit + off * off / same(lanes, step.mass_border[k])
+    store(flows.least, 0, lanes, merit)
+
+
+@within
+def _followed(step, flows, c, lanes):
+    """f⁺ of one contact; sets that, its state, and whether it changed."""
+    zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
+    rows, border = flows.velocity.rows, flows.velocity.border
+    w_n, w_t = contact_matrix.pull(step.network, c, rows, border, lanes)
+    f_n = load(flows.forces, 2 * c, lanes) - pace * same(lanes, step.stiffness[c, 0]) * w_n
+    f_t = load(flows.forces, 2 * c + 1, lanes) - pace * same(lanes, step.stiffness[c, 1]) * w_t
+    f_n = larger(f_n, zero)
+    limit = same(lanes, step.mu) * f_n
+    slides, sticks = same(lanes, 1.0 * SLIDING), same(lanes, 1.0 * STICKING)
+    state = pick(f_t, limit, slides, pick(-limit, f_t, -slides, sticks))
+    f_t = pick(f_t, limit, limit, pick(-limit, f_t, -limit, f_t))
+    state, f_t = pick(f_n, zero, state, zero), pick(f_n, zero, f_t, zero)
+    store(flows.following, 2 * c, lanes, f_n)
+    store(flows.following, 2 * c + 1, lanes, f_t)
+    store(flows.state, c, lanes, state)
+    change = size(state - load(flows.before, c, lanes))
+    store(flows.changed, 0, lanes, larger(change, load(flows.changed, 0, lanes)))
+    return f_n, f_t

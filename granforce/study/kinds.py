@@ -6,7 +6,6 @@ page take it from `KINDS`.
 
 import hashlib
 import time
-from concurrent.futures import as_completed
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.packing.compaction import draw_radii, pack
-from granforce.perturb.critical_force import MOST_STEPS, RISE
+from granforce.perturb.critical_force import MOST_STEPS, RISE, critical_force, critical_forces
 from granforce.records import InputError, check_memory, friction, positive, random_seed, whole
 from granforce.study import slices
 from granforce.study.bounds import (
@@ -34,7 +33,7 @@ from granforce.study.bounds import (
     outline_dataset,
     stress_dataset,
 )
-from granforce.study.cells import Kind, get, save
+from granforce.study.cells import Kind, get, load, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
 from granforce.study.responses import contact_dataset, perturbation_dataset
@@ -537,32 +536,30 @@ def _perturbation(store, parameters, *, workers, progress):
 
 def _perturbed(store, S, chosen, parameters, workers, progress):
     """Datasets of the single contacts, in order; those of the store are found."""
-    loads = limit_load_bounds(S, chosen, workers=workers)
-    _complete(loads, "limit loads")
-    tell = progress or (lambda done, total: None)
     shared = ("packing", "mu", *PROTOCOL, "prescribed", "stress")
     common = {name: parameters[name] for name in shared if name in parameters}
-    stopped = False
+    named = {c: PERTURBED_CONTACT.parameters(contact=int(c), **common) for c in chosen}
+    parts = {c: load(store, PERTURBED_CONTACT, named[c]) for c in chosen}
+    parts = {c: dataset for c, dataset in parts.items() if dataset is not None}
+    missing = [c for c in chosen if c not in parts]
+    if not missing:
+        return [parts[c] for c in chosen]
+    loads = limit_load_bounds(S, missing, workers=workers)
+    _complete(loads, "limit loads")
+    tell = progress or (lambda done, total: None)
 
-    def one(contact, load):
-        named = PERTURBED_CONTACT.parameters(contact=contact, **common)
-        shared = {"S": S, "limit_load": load, "cancel": lambda: stopped}
-        return get(store, PERTURBED_CONTACT, named, **shared)[0]
+    def ended(k, critical):
+        contact = missing[k]
+        parts[contact] = get(store, PERTURBED_CONTACT, named[contact], S=S, critical=critical)[0]
+        tell(len(parts), len(chosen))
 
-    with cancelling.threads(workers) as pool:
-        waiting = [
-            pool.submit(one, contact, load)
-            for contact, load in zip(loads.contacts, loads.load, strict=True)
-        ]
-        try:
-            for done, future in enumerate(as_completed(waiting), 1):
-                future.result()
-                tell(done, len(chosen))
-        except BaseException:
-            stopped = True  # what is under way ends at its next load
-            pool.shutdown(cancel_futures=True)
-            raise
-    return [future.result() for future in waiting]
+    options = {"limit_loads": loads.load, "workers": workers, "finished": ended}
+    critical_forces(S, missing, **options, **_named_protocol(parameters))
+    return [parts[c] for c in chosen]
+
+
+def _named_protocol(parameters):
+    return {name: parameters[name] for name in PROTOCOL if name in parameters}
 
 
 def _perturbed_contact_parameters(
@@ -576,12 +573,13 @@ def _perturbed_contact_parameters(
     }
 
 
-def _perturbed_contact(store, parameters, *, workers, progress, S=None, limit_load=None):
-    """Dataset of one perturbed contact; S and its limit load (force) where they are known."""
+def _perturbed_contact(store, parameters, *, workers, progress, S=None, critical=None):
+    """Dataset of one perturbed contact; S and its critical force where they are known."""
     if S is None:
         S = _ensemble(store, parameters)
-    protocol = {name: parameters[name] for name in PROTOCOL if name in parameters}
-    return contact_dataset(S, parameters["contact"], limit_load, **protocol)
+    if critical is None:
+        critical = critical_force(S, parameters["contact"], **_named_protocol(parameters))
+    return contact_dataset(S, critical, parameters["precision"])
 
 
 # The records

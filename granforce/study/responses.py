@@ -10,14 +10,9 @@ from granforce.perturb import decay
 from granforce.study.schema import labelled
 
 
-def contact_dataset(S, contact, limit_load, *, precision, **protocol):
-    """One perturbed contact (its number in the packing) as a dataset.
-
-    limit_load: force, or None to compute it. precision, protocol: as for `critical_force`.
-    """
-    critical = perturb.critical_force(
-        S, contact, limit_load=limit_load, precision=precision, **protocol
-    )
+def contact_dataset(S, critical, precision):
+    """One perturbed contact as a dataset: its CriticalForce, known to `precision`, and response."""
+    contact = critical.contact
     moved = perturb.response(S, contact, critical=critical, precision=precision)
     edges = decay.shells(S.packing)
     (position,) = S.positions([contact])
