@@ -29,6 +29,7 @@ _HOME = {
     "intervals": "explore.intervals",
     "limit_loads": "explore.intervals",
     "critical_force": "perturb.critical_force",
+    "critical_forces": "perturb.critical_force",
     "response": "perturb.critical_force",
     "outline": "explore.outline",
     "infer": "explore.infer",

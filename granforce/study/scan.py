@@ -20,7 +20,7 @@ from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.ensemble import ensemble
 from granforce.packing.compaction import pack
-from granforce.perturb.critical_force import critical_force
+from granforce.perturb.critical_force import critical_forces
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.cells import Cell, get, load, row
@@ -102,7 +102,7 @@ def run(path, cells, *, workers=2, scheduler=None, dtypes=None, progress=None, o
 
 
 def _over_processes(tasks, workers, finished, advanced):
-    warm_up()
+    warm_up({cell.kind for _, cell, _ in tasks.values()})
     count = len(tasks)
     for _ in range(TRIES):
         before = count - len(tasks)
@@ -220,10 +220,26 @@ def _over_dask(tasks, scheduler, finished):
             raise
 
 
-def warm_up():
-    """Compile (or load from numba's cache) every kernel once, before workers do it each."""
+def warm_up(needed=None):
+    """Compile (or load from numba's cache) kernels once, before workers do it each.
+
+    needed: the kinds that they are compiled for, by default all.
+    """
     S = ensemble(pack(12, 0.5, 0))
-    walk(S, 2, 0)
-    intervals(S, S.index[:1])
-    sample_uniform(S, 4)
-    critical_force(S, int(S.index[0]))
+    for kind, run in _FIRST_RUNS.items():
+        if needed is None or kind in needed:
+            run(S)
+
+
+def _push(S):
+    # A single contact, and several side by side.
+    for contacts in (S.index[:1], S.index[:3]):
+        critical_forces(S, contacts)
+
+
+_FIRST_RUNS = {
+    kinds.WALK: lambda S: walk(S, 2, 0),
+    kinds.INTERVALS: lambda S: intervals(S, S.index[:1]),
+    kinds.UNIFORM: lambda S: sample_uniform(S, 4),
+    kinds.PERTURBATION: _push,
+}

@@ -12,7 +12,7 @@ from granforce.numerics.lanes import ONE
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
 from granforce.perturb import flow as exact_step
-from granforce.perturb.critical_force import critical_force, response
+from granforce.perturb.critical_force import critical_force, critical_forces, response
 from granforce.records import Cancelled, InputError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -80,6 +80,26 @@ def test_what_is_given_up_too_early_is_followed_before_it_counts_as_motion():
         usual = critical_force(S, contact)
         assert found.low == pytest.approx(usual.low, rel=0.1, abs=0.02 * S.force_scale)
         assert response(S, contact, critical=found).converged
+
+
+def test_contacts_carried_side_by_side_are_as_alone_to_the_last_bit():
+    S, told = ensemble(packed(40, 0.3)), []
+    contacts = S.index[::5]
+    limit = limit_loads(S, contacts)
+    alone = [critical_force(S, c, limit_load=load) for c, load in zip(contacts, limit, strict=True)]
+    assert len({critical.counts["linear_systems"] for critical in alone}) > 5
+    for workers in (1, 2):
+        together = critical_forces(
+            S, contacts, workers=workers, finished=lambda k, one: told.append((k, one.low))
+        )
+        for one, other in zip(together, alone, strict=True):
+            assert one.contact == other.contact and one.counts == other.counts
+            assert (one.low, one.high, one.converged) == (other.low, other.high, other.converged)
+            assert np.array_equal(one.forces, other.forces)
+            assert (one.moving is None) == (other.moving is None)
+            if one.moving is not None:
+                assert np.array_equal(one.moving.velocity, other.moving.velocity)
+    assert sorted(told[: len(contacts)]) == [(k, one.low) for k, one in enumerate(alone)]
 
 
 def swept(S, forces, position, load, sweeps):

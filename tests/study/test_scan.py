@@ -146,7 +146,7 @@ def test_progress_of_cells_never_goes_back(tmp_path, monkeypatch):
             return {}
         return rest  # a worker died
 
-    monkeypatch.setattr(scan, "warm_up", lambda: None)
+    monkeypatch.setattr(scan, "warm_up", lambda needed: None)
     monkeypatch.setattr(scan, "_one_pool", pool)
     failed = scan.run(
         tmp_path / "s", small_cells(), progress=lambda done, total: told.append((done, total))
@@ -270,7 +270,7 @@ def die(*task):
 @pytest.mark.slow
 def test_a_cell_that_kills_its_worker_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(scan, "run_cell", die)
-    monkeypatch.setattr(scan, "warm_up", lambda: None)
+    monkeypatch.setattr(scan, "warm_up", lambda needed: None)
     failed = scan.run(tmp_path / "s", small_cells()[:1])
     assert "died 3 times" in failed[0][1]
 
