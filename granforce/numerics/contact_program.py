@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.numerics import contact_matrix
-from granforce.numerics.contact_matrix import Factors, Network, pull, push
+from granforce.numerics.contact_matrix import Factors, Network, clear, pull, push
 from granforce.numerics.lanes import (
     ONE,
     compiled,
@@ -515,8 +515,8 @@ def _refine(problem, at, work, lanes):
     """
     dy, dv, dv_border = work.dy.copy(), work.dv.copy(), work.dv_border.copy()
     one = same(lanes, 1.0)
-    work.h[:] = 0.0
-    work.rest[:] = 0.0
+    clear(work.h, lanes)
+    clear(work.rest, lanes)
     for _ in range(_REFINEMENTS):
         _less_pushed(problem, at, work.dy, work, lanes)
         _towards(problem, REFINED, at, work, lanes)
@@ -619,10 +619,10 @@ def advance(problem, loads, mode, at, work, lanes):
     pairs = len(at.y) if loads else len(at.y) - 1
     _stiffen(problem, mode, at, work, lanes)
     if mode == BALANCE:
-        work.h[:] = 0.0
+        clear(work.h, lanes)
     if mode == CENTRE:
-        work.turn[:] = 0.0
-        work.target[:] = 1.0
+        clear(work.turn, lanes)
+        store(work.target, 0, lanes, same(lanes, 1.0))
         _aim(problem, pairs, at, work, lanes)
     _factor(problem, mode, at, work, lanes)
     optimum = mode == OPTIMUM or mode == REFINED
