@@ -40,6 +40,7 @@ from granforce.numerics.lanes import (
     MANY,
     ONE,
     compiled,
+    inline,
     larger,
     load,
     pick,
@@ -546,7 +547,7 @@ def _answer(step, flows, lanes):
     store(flows.least, 0, lanes, merit)
 
 
-@within
+@inline
 def _followed(step, flows, c, lanes):
     """f⁺ of one contact; sets that, its state, and whether it changed."""
     zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
