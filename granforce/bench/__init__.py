@@ -9,7 +9,7 @@ import time
 
 from granforce.bench.conditions import knowledge
 from granforce.bench.inference import inference
-from granforce.bench.kernel import growth, kernel, starts
+from granforce.bench.kernel import growth, kernel, pushes, starts
 from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
 from granforce.bench.report import environment, note, table
 from granforce.bench.skips import skips
@@ -33,6 +33,7 @@ __all__ = [
     "kernel",
     "knowledge",
     "main",
+    "pushes",
     "relaxation",
     "run",
     "scaling",
@@ -50,6 +51,7 @@ PARTS = {
     "scaling": (scaling, "One relaxation against the number of disks"),
     "kernel": (kernel, "Factorisation: part of what the machine can do"),
     "starts": (starts, "Nearest networks: PIQP, one at a time, and in lanes"),
+    "pushes": (pushes, "Critical forces: one contact at a time, and in lanes"),
     "growth": (growth, "Set-up, relaxation and exact bound against the number of disks"),
     "batches": (batches, "Chains of one packing on one and two threads"),
     "compaction": (compaction, "Compaction: run time and overlap by time step and sweeps"),

@@ -10,7 +10,7 @@ import numpy as np
 
 from granforce.bench.report import exponent, note
 from granforce.bench.solvers import FRICTIONS, kicked, tile
-from granforce.explore.intervals import intervals
+from granforce.explore.intervals import intervals, limit_loads
 from granforce.forces.contact_problem import make_problem
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest, nearest_of_many
@@ -18,6 +18,7 @@ from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics import contact_matrix, contact_program
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.packing.compaction import pack
+from granforce.perturb.critical_force import critical_force, critical_forces
 
 # Operations of one product of two 3×3 blocks that is taken from a third.
 _PRODUCT = 54
@@ -110,6 +111,43 @@ def starts(quick=True, *, n=None, frictions=FRICTIONS, repeats=None):
             each = float(np.median(spent[name][1:]))  # the first run compiles
             row = {"n": n, "mu": mu, "solver": name, "ms_per_state": 1e3 * each}
             rows.append(row | {"ratio_to_piqp": piqp / each, "differ": worst / S.force_scale})
+    return rows
+
+
+def pushes(quick=True, *, n=None, frictions=(0.1, 1), contacts=None):
+    """Rows: processor seconds of critical forces, one contact after the other and side by side.
+
+    The same loads on the same contacts, whose limit loads are known; F_crit may not differ.
+    """
+    n, count = n or (60 if quick else 400), contacts or (10 if quick else 30)
+    rows = []
+    for mu in frictions:
+        note(f"pushes: N = {n}, μ = {mu:g}")
+        S = ensemble(pack(n, mu, 1))
+        some = S.index[:: max(1, len(S.index) // count)][:count]
+        loads = limit_loads(S, some)
+        ways = {
+            "one at a time": lambda which, given, S=S: [
+                critical_force(S, contact, limit_load=load)
+                for contact, load in zip(which, given, strict=True)
+            ],
+            f"{LANES} lanes": lambda which, given, S=S: critical_forces(
+                S, which, limit_loads=given
+            ),
+        }
+        seconds, found = {}, {}
+        for name, way in ways.items():
+            way(some[:3], loads[:3])  # compiles
+            begin = time.process_time()
+            found[name] = way(some, loads)
+            seconds[name] = time.process_time() - begin
+        alone, beside = ([one.low for one in each] for each in found.values())
+        for name in ways:
+            systems = sum(one.counts["linear_systems"] for one in found[name])
+            row = {"n": n, "mu": mu, "way": name, "seconds_per_contact": seconds[name] / len(some)}
+            row |= {"ms_per_system": 1e3 * seconds[name] / systems}
+            row |= {"ratio": seconds["one at a time"] / seconds[name]}
+            rows.append(row | {"differ": float(np.abs(np.subtract(alone, beside)).max())})
     return rows
 
 

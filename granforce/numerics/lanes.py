@@ -25,7 +25,9 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 within = njit(
     cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
-# Small ones that must become part of those that call them, or their numbers pass through memory.
+# What must become part of those that call it: small ones, or their numbers pass through memory, and
+# whatever is called for each contact with a network, which is a hundred numbers to hand over (a
+# step of one interior-point method takes 0.15 ms in place of 0.27, with the same bits).
 inline = njit(
     cache=True,
     nogil=True,

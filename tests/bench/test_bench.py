@@ -9,6 +9,7 @@ from packings import packed
 from granforce import bench
 from granforce.bench import conditions, packings, report, siconos, solvers, states
 from granforce.forces.ensemble import ensemble
+from granforce.numerics.lanes import LANES
 from granforce.records import NotJammedError
 
 SMALL = {"n": 30, "frictions": (0.3,)}
@@ -122,6 +123,12 @@ def test_compaction_at_each_friction_and_size():
     rows = bench.compaction_growth(True, mu=0.3, sizes=(20, 30), seeds=1)
     assert [row["n"] for row in rows] == [20, 30, "fit"]
     assert np.isfinite(rows[-1]["exponent"])
+
+
+def test_pushed_contacts_are_compared_at_the_same_critical_forces():
+    rows = bench.pushes(True, n=20, frictions=(0.3,), contacts=4)
+    assert [row["way"] for row in rows] == ["one at a time", f"{LANES} lanes"]
+    assert all(row["seconds_per_contact"] > 0 and row["differ"] == 0 for row in rows)
 
 
 def test_chains_on_two_threads():
