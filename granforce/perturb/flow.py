@@ -232,22 +232,31 @@ def follow(step, works, finished, workers=1):
     finished(number, value) is called, by one thread at a time, as a work returns its value. No
     outcome depends on the number of threads, nor on what it is carried beside, bit for bit.
     """
-    waiting, told = deque(enumerate(works)), threading.Lock()
+    waiting, told, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
 
     def tell(number, value):
         with told:
             finished(number, value)
 
+    def carry():
+        try:
+            _carry(step, waiting, tell, failed)
+        except BaseException:
+            failed.set()  # the other threads end as well
+            raise
+
     if workers == 1:
-        _carry(step, waiting, tell)
+        carry()
         return
     with cancelling.threads(workers) as pool:
-        for task in [pool.submit(_carry, step, waiting, tell) for _ in range(workers)]:
+        for task in [pool.submit(carry) for _ in range(workers)]:
             task.result()
 
 
-def _carry(step, waiting, finished):
+def _carry(step, waiting, finished, failed):
     """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
+    if not waiting:
+        return
     lanes = MANY if len(waiting) > _FEW else ONE
     flows, stop = _make_flows(step, len(lanes)), cancelling.flag()
     carried, seconds = [None] * len(lanes), np.zeros(len(lanes))
@@ -257,7 +266,7 @@ def _carry(step, waiting, finished):
             carried[lane] = _go_on(step, flows, lane, carried[lane], sent, waiting, finished)
             seconds[lane] = 0.0
         going = flows.going.copy()
-        if not going.any():
+        if failed.is_set() or not going.any():
             return
         begin = time.perf_counter()
         _follow(step, flows, BALANCED / 10, stop, lanes)
@@ -346,10 +355,7 @@ def _follow(step, flows, rest, stop, lanes):
         _answer(step, flows, lanes)
         _copy(flows.merit, flows.least, lanes)
         _copy(flows.before, flows.state, lanes)
-        for to, given in (
-            (flows.base, flows.velocity),
-            (flows.direction, flows.rest),
-        ):
+        for to, given in ((flows.base, flows.velocity), (flows.direction, flows.rest)):
             _copy(to.rows, given.rows, lanes)
             _copy(to.border, given.border, lanes)
         _factor(step, flows, stop, lanes)

@@ -102,6 +102,18 @@ def test_contacts_carried_side_by_side_are_as_alone_to_the_last_bit():
     assert sorted(told[: len(contacts)]) == [(k, one.low) for k, one in enumerate(alone)]
 
 
+def test_what_fails_in_one_thread_ends_the_others():
+    S, told = ensemble(packed(40, 0.3)), []
+
+    def fail(k, critical):
+        told.append(k)
+        raise OSError("no space left")
+
+    with pytest.raises(OSError, match="no space"):
+        critical_forces(S, S.index, workers=2, finished=fail)
+    assert len(told) <= 2
+
+
 def swept(S, forces, position, load, sweeps):
     """Gauss–Seidel sweeps under a pair: forces and unbalance, in ⟨f_n⟩."""
     problem, velocity, dilation, _ = _from_rest(S)
