@@ -77,8 +77,18 @@ def endless_hits(S):
 
 def endless_motion(S):
     # Under 100 ⟨f_n⟩ grains move for good, and no breach of Coulomb's law is below zero.
-    step, start = exact_step.make_step(S), S.original / S.force_scale
-    exact_step.relax(step, start, 0, 100.0, max_steps=10**9, steady=0.0)
+    exact_step.relax(exact_step.make_step(S), moving(S))
+
+
+def endless_motions_side_by_side(S):
+    def work():
+        yield moving(S)
+
+    exact_step.follow(exact_step.make_step(S), [work() for _ in range(9)], print, workers=2)
+
+
+def moving(S):
+    return exact_step.Push(S.original / S.force_scale, 0, 100.0, 10**9, 0.0)
 
 
 def long_program(solver):
@@ -103,7 +113,8 @@ def long_elimination():
     "work",
     [
         endless_steps, endless_insertion, endless_sweeps, endless_walk, endless_paths,
-        one_endless_path, endless_hits, endless_motion, endless_call, long_elimination,
+        one_endless_path, endless_hits, endless_motion, endless_motions_side_by_side, endless_call,
+        long_elimination,
         lambda: long_program("simplex"), lambda: long_program("ipm"),
     ],
 )  # fmt: skip
