@@ -134,6 +134,13 @@ def clear(values, lanes):
 
 
 @within
+def copy(values, given, lanes):
+    """values ← given, likewise."""
+    for k in range(len(values)):
+        store(values, k, lanes, load(given, k, lanes))
+
+
+@within
 def begin(network, diagonal, factors, lanes):
     """Set the matrix to diag(diagonal (rows,)), without global rows."""
     start = network.layout.start
@@ -149,62 +156,56 @@ def begin(network, diagonal, factors, lanes):
 
 @inline
 def add(network, c, nn, nt, tt, factors, lanes):
-    """Add contact c with the symmetric conductance K = [nn nt; nt tt] to the lower triangle."""
-    start, L = network.layout.start, factors.lower
-    high, low = _columns_of(network, c, 0, lanes), _columns_of(network, c, 3, lanes)
-    by_high, by_low = _times(nn, nt, nt, tt, high), _times(nn, nt, nt, tt, low)
-    _add_triangle(L, 9 * start[network.high[c]], high, by_high, lanes)
-    _add_triangle(L, 9 * start[network.low[c]], low, by_low, lanes)
-    _add_block(L, 9 * network.block[c], high, by_low, lanes)
-    _add_sides(network, c, by_high, by_low, factors.sides, lanes)
-    _add_corner(network, c, nn, nt, nt, tt, factors.corner, lanes)
+    """Add contact c with the symmetric conductance K = [nn nt; nt tt] to the matrix."""
+    _add_diagonal(network, c, nn, nt, nt, tt, factors, lanes)
+    _add_between(network, c, nn, nt, nt, tt, factors.lower, factors.sides, lanes)
 
 
 @inline
 def add_skew(network, c, nn, nt, tn, tt, factors, lanes):
     """Add contact c with the conductance K = [nn nt; tn tt] to a matrix that is not symmetric."""
-    start, L = network.layout.start, factors.lower
-    high, low = _columns_of(network, c, 0, lanes), _columns_of(network, c, 3, lanes)
-    by_high, by_low = _times(nn, nt, tn, tt, high), _times(nn, nt, tn, tt, low)
-    _add_block(L, 9 * start[network.high[c]], high, by_high, lanes)
-    _add_block(L, 9 * start[network.low[c]], low, by_low, lanes)
-    _add_block(L, 9 * network.block[c], high, by_low, lanes)
-    _add_sides(network, c, by_high, by_low, factors.sides, lanes)
-    _add_corner(network, c, nn, nt, tn, tt, factors.corner, lanes)
-    by_high, by_low = _times(nn, tn, nt, tt, high), _times(nn, tn, nt, tt, low)
-    _add_block(factors.upper, 9 * network.block[c], high, by_low, lanes)
-    _add_sides(network, c, by_high, by_low, factors.tops, lanes)
+    _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes)
+    _add_between(network, c, nn, nt, tn, tt, factors.lower, factors.sides, lanes)
+    _add_between(network, c, nn, tn, nt, tt, factors.upper, factors.tops, lanes)
 
 
-@within
-def _add_sides(network, c, by_high, by_low, sides, lanes):
-    """Add E K Eᵀ of the global rows by both grains."""
-    g, grains = network.border, len(network.layout.start) - 1
-    m = g.shape[1] // 2
-    for a in range(m):
-        _add_row(sides, 3 * (a * grains + network.low[c]), g[c, a], g[c, m + a], by_low, lanes)
-        _add_row(sides, 3 * (a * grains + network.high[c]), g[c, a], g[c, m + a], by_high, lanes)
-
-
-@within
-def _add_corner(network, c, nn, nt, tn, tt, corner, lanes):
-    """Add E K Eᵀ of the global rows by themselves."""
-    g = network.border
-    m = g.shape[1] // 2
+@inline
+def _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes):
+    """E K Eᵀ to the blocks of both grains and to the corner."""
+    start = network.layout.start
+    for first, grain in ((0, network.high[c]), (3, network.low[c])):
+        e = _columns_of(network, c, first, lanes)
+        _add_block(factors.lower, 9 * start[grain], e, _times(nn, nt, tn, tt, e), lanes)
+    g = network.border[c]
+    m = len(g) // 2
     for b in range(m):
-        by_n, by_t = _through(nn, nt, tn, tt, same(lanes, g[c, b]), same(lanes, g[c, m + b]))
+        by_n, by_t = _through(nn, nt, tn, tt, same(lanes, g[b]), same(lanes, g[m + b]))
         for a in range(m):
-            e_n, e_t = same(lanes, g[c, a]), same(lanes, g[c, m + a])
-            _add_to(corner, m * a + b, e_n, by_n, e_t, by_t, lanes)
+            _add_to(factors.corner, m * a + b, g[a], by_n, g[m + a], by_t, lanes)
+
+
+@inline
+def _add_between(network, c, nn, nt, tn, tt, blocks, sides, lanes):
+    """E K Eᵀ to the block of the later by the earlier grain, and of global rows by both."""
+    high, low = _columns_of(network, c, 0, lanes), _columns_of(network, c, 3, lanes)
+    by_low = _times(nn, nt, tn, tt, low)
+    _add_block(blocks, 9 * network.block[c], high, by_low, lanes)
+    g, grains = network.border[c], len(network.layout.start) - 1
+    m = len(g) // 2
+    if m:
+        by_high = _times(nn, nt, tn, tt, high)
+        for a in range(m):
+            _add_row(sides, 3 * (a * grains + network.low[c]), g[a], g[m + a], by_low, lanes)
+            _add_row(sides, 3 * (a * grains + network.high[c]), g[a], g[m + a], by_high, lanes)
 
 
 @within
 def _columns_of(network, c, first, lanes):
     """What unit f_n, then unit f_t do to the three rows of a contact's later or earlier grain."""
-    e = network.columns
+    e = network.columns[c]
     return (
-        *(same(lanes, e[c, first]), same(lanes, e[c, first + 1]), same(lanes, e[c, first + 2])),
-        *(same(lanes, e[c, first + 6]), same(lanes, e[c, first + 7]), same(lanes, e[c, first + 8])),
+        *(same(lanes, e[first]), same(lanes, e[first + 1]), same(lanes, e[first + 2])),
+        *(same(lanes, e[first + 6]), same(lanes, e[first + 7]), same(lanes, e[first + 8])),
     )
 
 
@@ -229,17 +230,6 @@ def _add_block(blocks, place, e, by, lanes):
     _add_three(blocks, place, e[0], e[3], by, lanes)
     _add_three(blocks, place + 3, e[1], e[4], by, lanes)
     _add_three(blocks, place + 6, e[2], e[5], by, lanes)
-
-
-@within
-def _add_triangle(blocks, place, e, by, lanes):
-    """Add the lower triangle of e byᵀ to that of a block."""
-    _add_to(blocks, place, e[0], by[0], e[3], by[3], lanes)
-    _add_to(blocks, place + 3, e[1], by[0], e[4], by[3], lanes)
-    _add_to(blocks, place + 4, e[1], by[1], e[4], by[4], lanes)
-    _add_to(blocks, place + 6, e[2], by[0], e[5], by[3], lanes)
-    _add_to(blocks, place + 7, e[2], by[1], e[5], by[4], lanes)
-    _add_to(blocks, place + 8, e[2], by[2], e[5], by[5], lanes)
 
 
 @within
@@ -279,8 +269,8 @@ def add_one(network, c, K, factors, lane):
 
 @within
 def _add_to(values, place, e_n, by_n, e_t, by_t, lanes):
-    value = fma(e_n, by_n, load(values, place, lanes))
-    store(values, place, lanes, fma(e_t, by_t, value))
+    value = fma(same(lanes, e_n), by_n, load(values, place, lanes))
+    store(values, place, lanes, fma(same(lanes, e_t), by_t, value))
 
 
 @compiled

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.numerics import contact_matrix
-from granforce.numerics.contact_matrix import Factors, Network, clear, pull, push
+from granforce.numerics.contact_matrix import Factors, Network, clear, copy, pull, push
 from granforce.numerics.lanes import (
     ONE,
     compiled,
@@ -55,8 +55,8 @@ _ROUNDING = 1e-13
 _LIGHT = 1e-10
 
 # What `advance` does: a step towards the optimum, towards y z = 1, to A T y + a F = b alone, one of
-# Newton's method on v alone, after `project`, or one towards the optimum that is solved twice: the
-# second time for what rounding left of A T δy + a δF.
+# Newton's method on v alone, after `project`, or one towards the optimum that is solved again and
+# again for what rounding left of the unbalance.
 OPTIMUM, CENTRE, BALANCE, PROJECTED, REFINED = range(5)
 
 # Stiffness of a component that stays where it is: its conductance is below any pivot.
@@ -523,9 +523,9 @@ def _refine(problem, at, work, lanes):
         _move(dy, work.dy, one, len(dy), lanes)
         _move(dv, work.dv, one, len(dv), lanes)
         _move(dv_border, work.dv_border, one, len(dv_border), lanes)
-    _set(work.dy, dy, lanes)
-    _set(work.dv, dv, lanes)
-    _set(work.dv_border, dv_border, lanes)
+    copy(work.dy, dy, lanes)
+    copy(work.dv, dv, lanes)
+    copy(work.dv_border, dv_border, lanes)
 
 
 @within
@@ -599,12 +599,6 @@ def _measure(pairs, inside, at, work, lanes):
     going = load(work.going, 0, lanes) * most
     store(work.primal, 0, lanes, going / primal)
     store(work.dual, 0, lanes, going / dual)
-
-
-@within
-def _set(values, given, lanes):
-    for k in range(len(values)):
-        store(values, k, lanes, load(given, k, lanes))
 
 
 @within

@@ -39,6 +39,14 @@ inline = njit(
 
 # What kernels take as their last argument: its length is known to the compiler.
 ONE, MANY = (0,), (0,) * LANES
+# So few problems are faster one after the other than beside idle lanes.
+_FEW = 2
+
+
+def lanes_for(count):
+    """The lanes that so many waiting problems go in."""
+    return MANY if count > _FEW else ONE
+
 
 _DOUBLE = ir.DoubleType()
 

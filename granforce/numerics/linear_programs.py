@@ -11,7 +11,7 @@ import numpy as np
 
 from granforce.numerics import contact_program
 from granforce.numerics.contact_program import BALANCE, CENTRE, OPTIMUM, REFINED
-from granforce.numerics.lanes import MANY, ONE
+from granforce.numerics.lanes import ONE, lanes_for
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
@@ -26,8 +26,6 @@ _LEAVE_UNBALANCE = 1e-5
 # A gap so far below that does not improve the balance any more (large μ, degenerate vertices).
 _HOPELESS = 1e-3
 _MOST_STEPS = 60
-# So few programs are faster one after the other than beside idle lanes.
-_FEW = 2
 _MOST_BALANCING = 4
 
 
@@ -100,7 +98,7 @@ def _work(problem, middle, programs, waiting, mode, finished):
     """One thread: fill lanes from the queue, step, hand over what has arrived."""
     if not waiting:
         return
-    lanes = MANY if len(waiting) > _FEW else ONE
+    lanes = lanes_for(len(waiting))
     width = len(lanes)
     at = contact_program.make_iterate(problem, width)
     work = contact_program.make_workspace(problem, width)

@@ -37,10 +37,10 @@ from granforce.forces.gauss_seidel import BOX_MASS
 from granforce.numerics import contact_matrix
 from granforce.numerics.contact_matrix import Factors, Network
 from granforce.numerics.lanes import (
-    MANY,
     ONE,
     compiled,
     inline,
+    lanes_for,
     larger,
     load,
     pick,
@@ -64,9 +64,6 @@ DECREASE = 0.1
 ROUNDING = 1e-14
 # Steady motion: what contacts still breach Coulomb's law by, relative to the fastest contact.
 STEADY = 1e-7
-
-# So few flows are faster one after the other than beside idle lanes.
-_FEW = 2
 
 OPEN, STICKING, SLIDING = range(3)  # and −SLIDING, where f_t = −μ f_n
 # How a Newton step ended: no equation is left, the unbalance fell, or neither.
@@ -257,12 +254,12 @@ def _carry(step, waiting, finished, failed):
     """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
     if not waiting:
         return
-    lanes = MANY if len(waiting) > _FEW else ONE
+    lanes = lanes_for(len(waiting))
     flows, stop = _make_flows(step, len(lanes)), cancelling.flag()
     carried, seconds = [None] * len(lanes), np.zeros(len(lanes))
     while True:
         for lane in np.flatnonzero(~flows.going):
-            sent = _outcome(step, flows, lane, seconds[lane])
+            sent = carried[lane] and _outcome(step, flows, lane, seconds[lane])
             carried[lane] = _go_on(step, flows, lane, carried[lane], sent, waiting, finished)
             seconds[lane] = 0.0
         going = flows.going.copy()
@@ -274,12 +271,11 @@ def _carry(step, waiting, finished, failed):
         seconds[going] += (time.perf_counter() - begin) / going.sum()
 
 
-def _go_on(step, flows, lane, carried, outcome, waiting, finished):
+def _go_on(step, flows, lane, carried, sent, waiting, finished):
     """Send a lane's work its outcome and start what it asks for next, or else what waits first.
 
-    carried: number and work of the lane, None without. Returns the same.
+    carried: number and work of the lane; it and what is sent are None without. Returns the same.
     """
-    sent = None if carried is None else outcome
     while True:
         try:
             number, work = carried or waiting.popleft()
@@ -353,11 +349,11 @@ def _follow(step, flows, rest, stop, lanes):
     """Newton steps of all flows, until one that is going has ended."""
     while not stop[0]:
         _answer(step, flows, lanes)
-        _copy(flows.merit, flows.least, lanes)
-        _copy(flows.before, flows.state, lanes)
+        contact_matrix.copy(flows.merit, flows.least, lanes)
+        contact_matrix.copy(flows.before, flows.state, lanes)
         for to, given in ((flows.base, flows.velocity), (flows.direction, flows.rest)):
-            _copy(to.rows, given.rows, lanes)
-            _copy(to.border, given.border, lanes)
+            contact_matrix.copy(to.rows, given.rows, lanes)
+            contact_matrix.copy(to.border, given.border, lanes)
         _factor(step, flows, stop, lanes)
         direction = flows.direction
         contact_matrix.solve_lu(
@@ -404,12 +400,6 @@ def _judge(flows, lane, rest):
         flows.lately[0, lane] = 0.0
     flows.ended[lane] = resting or flows.lately[0, lane] <= flows.steady[0, lane]
     flows.going[lane] = not flows.ended[lane] and flows.steps[lane] < flows.most[lane]
-
-
-@within
-def _copy(values, given, lanes):
-    for k in range(len(values)):
-        store(values, k, lanes, load(given, k, lanes))
 
 
 @within
