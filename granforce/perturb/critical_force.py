@@ -110,6 +110,7 @@ def critical_forces(
     positions = S.positions(contacts)
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
+        cancelling.check("critical force")  # which leaves limit loads open
     step, start = exact_step.make_step(S), starting_network(S) / S.force_scale
     works = [
         _raised(S, step, int(contact), position, float(limit) / S.force_scale, start, protocol)

@@ -550,7 +550,8 @@ def _perturbed(store, S, chosen, parameters, workers, progress):
 
     def ended(k, critical):
         contact = missing[k]
-        parts[contact] = get(store, PERTURBED_CONTACT, named[contact], S=S, critical=critical)[0]
+        parts[contact] = contact_dataset(S, critical, parameters["precision"])
+        save(store, PERTURBED_CONTACT, named[contact], parts[contact])
         tell(len(parts), len(chosen))
 
     options = {"limit_loads": loads.load, "workers": workers, "finished": ended}
@@ -573,12 +574,10 @@ def _perturbed_contact_parameters(
     }
 
 
-def _perturbed_contact(store, parameters, *, workers, progress, S=None, critical=None):
-    """Dataset of one perturbed contact; S and its critical force where they are known."""
-    if S is None:
-        S = _ensemble(store, parameters)
-    if critical is None:
-        critical = critical_force(S, parameters["contact"], **_named_protocol(parameters))
+def _perturbed_contact(store, parameters, *, workers, progress):
+    """Dataset of one perturbed contact."""
+    S = _ensemble(store, parameters)
+    critical = critical_force(S, parameters["contact"], **_named_protocol(parameters))
     return contact_dataset(S, critical, parameters["precision"])
 
 
