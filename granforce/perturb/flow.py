@@ -226,8 +226,9 @@ def follow(step, works, finished, workers=1):
     """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
 
     A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
-    finished(number, value) is called, by one thread at a time, as a work returns its value. No
-    outcome depends on the number of threads, nor on what it is carried beside, bit for bit.
+    finished(number, value) is called, by one thread at a time, as a work returns its value; if it
+    raises, it is still called for what other threads have ended by then. No outcome depends on the
+    number of threads, nor on what it is carried beside, bit for bit.
     """
     waiting, told, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
 
