@@ -398,6 +398,8 @@ def _assemble(packing, asked, free):
         A = sparse.vstack([A, sparse.csr_matrix(rows)], format="csr")
         b, scale = np.append(b, values), values[0]
     scale = float(scale) or 1.0
+    if held.any():
+        b = _held_in_balance(A, b, original if mu > 0 else original[:, :1], BALANCED * scale)
     known = None
     if asked.bounds is not None:
         known = knowledge.polygons(asked.bounds[free], mu, scale, free)
@@ -439,6 +441,16 @@ def _balance(packing, contacts, grains, held, mu):
     if mu == 0:
         A = A[:, ::2]
     return sparse.csr_matrix(A), b
+
+
+def _held_in_balance(A, b, original, tolerance):
+    """A x of the original network x, if that is balanced: b without what rounding left of it.
+
+    Frozen surroundings determine most forces, and leave rows of A that follow from others times
+    10⁴: what frozen forces are out of balance by, 10⁻¹², would contradict itself there by 10⁻⁸.
+    """
+    balanced = A @ original.ravel()
+    return balanced if np.abs(balanced - b).max(initial=0.0) <= tolerance else b
 
 
 def _force_matrix(packing, contacts, row_of, count, size):

@@ -27,6 +27,9 @@ _LEAVE_UNBALANCE = 1e-5
 _HOPELESS = 1e-3
 _MOST_STEPS = 60
 _MOST_BALANCING = 4
+# Unbalance, relative to BALANCED, at which the balance is restored; the smaller one where forces
+# act from outside: rows left out there may follow from others times 10⁴.
+_RESTORED, _RESTORED_LOADED = 0.1, 1e-4
 
 
 class Program(NamedTuple):
@@ -187,9 +190,10 @@ def balanced(problem, middle, outcomes, work=None, lanes=ONE):
         at.loaded[lane] = outcome.loaded
         if outcome.loaded >= 0:
             at.y[-1, lane] = outcome.load
+    restored = BALANCED * (_RESTORED_LOADED if problem.b.any() else _RESTORED)
     for _ in range(_MOST_BALANCING):
         contact_program.look(problem, True, at, work, lanes)
-        done = work.unbalance[0] <= 0.1 * BALANCED
+        done = work.unbalance[0] <= restored
         if done[: len(outcomes)].all():
             break
         # Those are put back, so that no outcome depends on the company it came in.

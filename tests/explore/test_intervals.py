@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from packings import packed
+from scipy import linalg
 
 from granforce.bench.exact import read_reference
 from granforce.explore import intervals as module
@@ -14,6 +15,7 @@ from granforce.forces.ensemble import ensemble
 from granforce.numerics import certified_values, linear_programs
 from granforce.numerics import highs as programs
 from granforce.records import InputError, make_contacts, make_packing
+from granforce.study import slices
 from granforce.tolerances import INTERVAL_GAP
 
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -52,6 +54,19 @@ def square_lattice(side, mu):
     forces = np.zeros((len(i), 2))
     forces[:, 0] = 1.0
     return make_packing(x, r, [side, side], contacts, forces, mu, 1.0)
+
+
+def test_what_frozen_surroundings_leave_open_is_certified():
+    # Rounding of the frozen forces once kept these programs from ending in balance at all.
+    packing = packed(400, 1.0, 1)
+    S = ensemble(packing, frozen=slices.outside(packing, (0.2, 0.8, 0.2, 0.8)))
+    found = intervals(S)
+    assert found.converged
+    assert found.counts["again"] == 0
+    moved = np.abs(S.to_forces(linalg.null_space(S.A.toarray()).T)).max(axis=(0, 2))
+    extent = (found.upper - found.lower).max(axis=1)
+    assert S.dimension == 2
+    assert np.array_equal(extent > 1e-6 * S.force_scale, moved > 1e-9)
 
 
 def test_bounds_agree_with_the_reference(small):
