@@ -7,7 +7,18 @@ import numpy as np
 
 from granforce.forces.contact_dynamics import StepProblem, add_forces, set_stiffness, sweep
 from granforce.forces.nearest import nearest
-from granforce.numerics.lanes import MANY, ONE, compiled, larger, load, same, size, store, within
+from granforce.numerics.lanes import (
+    MANY,
+    ONE,
+    compiled,
+    larger,
+    load,
+    room,
+    same,
+    size,
+    store,
+    within,
+)
 from granforce.records import InputError, Relaxation
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
@@ -71,8 +82,8 @@ class SideBySide:
         set_stiffness(self.problem)
         self.lanes = ONE if count == 1 else MANY
         width = len(self.lanes)
-        self.force = np.zeros((len(self.problem.i), 2, width))
-        self.velocity = np.zeros((*self.at_rest.shape, width))
+        self.force = room(len(self.problem.i), 2, width)
+        self.velocity = room(*self.at_rest.shape, width)
         # Lanes in which nothing was begun have ended.
         self.looks = _Looks(
             np.zeros(width),

@@ -21,6 +21,7 @@ from granforce.numerics.lanes import (
     inline,
     load,
     pick,
+    room,
     root,
     same,
     size,
@@ -84,8 +85,8 @@ def make_factors(network, width, symmetric=True):
     m = network.border.shape[1] // 2
     other = 0 if symmetric else 1
     return Factors(
-        *(np.zeros((count, width)) for count in (9 * blocks, 9 * blocks * other)),
-        *(np.zeros((count, width)) for count in (m * rows, m * rows * other, m * m)),
+        *(room(count, width) for count in (9 * blocks, 9 * blocks * other)),
+        *(room(count, width) for count in (m * rows, m * rows * other, m * m)),
     )
 
 
@@ -280,8 +281,9 @@ def factor(network, least, factors, stop, lanes):
     Rows with a pivot up to `least` (rows,) are left out; see `left_out`. Ends early, with the
     matrix half done, once stop[0] is raised.
     """
-    layout, L = network.layout, factors.lower
+    layout, L, sides, corner = network.layout, factors.lower, factors.sides, factors.corner
     start, panel = layout.start, layout.panel
+    m, rows = network.border.shape[1] // 2, 3 * (len(start) - 1)
     number = 0
     for p in range(len(panel) - 1):
         if stop[0]:
@@ -295,11 +297,11 @@ def factor(network, least, factors, stop, lanes):
             for q in range(k + 1, end):
                 a = start[k] + q - k
                 _subtract_column(L, 9 * start[q], L, 9 * a, last - a, L, 9 * a, lanes)
+        # Now, while these columns are at hand: what is larger than the caches takes its time.
+        for a in range(m):
+            _forward(layout, panel[p], end, L, _LOWER, L, sides, rows * a, lanes)
         number = _subtract_panel(layout, p, number, L, L, 0, L, lanes)
-    m, rows = network.border.shape[1] // 2, 3 * (len(start) - 1)
-    sides, corner = factors.sides, factors.corner
     for a in range(m):
-        _forward(layout, L, _LOWER, L, sides, rows * a, lanes)
         for b in range(a + 1):
             value = load(corner, m * a + b, lanes)
             value = _less_product(value, sides, rows * a, sides, rows * b, rows, lanes)
@@ -455,7 +457,7 @@ def solve(network, factors, x, y, lanes):
     """x, y ← (L Lᵀ)⁻¹ (x, y) for factored L; x (rows, W), y (m, W) of the global rows."""
     layout = network.layout
     m, rows = network.border.shape[1] // 2, 3 * (len(layout.start) - 1)
-    _forward(layout, factors.lower, _LOWER, factors.lower, x, 0, lanes)
+    _forward(layout, 0, rows // 3, factors.lower, _LOWER, factors.lower, x, 0, lanes)
     sides, corner = factors.sides, factors.corner
     for a in range(m):
         value = _less_product(load(y, a, lanes), sides, rows * a, x, 0, rows, lanes)
@@ -473,10 +475,13 @@ def solve(network, factors, x, y, lanes):
 
 
 @within
-def _forward(layout, D, side, L, x, first, lanes):
-    """x ← L⁻¹ x for the rows of x from `first` on; of L's diagonal blocks one side is in D."""
+def _forward(layout, begin, end, D, side, L, x, first, lanes):
+    """x ← L⁻¹ x by columns `begin` to `end`, for the rows of x from `first` on.
+
+    Of L's diagonal blocks one side is in D.
+    """
     start = layout.start
-    for k in range(len(start) - 1):
+    for k in range(begin, end):
         d, v = 9 * start[k], first + 3 * k
         v0 = load(x, v, lanes) * load(D, d, lanes)
         v1 = fma(-load(D, d + side[0], lanes), v0, load(x, v + 1, lanes)) * load(D, d + 4, lanes)
@@ -563,7 +568,7 @@ def factor_lu(network, factors, stop, lanes):
     corner = factors.corner
     for a in range(m):
         _forward_unit(layout, L, factors.tops, rows * a, lanes)
-        _forward(layout, L, _UPPER, U, factors.sides, rows * a, lanes)
+        _forward(layout, 0, rows // 3, L, _UPPER, U, factors.sides, rows * a, lanes)
     for a in range(m):
         for b in range(m):
             value = _less_product(

@@ -35,8 +35,10 @@ from granforce.numerics.lanes import (
     larger,
     load,
     pick,
+    room,
     root,
     same,
+    side_by_side,
     size,
     store,
     within,
@@ -120,11 +122,9 @@ def make_iterate(problem, width):
     """An Iterate of trivial programs that take any step."""
     n, rows, m = len(problem.start), len(problem.b), len(problem.b_border)
     return Iterate(
-        np.tile(np.append(problem.start, 1.0)[:, None], width),
-        np.ones((n + 1, width)),
-        np.zeros((n + 1, width)),
-        np.zeros((rows, width)),
-        np.zeros((m, width)),
+        side_by_side(np.append(problem.start, 1.0), width),
+        room(n + 1, width, value=1.0),
+        *(room(length, width) for length in (n + 1, rows, m)),
         np.full(width, -1),
     )
 
@@ -138,10 +138,10 @@ def make_workspace(problem, width):
         contact_matrix.make_factors(problem.network, width),
         cancelling.flag(),
         np.full(rows, contact_matrix.NO_PIVOT),
-        *(np.zeros((length, width)) for length in lengths),
-        np.tile(problem.w[:, None], width),
-        *(np.zeros((1, width)) for _ in range(6)),
-        np.ones((1, width)),
+        *(room(length, width) for length in lengths),
+        side_by_side(problem.w, width),
+        *(room(1, width) for _ in range(6)),
+        room(1, width, value=1.0),
     )
 
 

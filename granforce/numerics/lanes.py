@@ -13,6 +13,7 @@ a factorisation of 400 disks took 0.11 ms a matrix, with explicit lanes it takes
 
 import operator
 
+import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
@@ -43,9 +44,35 @@ ONE, MANY = (0,), (0,) * LANES
 _FEW = 2
 
 
+# Doubles in a line of the cache.
+_LINE = 8
+
+
 def lanes_for(count):
     """The lanes that so many waiting problems go in."""
     return MANY if count > _FEW else ONE
+
+
+def room(*shape, value=0.0):
+    """An array of one value that begins where a line of the cache does.
+
+    Lanes that lie across two lines take up to twice the time: a factorisation reaches 28 Gflop/s
+    with the arrays of numpy, which begin anywhere, and 48 so.
+    """
+    size = int(np.prod(shape))
+    longer = np.zeros(size + _LINE - 1)
+    first = -(longer.ctypes.data // longer.itemsize) % _LINE
+    found = longer[first : first + size].reshape(shape)
+    if value:
+        found.fill(value)
+    return found
+
+
+def side_by_side(values, width):
+    """Values (n,) in each of so many lanes: (n, width)."""
+    found = room(len(values), width)
+    found[:] = np.asarray(values)[:, None]
+    return found
 
 
 _DOUBLE = ir.DoubleType()

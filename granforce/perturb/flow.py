@@ -44,6 +44,7 @@ from granforce.numerics.lanes import (
     larger,
     load,
     pick,
+    room,
     same,
     size,
     store,
@@ -296,15 +297,15 @@ def _make_flows(step, width):
     contacts, (rows, m) = len(step.stiffness), (len(step.b), len(step.b_border))
 
     def motion():
-        return Motion(np.zeros((rows, width)), np.zeros((m, width)))
+        return Motion(room(rows, width), room(m, width))
 
     return Flows(
         contact_matrix.make_factors(step.network, width, symmetric=False),
         motion(),
-        *(np.zeros((2 * contacts, width)) for _ in range(2)),
-        *(np.zeros((contacts, width)) for _ in range(2)),
+        *(room(2 * contacts, width) for _ in range(2)),
+        *(room(contacts, width) for _ in range(2)),
         *(motion() for _ in range(5)),
-        *(np.ones((1, width)) for _ in range(9)),
+        *(room(1, width, value=1.0) for _ in range(9)),
         *(np.zeros(width, dtype=np.int64) for _ in range(5)),
         *(np.zeros(width, dtype=bool) for _ in range(2)),
     )
