@@ -12,8 +12,6 @@ from granforce.forces.ensemble import ensemble
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing
 
-_PRIMAL_SIMPLEX = 4
-
 
 def read_reference(path):
     """The Ensemble of a reference file (NPZ) and its arrays."""
@@ -28,7 +26,7 @@ def plain_loop(ensemble, contacts=None):
     """
     A, b, T = ensemble.scaled_form
     model = programs.standard_form(A, b, solver="simplex")
-    model.setOptionValue("simplex_strategy", _PRIMAL_SIMPLEX)
+    model.setOptionValue("simplex_strategy", programs.PRIMAL_SIMPLEX)
     places = ensemble.positions(ensemble.index if contacts is None else contacts)
     parts = ensemble.per_contact
     rows = T.tocsr()[(parts * places[:, None] + np.arange(parts)).ravel()].toarray()

@@ -13,6 +13,8 @@ from granforce.system import cancelling
 from granforce.tolerances import PROGRAM
 
 OPTIMAL = highspy.HighsModelStatus.kOptimal
+# HiGHS's number of the primal simplex method: a vertex stays one when costs change.
+PRIMAL_SIMPLEX = 4
 
 # How a program is tried again where it ended without an optimum.
 _OTHER_WAYS = (

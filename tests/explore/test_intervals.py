@@ -69,6 +69,22 @@ def test_what_frozen_surroundings_leave_open_is_certified():
     assert np.array_equal(extent > 1e-6 * S.force_scale, moved > 1e-9)
 
 
+def test_bounds_where_some_contacts_can_do_nothing_but_slide():
+    packing = packed(50, 0.01, 1)
+    S = ensemble(packing, frozen=slices.outside(packing, (0.2, 0.8, 0.2, 0.8)))
+    system = make_system(S)
+    assert not system.middle.reached
+    found = intervals(S)
+    assert found.converged
+    assert found.counts["again"] == 0
+    for c in range(len(S.index)):
+        for side, value in enumerate((found.lower, found.upper)):
+            program = module.bound_of(S, c, 0, side)
+            alone = certified_values.from_scratch(system, 0, program)
+            ((attained,), _) = certified_values.certify(system, [alone], [program])
+            assert abs(value[c, 0] / S.force_scale - (1 - 2 * side) * attained) <= 2 * INTERVAL_GAP
+
+
 def test_bounds_agree_with_the_reference(small):
     system, data, found = small
     agree(system, found, data["lo"][system.index], data["hi"][system.index])
