@@ -23,7 +23,7 @@ from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.nearest import starting_network
 from granforce.perturb import flow as exact_step
-from granforce.records import InputError, positive
+from granforce.records import InputError, UndecidedError, positive
 from granforce.system import cancelling
 
 # Part of the way from the last load at rest to the limit load that the next load goes.
@@ -104,6 +104,8 @@ def critical_forces(
     limit_loads (k,): force, computed if not given. workers: threads; no result depends on their
     number, nor on the other contacts. finished(k, CriticalForce) is called from the threads as each
     ends. Other options and errors as for `critical_force`.
+
+    Raises UndecidedError where a limit load cannot be certified.
     """
     S, protocol = ensemble, Protocol(**protocol)
     protocol = protocol._replace(precision=positive(protocol.precision, "precision"))
@@ -111,6 +113,9 @@ def critical_forces(
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
         cancelling.check("critical force")  # which leaves limit loads open
+        if not np.isfinite(limit_loads).all():
+            number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]
+            raise UndecidedError(f"the limit load of contact {number} could not be certified")
     step, start = exact_step.make_step(S), starting_network(S) / S.force_scale
     works = [
         _raised(S, step, int(contact), position, float(limit) / S.force_scale, start, protocol)

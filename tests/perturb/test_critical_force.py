@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from packings import lattice, packed
 
-from granforce.explore.intervals import limit_loads
+from granforce.explore.intervals import limit_load_bounds, limit_loads
 from granforce.forces import contact_dynamics as dynamics
 from granforce.forces.ensemble import ensemble
 from granforce.forces.gauss_seidel import _from_rest
@@ -13,7 +13,7 @@ from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
 from granforce.perturb import flow as exact_step
 from granforce.perturb.critical_force import critical_force, critical_forces, response
-from granforce.records import Cancelled, InputError
+from granforce.records import Cancelled, InputError, UndecidedError
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
@@ -277,6 +277,18 @@ def test_what_cannot_be_perturbed_is_told():
         response(S, S.index[0], 1e-3 * S.force_scale)
     with pytest.raises(Cancelled):
         critical_force(S, S.index[0], cancel=lambda: True)
+
+
+def test_no_critical_force_below_a_limit_load_that_is_not_certified(monkeypatch):
+    S = ensemble(packed(40, 0.5))
+
+    def open_ended(S, contacts, **options):
+        loads = limit_load_bounds(S, contacts, **options)
+        return loads._replace(load=np.where(contacts == S.index[1], np.nan, loads.load))
+
+    monkeypatch.setattr(perturb, "limit_load_bounds", open_ended)
+    with pytest.raises(UndecidedError, match=f"contact {S.index[1]} "):
+        critical_forces(S, S.index[:3])
 
 
 def parameters(**options):
