@@ -24,6 +24,11 @@ from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
 
+# HiGHS takes a vertex for the optimum where no slack of a cost is below −10⁻¹⁰: times as many forces
+# as there are, that may be more than INTERVAL_GAP.
+_DEARER = 1e3
+
+
 class System(NamedTuple):
     """A y = b in cone coordinates and units of ⟨f_n⟩, and what bounds y."""
 
@@ -225,9 +230,9 @@ def _cost_of(system, task):
 
 def _outcome(system, model, A, cost, number, task):
     """What HiGHS makes of a program, from its basis, if any, to rounding."""
-    highs.set_cost(model, cost)
+    highs.set_cost(model, _DEARER * cost)
     _, y = highs.solve(model)
-    multiplier = np.array(model.getSolution().row_dual)
+    multiplier = np.array(model.getSolution().row_dual) / _DEARER
     basis = highs.basis(model)
     if basis is not None:
         y, multiplier = highs.vertex(A, system.b, cost, *basis)
