@@ -2,9 +2,10 @@
 
 import threading
 import weakref
+from functools import partial
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
 from granforce.forces import knowledge
 from granforce.numerics import (
@@ -18,6 +19,9 @@ from granforce.system import cancelling
 # Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
 # slows no step, only bounds them.
 SHIFT = 1e-11
+# Rows whose pivot is below this, relative to the largest, follow from others; of so many rows at
+# most that is asked of dense matrices.
+DEPENDENT, MOST_DENSE = 1e-10, 3000
 # Least cone coordinate (in ⟨f_n⟩) of a centre that is one for sure.
 WELL_INSIDE = 1e-5
 
@@ -114,8 +118,32 @@ def independent_problem_of(ensemble):
     """The Problem for linear programs: independent rows, exactly."""
     kept = _kept(ensemble)
     if len(kept) == 2:
-        kept.append(contact_program.without_dependent_rows(*kept))
+        problem, idle = kept
+        if len(ensemble.frozen) and ensemble.A.shape[0] <= MOST_DENSE:
+            out = np.zeros(len(idle), bool)
+            out[problem.place] = _dependent_rows(ensemble)
+        else:
+            out = contact_program.dependent_rows(problem, idle)
+        kept.append(contact_program.without_rows(problem, idle, out))
     return kept[2]
+
+
+def _dependent_rows(ensemble):
+    """Mask of rows of A that follow from others, none of which it is many times.
+
+    Frozen surroundings determine most forces: rows without a pivot may be others times 2·10⁵ there,
+    and rounding may pass for a pivot. QR with pivoting (Golub, Numer. Math. 7, 206 (1965)) tells.
+    """
+    free = np.ones((len(ensemble.index), 2), bool)
+    if ensemble.known is not None:
+        free = ~(ensemble.known.pinned | ensemble.known.wholly[:, None])
+    A = ensemble.A[:, ensemble.to_vector(free).astype(bool)].toarray()
+    decompose = partial(linalg.qr, mode="r", pivoting=True)
+    R, order = cancelling.apart(decompose, A.T)
+    pivots = np.abs(np.diag(R))
+    out = np.ones(len(A), bool)
+    out[order[: np.sum(pivots > DEPENDENT * pivots.max(initial=0.0))]] = False
+    return out
 
 
 def _kept(ensemble):

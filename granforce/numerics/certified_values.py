@@ -23,9 +23,8 @@ from granforce.records import Cancelled
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
-
-# HiGHS takes a vertex for the optimum where no slack of a cost is below −10⁻¹⁰: times as many forces
-# as there are, that may be more than INTERVAL_GAP.
+# HiGHS takes a vertex for the optimum where no slack is below −10⁻¹⁰ of its costs: times as many
+# forces as there are, that may be more than INTERVAL_GAP.
 _DEARER = 1e3
 
 

@@ -159,23 +159,31 @@ def make_problem(network, b, b_border, idle, place, mu, shift):
     return Problem(network, b, b_border, diagonal, mu, place, w, start, side, none, none)
 
 
-def without_dependent_rows(problem, idle):
-    """The problem, linear, without the rows of the balance that follow from others, and shift."""
-    network, w = problem.network, np.where(problem.w < PINNED, 0.0, PINNED)
-    problem = problem._replace(diagonal=idle, w=w)
+def dependent_rows(problem, idle):
+    """Mask (rows,) of rows of the balance that follow from others: those without a pivot."""
+    network, problem = problem.network, _linear(problem, idle)
     # With y = 1 the matrix is A Aᵀ/2.
     at, work = make_iterate(problem, 1), make_workspace(problem, 1)
     work.least[:] = 0.5 * _DEPENDENT * _diagonal(network)
     look(problem, True, at, work, ONE)
     advance(problem, True, BALANCE, at, work, ONE)
     cancelling.check()
-    out = contact_matrix.left_out(network, work.factors) & (idle == 0)
+    return contact_matrix.left_out(network, work.factors) & (idle == 0)
+
+
+def without_rows(problem, idle, out):
+    """The problem, linear, without shift and the rows (rows,) that are out."""
+    network = problem.network
     columns = np.where(out[_rows(network)], 0.0, network.columns.reshape(-1, 2, 2, 3))
-    return problem._replace(
+    return _linear(problem, idle)._replace(
         network=network._replace(columns=columns.reshape(-1, 12)),
         b=np.where(out, 0.0, problem.b),
         diagonal=np.where(out, 1.0, idle),
     )
+
+
+def _linear(problem, idle):
+    return problem._replace(diagonal=idle, w=np.where(problem.w < PINNED, 0.0, PINNED))
 
 
 def _rows(network):
