@@ -62,6 +62,10 @@ def solver(table):
             yield from _by_range(
                 _ratios(table, name, part, "walk"), f"{label} of {sampler} over {label} of nearest"
             )
+    # Of fewer states than the others, η3 would be smaller for that alone.
+    for name, label in (("eta1", "η1"), ("eta2", "η2")):
+        found = _ratios(table, name, "sweeps_1e-6", "walk")
+        yield from _by_range(found, f"{label} of sweeps_1e-6 over {label} of nearest")
     for part in ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6"):
         for name, word in (("acceptance", "acceptance"), ("mean_sweeps", "sweeps per state")):
             yield from _by_range(_values(table.part(part), name), f"{word} of {part}")

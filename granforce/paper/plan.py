@@ -53,7 +53,7 @@ class Plan(NamedTuple):
     packings: int = 10
     states: int = 1000
     gauss_seidel_packings: int = 10
-    hardest_packings: int = 3  # with sweeps down to the smallest residual
+    hardest_packings: int = 10  # with sweeps down to the smallest residual
     # More packings where the maximum is, and where packings differ most.
     fine_frictions: tuple = (0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
     large_frictions: tuple = (1, 2, 5, 10)
