@@ -235,6 +235,9 @@ def _outcome(system, model, A, cost, number, task):
     basis = highs.basis(model)
     if basis is not None:
         y, multiplier = highs.vertex(A, system.b, cost, *basis)
+    y = np.maximum(y, 0.0)
     load = float(y[-1]) if task.loaded >= 0 else 0.0
     outcome = Outcome(number, task.loaded, y[: len(system.weight)], load, multiplier, None, 0)
+    if np.abs(A @ y - system.b).max(initial=0.0) <= BALANCED:
+        return outcome
     return linear_programs.balanced(system.problem, system.middle, [outcome])[0]
