@@ -7,8 +7,8 @@ rounding (`fma`) in either width: a problem gives the same result, bit for bit, 
 company. Arrays hold the lanes of one number next to each other: shape (…, 1) or (…, LANES).
 
 Left to the compiler, loops over lanes spend most of their time proving that arrays do not overlap:
-a factorisation of 400 disks took 0.11 ms a matrix, with explicit lanes it takes 0.036 ms (16 lanes:
-0.049 ms, since eight factors fit into the cache and sixteen do not).
+a factorisation of 400 disks took 0.11 ms a matrix, with explicit lanes it takes 0.028 ms (16 lanes
+are slower: eight factors fit into the cache and sixteen do not).
 """
 
 import operator
@@ -56,8 +56,8 @@ def lanes_for(count):
 def room(*shape, value=0.0):
     """An array of one value that begins where a line of the cache does.
 
-    Lanes that lie across two lines take up to twice the time: a factorisation reaches 28 Gflop/s
-    with the arrays of numpy, which begin anywhere, and 48 so.
+    Lanes that lie across two lines take up to twice the time: a factorisation reaches 22 to 28
+    Gflop/s with the arrays of numpy, which begin anywhere, and 38 to 44 so.
     """
     size = int(np.prod(shape))
     longer = np.zeros(size + _LINE - 1)

@@ -28,7 +28,7 @@ _HOPELESS = 1e-3
 _MOST_STEPS = 60
 _MOST_BALANCING = 4
 # Unbalance, relative to BALANCED, at which the balance is restored; the smaller one where forces
-# act from outside: rows left out there may follow from others times 10⁴.
+# act from outside: rows left out there may follow from hundreds of others.
 _RESTORED, _RESTORED_LOADED = 0.1, 1e-4
 
 

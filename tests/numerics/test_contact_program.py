@@ -2,6 +2,7 @@
 
 from collections import deque
 
+import numpy as np
 import pytest
 from packings import packed
 
@@ -10,7 +11,7 @@ from granforce.forces.contact_problem import independent_problem_of
 from granforce.forces.ensemble import ensemble
 from granforce.numerics import contact_program, linear_programs
 from granforce.numerics.contact_program import OPTIMUM, REFINED
-from granforce.numerics.lanes import MANY, ONE
+from granforce.numerics.lanes import MANY, ONE, room, side_by_side
 from granforce.tolerances import BALANCED
 
 
@@ -41,3 +42,15 @@ def test_refined_steps_leave_less_unbalance_on_the_same_way(mu):
     assert max(off for gap, off in refined if gap > 1e-7) < 0.1 * BALANCED
     assert sum(off for _, off in refined) < 0.1 * sum(off for _, off in plain)
     assert unbalances(S, REFINED, MANY) == refined
+
+
+def test_lanes_begin_where_a_line_of_the_cache_does():
+    # Those of two lines at once take up to twice the time, with the same results.
+    problem = independent_problem_of(ensemble(packed(100, 0.3)))
+    at = contact_program.make_iterate(problem, len(MANY))
+    work = contact_program.make_workspace(problem, len(MANY))
+    arrays = [*at[:-1], *work.factors, *work[3:]]
+    assert len(arrays) > 20
+    assert {array.ctypes.data % 64 for array in arrays if array.size} == {0}
+    assert np.array_equal(room(3, 2, value=0.5), np.full((3, 2), 0.5))
+    assert np.array_equal(side_by_side([1.0, 2.0], 3), [[1.0] * 3, [2.0] * 3])
