@@ -17,13 +17,14 @@ MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.1
 # Parts of the study, and what they are called.
 SAMPLERS = {
     "walk": "random walk",
-    "sweeps_1e-3": "walk by Gauss–Seidel",
+    "sweeps_1e-3": "by Gauss–Seidel, to 10⁻³",
     "uniform": "uniform in S",
     "exact": "exact",
+    "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN = "finished results"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
-MARKERS = ("circle", "square", "triangle", "diamond")
+MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
 CLAIMS = """<table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
@@ -104,8 +105,8 @@ def indeterminacy(own, exact, log):
         "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ is "
         "a packing of its own. A tap on a point shows the states of that μ, or asks for them. The "
         f"second figure: 0.15 η3 of the {term('walk', 'random walk')}, of the "
-        f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, of states {term('uniform')}, and "
-        f"{term('exact', 'exact')}."
+        f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')} to two unbalances, of states "
+        f"{term('uniform')}, and {term('exact', 'exact')}."
     )
     return [etas, seen, z], text
 
