@@ -59,7 +59,7 @@ class Plan(NamedTuple):
     large_frictions: tuple = (1, 2, 5, 10)
     many_packings: int = 30
     exact_packings: int = 3
-    uniform_packings: int = 3
+    uniform_packings: int = 10
     response_packings: int = 10
     response_contacts: int = 20
     perturb_packings: int = 3
@@ -203,8 +203,9 @@ def _exacts(plan, seed):
 
 def _uniform(plan, seed):
     found = []
-    many = plan.fine_frictions if seed <= plan.packings else ()
-    for mu in _frictions(plan, seed, plan.uniform_packings, many):
+    if seed > min(plan.uniform_packings, plan.packings):
+        return []
+    for mu in sorted(set(plan.frictions) | set(plan.fine_frictions)):
         # All states are kept: their mean is the centre that distances are measured from.
         named = kinds.UNIFORM.parameters(kinds.PACKING.parameters(plan.n, mu, seed), plan.states)
         found.append(Task("uniform", Cell(kinds.UNIFORM, named), plan.n, mu, seed))
