@@ -201,9 +201,12 @@ def _shown(dataset):
 
 
 def merged(new, old):
-    """The Table `new` with the rows of its plan that it lacks and `old` has, after its own."""
+    """The Table `new` with the rows of its plan that it lacks and `old` has, after its own.
 
-    known = {_name(row) for row in new.rows}
+    Numbers of a row that hang on other cells (distances from the uniform centre) stay the old ones
+    where those cells are gone.
+    """
+    known, older = {_name(row) for row in new.rows}, {_name(row): row for row in old.rows}
     planned = {(t.part, t.n, t.mu, t.seed) for t in plans.tasks(plans.Plan(**new.plan))}
     kept = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
     place = {k: len(new.rows) + at for at, k in enumerate(kept)}
@@ -215,7 +218,7 @@ def merged(new, old):
     moved = [place[k] for k in old.samples["row"][lacked].astype(int)]
     samples["row"][len(new.samples["row"]) :] = moved
     return new._replace(
-        rows=new.rows + [old.rows[k] for k in kept],
+        rows=[older.get(_name(row), {}) | row for row in new.rows] + [old.rows[k] for k in kept],
         samples=samples,
         shown=new.shown + [(place[k], normal) for k, normal in old.shown if k in place],
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},

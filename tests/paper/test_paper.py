@@ -216,8 +216,10 @@ def test_rows_that_a_store_lacks_come_from_the_older_table(done):
     fewer.samples["row"][:] = np.searchsorted(kept, fewer.samples["row"])
     fewer.rows[0]["eta3"] = 7.0  # the newer row is the one that is taken
     old.rows.append({"part": "of another plan", "n": 20, "mu": 0.1, "seed": 1})
+    lost = fewer.rows[-1].pop("dimension")
     joined = tables.merged(fewer, old)
     assert len(joined.rows) == len(new.rows)
+    assert joined.rows[len(fewer.rows) - 1]["dimension"] == lost
     assert joined.rows[0]["eta3"] == 7.0
     for part in ("walk", "exact", "uniform"):
         for mu, group in joined.extents(part).items():
