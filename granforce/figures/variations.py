@@ -62,13 +62,16 @@ def opened(rows, own, *, backend="bokeh"):
     return _frames(sources, backend, names, "top_left", logy=("eta2", "eta3"))
 
 
-def frozen(periodic, inner, *, backend="bokeh"):
+def frozen(periodic, inner, larger=(), *, backend="bokeh"):
     """Part of contacts without a unique force, and their clusters, against μ.
 
     periodic: rows (dicts with mu, undetermined_part, clusters) where only the pressure is
-    prescribed; inner: where the forces on all contacts outside an inner part are held.
+    prescribed; inner: where the forces on all contacts outside an inner part are held; larger: the
+    same in packings of more disks, with their number n.
     """
-    sources = (("periodic", periodic, "solid"), ("frozen surroundings", inner, "dashed"))
+    sources = [("periodic", periodic, "solid"), ("frozen surroundings", inner, "dashed")]
+    if larger:
+        sources.append((f"the same, N = {larger[0]['n']}", larger, "dotted"))
     names = (("undetermined_part", "undetermined part", 1.0), ("clusters", "clusters", 1.0))
     return _frames(sources, backend, names, "right")
 

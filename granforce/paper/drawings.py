@@ -163,7 +163,8 @@ def _beyond(table):
         made["opened"] = _later(figures.opened, table.part("opened"), walk)
     if table.part("frozen"):
         periodic = [row for row in exact if row["mu"] > 0]
-        made["frozen"] = _later(figures.frozen, periodic, table.part("frozen"))
+        inner = table.part("frozen"), table.part("frozen_large")
+        made["frozen"] = _later(figures.frozen, periodic, *inner)
     if any("walk_ratio" in row for row in uniform):
         made["distances"] = _later(figures.distances, uniform)
     if table.part("stress"):

@@ -210,6 +210,9 @@ def test_variations_show_what_the_rows_hold():
     part, clusters = frames(figures.frozen([], inner))
     np.testing.assert_allclose(curves(part)["frozen surroundings"], ([0.1], [0]))
     np.testing.assert_allclose(curves(clusters)["frozen surroundings"], ([0.1], [3]))
+    larger = [{"mu": 1, "n": 80, "undetermined_part": 0.5, "clusters": 2}]
+    part, _ = frames(figures.frozen([], inner, larger))
+    np.testing.assert_allclose(curves(part)["the same, N = 80"], ([1], [0.5]))
     walks = [{"mu": mu, "acceptance": mu, "mean_sweeps": 1e4 * mu} for mu in (0.1, 1)]
     walks.append({"mu": 10, "acceptance": 0.0})  # out of reach: told, and without sweeps
     part, sweeps = frames(figures.effort({"to 1e-3": walks}))
