@@ -25,8 +25,7 @@ def plain_loop(ensemble, contacts=None):
     first all minima, then all maxima.
     """
     A, b, T = ensemble.scaled_form
-    model = programs.standard_form(A, b, solver="simplex")
-    model.setOptionValue("simplex_strategy", programs.PRIMAL_SIMPLEX)
+    model = programs.going_on(A, b)
     places = ensemble.positions(ensemble.index if contacts is None else contacts)
     parts = ensemble.per_contact
     rows = T.tocsr()[(parts * places[:, None] + np.arange(parts)).ravel()].toarray()

@@ -71,7 +71,6 @@ def _with_known(problem, ensemble):
     """The Problem with what is known; contacts known altogether stay at y = (1, 1) in it."""
     known, mu = ensemble.known, ensemble.mu
     first = knowledge.first_forces(known, mu)
-    pinned = known.pinned | known.wholly[:, None]
     rows = np.zeros(len(problem.b) + len(problem.b_border))
     rows[problem.place] = _instead(ensemble)
     sides = known.contact, known.component, known.sign
@@ -81,7 +80,7 @@ def _with_known(problem, ensemble):
     return problem._replace(
         b=problem.b + rows[: len(problem.b)],
         b_border=problem.b_border + rows[len(problem.b) :],
-        w=np.where(pinned.ravel(), contact_program.PINNED, problem.w),
+        w=np.where(known.pinned.ravel(), contact_program.PINNED, problem.w),
         start=np.append(pairs.ravel(), np.maximum(rest, 0.1)),
         side=2 * sides[0] + sides[1],
         sign=sides[2],
@@ -134,14 +133,10 @@ def _dependent_rows(ensemble):
     Frozen surroundings determine most forces: rows without a pivot may be others times 2·10⁵ there,
     and rounding may pass for a pivot. QR with pivoting (Golub, Numer. Math. 7, 206 (1965)) tells.
     """
-    free = np.ones((len(ensemble.index), 2), bool)
-    if ensemble.known is not None:
-        free = ~(ensemble.known.pinned | ensemble.known.wholly[:, None])
-    A = ensemble.A[:, ensemble.to_vector(free).astype(bool)].toarray()
     decompose = partial(linalg.qr, mode="r", pivoting=True)
-    R, order = cancelling.apart(decompose, A.T)
+    R, order = cancelling.apart(decompose, ensemble.free_columns.toarray().T)
     pivots = np.abs(np.diag(R))
-    out = np.ones(len(A), bool)
+    out = np.ones(len(order), bool)
     out[order[: np.sum(pivots > DEPENDENT * pivots.max(initial=0.0))]] = False
     return out
 

@@ -78,9 +78,7 @@ class Ensemble:
         A Aᵀ. Two less where the whole stress is prescribed. Beyond LARGEST_RANK rows the generic
         value is given.
         """
-        A = self.A
-        if self.known is not None:
-            A = A.tocsc()[:, ~self.to_vector(self.known.pinned).astype(bool)]
+        A = self.free_columns
         rows, unknowns = A.shape
         if rows > LARGEST_RANK:
             dependent = 2 if self.has_pressure_row else 3
@@ -90,6 +88,13 @@ class Ensemble:
             return 0
         square = cancelling.apart(np.linalg.eigvalsh, (A @ A.T).toarray())
         return unknowns - int(np.sum(square > 1e-12 * square[-1]))
+
+    @property
+    def free_columns(self):
+        """A without the columns of components that are pinned."""
+        if self.known is None:
+            return self.A
+        return self.A.tocsc()[:, ~self.to_vector(self.known.pinned).astype(bool)]
 
     @property
     def coordination(self):

@@ -204,8 +204,7 @@ def one_after_another(system, tasks):
     Each goes on from the vertex of the one before, which takes a tenth of the time: for S without
     an inside, where some contacts can do nothing but slide or open.
     """
-    model = highs.standard_form(system.A, system.b, solver="simplex")
-    model.setOptionValue("simplex_strategy", highs.PRIMAL_SIMPLEX)
+    model = highs.going_on(system.A, system.b)
     for number, task in enumerate(tasks):
         if task.loaded < 0:
             cancelling.check()

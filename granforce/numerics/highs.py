@@ -13,8 +13,7 @@ from granforce.system import cancelling
 from granforce.tolerances import PROGRAM
 
 OPTIMAL = highspy.HighsModelStatus.kOptimal
-# HiGHS's number of the primal simplex method: a vertex stays one when costs change.
-PRIMAL_SIMPLEX = 4
+_PRIMAL_SIMPLEX = 4  # HiGHS's number
 
 # How a program is tried again where it ended without an optimum.
 _OTHER_WAYS = (
@@ -28,6 +27,13 @@ def standard_form(A, b, *, upper=np.inf, solver="choose"):
     """A silent HiGHS model of {0 ≤ y ≤ upper, A y = b}, zero cost; A sparse (m, n), b (m,)."""
     columns = np.zeros(A.shape[1]), np.full(A.shape[1], upper)
     return bounded(A, (b, b), columns, np.zeros(A.shape[1]), solver=solver)
+
+
+def going_on(A, b):
+    """A standard_form for the primal simplex method: a vertex stays one when costs change."""
+    model = standard_form(A, b, solver="simplex")
+    model.setOptionValue("simplex_strategy", _PRIMAL_SIMPLEX)
+    return model
 
 
 def bounded(A, rows, columns, cost, *, solver="choose"):
