@@ -6,6 +6,7 @@ Signs: **n** points from grain i to grain j, **t** = (−n_y, n_x); the force on
 f_n n + f_t t, and f_n ≥ 0 presses.
 """
 
+import itertools
 import os
 from typing import NamedTuple
 
@@ -46,12 +47,75 @@ class Contacts(NamedTuple):
     arm_j: np.ndarray  # (N_c,) lever arm a_j
 
 
+class Cell(NamedTuple):
+    """The periodic cell, spanned by a = (L_x, 0) and b = (tilt, L_y); tilt is LAMMPS' ``xy``."""
+
+    box: np.ndarray  # (2,) L_x, L_y, length; inf in an open direction
+    tilt: float  # x component of b, length; 0 where a direction is open
+
+    @property
+    def vectors(self):
+        """a and b as rows (2, 2), zero along open directions: images are at x + shift @ vectors."""
+        sides = np.where(np.isfinite(self.box), self.box, 0.0)
+        return np.array([[sides[0], 0.0], [self.tilt, sides[1]]])
+
+    @property
+    def reduced(self):
+        """The two shortest vectors (2, 2) that span the lattice, the shortest first (Gauss)."""
+        short, long = sorted(self.vectors, key=np.linalg.norm)
+        while (times := np.round(short @ long / max(short @ short, np.finfo(float).tiny))) != 0:
+            short, long = sorted((short, long - times * short), key=np.linalg.norm)
+        return np.array([short, long])
+
+    def parts(self, x):
+        """Points (…, 2) as parts of a and b, from 0 to 1 inside; needs both directions periodic."""
+        up = x[..., 1] / self.box[1]
+        return np.stack([(x[..., 0] - self.tilt * up) / self.box[0], up], axis=-1)
+
+    def wrapped(self, x):
+        """Points (…, 2) at their image in the parallelogram of a and b, as they are along open."""
+        found = np.array(x, dtype=np.float64)
+        lean = np.zeros(found.shape[:-1])
+        if np.isfinite(self.box[1]):
+            up = _remainder(found[..., 1], self.box[1])
+            if self.tilt:
+                crossed = np.round((found[..., 1] - up) / self.box[1])
+                found[..., 0] -= crossed * self.tilt
+                lean = self.tilt * (up / self.box[1])
+            found[..., 1] = up
+        if np.isfinite(self.box[0]):
+            found[..., 0] = _remainder(found[..., 0] - lean, self.box[0]) + lean
+        return found
+
+    def nearest(self, branch):
+        """The shortest image (…, 2) of vectors between two points."""
+        branch = np.array(branch, dtype=np.float64)
+        if not self.tilt:
+            periodic = np.isfinite(self.box)
+            side = np.where(periodic, self.box, 1.0)
+            return branch - np.where(periodic, side * np.round(branch / side), 0.0)
+        # Between the two shortest vectors the angle is 60° or more: from the rounded image, the
+        # shortest is at most one step away along each.
+        short = self.reduced
+        branch = branch - np.round(branch @ np.linalg.inv(short)) @ short
+        steps = [(0, 0), *(s for s in itertools.product((-1, 0, 1), repeat=2) if any(s))]
+        images = branch[..., None, :] + np.array(steps) @ short
+        pick = np.argmin(np.linalg.norm(images, axis=-1), axis=-1)
+        return np.take_along_axis(images, pick[..., None, None], axis=-2)[..., 0, :]
+
+
+def _remainder(values, side):
+    """Numbers modulo a side, in [0, side): a tiny negative number plus the side rounds to it."""
+    left = np.mod(values, side)
+    return np.where(left >= side, 0.0, left)
+
+
 class Packing(NamedTuple):
     """N disks, their contacts, and one force network on them."""
 
     x: np.ndarray  # (N, 2) centres, length
     r: np.ndarray  # (N,) radii, length
-    box: np.ndarray  # (2,) sides L_x, L_y of the periodic box; inf in an open direction
+    box: np.ndarray  # (2,) sides L_x, L_y of the periodic cell; inf in an open direction
     contacts: Contacts
     forces: np.ndarray  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force
     mu: float  # friction coefficient μ
@@ -60,10 +124,16 @@ class Packing(NamedTuple):
         np.ndarray
     )  # (N, 3) external force and torque on each grain; NaN: its balance is left open
     info: dict  # how it was made: seed, steps, skipped work, … (plain numbers and strings)
+    tilt: float = 0.0  # of the cell, between ∓L_x/2, length; 0 where a direction is open
+
+    @property
+    def cell(self):
+        """The periodic cell."""
+        return Cell(self.box, self.tilt)
 
     @property
     def volume(self):
-        """Area V of the box (length², infinite if open)."""
+        """Area V of the cell (length², infinite if open)."""
         return float(np.prod(self.box))
 
     @property
@@ -202,27 +272,63 @@ def make_contacts(i, j, normal, length, r):
     return Contacts(i, j, normal / norm[:, None], length, gap, r[i] + inward, r[j] + inward)
 
 
-def make_packing(x, r, box, contacts, forces, mu, pressure=np.nan, load=None, info=None):
+def make_packing(x, r, box, contacts, forces, mu, pressure=np.nan, load=None, info=None, tilt=0.0):
     """A Packing from array-likes, cast and validated once; see the fields of Packing.
 
-    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, a contact given twice, or box
-    sides not above the largest diameter (a grain may not touch its own image).
+    A tilt beyond ±L_x/2 becomes the one between them that spans the same lattice.
+
+    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, a contact given twice, or a
+    cell in which a grain touches its own image.
     """
     r = float_array(r, (-1,), "radii")
     if np.any(r <= 0):
         raise InputError(f"radius of grain {int(np.argmax(r <= 0))} is not positive")
     x = float_array(x, (len(r), 2), "centres")
-    box = np.array(box, dtype=np.float64)
-    if box.shape != (2,) or np.any(np.isnan(box)) or np.any(box <= 2 * r.max(initial=0)):
-        raise InputError(f"box sides must be two numbers above the largest diameter, got {box}")
+    box, tilt = make_cell(box, tilt)
+    _check_own_images(Cell(box, tilt), 2 * r.max(initial=0))
     load = np.zeros((len(r), 3)) if load is None else _loads(load, len(r))
     if not np.isnan(pressure):
         pressure = moderate(pressure, "pressure")
     forces = float_array(forces, (len(contacts.i), 2), "forces")
     _check_repeated(contacts)
     return Packing(
-        x, r, box, contacts, forces, friction(mu), float(pressure), load, dict(info or {})
+        x, r, box, contacts, forces, friction(mu), float(pressure), load, dict(info or {}), tilt
     )
+
+
+def make_cell(box, tilt=0.0):
+    """A Cell of sides (2,) > 0, inf where open, whose tilt is taken between ±L_x/2.
+
+    Raises InputError for anything else, and for a tilted cell that is open in a direction.
+    """
+    try:
+        box, tilt = np.array(box, dtype=np.float64), float(tilt)
+    except (TypeError, ValueError):
+        raise InputError(f"box must be two sides and tilt a number, got {box}, {tilt}") from None
+    if box.shape != (2,) or not np.all(box > 0):
+        raise InputError(f"box must be two sides L_x, L_y > 0, got {box}")
+    if not np.isfinite(tilt):
+        raise InputError(f"the tilt of the cell must be a finite number, got {tilt}")
+    if tilt and not np.all(np.isfinite(box)):
+        raise InputError(
+            f"a cell tilted by {tilt:g} must be periodic in both directions, got sides {box}; "
+            "leave out the tilt, or give both sides"
+        )
+    return Cell(box, float(tilt - box[0] * np.round(tilt / box[0])) if tilt else 0.0)
+
+
+def _check_own_images(cell, diameter):
+    if not cell.tilt and np.any(cell.box <= diameter):
+        raise InputError(
+            f"box sides must be two numbers above the largest diameter, got {cell.box}"
+        )
+    # A tilted cell may be lower than a diameter: its images lie aside as well.
+    shortest = np.linalg.norm(cell.reduced[0]) if cell.tilt else np.inf
+    if shortest <= diameter:
+        raise InputError(
+            f"the cell of sides {cell.box}, tilted by {cell.tilt:g}, has a grain's own image at a "
+            f"distance of {shortest:g}, which must be above the largest diameter {diameter:g}"
+        )
 
 
 def _loads(load, count):

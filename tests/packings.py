@@ -55,6 +55,31 @@ def lattice(columns, rows, mu, triangular=False):
     return make_packing(x % box, r, box, contacts, np.zeros((len(i), 2)), mu, 1.0)
 
 
+def skewed(packing, basis=((2, 1), (1, 1))):
+    """The same periodic structure, turned: its cell spanned by other vectors of the same lattice.
+
+    basis: the new a and b in the old ones. Returns the packing and turn (2, 2): points of the old
+    one lie at x @ turn.
+    """
+    a, b = np.array(basis) @ packing.cell.vectors
+    along = a / np.linalg.norm(a)
+    turn = np.array([[along[0], -along[1]], [along[1], along[0]]])
+    contacts = packing.contacts._replace(normal=packing.contacts.normal @ turn)
+    found = make_packing(
+        packing.x @ turn,
+        packing.r,
+        [np.linalg.norm(a), (b @ turn)[1]],
+        contacts,
+        packing.forces,
+        packing.mu,
+        packing.pressure,
+        packing.load,
+        packing.info,
+        (b @ turn)[0],
+    )
+    return found, turn
+
+
 def _slip(up, rows, triangular):
     # A triangular lattice leans by half a disk a row: crossing the top shifts by rows/2 columns.
     return np.where(up >= rows, rows // 2, 0) * triangular

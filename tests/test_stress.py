@@ -24,8 +24,8 @@ from granforce.records import Contacts, NotJammedError, make_contacts, make_pack
 def assert_sound(packing, overlap=1e-7):
     """Balanced, inside the cones, without overlap; returns the ensemble."""
     unit = packing.r.max()
-    i, j, shift = find_pairs(packing.x, packing.r, packing.box, 0.01 * unit)
-    assert separations(packing.x, packing.r, packing.box, i, j, shift)[2].min() > -overlap * unit
+    i, j, shift = find_pairs(packing.x, packing.r, packing.cell, 0.01 * unit)
+    assert separations(packing.x, packing.r, packing.cell, i, j, shift)[2].min() > -overlap * unit
     S = ensemble(packing)
     assert S.residual(S.original) < 1e-10
     assert S.violation(S.original) < 1e-9
@@ -105,8 +105,8 @@ def test_a_box_much_longer_than_wide(rng):
 
 def test_nearly_touching_grains_are_no_contacts():
     packing = packed(60, 0.3)
-    i, j, shift = find_pairs(packing.x, packing.r, packing.box, 0.05)
-    gap = separations(packing.x, packing.r, packing.box, i, j, shift)[2]
+    i, j, shift = find_pairs(packing.x, packing.r, packing.cell, 0.05)
+    gap = separations(packing.x, packing.r, packing.cell, i, j, shift)[2]
     # Every pair closer than the tolerance is in the list, none that is farther away.
     listed = set(zip(packing.contacts.i, packing.contacts.j, strict=True))
     close = set(zip(i[gap < 1e-10], j[gap < 1e-10], strict=True))
@@ -191,14 +191,14 @@ def test_one_contact_short_of_rigidity_fails_loudly(mu):
 def test_a_gap_at_the_tolerance_opens_or_closes_a_contact():
     """Moved apart by less than the tolerance two grains still touch, by more they do not."""
     packing = packed(60, 0.3)
-    i, j, shift = find_pairs(packing.x, packing.r, packing.box, 1e-9)
-    gap = separations(packing.x, packing.r, packing.box, i, j, shift)[2]
+    i, j, shift = find_pairs(packing.x, packing.r, packing.cell, 1e-9)
+    gap = separations(packing.x, packing.r, packing.cell, i, j, shift)[2]
     touching = np.flatnonzero(np.abs(gap) < 1e-10)
     c = touching[0]
     for move, seen in ((0.5e-9, True), (2e-9, False)):
         r = packing.r.copy()
         r[i[c]] -= move
-        pairs = find_pairs(packing.x, r, packing.box, 1e-9)
+        pairs = find_pairs(packing.x, r, packing.cell, 1e-9)
         listed = set(zip(pairs[0].tolist(), pairs[1].tolist(), strict=True))
         assert ((int(i[c]), int(j[c])) in listed) == seen
 

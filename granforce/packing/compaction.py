@@ -20,6 +20,7 @@ from granforce.numerics import highs as programs
 from granforce.numerics.lanes import compiled
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import (
+    Cell,
     InputError,
     NotJammedError,
     UndecidedError,
@@ -70,6 +71,7 @@ class Glimpse(NamedTuple):
     forces: np.ndarray  # (k, 2) f_n, f_t, force
     packing_fraction: float
     unbalance: float  # largest change of a grain's momentum per step, ⟨f_n⟩
+    tilt: float = 0.0  # of the cell, length
 
 
 @cancelling.cancellable
@@ -242,7 +244,7 @@ def _with_new_list(motion):
         raise NotJammedError(
             "the box shrank to the largest disk's diameter without jamming: too few disks"
         )
-    i, j, shift = find_pairs(motion.x, motion.r, motion.box, SKIN)
+    i, j, shift = find_pairs(motion.x, motion.r, Cell(motion.box, 0.0), SKIN)
     # In an order of their own, pairs are swept in the same order however often the list is made.
     order = np.lexsort((shift[:, 1], shift[:, 0], j, i))
     i, j, shift = i[order], j[order], shift[order]
@@ -340,7 +342,8 @@ def _finish(motion, mu, settings, unbalance, work):
 
 def _jammed_network(motion, mu):
     """The packing at rest, if an admissible network lies close to the dynamic forces."""
-    normal, _, gap = separations(motion.x, motion.r, motion.box, motion.i, motion.j, motion.shift)
+    pairs = motion.i, motion.j, motion.shift
+    normal, _, gap = separations(motion.x, motion.r, Cell(motion.box, 0.0), *pairs)
     touching = (motion.force[:, 0] > 0) | (gap < TOUCHING)
     if not touching.any():
         return None
@@ -380,7 +383,7 @@ def _on_backbone(packing):
 
 def _packing_of(motion, x, box, touching, force, mu):
     i, j, shift = motion.i[touching], motion.j[touching], motion.shift[touching]
-    normal, length, _ = separations(x, motion.r, box, i, j, shift)
+    normal, length, _ = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
     contacts = make_contacts(i, j, normal, np.maximum(length, 0), motion.r)
     # Overlap that contact dynamics left is closed before the packing is handed out: rigid arms.
     contacts = contacts._replace(arm_i=motion.r[i], arm_j=motion.r[j])
@@ -400,7 +403,7 @@ def _close_contacts(motion, touching, normal, gap):
     exact = touching[near]
     force = motion.force[near, 0]
     for _ in range(8):
-        normal, length, gap = separations(x, motion.r, box, i, j, shift)
+        normal, length, gap = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
         if max(np.abs(gap[exact]).max(), -gap.min()) < 1e-3 * OVERLAP:
             closed = np.zeros(len(touching), bool)
             closed[near] = exact
@@ -475,8 +478,8 @@ def _shrink_to_isostatic(motion, mu, work):
     x, box = _without_overlap(x, box, motion)
     for _ in range(60):
         cancelling.check("compaction")
-        i, j, shift = find_pairs(x, motion.r, box, 4 * TRUST)
-        normal, length, gap = separations(x, motion.r, box, i, j, shift)
+        i, j, shift = find_pairs(x, motion.r, Cell(box, 0.0), 4 * TRUST)
+        normal, length, gap = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
         move, strain = _shrink_program(i, j, normal, length, gap, len(x))
         work["linear_programs"] += 1
         x = x * (1 + strain) + move
@@ -484,7 +487,7 @@ def _shrink_to_isostatic(motion, mu, work):
         # Rattlers move at the programs' whim to the end; only the box tells that nothing is left.
         if strain > -1e-13:
             break
-    i, j, shift = find_pairs(x, motion.r, box, TOUCHING)
+    i, j, shift = find_pairs(x, motion.r, Cell(box, 0.0), TOUCHING)
     at_rest = motion._replace(i=i, j=j, shift=shift)
     touching = np.ones(len(i), bool)
     packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), mu)
@@ -493,7 +496,8 @@ def _shrink_to_isostatic(motion, mu, work):
 
 def _without_overlap(x, box, motion):
     """Expand the box until the largest overlap is gone: the programs start feasible."""
-    _, length, gap = separations(x, motion.r, box, motion.i, motion.j, motion.shift)
+    pairs = motion.i, motion.j, motion.shift
+    _, length, gap = separations(x, motion.r, Cell(box, 0.0), *pairs)
     growth = 1 + max(0.0, float(np.max(-gap / length, initial=0.0)))
     return x * growth, box * growth
 

@@ -89,7 +89,9 @@ def _packing_parameters(
 def imported_parameters(packing):
     """The parameters that name a packing made elsewhere: a hash of its arrays."""
     arrays = (packing.x, packing.r, packing.box, packing.forces, packing.load, *packing.contacts)
-    digest = _digest(*arrays, np.array([packing.mu, packing.pressure]))
+    # The tilt only where there is one: keys of packings in straight cells stay what they were.
+    tilt = [packing.tilt] if packing.tilt else []
+    digest = _digest(*arrays, np.array([packing.mu, packing.pressure, *tilt]))
     return {"imported": digest, "mu": packing.mu}
 
 

@@ -26,6 +26,7 @@ VARIABLES: dict[str, Variable] = {
     "x": Variable(("grain", "axis"), "float64", "length", "centres of the grains"),
     "r": Variable(("grain",), "float64", "length", "radii of the grains"),
     "box": Variable(("axis",), "float64", "length", "box sides, infinite where open"),
+    "tilt": Variable((), "float64", "length", "tilt of the cell: x component of its upper side b"),
     "mu": Variable((), "float64", "1", "friction coefficient μ"),
     "pressure": Variable((), "float64", "force/length", "pressure P0, NaN where not prescribed"),
     "load": Variable(
@@ -318,6 +319,7 @@ def dataset_packing(dataset):
         mu=float(dataset["mu"]),
         pressure=float(dataset["pressure"]),
         info=json.loads(dataset.attrs["info"]),
+        tilt=float(dataset.get("tilt", 0.0)),
         **arrays,
     )
 

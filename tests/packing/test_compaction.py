@@ -14,8 +14,8 @@ from granforce.tolerances import LARGEST_FRICTION
 def check(packing):
     """What every finished packing must show; returns its ensemble."""
     unit = packing.r.max()
-    i, j, shift = find_pairs(packing.x, packing.r, packing.box, 0.01 * unit)
-    gap = separations(packing.x, packing.r, packing.box, i, j, shift)[2]
+    i, j, shift = find_pairs(packing.x, packing.r, packing.cell, 0.01 * unit)
+    gap = separations(packing.x, packing.r, packing.cell, i, j, shift)[2]
     assert gap.min() > -1e-7 * unit
     assert np.abs(packing.contacts.gap).max() < 1e-6 * unit
     S = ensemble(packing)

@@ -28,7 +28,9 @@ IMPORT = "import granforce.packing.neighbours\nprint(granforce.__file__)\n"
 USE = (
     "import numpy as np\n"
     "x, r = np.array([[0.0, 0.0], [2.0, 0.0]]), np.ones(2)\n"
-    "pairs = granforce.packing.neighbours.find_pairs(x, r, np.full(2, np.inf), 0.1)\n"
+    "from granforce.records import Cell\n"
+    "cell = Cell(np.full(2, np.inf), 0.0)\n"
+    "pairs = granforce.packing.neighbours.find_pairs(x, r, cell, 0.1)\n"
     "assert len(pairs[0]) == 1\n"
 )
 

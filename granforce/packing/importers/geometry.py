@@ -1,4 +1,4 @@
-"""Images in the box, and the checks that contacts and positions of a file agree."""
+"""Contacts of given disks in a cell, and the checks that contacts and positions of a file agree."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,51 +21,33 @@ EXTENT = 1e7
 CLOSE_PAIRS = 20_000_000
 
 
-def wrapped(x, box):
-    """Positions (N, 2) taken into [0, L) along the periodic directions of box (2,)."""
-    x = x.copy()
-    for k in np.flatnonzero(np.isfinite(box) & (box > 0)):
-        x[:, k] = np.mod(x[:, k], box[k])
-        x[x[:, k] >= box[k], k] = 0.0  # a tiny negative number plus L rounds to L
-    return x
-
-
-def branches(x, box, i, j):
-    """Vectors (P, 2) from grains i (P,) to the nearest image of grains j (P,)."""
-    branch = x[j] - x[i]
-    periodic = np.isfinite(box)
-    branch[:, periodic] -= box[periodic] * np.round(branch[:, periodic] / box[periodic])
-    return branch
-
-
-def touching(x, r, box, tolerance):
+def touching(x, r, cell, tolerance):
     """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1)."""
     tolerance = positive(tolerance, "tolerance")
     if tolerance > 1:
         raise InputError(f"tolerance is in largest radii and must not exceed 1, got {tolerance:g}")
-    i, j, shift = find_pairs(x, r, box, tolerance * r.max())
-    normal, length, _ = separations(x, r, box, i, j, shift)
+    i, j, shift = find_pairs(x, r, cell, tolerance * r.max())
+    normal, length, _ = separations(x, r, cell, i, j, shift)
     return make_contacts(i, j, normal, length, r)
 
 
-def overlapping(x, r, box):
+def overlapping(x, r, cell):
     """Grains i, j (P,) of all pairs that overlap, and their gaps (P,) < 0; centres may coincide."""
-    i, j, shift = find_pairs(x, r, box, 0.0)
-    side = np.where(np.isfinite(box), box, 0.0)
-    return i, j, np.hypot(*(x[j] - x[i] + shift * side).T) - r[i] - r[j]
+    i, j, shift = find_pairs(x, r, cell, 0.0)
+    return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
 
-def listed(x, r, box, i, j, place, branch=None):
+def listed(x, r, cell, i, j, place, branch=None):
     """Contacts between grains i, j (N_c,), their branch vectors (N_c, 2) given or nearest images.
 
     place(c) names contact c in messages. Raises InputError where a given branch does not lead
     from i to an image of j, where disks overlap or gape too much, and for contacts given twice.
     """
-    nearest = branches(x, box, i, j)
+    nearest = cell.nearest(x[j] - x[i])
     if branch is None:
         branch = nearest
     else:
-        _check_branches(branch - nearest, box, r.max(), place)
+        _check_branches(cell.nearest(branch - nearest), r.max(), place)
     length = np.hypot(*branch.T)
     for c in np.flatnonzero((i == j) | (length == 0)):
         raise InputError(f"{place(c)}: {_pair(i, j, c)} join one point; correct the grains")
@@ -86,8 +68,8 @@ def check_contacts(contacts, r, place, allowed=OVERLAP_ALLOWED):
     _check_repeated(contacts, place)
 
 
-def check_disks(x, r, box, place, allowed=OVERLAP_ALLOWED):
-    """InputError where radii, positions or box cannot be a packing; place(g) names grain g."""
+def check_disks(x, r, cell, place, allowed=OVERLAP_ALLOWED):
+    """InputError where radii, positions or cell cannot be a packing; place(g) names grain g."""
     for g in np.flatnonzero(r <= 0)[:1]:
         raise InputError(
             f"{place(g)}: radius {r[g]:g} is not positive; correct or remove the grain"
@@ -95,15 +77,16 @@ def check_disks(x, r, box, place, allowed=OVERLAP_ALLOWED):
     largest = r.max()
     if largest < 1e-100:
         raise InputError(f"the largest radius is {largest:g}; give lengths in another unit")
-    make_packing(x, r, box, make_contacts([], [], np.empty((0, 2)), [], r), np.empty((0, 2)), 0)
+    none, box = np.empty((0, 2)), cell.box
+    make_packing(x, r, box, make_contacts([], [], none, [], r), none, 0, tilt=cell.tilt)
     extent = max(np.abs(x).max(), box[np.isfinite(box)].max(initial=0.0))
     if extent > EXTENT * largest:
         raise InputError(
             f"positions or box reach {extent / largest:.2g} largest radii, too far to resolve a "
             "contact; shift the origin, or check the unit of the radii"
         )
-    _check_crowding(x, r, box)
-    i, j, gap = overlapping(x, r, box)
+    _check_crowding(x, r, cell)
+    i, j, gap = overlapping(x, r, cell)
     for c in np.flatnonzero(-gap > allowed * np.minimum(r[i], r[j]))[:1]:
         raise InputError(
             f"{place(j[c])}: {_pair(i, j, c)} overlap by {-gap[c]:.3g}, more than "
@@ -111,16 +94,15 @@ def check_disks(x, r, box, place, allowed=OVERLAP_ALLOWED):
         )
 
 
-def _check_crowding(x, r, box):
-    tree = cKDTree(wrapped(x, box), boxsize=np.where(np.isfinite(box), box, 0.0))
+def _check_crowding(x, r, cell):
+    # Without pairs across a side, as the tree knows no tilted cell: a crowd shows without them.
+    tree = cKDTree(cell.wrapped(x))
     if tree.count_neighbors(tree, 2 * r.max()) > CLOSE_PAIRS:
         raise InputError("too many grains lie within one diameter of each other; check the unit")
 
 
-def _check_branches(misfit, box, largest, place):
-    """A given branch may lead to another image than the nearest: whole box sides do not count."""
-    periodic = np.isfinite(box)
-    misfit[:, periodic] -= box[periodic] * np.round(misfit[:, periodic] / box[periodic])
+def _check_branches(misfit, largest, place):
+    """A given branch may lead to any image: misfit is what is left without vectors of the cell."""
     for c in np.flatnonzero(np.hypot(*misfit.T) > MISFIT * largest)[:1]:
         raise InputError(
             f"{place(c)}: normal and length lead {np.hypot(*misfit[c]):.2g} past the second "

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.packing.importers.geometry import MISFIT, check_disks, listed, wrapped
+from granforce.packing.importers.geometry import MISFIT, check_disks, listed
 from granforce.packing.importers.network import adopt
 from granforce.packing.importers.text import check_grains, make_table, read_text, some_of
-from granforce.records import InputError, friction, make_packing
+from granforce.records import Cell, InputError, friction, make_packing
 
 # Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
 CONTACT_COLUMNS = ("atom1", "atom2", "distance", "fx", "fy", "px", "py")
@@ -51,9 +51,10 @@ def read_lammps(particles, contacts, mu, *, columns=None, most_grains=None):
     atoms = _table(first[0], first[1][step], "ATOMS")
     check_grains(len(atoms.rows), most_grains, first[0])
     pairs = _table(second[0], second[1][step], "ENTRIES")
-    x, r, box, index = _disks(atoms, *_box(first[0], first[1][step]))
-    joined, forces, skipped = _contacts(pairs, columns, x, r, box, index)
-    packing = make_packing(x, r, box, joined, forces, mu, info={"source": "lammps"})
+    low, cell = _cell(first[0], first[1][step])
+    x, r, index = _disks(atoms, low, cell)
+    joined, forces, skipped = _contacts(pairs, columns, x, r, cell, index)
+    packing = make_packing(x, r, cell.box, joined, forces, mu, info={"source": "lammps"})
     return adopt(packing, timestep=step, contacts_skipped=skipped)
 
 
@@ -112,8 +113,8 @@ def _table(name, items, title):
     return make_table(name, item.words, item.body, lines)
 
 
-def _box(name, items):
-    """Origin (2,) and sides (2,) of the box, inf along directions that are not periodic."""
+def _cell(name, items):
+    """Origin (2,) and Cell of the box, open along directions that are not periodic."""
     item = _item(name, items, "BOX BOUNDS")
     flags = item.words
     if len(flags) > 3 or any(len(flag) != 2 or not set(flag) <= set("pfsm") for flag in flags):
@@ -127,10 +128,10 @@ def _box(name, items):
         raise InputError(f"{bounds.place(k)}: the upper bound of the box is not above the lower")
     # Dumps of old versions have no flags, and were periodic by default.
     is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
-    return low, np.where(is_open, np.inf, high - low)
+    return low, Cell(np.where(is_open, np.inf, high - low), 0.0)
 
 
-def _disks(table, low, box):
+def _disks(table, low, cell):
     ids = table.numbers("id")
     order = np.argsort(ids, kind="stable")
     rank = np.argsort(order)
@@ -141,12 +142,12 @@ def _disks(table, low, box):
         r = table.numbers("diameter") / 2
     else:
         r = table.numbers("radius")
-    x, r = wrapped(x[order], box), r[order]
-    check_disks(x, r, box, lambda g: table.place(order[g]))
-    return x, r, box, index
+    x, r = cell.wrapped(x[order]), r[order]
+    check_disks(x, r, cell, lambda g: table.place(order[g]))
+    return x, r, index
 
 
-def _contacts(table, columns, x, r, box, index):
+def _contacts(table, columns, x, r, cell, index):
     """Contacts that carry force, their forces (N_c, 2), and how many pairs carry none."""
     names = _force_columns(table, columns)
     i, j = (table.lookup(names[k], index) for k in ("atom1", "atom2"))
@@ -162,7 +163,7 @@ def _contacts(table, columns, x, r, box, index):
     def place(c):
         return table.place(active[c])
 
-    joined = listed(x, r, box, i[active], j[active], place)
+    joined = listed(x, r, cell, i[active], j[active], place)
     _check_distances(joined.length, distance[active], r.max(), place)
     # Forces are on atom1 = i; ours are on j.
     forces = _components(joined.normal, -normal_force[active], -tangential_force[active], place)

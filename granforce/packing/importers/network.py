@@ -107,7 +107,7 @@ def _held(whole):
 
 
 def _largest_overlap(packing):
-    gap = overlapping(packing.x, packing.r, packing.box)[2]
+    gap = overlapping(packing.x, packing.r, packing.cell)[2]
     return float(-gap.min(initial=0.0) / packing.r.max())
 
 

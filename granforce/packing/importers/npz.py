@@ -21,8 +21,8 @@ def load_packing(source, *, unpacked=_UNPACKED, most_grains=None):
     """The Packing in an NPZ file (a path or an open binary file), its contacts as they are.
 
     Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if none), mu, i, j, nx, ny, branch, fn, ft;
-    seed, load, arm_i, arm_j and info (JSON) if there. unpacked: most bytes of all arrays together;
-    most_grains: how many are taken. Raises InputError naming what is wrong.
+    seed, load, tilt, arm_i, arm_j and info (JSON) if there. unpacked: most bytes of all arrays
+    together; most_grains: how many are taken. Raises InputError naming what is wrong.
     """
     name = str(getattr(source, "name", "the given file") if hasattr(source, "read") else source)
     arrays = _arrays(source, name, unpacked, most_grains)
@@ -52,6 +52,7 @@ def save_packing(packing, target):
         "x": packing.x,
         "r": packing.r,
         **({"L": width} if width == height else {"Lx": width, "Ly": height}),
+        "tilt": packing.tilt,
         "P": packing.pressure,
         "mu": packing.mu,
         "i": contacts.i,
@@ -129,6 +130,7 @@ def _packing(arrays):
         _scalar(arrays, "P"),
         arrays.get("load"),
         info,
+        _scalar(arrays, "tilt") if "tilt" in arrays else 0.0,
     )
 
 

@@ -24,6 +24,7 @@ from granforce.packing.importers.geometry import check_disks
 from granforce.packing.importers.network import judged
 from granforce.packing.importers.text import check_grains, make_table, read_text
 from granforce.records import (
+    Cell,
     InputError,
     Packing,
     UndecidedError,
@@ -213,7 +214,7 @@ def _disks(table, scale):
     """Positions, radii, names, and which grains are at a wall."""
     x = np.column_stack([table.numbers("x"), table.numbers("y")])
     r = scale * table.numbers("radius")
-    check_disks(x, r, np.full(2, np.inf), table.place, _OVERLAP)
+    check_disks(x, r, Cell(np.full(2, np.inf), 0.0), table.place, _OVERLAP)
     return x, r, table.numbers("id"), table.numbers("flag") != 0
 
 

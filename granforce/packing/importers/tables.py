@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from granforce.packing.importers.geometry import check_disks, listed, touching, wrapped
+from granforce.packing.importers.geometry import check_disks, listed, touching
 from granforce.packing.importers.network import adopt, find
 from granforce.packing.importers.text import check_grains, read_csv
-from granforce.records import InputError, friction, make_packing, positive
+from granforce.records import InputError, friction, make_cell, make_packing, positive
 from granforce.tolerances import TOUCHING
 
 
@@ -33,24 +33,24 @@ def read_table(
 
     Raises InputError naming file and line, NotJammedError where no network exists.
     """
-    mu, box = friction(mu), _sides(box)
+    mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box)
     pressure = positive(pressure, "pressure")
     table = read_csv(grains)
     check_grains(len(table.rows), most_grains, table.name)
-    x, r = _disks(table, box)
-    load = _loads(table, box)
+    x, r = _disks(table, cell)
+    load = _loads(table, cell)
     if contacts is None:
         if forces:
             raise InputError("forces need a table of contacts with columns i, j, fn, ft")
-        joined, given = touching(x, r, box, tolerance), None
+        joined, given = touching(x, r, cell, tolerance), None
     else:
-        joined, given = _joined(read_csv(contacts), table, x, r, box, forces, mu)
-    closed = bool(np.all(np.isfinite(box)))
+        joined, given = _joined(read_csv(contacts), table, x, r, cell, forces, mu)
+    closed = bool(np.all(np.isfinite(cell.box)))
     zero = np.zeros((len(joined.i), 2))
     packing = make_packing(
         x,
         r,
-        box,
+        cell.box,
         joined,
         zero if given is None else given,
         mu,
@@ -63,33 +63,21 @@ def read_table(
     return adopt(packing, forces="given")
 
 
-def _disks(table, box):
+def _disks(table, cell):
     r = table.numbers("r")
     x = np.column_stack([table.numbers("x"), table.numbers("y")])
-    x = wrapped(x, box)
-    check_disks(x, r, box, table.place)
+    x = cell.wrapped(x)
+    check_disks(x, r, cell, table.place)
     return x, r
 
 
-def _sides(box):
-    if box is None:
-        return np.full(2, np.inf)
-    try:
-        sides = np.array(box, dtype=np.float64)
-    except (TypeError, ValueError):
-        sides = np.empty(0)
-    if sides.shape != (2,) or not np.all(sides > 0):
-        raise InputError(f"box must be two sides L_x, L_y > 0, got {box}")
-    return sides
-
-
-def _loads(table, box):
+def _loads(table, cell):
     load = np.zeros((len(table.rows), 3))
     for k, column in enumerate(("fx", "fy", "torque")):
         if column in table.header:
             load[:, k] = table.numbers(column)
     loaded = np.flatnonzero(load.any(axis=1))
-    if len(loaded) and np.all(np.isfinite(box)):
+    if len(loaded) and np.all(np.isfinite(cell.box)):
         raise InputError(
             f"{table.place(loaded[0])}: a load in a periodic box; "
             "remove fx, fy, torque, or leave out the box"
@@ -97,12 +85,12 @@ def _loads(table, box):
     return load
 
 
-def _joined(table, grains, x, r, box, forces, mu):
+def _joined(table, grains, x, r, cell, forces, mu):
     """Contacts of a table and their forces (N_c, 2), or None without."""
     count = len(grains.rows)
     index = grains.index("id") if "id" in grains.header else {row: row for row in range(count)}
     i, j = table.lookup("i", index), table.lookup("j", index)
-    joined = listed(x, r, box, i, j, table.place, _given_branches(table))
+    joined = listed(x, r, cell, i, j, table.place, _given_branches(table))
     if forces is None:
         forces = "fn" in table.header or "ft" in table.header
     if not forces:
