@@ -42,9 +42,10 @@ RANGES = {
     "mu": (0, 1000),
     "seed": (0, 2**53 - 1),  # whole numbers that browsers know, too
     "pressure": (1e-6, 1e6),
-    "dt": (0.001, 0.1),
+    "dt": (0.01, 1),
     "box_mass": (10, 10_000),
-    "sweeps": (1, 1000),
+    "sweeps": (1, 10_000),
+    "accuracy": (1e-6, 1),
 }
 SIZE_RATIO = 20  # largest over smallest radius that a distribution may name
 DISTRIBUTIONS = {"uniform": 2, "bidisperse": 3}  # of radii, and how many numbers they take
@@ -58,6 +59,7 @@ NAMES = {
     "dt": "the time step dt",
     "box_mass": "the box mass",
     "sweeps": "the number of sweeps",
+    "accuracy": "the accuracy of a step",
 }
 
 

@@ -16,7 +16,7 @@ SOLVERS = {
 }
 KINDS = {"walk": "the paper's random walk", "uniform": "uniform in S"}
 # Command-line options of a packing, apart from N, μ and seed.
-OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps")
+OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy")
 # Stored states take at most about this much; measures are those of all states anyway.
 KEPT_BYTES = 64e6
 LONGEST_REASON = 200  # characters of a message about a link, which may hold anything

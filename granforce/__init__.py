@@ -17,6 +17,7 @@ _HOME = {
     "make_contacts": "records",
     "make_packing": "records",
     "pack": "packing.compaction",
+    "margin": "packing.closing",
     "Ensemble": "forces.ensemble",
     "Known": "forces.knowledge",
     "ensemble": "forces.ensemble",

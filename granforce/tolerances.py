@@ -7,6 +7,11 @@ Lengths are relative to the largest radius, forces to the mean normal force ⟨f
 # the final projection then brings the gap of every touching pair to rounding error.
 TOUCHING = 1e-6
 
+# Once a packing is closed, gaps (in largest radii) of its contacts are below CLOSED, which is
+# rounding, and those of all other pairs above APART: no pair lies between.
+CLOSED = 1e-11
+APART = 1e-7
+
 # Largest overlap (in largest radii) that a finished rigid packing may show.
 OVERLAP = 1e-9
 
@@ -40,7 +45,7 @@ FLAT = 1e-8
 
 # A network that certifies jamming: relative distance |f − f_dyn| / |f_dyn| between the dynamic
 # forces and the nearest admissible network on the same contacts.
-JAMMED_DISTANCE = 1e-2
+JAMMED_DISTANCE = 1e-1
 
 # Largest duality gap (in ⟨f_n⟩) of a certified bound on a force, or of a limit load.
 INTERVAL_GAP = 1e-8

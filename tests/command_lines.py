@@ -34,6 +34,7 @@ PACKING = {
     "--radii": RADII,
     "--pressure": POSITIVE,
     "--dt": POSITIVE,
+    "--accuracy": POSITIVE,
     "--box-mass": POSITIVE,
     "--sweeps": [*WHOLE, LONG],
 }

@@ -12,22 +12,22 @@ from granforce.records import NotJammedError
 FRICTIONS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 
 
-def compaction(quick=True, *, n=None, mu=0.1, steps=None, sweeps=None, seeds=None):
+def compaction(quick=True, *, n=None, mu=0.1, steps=None, accuracies=None, seeds=None):
     """Rows: run time and mean overlap of the dynamics, and φ, z, h of the packing it gave.
 
-    One row per time step Δt and number of sweeps per step; means over seeds. Mean overlap against
+    One row per longest time step Δt and accuracy of a step; means over seeds. Mean overlap against
     run time is the figure of merit of arXiv:0803.3566 (its Fig. 7). Every packing is then
     finished exactly, so that of this error only the place where it jams is left; runs that did
     not jam are left out of the means and counted in `failed`.
     """
     n = n or (100 if quick else 400)
-    steps = steps or ((0.01, 0.02) if quick else (0.005, 0.01, 0.02, 0.05))
-    sweeps = sweeps or ((25, 100) if quick else (25, 100, 400))
+    steps = steps or ((0.05, 0.1) if quick else (0.02, 0.05, 0.1, 0.2))
+    accuracies = accuracies or ((0.1, 0.01) if quick else (0.1, 0.01, 0.001))
     seeds = seeds or (2 if quick else 3)
     return [
-        _row(n, mu, seeds, dt=dt, sweeps=count) | {"dt": dt, "sweeps": count}
+        _row(n, mu, seeds, dt=dt, accuracy=each) | {"dt": dt, "accuracy": each}
         for dt in steps
-        for count in sweeps
+        for each in accuracies
     ]
 
 

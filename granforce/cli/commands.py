@@ -64,6 +64,7 @@ def _packing_parameters(arguments, mu, seed):
         dt=arguments.dt,
         box_mass=arguments.box_mass,
         sweeps=arguments.sweeps,
+        accuracy=arguments.accuracy,
     )
 
 
@@ -85,7 +86,8 @@ def pack(arguments):
         )
     if arguments.out is not None:
         importers.save_packing(packing, arguments.out)
-    work = {k: packing.info[k] for k in ("steps", "sweeps_done", "list_rebuilds")}
+    told = "steps", "sweeps_done", "unfinished_steps", "largest_contact_gap", "least_other_gap"
+    work = {name: packing.info[name] for name in told}
     lines = {**importers.report(packing), **work, "cached": cached}
     report(lines, arguments.json)
 

@@ -121,9 +121,16 @@ def _add_packing(command, several=False):
         "per line (default uniform:0.5,1)",
     )
     group.add_argument("--pressure", type=float, default=1.0, help="pressure P0 (default 1)")
-    group.add_argument("--dt", type=float, default=0.01, help="time step (default 0.01)")
+    group.add_argument("--dt", type=float, default=0.1, help="longest time step (default 0.1)")
     group.add_argument("--box-mass", type=float, default=100.0, help="box inertia (default 100)")
-    group.add_argument("--sweeps", type=int, default=100, help="sweeps per step (default 100)")
+    group.add_argument("--sweeps", type=int, default=600, help="most sweeps per step (default 600)")
+    group.add_argument(
+        "--accuracy",
+        type=float,
+        default=0.01,
+        help="breach of the contact laws that ends a step, relative to the fastest grain "
+        "(default 0.01)",
+    )
 
 
 def _add_any_packing(command):

@@ -139,62 +139,155 @@ class Motion(NamedTuple):
     shift: np.ndarray  # (P, 2)
     force: np.ndarray  # (P, 2) of the last step, the warm start of the next
     drift: np.ndarray  # (1,) bound on the approach of any pair since the list was built
+    pace: np.ndarray  # (2,) Δt of the next step, and the relaxation factor of its sweeps
+
+
+class Pace(NamedTuple):
+    """How steps are made: how long they are, and how accurately they are solved."""
+
+    box_mass: float  # M_λ
+    shortest: float  # Δt
+    longest: float
+    stride: float  # largest displacement of a grain that carries, in a step, that Δt grows up to
+    sweeps: int  # at most, in a step
+    accuracy: float  # largest breach of the contact laws that ends a step, of the fastest grain
 
 
 # What advance() tells: index of each number in its counters.
-STEPS, SWEEPS, UPDATES = range(3)
+STEPS, SWEEPS, UPDATES, UNFINISHED = range(4)
+# Sweeps between two looks at what they have reached.
+LOOK = 10
+# A breach that has not fallen to this part of the least one after so many looks has stalled: then
+# sweeps go in circles, and correct by this part of what they did. It grows again step by step.
+FALLEN, STALLED, CAUTION, COURAGE = 0.7, 20, 0.8, 1.03
+# Bounds of the relaxation factor, the least being 1.6 − μ where that is more. At small μ sweeps
+# that over-correct converge six times sooner (Young's over-relaxation), and never in circles; at
+# μ = 10 they converge at 0.7 only.
+LEAST_RELAXATION, MOST_RELAXATION = 0.7, 1.7
+# Part of an overlap that a step pushes out again, and at most that length.
+PUSHED, FARTHEST = 0.5, 1e-3
+# Pairs farther apart than this (in largest radii) are not looked at; neighbour lists hold all
+# that are nearer.
+REACH = 0.1
+# Growth of Δt from step to step.
+GROWTH = 1.3
+# Breach (velocity times Δt, length) below which rounding is all that is left.
+ROUNDING = 1e-14
 
 
 @compiled
-def advance(motion, mu, pressure, box_mass, dt, sweeps, accuracy, moved, steps, counters, stop):
+def advance(motion, mu, pressure, pace, moved, steps, counters, stop):
     """Do up to `steps` time steps; stop early once two grains may have moved closer by `moved`,
     when the neighbour list must be made anew, or once stop[0] is raised.
 
-    Returns the last step's mean overlap (in largest radii) and unbalance: the largest change of
-    momentum of a grain per step, in units of the mean contact force.
+    Returns the last step's mean overlap of carrying contacts (in largest radii) and unbalance: the
+    largest change of momentum of a grain per step, in units of the mean contact force.
     """
-    overlap = 0.0
-    unbalance = np.inf
+    overlap, unbalance = 0.0, np.inf
     for _ in range(steps):
         if motion.drift[0] > moved or stop[0]:
             break
-        overlap, unbalance = _step(
-            motion, mu, pressure, box_mass, dt, sweeps, accuracy, counters, stop
-        )
+        overlap, unbalance = _step(motion, mu, pressure, pace, counters, stop)
         counters[STEPS] += 1
     return overlap, unbalance
 
 
 @within
-def _step(motion, mu, pressure, box_mass, dt, sweeps, accuracy, counters, stop):
-    x, velocity, r, box = motion.x, motion.velocity, motion.r, motion.box
-    volume = box[0] * box[1]
-    active, problem, overlap = _near_contacts(motion, dt, box_mass * 2.0 * volume)
+def _step(motion, mu, pressure, pace, counters, stop):
+    velocity, box = motion.velocity, motion.box
+    volume, dt = box[0] * box[1], motion.pace[0]
+    active, problem, overlap = _near_contacts(motion, dt, pace.box_mass * 2.0 * volume)
     before = velocity.copy()
     kinetic = 0.0
-    for k in range(x.shape[0]):
+    for k in range(motion.x.shape[0]):
         kinetic += motion.mass[k] * (velocity[k, 0] ** 2 + velocity[k, 1] ** 2)
-    free = motion.dilation[0] + (kinetic / (2.0 * volume) - pressure) * dt / box_mass
+    free = motion.dilation[0] + (kinetic / (2.0 * volume) - pressure) * dt / pace.box_mass
 
     count = active.shape[0]
     force = np.empty((count, 2))
     for c in range(count):
         force[c, 0], force[c, 1] = motion.force[active[c], 0], motion.force[active[c], 1]
     set_stiffness(problem)
-    dilation = add_forces(problem, force, velocity, free)
-    order = np.arange(count)
-    for _ in range(sweeps):
-        dilation, change, total = sweep(problem, order, mu, force, velocity, dilation, ONE)
-        counters[SWEEPS] += 1
-        counters[UPDATES] += count
-        if change <= accuracy * total or stop[0]:
-            break
+    free = add_forces(problem, force, velocity, free)
+    dilation = _swept(motion, problem, mu, pace, force, velocity, free, dt, counters, stop)
     motion.force[:] = 0.0
     for c in range(count):
         motion.force[active[c], 0], motion.force[active[c], 1] = force[c, 0], force[c, 1]
     motion.dilation[0] = dilation
     _move(motion, dilation, dt)
-    return overlap / r.max(), _unbalance(motion, before, force, dt)
+    stride = _fastest(problem, force, velocity) * dt
+    growth = min(GROWTH, max(1.0 / GROWTH, pace.stride / max(stride, 1e-300)))
+    motion.pace[0] = min(pace.longest, max(pace.shortest, dt * growth))
+    return overlap / motion.r.max(), _unbalance(motion, before, force, dt)
+
+
+@within
+def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, stop):
+    """Sweep until the breach is small enough; returns λ."""
+    count = force.shape[0]
+    order, factor = np.arange(count), motion.pace[1]
+    cautious = max(LEAST_RELAXATION, 1.6 - mu)
+    _scale(problem, factor)
+    least, looks, breach = np.inf, 0, np.inf
+    for done in range(1, pace.sweeps + 1):
+        dilation, _, _ = sweep(problem, order, mu, force, velocity, dilation, ONE)
+        counters[SWEEPS] += 1
+        counters[UPDATES] += count
+        if stop[0]:
+            break
+        if done % LOOK and done > 3 and done < pace.sweeps:
+            continue
+        breach = _breach(problem, mu, force, velocity, dilation, factor)
+        if breach <= max(pace.accuracy * _fastest(problem, force, velocity), ROUNDING / dt):
+            break
+        looks += 1
+        if breach < FALLEN * least:
+            least, looks = breach, 0
+        elif looks >= STALLED and factor > cautious:
+            _scale(problem, CAUTION)
+            factor, least, looks = CAUTION * factor, breach, 0
+    else:
+        counters[UNFINISHED] += 1
+    motion.pace[1] = min(COURAGE * factor, MOST_RELAXATION)
+    return dilation
+
+
+@within
+def _scale(problem, factor):
+    for c in range(problem.stiff_n.shape[0]):
+        problem.stiff_n[c] *= factor
+        problem.stiff_t[c] *= factor
+
+
+@within
+def _breach(problem, mu, force, velocity, dilation, factor):
+    """Largest breach of Signorini's and Coulomb's laws: the velocity that one more update stops."""
+    worst = 0.0
+    for c in range(force.shape[0]):
+        i, j = problem.i[c], problem.j[c]
+        n_x, n_y = problem.n_x[c], problem.n_y[c]
+        v_x, v_y = velocity[j, 0] - velocity[i, 0], velocity[j, 1] - velocity[i, 1]
+        v_n = v_x * n_x + v_y * n_y + dilation * problem.length[c] + problem.closing[c]
+        stiff_n, stiff_t = problem.stiff_n[c] / factor, problem.stiff_t[c] / factor
+        f_n = max(force[c, 0] - v_n * stiff_n, 0.0)
+        if f_n == 0.0 and force[c, 0] == 0.0:
+            continue
+        spin = problem.arm_i[c] * velocity[i, 2] + problem.arm_j[c] * velocity[j, 2]
+        f_t = force[c, 1] - (v_y * n_x - v_x * n_y - spin) * stiff_t
+        f_t = min(max(f_t, -mu * f_n), mu * f_n)
+        worst = max(worst, abs(f_n - force[c, 0]) / stiff_n, abs(f_t - force[c, 1]) / stiff_t)
+    return worst
+
+
+@within
+def _fastest(problem, force, velocity):
+    """Largest velocity component of the grains that carry."""
+    fastest = 0.0
+    for c in range(force.shape[0]):
+        if force[c, 0] > 0.0:
+            for k in (problem.i[c], problem.j[c]):
+                fastest = max(fastest, abs(velocity[k, 0]), abs(velocity[k, 1]))
+    return fastest
 
 
 @within
@@ -204,9 +297,9 @@ def _near_contacts(motion, dt, box_inertia):
     speed = 0.0
     for k in range(x.shape[0]):
         speed = max(speed, motion.velocity[k, 0] ** 2 + motion.velocity[k, 1] ** 2)
-    # Twice the fastest free approach, and a little more for grains that are pushed in this step.
+    # Twice the fastest free approach, and the way that forces may push grains in this step.
     margin = 2.0 * dt * (2.0 * np.sqrt(speed) + 2.0 * abs(motion.dilation[0]) * r.max())
-    margin += 2e-3 * r.max()
+    margin = min(margin + (2e-3 + 4.0 * dt * dt) * r.max(), REACH * r.max())
     pairs = motion.i.shape[0]
     active = np.empty(pairs, np.int64)
     table = np.empty((6, pairs))
@@ -232,7 +325,7 @@ def _near_contacts(motion, dt, box_inertia):
         table[2, count] = length
         table[3, count] = r[i]
         table[4, count] = r[j]
-        table[5, count] = max(gap, 0.0) / dt
+        table[5, count] = max(gap, PUSHED * min(gap, 0.0), -FARTHEST) / dt
         count += 1
     active = active[:count]
     inertia = 0.5 * motion.mass * r**2

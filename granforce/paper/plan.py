@@ -6,7 +6,7 @@ paper, which end at that residual in ⟨f_n⟩), "walk" (by nearest networks), "
 loads raised in tenths of the way), "response_long" (some of them with four times the implicit
 steps) and "perturb" (loads raised by 0.4 of the way), "frozen" and "frozen_large" (exact intervals
 of the inner part with all forces outside held), "prepared_…" (walks in packings made with another
-time step or more sweeps), "opened" and "opened_exact" (packings made without friction, cones opened
+time step or accuracy), "opened" and "opened_exact" (packings made without friction, cones opened
 to μ), "size" and "size_exact" (other numbers of disks), "stress" (outlines of the stresses that
 the contacts can carry) and "stress_uniform" (uniform states, for their stresses).
 """
@@ -39,9 +39,9 @@ HARDEST, HARDEST_STATES = ("sweeps_1e-6", 1e-6), 200
 RISE, LONGER = 0.1, 4
 # What else packings are made with.
 PREPARED = {
-    "prepared_dt_0.02": {"dt": 0.02},
-    "prepared_dt_0.005": {"dt": 0.005},
-    "prepared_sweeps_400": {"sweeps": 400},
+    "prepared_dt_0.2": {"dt": 0.2},
+    "prepared_dt_0.05": {"dt": 0.05},
+    "prepared_accuracy_0.003": {"accuracy": 0.003, "sweeps": 2400},
 }
 
 

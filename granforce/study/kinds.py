@@ -63,7 +63,16 @@ RELAXATIONS = {
 
 
 def _packing_parameters(
-    n, mu, seed, *, radii="uniform:0.5,1", pressure=1.0, dt=0.01, box_mass=100.0, sweeps=100
+    n,
+    mu,
+    seed,
+    *,
+    radii="uniform:0.5,1",
+    pressure=1.0,
+    dt=0.1,
+    box_mass=100.0,
+    sweeps=600,
+    accuracy=0.01,
 ):
     """The parameters that name a packing in the store; as for `pack`.
 
@@ -83,6 +92,7 @@ def _packing_parameters(
         "dt": positive(dt, "dt"),
         "box_mass": positive(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
+        "accuracy": positive(accuracy, "accuracy"),
     }
 
 
@@ -585,7 +595,7 @@ def _perturbed_contact(store, parameters, *, workers, progress):
 
 # The records
 
-PACKING = Kind("packing", 1, "compaction", "step", _packing_parameters, _packing)
+PACKING = Kind("packing", 2, "compaction", "step", _packing_parameters, _packing)
 WALK = Kind("walk", 1, "random walk", "state", _walk_parameters, _walk, holds_states=True)
 UNIFORM = Kind(
     "uniform", 2, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True

@@ -101,12 +101,12 @@ def test_an_exponent_is_the_slope_of_the_sizes_that_were_reached():
 
 def test_compaction_rows(monkeypatch):
     def half(n, mu, seed, **options):
-        if options["dt"] > 0.015:
+        if options["dt"] > 0.07:
             raise NotJammedError("not jammed")
         return packed(30, 0.3)
 
     monkeypatch.setattr(packings, "pack", half)
-    rows = bench.compaction(True, n=30, mu=0.3, steps=(0.01, 0.02), sweeps=(100,), seeds=2)
+    rows = bench.compaction(True, n=30, mu=0.3, steps=(0.05, 0.1), accuracies=(0.01,), seeds=2)
     assert [row["failed"] for row in rows] == [0, 2]
     S = ensemble(packed(30, 0.3))
     assert rows[0]["z"] == pytest.approx(S.coordination)

@@ -50,7 +50,7 @@ def test_forces_lie_in_their_cones_after_one_sweep(swept):
 
 @pytest.mark.parametrize("order", ["sequential", "random"])
 def test_relaxation_reaches_the_balance(order, rng):
-    S = ensemble(packed(40, 0.3))
+    S = ensemble(packed(40, 0.3, 2))
     start = S.original + rng.uniform(-1, 1, S.original.shape) * S.force_scale
     found = gauss_seidel(S, start, order=order)
     assert found.converged

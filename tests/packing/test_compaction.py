@@ -5,10 +5,11 @@ import pytest
 from packings import packed
 
 from granforce.forces.ensemble import ensemble
+from granforce.packing.closing import margin
 from granforce.packing.compaction import WATCH_EVERY, draw_radii, pack
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import Cancelled, InputError, NotJammedError
-from granforce.tolerances import LARGEST_FRICTION
+from granforce.tolerances import APART, CLOSED, LARGEST_FRICTION
 
 
 def check(packing):
@@ -108,15 +109,15 @@ def test_bad_input_is_told_in_one_line(options, what):
 
 
 def test_a_budget_too_small_tells_the_state_reached():
-    with pytest.raises(NotJammedError, match=r"not jammed after 200 steps: φ = 0\.\d+"):
-        pack(40, 0.3, 0, max_steps=200)
+    with pytest.raises(NotJammedError, match=r"not jammed after 75 steps: φ = 0\.\d+"):
+        pack(40, 0.3, 0, max_steps=75)
 
 
 def test_compaction_reports_and_can_be_cancelled():
     seen = []
     with pytest.raises(Cancelled):
         pack(40, 0.3, 0, progress=lambda *a: seen.append(a), cancel=lambda: len(seen) == 2)
-    assert [step for step, _ in seen] == [100, 200]
+    assert [step for step, _ in seen] == [25, 50]
 
 
 @pytest.mark.slow
@@ -174,3 +175,38 @@ def test_what_is_watched_has_the_users_units():
     pack(20, 0.3, 7, pressure=2.0**20, radii=f"uniform:{2.0**-11},{2.0**-10}", watch=two.append)
     assert np.array_equal(two[40].x, 2.0**-10 * one[40].x)
     assert np.array_equal(two[-1].forces, 2.0**10 * one[-1].forces)
+
+
+@pytest.mark.parametrize("mu", [0.01, 0.3, 3.0])
+def test_contacts_are_told_from_other_pairs_by_a_gap_in_the_gaps(mu):
+    """Whether they carried or not: every pair that touches is a contact, and no other is near."""
+    packing = packed(60, mu)
+    apart = margin(packing)
+    assert apart.certain and apart.contact < CLOSED and apart.other > APART
+    assert (
+        packing.info["largest_contact_gap"] * packing.r.max() == np.abs(packing.contacts.gap).max()
+    )
+    touching = find_pairs(packing.x, packing.r, packing.cell, APART)[0]
+    assert len(touching) == len(packing.contacts.i)
+    # Without one of its contacts that pair is another one, and it touches.
+    c = packing.contacts
+    less = packing._replace(contacts=type(c)(*(values[1:] for values in c)))
+    assert margin(less).other < CLOSED and not margin(less).certain
+
+
+def test_a_margin_does_not_depend_on_units():
+    one = pack(20, 0.3, 7)
+    two = pack(20, 0.3, 7, radii=f"uniform:{2.0**-11},{2.0**-10}")
+    assert margin(one) == pytest.approx(margin(two), rel=1e-9)
+
+
+def test_steps_are_as_accurate_as_asked():
+    """Each looks at its largest breach of the contact laws, and says where sweeps did not do."""
+    few, many = pack(60, 0.1, 1, sweeps=40), pack(60, 0.1, 1, sweeps=5000)
+    assert few.info["unfinished_steps"] > 5 * many.info["unfinished_steps"]
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_too_few_disks_for_a_periodic_box_are_told(n):
+    with pytest.raises(NotJammedError, match="too few"):
+        pack(n, 0.3, 1)

@@ -1,0 +1,268 @@
+"""The last step of a compaction: grains and box move by the least amount that closes every contact.
+
+Which pairs are contacts is decided by their gaps, not by what they carry: a pair that carried
+nothing may touch all the same, and belongs to S. Once the carrying contacts are closed, gaps are
+rounding (below CLOSED) or clearly larger (above APART); where one lies between, or more contacts
+had carried than rigid disks can close at once, the dynamics goes on. At μ = 0 contact dynamics
+does not reach isostaticity: there linear programs shrink the box under linearised non-overlap.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import piqp
+from scipy import sparse
+
+from granforce.forces.ensemble import ensemble
+from granforce.forces.nearest import nearest
+from granforce.numerics import highs as programs
+from granforce.packing.neighbours import find_pairs, separations
+from granforce.records import (
+    Cell,
+    NotJammedError,
+    UndecidedError,
+    make_contacts,
+    make_packing,
+)
+from granforce.system import cancelling
+from granforce.tolerances import APART, CLOSED, JAMMED_DISTANCE, TOUCHING
+
+# Skin of the neighbour list and reach of the finishing programs, in largest radii.
+SKIN = 0.2
+# Steps of the quadratic program that finds a network: where one exists it was found in 9 to 21
+# (N = 400), where none exists the program would go on to its limit.
+NETWORK_ITERATIONS = 60
+# Largest displacement of a grain that the finishing of a frictional packing may need, and Newton
+# steps on its gaps.
+LARGEST_CORRECTION, MOST_CLOSINGS = 1e-2, 16
+# Largest move of a grain in one of the linear programs, along each axis.
+TRUST = 0.05
+
+
+def jammed_network(motion, mu):
+    """The packing at rest, if an admissible network lies close to the dynamic forces.
+
+    Its contacts are all pairs that touch once the carrying ones are closed. None, too, where a pair
+    neither touches nor is apart for certain: then the dynamics has to go on.
+    """
+    pairs = motion.i, motion.j, motion.shift
+    gap = separations(motion.x, motion.r, Cell(motion.box, 0.0), *pairs)[2]
+    touching = (motion.force[:, 0] > 0) | (gap < TOUCHING)
+    if not touching.any():
+        return None
+    as_it_moves = _packing_of(motion, motion.x, motion.box, touching, motion.force, mu)
+    if _near_forces(as_it_moves) is None:
+        return None
+    closed = _close_contacts(motion, touching)
+    if closed is None:
+        return None
+    packing = _packing_of(motion, *closed, motion.force, mu)
+    found = _near_forces(packing)
+    if found is None:
+        # Overlap had jammed more contacts than rigid disks can have: go on from where they fit.
+        motion.x[:], motion.box[:] = closed[:2]
+        return None
+    return _on_backbone(packing._replace(forces=found))
+
+
+class Margin(NamedTuple):
+    """How clearly contacts are told from other pairs; gaps in largest radii."""
+
+    contact: float  # largest |gap| of a contact
+    other: float  # least gap of any other pair of disks; SKIN / 2 where none is that near
+
+    @property
+    def certain(self):
+        """Whether no gap lies between rounding and what is clearly apart."""
+        return self.contact < CLOSED and self.other > APART
+
+
+def margin(packing):
+    """The Margin of a packing's contacts, by the gaps of all its pairs.
+
+    Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs 10⁻⁶ apart or more;
+    soft or measured disks overlap, and their contacts have no such margin.
+    """
+    unit = packing.r.max()
+    i, j, shift = find_pairs(packing.x, packing.r, packing.cell, SKIN / 2 * unit)
+    normal, _, gap = separations(packing.x, packing.r, packing.cell, i, j, shift)
+    c = packing.contacts
+    listed = {}
+    for first, second, direction in zip(c.i.tolist(), c.j.tolist(), c.normal, strict=True):
+        listed.setdefault((first, second), []).append(direction)
+        listed.setdefault((second, first), []).append(-direction)
+    # Two grains touch twice only through different images, whose normals differ by 60° or more.
+    other = [
+        all(n @ direction < 0.75 for direction in listed.get((first, second), ()))
+        for n, first, second in zip(normal, i.tolist(), j.tolist(), strict=True)
+    ]
+    return Margin(
+        float(np.abs(c.gap).max(initial=0.0) / unit),
+        float(gap[np.array(other, bool)].min(initial=SKIN / 2 * unit) / unit),
+    )
+
+
+def _near_forces(packing):
+    """The balanced network nearest to the packing's forces, or None if it is not close to them."""
+    S = ensemble(packing, prune=False)
+    forces = nearest(S, S.original, max_iterations=NETWORK_ITERATIONS).forces
+    far = np.linalg.norm(forces - packing.forces) / np.linalg.norm(packing.forces)
+    return forces if S.admits(forces) and far <= JAMMED_DISTANCE else None
+
+
+def _on_backbone(packing):
+    """The packing with forces on its backbone alone, balanced to the last digits; None if not."""
+    try:
+        S = ensemble(packing)
+    except (NotJammedError, UndecidedError):
+        return None
+    forces = nearest(S, S.original).forces
+    return packing._replace(forces=S.expand(forces)) if S.admits(forces) else None
+
+
+def _packing_of(motion, x, box, touching, force, mu):
+    i, j, shift = motion.i[touching], motion.j[touching], motion.shift[touching]
+    normal, length, _ = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
+    contacts = make_contacts(i, j, normal, np.maximum(length, 0), motion.r)
+    # Overlap that contact dynamics left is closed before the packing is handed out: rigid arms.
+    contacts = contacts._replace(arm_i=motion.r[i], arm_j=motion.r[j])
+    return make_packing(x, motion.r, box, contacts, force[touching], mu, 1.0)
+
+
+def _close_contacts(motion, touching):
+    """Centres, box and contacts, moved as little as brings touching gaps to 0, others to 0 or more.
+
+    Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box: near μ = 0 the
+    contacts are as many as the coordinates, and close only together with the box. Newton on the
+    gaps, each step a quadratic program. Pairs that came to touch on the way are contacts from then
+    on. None where the contacts cannot all close, or where no margin parts them from other pairs.
+    """
+    x, box = motion.x.copy(), motion.box.copy()
+    pairs = motion.i, motion.j, motion.shift
+    near = separations(x, motion.r, Cell(box, 0.0), *pairs)[2] < SKIN / 2
+    near |= touching
+    i, j, shift = (which[near] for which in pairs)
+    exact, force = touching[near].copy(), motion.force[near, 0]
+    opened = np.zeros(len(i), bool)
+    for _ in range(MOST_CLOSINGS):
+        normal, length, gap = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
+        if max(np.abs(gap[exact]).max(), -gap.min()) < CLOSED:
+            came = ~exact & ~opened & (gap < APART)
+            if not came.any():
+                closed = np.zeros(len(near), bool)
+                closed[near] = exact
+                # What had to open may have come to rest in between: that is for the dynamics.
+                return None if np.any(opened & (gap < APART)) else (x, box, closed)
+            exact |= came
+        weight = box[0] * np.sqrt(len(x))
+        R = sparse.hstack(
+            [_approach(i, j, normal, len(x)), sparse.csc_matrix(length[:, None] / weight)]
+        )
+        move, had_to = _least_motion(sparse.csr_matrix(R), gap, exact, force)
+        opened |= had_to
+        exact &= ~had_to
+        if np.abs(move[:-1]).max() > LARGEST_CORRECTION or not exact.any():
+            return None
+        strain = move[-1] / weight
+        x = x * (1 + strain) + move[:-1].reshape(-1, 2)
+        box = box * (1 + strain)
+    return None
+
+
+def _approach(i, j, normal, n):
+    """Sparse (pairs, 2n) matrix: first-order change of each gap with the displacements."""
+    row = np.repeat(np.arange(len(i)), 4)
+    column = np.column_stack([2 * i, 2 * i + 1, 2 * j, 2 * j + 1]).ravel()
+    value = np.column_stack([-normal, normal]).ravel()
+    return sparse.csc_matrix((value, (row, column)), shape=(len(i), 2 * n))
+
+
+def _least_motion(R, gap, exact, force):
+    """u with the least |u|² such that R u = −gap (exact) and R u ≥ −gap (others); who had to open.
+
+    Overlap that piled up during the dynamics can leave more contacts than rigid disks can close
+    at once (near μ = 0). Then those open whose work Σ f_n · opening is least.
+    """
+    others = ~exact
+    n, closed = R.shape[1], int(exact.sum())
+    # Scaled by the largest gap to be closed, so that the solver's tolerance is relative to it.
+    scale = max(np.abs(gap[exact]).max(), -gap.min(), 1e-300)
+    cost = 1e4 * (force[exact] / max(force.mean(), 1e-300) + 1e-3)
+    for slack in (0, closed):
+        opening = sparse.eye(closed, slack)
+        solver = piqp.SparseSolver()
+        solver.settings.eps_abs = solver.settings.eps_rel = 1e-14
+        solver.setup(
+            sparse.block_diag([sparse.identity(n), 1e-8 * sparse.identity(slack)], format="csc"),
+            np.concatenate([np.zeros(n), cost[:slack]]),
+            sparse.csc_matrix(sparse.hstack([R[exact], -opening])),
+            -gap[exact] / scale,
+            sparse.csc_matrix(
+                sparse.hstack([R[others], sparse.csr_matrix((int(others.sum()), slack))])
+            ),
+            -gap[others] / scale,
+            np.full(int(others.sum()), np.inf),
+            np.concatenate([np.full(n, -np.inf), np.zeros(slack)]),
+        )
+        solver.solve()
+        move = np.array(solver.result.x)[:n]
+        left = R[exact] @ move + gap[exact] / scale
+        if np.abs(left).max() < 1e-3:
+            break
+    opened = np.zeros(len(gap), bool)
+    opened[exact] = left > 1e-3
+    return move * scale, opened
+
+
+def shrink_to_isostatic(motion, mu, work):
+    """Frictionless finish: linear programs that shrink the box until no grain can make room.
+
+    minimise ε subject to gap_c + n_c·(u_j − u_i) + ε ℓ_c ≥ 0, |u| ≤ TRUST. Distances are convex
+    in the displacements, so no step makes an overlap; at the end the contacts that carry force
+    are exactly isostatic, N_c = 2M − 1.
+    """
+    x, box = motion.x.copy(), motion.box.copy()
+    x, box = _without_overlap(x, box, motion)
+    for _ in range(60):
+        cancelling.check("compaction")
+        i, j, shift = find_pairs(x, motion.r, Cell(box, 0.0), 4 * TRUST)
+        normal, length, gap = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
+        move, strain = _shrink_program(i, j, normal, length, gap, len(x))
+        work["linear_programs"] += 1
+        x = x * (1 + strain) + move
+        box = box * (1 + strain)
+        # Rattlers move at the programs' whim to the end; only the box tells that nothing is left.
+        if strain > -1e-13:
+            break
+    i, j, shift = find_pairs(x, motion.r, Cell(box, 0.0), TOUCHING)
+    at_rest = motion._replace(i=i, j=j, shift=shift)
+    touching = np.ones(len(i), bool)
+    packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), mu)
+    return _on_backbone(packing)
+
+
+def _without_overlap(x, box, motion):
+    """Expand the box until the largest overlap is gone: the programs start feasible."""
+    pairs = motion.i, motion.j, motion.shift
+    _, length, gap = separations(x, motion.r, Cell(box, 0.0), *pairs)
+    growth = 1 + max(0.0, float(np.max(-gap / length, initial=0.0)))
+    return x * growth, box * growth
+
+
+def _shrink_program(i, j, normal, length, gap, n):
+    """Displacements (n, 2) and strain of the box of the linear program, by HiGHS."""
+    R = sparse.hstack([_approach(i, j, normal, n), sparse.csc_matrix(length[:, None])])
+    # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the pairs' reach.
+    lower = np.append(np.full(2 * n, -TRUST), -TRUST / 2)
+    upper = np.append(np.full(2 * n, TRUST), 0.0)
+    # The duals are the contact forces: this cost makes their mean about 1, the tolerances' scale.
+    cost = np.append(np.zeros(2 * n), 4.0 * n)
+    rows = -gap, np.full(len(gap), np.inf)
+    model = programs.bounded(R, rows, (lower, upper), cost)
+    u = programs.optimal(model)
+    if u is None:
+        raise UndecidedError(
+            "the last step of the compaction is undecided: no solver found the optimum of one of "
+            "its linear programs; take another seed"
+        )
+    return u[:-1].reshape(-1, 2), float(u[-1])
