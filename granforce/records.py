@@ -367,7 +367,13 @@ def _check_own_images(cell, diameter):
         raise InputError(
             f"box sides must be two numbers above the largest diameter, got {cell.box}"
         )
-    # A tilted cell may be lower than a diameter: its images lie aside as well.
+    # A tilted cell may be lower than a diameter, as its images lie aside; where it is lower than a
+    # radius, every search would go through images by the hundred.
+    if cell.tilt and cell.box[1] < diameter / 2:
+        raise InputError(
+            f"the tilted cell of sides {cell.box} is lower than the largest radius, "
+            f"{diameter / 2:g}; describe it by other vectors of its lattice"
+        )
     if cell.shortest <= diameter:
         raise InputError(
             f"the cell of sides {cell.box}, tilted by {cell.tilt:g}, has a grain's own image at a "

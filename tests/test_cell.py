@@ -112,7 +112,8 @@ def one_disk(box, tilt):
         ([20.0, 1.99], 0.0, False),
         ([20.0, 1.99], 0.2, True),  # b is longer than its height
         ([20.0, 1.0], 7.0, True),  # 3 b − a = (1, 3)
-        ([20.0, 0.5], 7.0, False),  # 3 b − a = (1, 1.5)
+        ([20.0, 1.0], 10.0, False),  # 2 b − a = (0, 2)
+        ([20.0, 0.9], 7.0, False),  # lower than a radius
         ([2.0, 9.0], 0.7, False),
     ],
 )
@@ -120,7 +121,7 @@ def test_a_grain_may_not_touch_its_image_in_any_direction(box, tilt, free):
     if free:
         assert one_disk(box, tilt).tilt == tilt
     else:
-        with pytest.raises(InputError, match="largest diameter"):
+        with pytest.raises(InputError, match=r"largest (diameter|radius)"):
             one_disk(box, tilt)
 
 
