@@ -61,6 +61,7 @@ class Replay(NamedTuple):
     disks: geometry.Disks
     links: geometry.Links
     box: np.ndarray  # (2,) sides; inf where open
+    tilt: float  # of the cell
     window: tuple  # x_low, x_high, y_low, y_high of the view, a square
     backbone: np.ndarray  # (N_c,) positions of the contacts in the packing
     force_scale: float  # ⟨f_n⟩, force
@@ -285,7 +286,7 @@ def make_replay(packing, dataset, mu):
     number = np.linspace(0, walked - 1, kept).astype(int)[pick] + 1
     summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
     summary |= {"kept": len(pick), "states": walked}
-    x = geometry.into_box(packing)
+    x = geometry.into_cell(packing)
     window = geometry.square(x, packing)
 
     def column(name):
@@ -296,9 +297,10 @@ def make_replay(packing, dataset, mu):
     distance = column("distance_to_centre")
     distance[0] = summary["original_distance"]
     return Replay(
-        disks=geometry.disks(packing, x, window, backbone),
-        links=geometry.links(packing, x, window, backbone),
+        disks=geometry.disks(packing, x, backbone),
+        links=geometry.links(packing, x, backbone),
         box=packing.box,
+        tilt=packing.tilt,
         window=window,
         backbone=backbone,
         force_scale=scale,

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Width of the strip around the periodic box in which images are drawn, in largest radii.
+# Width of the strip around the periodic cell in which images are drawn, in largest radii.
 MARGIN = 1.0
 
 
@@ -16,7 +16,7 @@ class Disks(NamedTuple):
     r: np.ndarray
     grain: np.ndarray  # (k,) number of the grain
     contacts: np.ndarray  # (k,) its number of force-bearing contacts
-    image: np.ndarray  # (k,) bool, whether the centre lies outside the box
+    image: np.ndarray  # (k,) bool, whether the centre lies outside the cell
 
 
 class Links(NamedTuple):
@@ -31,64 +31,48 @@ class Links(NamedTuple):
     j: np.ndarray
 
 
-def into_box(packing):
-    """Centres (N, 2), moved into [0, L) along each periodic axis."""
-    periodic = np.isfinite(packing.box)
-    return np.where(periodic, packing.x % np.where(periodic, packing.box, 1.0), packing.x)
+def into_cell(packing):
+    """Centres (N, 2), moved into the cell along each periodic direction."""
+    return packing.cell.wrapped(packing.x)
 
 
 def square(x, packing):
-    """(x_low, x_high, y_low, y_high) of a square around the box (where open, the grains)."""
+    """(x_low, x_high, y_low, y_high) of a square around the cell (where open, the grains)."""
     margin = MARGIN * packing.r.max()
     periodic = np.isfinite(packing.box)
-    low = np.where(periodic, 0.0, (x - packing.r[:, None]).min(axis=0))
-    high = np.where(periodic, packing.box, (x + packing.r[:, None]).max(axis=0))
+    corner, opposite = packing.cell.extent
+    low = np.where(periodic, corner, (x - packing.r[:, None]).min(axis=0))
+    high = np.where(periodic, opposite, (x + packing.r[:, None]).max(axis=0))
     middle, half = (low + high) / 2, (high - low).max() / 2 + margin
     corners = np.stack([middle - half, middle + half], axis=1)
     return tuple(float(value) for value in corners.ravel())
 
 
-def _shifts(packing):
-    """Shifts by −1, 0, 1 boxes along each periodic axis, (k, 2)."""
-    steps = [(-1, 0, 1) if np.isfinite(side) else (0,) for side in packing.box]
-    sides = np.where(np.isfinite(packing.box), packing.box, 0.0)
-    return np.array([(a, b) for a in steps[0] for b in steps[1]]) * sides
-
-
-def _seen(low, high, packing, window):
-    """Rows whose extent (k, 2) reaches into the drawn strip around the box."""
-    margin = MARGIN * packing.r.max()
-    open_low, open_high = np.array(window[::2]), np.array(window[1::2])
-    edge_low = np.where(np.isfinite(packing.box), -margin, open_low)
-    edge_high = np.where(np.isfinite(packing.box), packing.box + margin, open_high)
-    return np.all((high > edge_low) & (low < edge_high), axis=1)
-
-
-def disks(packing, x, window, backbone):
-    """Disks; backbone: (N_c,) its contacts as positions in the packing."""
+def disks(packing, x, backbone):
+    """Disks; x (N, 2) centres in the cell, backbone: (N_c,) its contacts as positions."""
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
     number = np.bincount(i, minlength=len(x)) + np.bincount(j, minlength=len(x))
     parts = []
-    for shift in _shifts(packing):
-        r = packing.r[:, None]
-        grain = np.flatnonzero(_seen(x + shift - r, x + shift + r, packing, window))
-        at = x[grain] + shift
-        image = np.full(len(grain), bool(np.any(shift)))
-        parts.append((at[:, 0], at[:, 1], packing.r[grain], grain, number[grain], image))
+    cell, r = packing.cell, packing.r[:, None]
+    at = cell.across(x)
+    for moved, grain in cell.images(at - r, at + r, MARGIN * packing.r.max()):
+        image = np.full(len(grain), bool(np.any(moved)))
+        place = x[grain] + moved
+        parts.append((*place.T, packing.r[grain], grain, number[grain], image))
     return Disks(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
-def links(packing, x, window, backbone):
+def links(packing, x, backbone):
     """Segments of the backbone's contacts, given as positions in the packing."""
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
     reach = packing.contacts.length[backbone, None] * packing.contacts.normal[backbone]
     parts = []
-    # From a centre inside the box a contact may reach out of it, so its image may come in.
-    for shift in _shifts(packing):
-        begin = x[i] + shift
-        end = begin + reach
-        low, high = np.minimum(begin, end), np.maximum(begin, end)
-        contact = np.flatnonzero(_seen(low, high, packing, window))
-        ends = (*begin[contact].T, *end[contact].T)
-        parts.append((*ends, contact, i[contact], j[contact]))
+    # From a centre inside the cell a contact may reach out of it, so its image may come in.
+    cell, begin = packing.cell, x[i]
+    end = begin + reach
+    ends = cell.across(begin), cell.across(end)
+    low, high = np.minimum(*ends), np.maximum(*ends)
+    for moved, contact in cell.images(low, high, MARGIN * packing.r.max()):
+        placed = (*(begin[contact] + moved).T, *(begin[contact] + moved + reach[contact]).T)
+        parts.append((*placed, contact, i[contact], j[contact]))
     return Links(*(np.concatenate(field) for field in zip(*parts, strict=True)))

@@ -55,7 +55,7 @@ class Compaction:
 
     def add(self, glimpse):
         """Keep a Glimpse, if it differs enough from the last one."""
-        now, side = time.perf_counter(), float(glimpse.box[0])
+        now, side = time.perf_counter(), float(np.sqrt(np.prod(glimpse.box)))
         if side > (1 - STRAIN) * self._side and now < self._at + EVERY_S:
             return
         self._side, self._at = side, now
@@ -90,6 +90,7 @@ def _picture(glimpse):
     mean = float(forces[:, 0].mean()) if len(forces) else 1.0
     return {
         "box": [float(side) for side in glimpse.box],
+        "tilt": float(glimpse.tilt),
         "x": glimpse.x.astype(np.float32).ravel(),
         "radius": glimpse.r.astype(np.float32),
         "i": glimpse.i.astype(np.int32),
@@ -203,13 +204,14 @@ def first_replay(S, states):
     """
     packing, backbone, scale = S.packing, S.index, S.force_scale
     original = (S.original / scale).astype(np.float32)
-    x = geometry.into_box(packing)
+    x = geometry.into_cell(packing)
     window = geometry.square(x, packing)
     nothing = np.full(1, np.nan)
     return Replay(
-        disks=geometry.disks(packing, x, window, backbone),
-        links=geometry.links(packing, x, window, backbone),
+        disks=geometry.disks(packing, x, backbone),
+        links=geometry.links(packing, x, backbone),
         box=packing.box,
+        tilt=packing.tilt,
         window=window,
         backbone=backbone,
         force_scale=scale,

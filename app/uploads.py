@@ -110,11 +110,12 @@ def missing(files):
     return [part for part in needed if part not in files]
 
 
-def read(files, *, mu=None, box=None, pressure=1.0):
+def read(files, *, mu=None, box=None, tilt=0.0, pressure=1.0):
     """The Packing in files {role: (name, content)}.
 
-    mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, pressure: of a
-    table. Raises InputError, naming file and line, for what cannot be used, and beyond LIMITS.
+    mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, tilt and
+    pressure: of a table. Raises InputError, naming file and line, for what cannot be used, and
+    beyond LIMITS.
     """
     LIMITS.check(pressure=pressure)
     given = {part: opened(*file) for part, file in files.items()}
@@ -126,7 +127,13 @@ def read(files, *, mu=None, box=None, pressure=1.0):
         packing = importers.read_lammps(given["particles"], given["contacts"], mu, **most)
     else:
         packing = importers.read_table(
-            given["grains"], given.get("joined"), mu=mu, box=box, pressure=pressure, **most
+            given["grains"],
+            given.get("joined"),
+            mu=mu,
+            box=box,
+            tilt=tilt,
+            pressure=pressure,
+            **most,
         )
     LIMITS.check(mu=packing.mu)
     return packing

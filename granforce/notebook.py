@@ -54,7 +54,7 @@ def packing_svg(packing):
     low, sides = _window(packing)
     scale = SIDE / max(sides)
     width, height = sides * scale
-    x = np.where(np.isfinite(packing.box), low + np.mod(packing.x - low, packing.box), packing.x)
+    x = packing.cell.wrapped(packing.x)
 
     def place(points):
         """Centres in pixels from the upper left corner."""
@@ -62,6 +62,7 @@ def packing_svg(packing):
 
     words = _words(packing)
     drawn = [*_disks(packing, place, x, scale), *_chains(packing, place, x, scale)]
+    drawn = _cut(packing, place, drawn)
     text = "".join(
         f'<text x="4" y="{height + LINE * (k + 1):.0f}">{escape(line)}</text>'
         for k, line in enumerate(words)
@@ -77,34 +78,41 @@ def packing_svg(packing):
 
 
 def _window(packing):
-    """Lower left corner (2,) and sides (2,) of what is drawn: the box, or the disks where open."""
+    """Lower left corner (2,) and sides (2,) of what is drawn: the cell, or the disks where open."""
     if not len(packing.r):
         return np.zeros(2), np.ones(2)
     low = (packing.x - packing.r[:, None]).min(axis=0)
     high = (packing.x + packing.r[:, None]).max(axis=0)
     closed = np.isfinite(packing.box)
-    return np.where(closed, 0.0, low), np.where(closed, packing.box, high - low)
+    corner, opposite = packing.cell.extent
+    low = np.where(closed, corner, low)
+    return low, np.where(closed, opposite, high) - low
 
 
-def _images(packing, low, high):
-    """Shifts (k, 2) by which what reaches from low to high (2,) is seen in the box as well."""
-    steps = [
-        [0.0] + ([side] if a < 0 else []) + ([-side] if b > side else [])
-        if np.isfinite(side)
-        else [0.0]
-        for side, a, b in zip(packing.box, low, high, strict=True)
+def _cut(packing, place, drawn):
+    """What is drawn, cut at the sides of a tilted cell, and those sides."""
+    if not packing.tilt:
+        return drawn
+    outline = " ".join(f"{a:.1f},{b:.1f}" for a, b in place(packing.cell.corners[:4]))
+    # Named by its shape: pictures of one document that share a name share the shape.
+    name = "cell-" + outline.replace(" ", "-").replace(",", "-")
+    return [
+        f'<clipPath id="{name}"><polygon points="{outline}"/></clipPath>',
+        f'<g clip-path="url(#{name})">',
+        *drawn,
+        f'</g><polygon points="{outline}" fill="none" stroke="#aaaaaa" stroke-dasharray="4 4"/>',
     ]
-    return [(dx, dy) for dx in steps[0] for dy in steps[1]]
 
 
 def _disks(packing, place, x, scale):
     if not len(x) or len(x) > MOST_DRAWN:
         return
     yield '<g fill="#eeeeee" stroke="#aaaaaa" stroke-width="0.5">'
-    for centre, radius in zip(x, packing.r, strict=True):
-        for shift in _images(packing, centre - radius, centre + radius):
-            a, b = place(centre + shift)
-            yield f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{radius * scale:.1f}"/>'
+    cell, radius = packing.cell, packing.r[:, None]
+    at = cell.across(x)
+    for moved, grains in cell.images(at - radius, at + radius):
+        for (a, b), r in zip(place(x[grains] + moved), packing.r[grains], strict=True):
+            yield f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{r * scale:.1f}"/>'
     yield "</g>"
 
 
@@ -124,11 +132,13 @@ def _chains(packing, place, x, scale):
     begin = x[contacts.i[pressing]]
     end = begin + contacts.length[pressing, None] * contacts.normal[pressing]
     paths = {}
-    for k in range(len(pressing)):
-        path = paths.setdefault((width[k], colour[k]), [])
-        low, high = np.minimum(begin[k], end[k]), np.maximum(begin[k], end[k])
-        for shift in _images(packing, low, high):
-            (a, b), (c, d) = place(begin[k] + shift), place(end[k] + shift)
+    cell = packing.cell
+    ends = cell.across(begin), cell.across(end)
+    for moved, rows in cell.images(np.minimum(*ends), np.maximum(*ends)):
+        for k, (a, b), (c, d) in zip(
+            rows, place(begin[rows] + moved), place(end[rows] + moved), strict=True
+        ):
+            path = paths.setdefault((width[k], colour[k]), [])
             path.append(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}")
     thickest = min(THICKEST * SIDE / 100, packing.r.mean() * scale)
     yield '<g fill="none" stroke-linecap="round">'

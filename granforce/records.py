@@ -60,6 +60,29 @@ class Cell(NamedTuple):
         return np.array([[sides[0], 0.0], [self.tilt, sides[1]]])
 
     @property
+    def heights(self):
+        """Distances (2,) between the sides that face each other along a and b; inf where open."""
+        if not self.tilt:
+            return self.box
+        return self.box * [self.box[1] / np.hypot(self.tilt, self.box[1]), 1.0]
+
+    @property
+    def corners(self):
+        """Corners (5, 2) of the parallelogram, back to the first; needs both sides periodic."""
+        return np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]) @ self.vectors
+
+    @property
+    def extent(self):
+        """Lower left and upper right corner (2, 2) around the parallelogram; inf where open."""
+        lean = np.array([self.tilt, 0.0])
+        return np.array([np.minimum(lean, 0.0), self.box + np.maximum(lean, 0.0)])
+
+    @property
+    def shortest(self):
+        """Distance of a point from its nearest own image; inf without one."""
+        return float(np.linalg.norm(self.reduced[0]) if self.tilt else self.box.min())
+
+    @property
     def reduced(self):
         """The two shortest vectors (2, 2) that span the lattice, the shortest first (Gauss)."""
         short, long = sorted(self.vectors, key=np.linalg.norm)
@@ -71,6 +94,28 @@ class Cell(NamedTuple):
         """Points (…, 2) as parts of a and b, from 0 to 1 inside; needs both directions periodic."""
         up = x[..., 1] / self.box[1]
         return np.stack([(x[..., 0] - self.tilt * up) / self.box[0], up], axis=-1)
+
+    def across(self, x):
+        """Distances (…, 2) of points from the sides b and a; x and y themselves where straight."""
+        if not self.tilt:
+            return np.array(x, dtype=np.float64)
+        return self.parts(x) * self.heights
+
+    def images(self, low, high, margin=0.0):
+        """Which images of what reaches from low to high (k, 2), told as `across`, are in the cell.
+
+        margin: width of a strip around the cell that counts as well. Yields vectors (2,) of whole
+        cells, and the rows (m,) of which the image by that vector is seen.
+        """
+        periodic = np.isfinite(self.box)
+        side = np.where(periodic, self.heights, 1.0)
+        first = np.minimum(np.floor(-(margin + high.max(axis=0, initial=0.0)) / side) + 1, 0)
+        last = np.maximum(np.ceil(1 + (margin - low.min(axis=0, initial=0.0)) / side) - 1, 0)
+        first, last = (np.where(periodic, steps, 0.0).astype(int) for steps in (first, last))
+        for step in itertools.product(*(range(a, b + 1) for a, b in zip(first, last, strict=True))):
+            moved = step * side
+            seen = (high + moved > -margin) & (low + moved < side + margin)
+            yield step @ self.vectors, np.flatnonzero(np.all(seen | ~periodic, axis=1))
 
     def wrapped(self, x):
         """Points (…, 2) at their image in the parallelogram of a and b, as they are along open."""
@@ -322,12 +367,17 @@ def _check_own_images(cell, diameter):
         raise InputError(
             f"box sides must be two numbers above the largest diameter, got {cell.box}"
         )
-    # A tilted cell may be lower than a diameter: its images lie aside as well.
-    shortest = np.linalg.norm(cell.reduced[0]) if cell.tilt else np.inf
-    if shortest <= diameter:
+    # A tilted cell may be lower than a diameter, as its images lie aside; where it is lower than a
+    # radius, every search would go through images by the hundred.
+    if cell.tilt and cell.box[1] < diameter / 2:
+        raise InputError(
+            f"the tilted cell of sides {cell.box} is lower than the largest radius, "
+            f"{diameter / 2:g}; describe it by other vectors of its lattice"
+        )
+    if cell.shortest <= diameter:
         raise InputError(
             f"the cell of sides {cell.box}, tilted by {cell.tilt:g}, has a grain's own image at a "
-            f"distance of {shortest:g}, which must be above the largest diameter {diameter:g}"
+            f"distance of {cell.shortest:g}, which must be above the largest diameter {diameter:g}"
         )
 
 

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from packings import reference, skewed
 
 import granforce as gf
+from granforce.bench import solvers
 from granforce.packing.importers.geometry import touching
+from granforce.perturb import decay
 from granforce.records import Cell, InputError, make_cell, make_contacts, make_packing
-from granforce.study import kinds
+from granforce.study import kinds, slices
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.tolerances import TOUCHING
-from tests.packings import reference, skewed
 
 CELLS = st.builds(
     lambda width, height, tilt: Cell(np.array([width, height]), tilt),
@@ -110,7 +112,8 @@ def one_disk(box, tilt):
         ([20.0, 1.99], 0.0, False),
         ([20.0, 1.99], 0.2, True),  # b is longer than its height
         ([20.0, 1.0], 7.0, True),  # 3 b − a = (1, 3)
-        ([20.0, 0.5], 7.0, False),  # 3 b − a = (1, 1.5)
+        ([20.0, 1.0], 10.0, False),  # 2 b − a = (0, 2)
+        ([20.0, 0.9], 7.0, False),  # lower than a radius
         ([2.0, 9.0], 0.7, False),
     ],
 )
@@ -118,7 +121,7 @@ def test_a_grain_may_not_touch_its_image_in_any_direction(box, tilt, free):
     if free:
         assert one_disk(box, tilt).tilt == tilt
     else:
-        with pytest.raises(InputError, match="largest diameter"):
+        with pytest.raises(InputError, match=r"largest (diameter|radius)"):
             one_disk(box, tilt)
 
 
@@ -171,3 +174,46 @@ def test_the_tilt_names_an_imported_packing():
         for tilt in (0.0, packing.tilt, -packing.tilt)
     }
     assert len(names) == 3
+
+
+def test_distances_and_slices_follow_a_tilted_cell():
+    packing = reference("n100_mu0.1_s11")
+    other = skewed(packing)[0]
+    for contact in (0, 40, 120):
+        one, two = decay.distances(packing, contact), decay.distances(other, contact)
+        assert one == pytest.approx(two, abs=1e-9)
+    # The cell is low, but no image is nearer than in the straight one.
+    assert other.box[1] < 0.5 * packing.box[1]
+    assert other.cell.shortest == pytest.approx(packing.cell.shortest)
+    assert len(decay.shells(other)) == len(decay.shells(packing))
+    # In a slice lie the contacts whose two centres do, with no side of the cell between them.
+    x = other.cell.wrapped(other.x)
+    c = other.contacts
+    steps = np.linalg.inv(other.cell.vectors)
+    begin = x[c.i]
+    end = begin + c.length[:, None] * c.normal
+    inside = [np.all((p @ steps > 0.1) & (p @ steps < 0.9), axis=1) for p in (begin, end)]
+    found = slices.outside(other, (0.1, 0.9, 0.1, 0.9))
+    assert np.array_equal(found, ~(inside[0] & inside[1]))
+    assert 20 < np.count_nonzero(~found) < len(found) - 20
+
+
+def test_a_tilted_packing_is_tiled_by_its_lattice():
+    packing = skewed(reference("n100_mu1_s12"))[0]
+    S = gf.ensemble(packing)
+    larger = solvers.tile(S, 2)
+    assert larger.tilt == 2 * packing.tilt and larger.volume == pytest.approx(4 * packing.volume)
+    T = gf.ensemble(larger, prune=False)
+    assert T.residual(T.original) < 1e-9
+    # Each contact leads to the grain that is there.
+    c = larger.contacts
+    apart = larger.x[c.j] - larger.x[c.i] - c.length[:, None] * c.normal
+    assert np.abs(larger.cell.nearest(apart)).max() < 1e-6
+
+
+def test_the_stress_turns_with_the_packing():
+    packing = reference("n100_mu0.1_s11")
+    other = skewed(packing)[0]
+    S, T = gf.ensemble(packing), gf.ensemble(other)
+    one, two = (gf.stress_outline(ensemble).friction for ensemble in (S, T))
+    assert one == pytest.approx(two, rel=1e-3)

@@ -5,9 +5,10 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from packings import packed, two_disks
+from packings import packed, skewed, two_disks
 
 import granforce as gf
+from granforce import notebook
 from granforce.records import make_contacts, make_packing
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -50,6 +51,30 @@ def test_any_packing_has_a_picture(packing, disks, lines):
     assert len(list(picture.iter(f"{SVG}circle"))) == disks
     assert len(list(picture.iter(f"{SVG}path"))) == lines
     assert "nan" not in picture.find(f"{SVG}title").text
+
+
+def test_a_tilted_cell_is_cut_at_its_sides():
+    """Every disk is drawn, those across a side at each image that reaches into the cell."""
+    packing, _ = skewed(packed(30, 0.3))
+    picture = ET.fromstring(packing._repr_svg_())
+    clip = next(picture.iter(f"{SVG}clipPath"))
+    corners = [p.split(",") for p in clip[0].get("points").split()]
+    corners = np.array(corners, float)
+    assert len(corners) == 4
+    scale = notebook.SIDE / np.ptp(packing.cell.extent, axis=0).max()
+    assert np.linalg.norm(corners[1] - corners[0]) == pytest.approx(packing.box[0] * scale, abs=0.2)
+    drawn = np.array(
+        [[float(c.get(key)) for key in ("cx", "cy", "r")] for c in picture.iter(f"{SVG}circle")]
+    )
+    # By brute force: disks at many images, seen where they overlap the parallelogram.
+    steps = np.mgrid[-6:7, -6:7].reshape(2, -1).T
+    at = packing.cell.across(packing.x[:, None] + steps @ packing.cell.vectors)
+    reach = packing.r[:, None, None]
+    seen = np.all((at > -reach) & (at < packing.cell.heights + reach), axis=-1)
+    assert len(drawn) == np.count_nonzero(seen) > len(packing.r)
+    group = next(g for g in picture.iter(f"{SVG}g") if g.get("clip-path"))
+    assert group.get("clip-path") == f"url(#{clip.get('id')})"
+    assert len(list(group.iter(f"{SVG}circle"))) == len(drawn)
 
 
 def test_ensembles_walks_and_intervals_are_small_tables():

@@ -8,32 +8,36 @@ const FORCES = ["normal", "tangential"]
 const TOLD = ["residual", "acceptance", "eta1", "eta2", "eta3"]
 
 /** A moving packing as the scene draws it, its periodic images included. */
-function moving({ box, x, radius, i, j, reach }) {
-  const made = { box, radius, touching: [], i: [], j: [], contact: [] }
+function moving({ box, tilt, x, radius, i, j, reach }) {
+  const made = { box, tilt, radius, touching: [], i: [], j: [], contact: [] }
   for (const name of ["x", "y", "r", "grain", "kind", "x0", "y0", "x1", "y1"]) made[name] = []
   const margin = STRIP * radius.reduce((most, r) => Math.max(most, r), 0)
   const [wide, high] = box
+  // Across a tilted cell: distances from its sides b and a; x and y where it is straight.
+  const narrow = high / Math.hypot(tilt, high), across = (px, py) => (px - (tilt * py) / high) * narrow
   const seen = (low, up, side) => up > -margin && low < side + margin
   const touching = new Int32Array(radius.length)
   for (let c = 0; c < i.length; c++) { touching[i[c]]++; touching[j[c]]++ }
-  for (const a of [0, -wide, wide]) for (const b of [0, -high, high]) {
-    const image = a || b ? 2 : 0
+  for (const s of [0, -1, 1]) for (const t of [0, -1, 1]) {
+    const a = s * wide + t * tilt, b = t * high, image = s || t ? 2 : 0
     for (let g = 0; g < radius.length; g++) {
-      const px = x[2 * g] + a, py = x[2 * g + 1] + b, r = radius[g]
-      if (!seen(px - r, px + r, wide) || !seen(py - r, py + r, high)) continue
+      const px = x[2 * g] + a, py = x[2 * g + 1] + b, r = radius[g], at = across(px, py)
+      if (!seen(at - r, at + r, wide * narrow) || !seen(py - r, py + r, high)) continue
       made.x.push(px); made.y.push(py); made.r.push(r); made.grain.push(g)
       made.touching.push(touching[g]); made.kind.push(image + (touching[g] ? 0 : 1))
     }
     for (let c = 0; c < i.length; c++) {
       const x0 = x[2 * i[c]] + a, y0 = x[2 * i[c] + 1] + b
       const x1 = x0 + reach[2 * c], y1 = y0 + reach[2 * c + 1]
-      if (!seen(Math.min(x0, x1), Math.max(x0, x1), wide)) continue
+      const at = across(x0, y0), to = across(x1, y1)
+      if (!seen(Math.min(at, to), Math.max(at, to), wide * narrow)) continue
       if (!seen(Math.min(y0, y1), Math.max(y0, y1), high)) continue
       made.x0.push(x0); made.y0.push(y0); made.x1.push(x1); made.y1.push(y1)
       made.contact.push(c); made.i.push(i[c]); made.j.push(j[c])
     }
   }
-  made.window = [-margin, wide + margin, -margin, high + margin]
+  const half = Math.max(wide + Math.abs(tilt), high) / 2 + margin
+  made.window = [(wide + tilt) / 2 - half, (wide + tilt) / 2 + half, high / 2 - half, high / 2 + half]
   return made
 }
 
@@ -110,6 +114,7 @@ class Live {
   show(picture) {
     const { scene, buttons, model } = this.player, geometry = moving(picture)
     if (!this.moves) this.player.play(false)
+    const [left, right, low, high] = geometry.window
     this.window ??= geometry.window
     this.player.split.show()
     geometry.window = this.window
@@ -117,7 +122,9 @@ class Live {
     scene.frozen = true
     scene.selected = null
     scene.show(geometry)
-    scene.view = { x: picture.box[0] / 2, y: picture.box[1] / 2, half: (this.window[1] - this.window[0]) / 2 }
+    // As large as at first while it shrinks, larger where it tilts out of that.
+    const half = Math.max(this.window[1] - this.window[0], right - left) / 2
+    scene.view = { x: (left + right) / 2, y: (low + high) / 2, half }
     scene.style = flickering(picture, plain(model.palettes))
     scene.resize()
     if (scene.size) scene.repaint()

@@ -231,6 +231,7 @@ def legend(state):
     if state.colour == "known" and not state.pulls and state.narrowed is None:
         bar = "(nothing is known: select a contact and press H)"
     sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
+    tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
     return LEGEND.format(
         width=WIDTHS[state.thickness],
         width_term=EXPLAINED[state.thickness],
@@ -238,7 +239,7 @@ def legend(state):
         colour=colour_words(state),
         bar=bar,
         marks=_marks(state.dark) if state.overlay else "",
-        sides=f" of {' × '.join(sides)} largest radii" if sides else "",
+        sides=f" of {' × '.join(sides)} largest radii{tilted}" if sides else "",
     )
 
 

@@ -117,6 +117,7 @@ def frames(replay, room=0):
         "mu": replay.summary["mu"],
         "states": replay.summary["states"],
         "box": [float(side) if np.isfinite(side) else -1.0 for side in replay.box],
+        "tilt": replay.tilt,
         "window": list(replay.window),
         "x": disks.x,
         "y": disks.y,

@@ -141,12 +141,19 @@ class Scene {
   }
 
   drawBox(context) {
-    const [width, height] = this.geometry.box
+    const { box: [width, height], tilt } = this.geometry
     if (width < 0 || height < 0) return // open
+    context.beginPath()
+    const corners = [[0, 0], [width, 0], [width + tilt, height], [tilt, height]]
+    if (context instanceof Sheet) context.polygon(corners)
+    else {
+      for (const corner of corners) context.lineTo(...corner)
+      context.closePath()
+    }
     context.setLineDash([4 / this.scale, 4 / this.scale])
     context.lineWidth = 1 / this.scale
     context.strokeStyle = this.palette.edge
-    context.strokeRect(0, 0, width, height)
+    context.stroke()
     context.setLineDash([])
   }
 

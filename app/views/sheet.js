@@ -5,6 +5,8 @@ const BELOW = 60 // pixels from the picture to the first line of its caption
 const LINE = 21 // pixels
 const SCALE_LENGTH = 5 // of the scale, in largest radii
 
+const written = (value) => (typeof value === "number" ? Number(value.toPrecision(5)) : value)
+
 class Sheet {
   constructor() {
     this.canvas = {}
@@ -23,10 +25,8 @@ class Sheet {
 
   arc(x, y, r) { this.add("circle", { cx: x, cy: -y, r }) }
 
-  strokeRect(x, y, width, height) {
-    this.beginPath()
-    this.add("rect", { x, y: -y - height, width, height })
-    this.stroke()
+  polygon(corners) {
+    this.add("polygon", { points: corners.map(([x, y]) => [x, -y].map(written)).join(" ") })
   }
 
   add(name, places) {
@@ -54,7 +54,6 @@ class Sheet {
   /** All that was drawn, as a text, with colour bar, scale and caption below. */
   svg([left, right, bottom, top], { background, ink, bar, lines, unit }) {
     const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
-    const written = (value) => (typeof value === "number" ? Number(value.toPrecision(5)) : value)
     const element = ({ name, ...given }) =>
       `<${name} ${Object.entries(given).map(([key, value]) => `${key}="${written(value)}"`).join(" ")}/>`
     const full = PIXELS + BELOW + LINE * lines.length

@@ -5,7 +5,7 @@ import html
 import panel as pn
 import panel_material_ui as pmui
 
-from granforce.records import InputError, friction, positive
+from granforce.records import InputError, friction, make_cell, positive
 
 from .. import photoelastic, uploads
 from ..limits import LIMITS
@@ -50,7 +50,7 @@ class View:
             margin=(8, 10),
         )
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
-        self.box = pmui.TextInput(label="Box L_x, L_y", placeholder="open", **SMALL)
+        self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
         self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
@@ -124,9 +124,13 @@ class View:
             options["reverse"] = self.reverse.value
         if kind == "table":
             sides = (self.box.value_input or self.box.value).replace(",", " ").split()
-            if len(sides) not in (0, 2):
-                raise InputError("give two sides of the box, such as 30, 30, or none if it is open")
-            options["box"] = [positive(side, "a side of the box") for side in sides] or None
+            if len(sides) not in (0, 2, 3):
+                raise InputError(
+                    "give two sides of the box, such as 30, 30, and its tilt, if it has one; or "
+                    "nothing if it is open"
+                )
+            options["box"] = [positive(side, "a side of the box") for side in sides[:2]] or None
+            options["tilt"] = make_cell(options["box"], sides[2]).tilt if sides[2:] else 0.0
             options["pressure"] = positive(self.pressure.value, "the pressure")
         return options
 

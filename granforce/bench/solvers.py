@@ -150,11 +150,11 @@ def tile(S, k):
     """
     packing, contacts = S.packing, S.contacts
     i, j, count = contacts.i, contacts.j, len(packing.r)
-    # How many boxes away from i the image of j lies that is touched.
+    # How many cells away from i the image of j lies that is touched.
     reach = packing.x[i] + contacts.length[:, None] * contacts.normal - packing.x[j]
-    image = np.rint(reach / packing.box).astype(np.int64)
+    image = np.rint(packing.cell.parts(reach)).astype(np.int64)
     column, row = (part.ravel() for part in np.meshgrid(np.arange(k), np.arange(k)))
-    x = packing.x[None] + np.column_stack([column, row])[:, None] * packing.box
+    x = packing.x[None] + (np.column_stack([column, row]) @ packing.cell.vectors)[:, None]
     to = (column[:, None] + image[:, 0]) % k + k * ((row[:, None] + image[:, 1]) % k)
     tiles = k * k
     r = np.tile(packing.r, tiles)
@@ -174,6 +174,7 @@ def tile(S, k):
         np.tile(S.original, (tiles, 1)),
         packing.mu,
         packing.pressure,
+        tilt=k * packing.tilt,
     )
 
 

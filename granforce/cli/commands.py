@@ -496,6 +496,7 @@ def import_(arguments):
             arguments.contacts,
             mu=arguments.mu,
             box=arguments.box,
+            tilt=arguments.tilt,
             forces=True if arguments.forces else None,
             pressure=arguments.pressure,
         )

@@ -486,6 +486,9 @@ def _add_import(commands):
     command.add_argument(
         "--box", type=float, nargs=2, metavar=("LX", "LY"), help="table: box sides"
     )
+    command.add_argument(
+        "--tilt", type=float, default=0.0, help="table: tilt of the box, LAMMPS' xy (default 0)"
+    )
     command.add_argument("--forces", action="store_true", help="table: fn, ft must be given")
     command.add_argument("--pressure", type=float, default=1.0, help="table without forces: P0")
     command.add_argument("--out", metavar="FILE.npz", help="save the packing to this file")

@@ -4,7 +4,7 @@ import holoviews as hv
 import numpy as np
 
 from granforce.figures import style
-from granforce.figures.networks import contact_points
+from granforce.figures.networks import contact_points, outline
 
 # The length of the arrow of the fastest grain, in mean diameters.
 LONGEST_ARROW = 2.0
@@ -22,17 +22,18 @@ def displacement(packing, field, contact=None, *, backend="bokeh"):
     size = np.linalg.norm(field[known], axis=1)
     longest = size.max(initial=0.0)
     arrow = LONGEST_ARROW * 2 * packing.r.mean() / (longest or 1.0)
-    x = np.where(np.isfinite(packing.box), np.mod(packing.x, packing.box), packing.x)
+    x = packing.cell.wrapped(packing.x)
     drawn = [
         _disks(x[~known], packing.r[~known], "#eeeeee", backend),
         _disks(x[known], packing.r[known], "#cccccc", backend),
         _arrows(x[known], arrow * field[known], backend),
+        *outline(packing, backend),
     ]
     if contact is not None:
         at = contact_points(packing, np.array([contact]))
         drawn.append(style.dots(at, "perturbed contact", style.COLOURS[1], backend, size=8))
     whole = np.isfinite(packing.box).all()
-    low, high = (np.zeros(2), packing.box) if whole else (x.min(axis=0), x.max(axis=0))
+    low, high = packing.cell.extent if whole else (x.min(axis=0), x.max(axis=0))
     limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
     shape = {"data_aspect": 1} if backend == "bokeh" else {"aspect": "equal"}
     words = {f"{axis}label": style.typeset(axis, backend) for axis in "xy"}

@@ -62,17 +62,12 @@ def places(groups, *, backend="bokeh", part=0.1):
                 style.dots(at, "contacts", style.GREY, backend, size=2),
                 style.dots(at[chosen], word, colour, backend, size=5),
             ]
-            box = packing.box
             frames.append(
                 style.frame(
-                    drawn,
+                    drawn + outline(packing, backend),
                     backend,
                     title=f"μ = {mu:g}: {word} {100 * part:g} %",
-                    x="x / r_max",
-                    y="y / r_max",
-                    xlim=(0, box[0]),
-                    ylim=(0, box[1]),
-                    **style.equal_scales(box, backend),
+                    **_axes(packing, backend),
                 )
             )
     return style.page(frames, backend, columns=2)
@@ -94,26 +89,36 @@ def overlaid(groups, *, backend="bokeh"):
             style.dots(at[loose], "ΔF_n > ⟨ΔF_n⟩", style.COLOURS[4], backend, "s", size=6),
             style.dots(at[strong], "f_n > 2⟨f_n⟩", style.COLOURS[1], backend, size=4),
         ]
-        box = packing.box
         last = mu == max(groups)
         frames.append(
             style.frame(
-                drawn,
+                drawn + outline(packing, backend),
                 backend,
                 title=f"μ = {mu:g}: {strong.sum()} strong, {loose.sum()} undetermined",
-                x="x / r_max",
-                y="y / r_max",
-                xlim=(0, box[0]),
-                ylim=(0, box[1]),
                 legend=style.beside("top_right", backend) if last else None,
-                **style.equal_scales(box, backend),
+                **_axes(packing, backend),
             )
         )
     return style.page(frames, backend, columns=2)
 
 
 def contact_points(packing, contacts):
-    """Points of contact (n, 2), folded into the box."""
+    """Points of contact (n, 2), folded into the cell."""
     c = packing.contacts
     at = packing.x[c.i[contacts]] + c.arm_i[contacts, None] * c.normal[contacts]
-    return np.where(np.isfinite(packing.box), np.mod(at, packing.box), at)
+    return packing.cell.wrapped(at)
+
+
+def outline(packing, backend):
+    """The cell as a list of one line, where the frame's own edges are not it."""
+    if not packing.tilt:
+        return []
+    return [style.line(packing.cell.corners, "cell", style.GREY, backend, "dashed")]
+
+
+def _axes(packing, backend):
+    """Options of a frame that shows the cell, both axes in one scale."""
+    low, high = packing.cell.extent
+    limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}
+    words = {"x": "x / r_max", "y": "y / r_max"}
+    return words | limits | style.equal_scales(high - low, backend)

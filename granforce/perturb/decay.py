@@ -2,7 +2,8 @@
 
 |u|(r) is averaged over the grains of each shell, then over contacts, each field scaled to rms 1.
 α is the slope of −log⟨|u|⟩ against log r by least squares over the shells whose middle lies in the
-fit range, FIT_INNER mean diameters to FIT_OUTER of the shorter box side; its interval comes from
+fit range, FIT_INNER mean diameters to FIT_OUTER of the shorter box side (of the distance between
+images, where the cell is tilted); its interval comes from
 contacts drawn anew, and exponents of all FIT_RANGES are kept beside it.
 """
 
@@ -32,20 +33,19 @@ def distances(packing, contact):
     """Distance (N,) of every grain from the point of contact, by the nearest periodic image."""
     c = packing.contacts
     centre = packing.x[c.i[contact]] + c.arm_i[contact] * c.normal[contact]
-    apart = packing.x - centre
-    periodic = np.isfinite(packing.box)
-    side = np.where(periodic, packing.box, 1.0)
-    apart -= np.where(periodic, side * np.round(apart / side), 0.0)
-    return np.linalg.norm(apart, axis=1)
+    return np.linalg.norm(packing.cell.nearest(packing.x - centre), axis=1)
 
 
 def shells(packing):
-    """Edges of shells half a mean diameter wide, out to half the shorter side of the box."""
+    """Edges of shells half a mean diameter wide, out to half the distance between images."""
     width = float(packing.r.mean())
     return width * np.arange(int(_side(packing) / 2 / width) + 1)
 
 
 def _side(packing):
+    """The shorter side of the box; in a tilted cell the distance between nearest images."""
+    if packing.tilt:
+        return packing.cell.shortest
     extent = np.where(np.isfinite(packing.box), packing.box, np.ptp(packing.x, axis=0))
     return float(extent.min())
 

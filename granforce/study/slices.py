@@ -19,17 +19,16 @@ def edges(given):
 
 
 def outside(packing, slice_):
-    """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (parts of the box).
+    """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (parts of a and b).
 
     Raises InputError unless 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1.
     """
     x0, x1, y0, y1 = edges(slice_)
-    place = np.mod(packing.x, packing.box) / packing.box
+    cell, contacts = packing.cell, packing.contacts
+    x = cell.wrapped(packing.x)
+    place = cell.parts(x)
     inside = np.all((place >= (x0, y0)) & (place <= (x1, y1)), axis=1)
-    contacts = packing.contacts
-    # A contact that reaches across the box's edge leaves the slice even if both grains are in it.
-    step = (
-        packing.x[contacts.j] - packing.x[contacts.i] - contacts.normal * contacts.length[:, None]
-    )
-    crossing = np.any(np.abs(step) > 0.5 * packing.box, axis=1)
+    # A contact that reaches across the cell's edge leaves the slice even if both grains are in it.
+    step = x[contacts.j] - x[contacts.i] - contacts.normal * contacts.length[:, None]
+    crossing = np.any(np.abs(cell.parts(step)) > 0.5, axis=1)
     return ~(inside[contacts.i] & inside[contacts.j]) | crossing

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from packings import skewed
 from small_store import DISKS, KEPT, STATES, cell_parameters
 
 import granforce as gf
@@ -114,6 +115,45 @@ def test_replayed_measures_are_those_of_the_states_kept(library):
 def test_mu_zero_is_one_point_without_relaxation(library):
     summary = replay_at(library, 0).summary
     assert summary["dimension"] == 0 and summary["skipped"] == STATES
+
+
+@pytest.mark.parametrize("basis", [((2, 1), (1, 1)), ((1, 1), (0, 1)), ((1, 3), (0, 1))])
+def test_tilted_cells_are_drawn_with_their_images(library, basis):
+    """The same disks and contacts as in the straight cell, up to whole cells, and all images."""
+    from app.data import make_replay
+    from app.geometry import MARGIN
+
+    cell = cell_at(library, 0.1)
+    packing, dataset = library.packing(cell.params["packing"]), library.dataset(cell)
+    tilted, turn = skewed(packing, basis)
+    replay = make_replay(tilted, dataset, cell.mu)
+    disks, links = replay.disks, replay.links
+    assert replay.tilt == tilted.tilt
+    at = np.column_stack([disks.x, disks.y])
+    off = tilted.cell.parts(at - packing.x[disks.grain] @ turn)
+    np.testing.assert_allclose(off, np.round(off), atol=1e-9)
+    for grain, x, y in ((links.i, links.x0, links.y0), (links.j, links.x1, links.y1)):
+        off = tilted.cell.parts(np.column_stack([x, y]) - packing.x[grain] @ turn)
+        np.testing.assert_allclose(off, np.round(off), atol=1e-6)
+    # By brute force over many images: those that reach into the strip around the cell.
+    margin, steps = MARGIN * packing.r.max(), np.mgrid[-8:9, -8:9].reshape(2, -1).T
+    images = (packing.x @ turn)[:, None] + steps @ tilted.cell.vectors
+    q, reach = tilted.cell.across(images), packing.r[:, None, None] + margin
+    seen = np.all((q > -reach) & (q < tilted.cell.heights + reach), axis=-1)
+    assert len(disks.x) == np.count_nonzero(seen)
+    assert sorted(disks.grain[~disks.image]) == list(range(DISKS))
+    inside = tilted.cell.parts(at[~disks.image])
+    assert inside.min() > -1e-12 and inside.max() < 1 + 1e-12
+    contacts = tilted.contacts.i[replay.backbone], tilted.contacts.normal[replay.backbone]
+    begin = images[contacts[0]]
+    reach = (tilted.contacts.length[replay.backbone, None] * contacts[1])[:, None]
+    ends = np.stack([tilted.cell.across(begin), tilted.cell.across(begin + reach)])
+    seen = (ends.max(axis=0) > -margin) & (ends.min(axis=0) < tilted.cell.heights + margin)
+    assert len(links.contact) == np.count_nonzero(np.all(seen, axis=-1))
+    x_low, x_high, y_low, y_high = replay.window
+    assert x_high - x_low == pytest.approx(y_high - y_low)
+    low, high = tilted.cell.extent
+    assert x_low < low[0] and y_low < low[1] and x_high > high[0] and y_high > high[1]
 
 
 def test_open_boxes_have_no_images(library):

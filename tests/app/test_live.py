@@ -285,7 +285,7 @@ class Glimpse:
         self.x, self.r = np.zeros((grains, 2)), np.ones(grains)
         self.i = self.j = np.zeros(0, np.int64)
         self.reach = self.forces = np.zeros((0, 2))
-        self.step, self.packing_fraction, self.unbalance = 0, 0.5, np.inf
+        self.step, self.packing_fraction, self.unbalance, self.tilt = 0, 0.5, np.inf, 0.0
 
 
 def test_pictures_are_kept_as_the_box_shrinks_and_as_time_goes(monkeypatch):

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from packings import reference, skewed
 from serving import MODEL, bars_drawn, column, laid_out, scene
 from small_store import KEPT, ROOT
+
+from app import geometry
 
 ARTEFACTS = ROOT / "artefacts" / "live"
 PATIENCE = 60_000  # ms, on a busy machine
@@ -85,6 +88,46 @@ def picture(page, name):
 
 
 # Seen while it is computed
+
+
+def test_a_tilting_packing_is_drawn_with_its_images(visit):
+    """What a moving cell shows, images included, is what the finished one does."""
+    page = visit()
+    packing = skewed(reference("n100_mu1_s12"), ((1, 1), (0, 1)))[0]
+    x, c = packing.cell.wrapped(packing.x), packing.contacts
+    backbone = np.arange(len(c.i))
+    picture = {
+        "box": packing.box.tolist(),
+        "tilt": packing.tilt,
+        "x": x.ravel().tolist(),
+        "radius": packing.r.tolist(),
+        "i": c.i.tolist(),
+        "j": c.j.tolist(),
+        "reach": (c.length[:, None] * c.normal).ravel().tolist(),
+        "normal": packing.forces[:, 0].tolist(),
+        "tangential": packing.forces[:, 1].tolist(),
+        "step": 1,
+        "fraction": 0.8,
+        "unbalance": 0.1,
+        "mu": 1.0,
+    }
+    shown = page.locator(".scene").evaluate(
+        """({scene}, picture) => {
+            scene.hand.player.live.show(picture)
+            const {x, y, x0, y0, window, tilt} = scene.geometry
+            return [x, y, x0, y0, window, tilt, scene.view.half]
+        }""",
+        picture,
+    )
+    disks, links = geometry.disks(packing, x, backbone), geometry.links(packing, x, backbone)
+    for (here, there), (a, b) in zip(
+        (shown[:2], shown[2:4]), ((disks.x, disks.y), (links.x0, links.y0)), strict=True
+    ):
+        drawn, wanted = np.column_stack([here, there]), np.column_stack([a, b])
+        order = [np.lexsort(np.round(rows, 6).T) for rows in (drawn, wanted)]
+        assert drawn[order[0]] == pytest.approx(wanted[order[1]], abs=1e-9)
+    assert shown[4] == pytest.approx(geometry.square(x, packing))
+    assert shown[5] == packing.tilt and shown[6] == pytest.approx((shown[4][1] - shown[4][0]) / 2)
 
 
 def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):

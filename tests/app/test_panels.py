@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import zarr
-from packings import REFERENCE, packed
+from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
 from small_store import KEPT, STATES
 
@@ -176,6 +176,29 @@ def test_files_are_known_by_their_content(kind):
         np.testing.assert_allclose(read.forces, packing.forces, rtol=1e-9)
     else:
         assert len(read.contacts.i) == len(packing.contacts.i)
+
+
+@pytest.mark.parametrize("contacts", [False, True])
+def test_tables_of_tilted_boxes_are_read(state, contacts):
+    """Sides and tilt are typed in one field."""
+    from app.views.upload import View
+
+    packing = skewed(packed(30, 0.3))[0]
+    view = View(state)
+    view.files = {"grains": ("g.txt", table(packing))}
+    if contacts:
+        view.files["joined"] = ("c.txt", table(packing, contacts=True))
+    view.box.value = ", ".join(map(repr, [*packing.box.tolist(), packing.tilt]))
+    read = uploads.read(view.files, **view._options())
+    assert read.tilt == packing.tilt and len(read.contacts.i) >= len(packing.contacts.i)
+    for wrong, message in (
+        ("30", "two sides"),
+        ("30 30 far", "number"),
+        ("30 30 1 2", "two sides"),
+    ):
+        view.box.value = wrong
+        with pytest.raises(InputError, match=message):
+            view._options()
 
 
 def test_a_file_of_another_family_replaces_what_was_there():

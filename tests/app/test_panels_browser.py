@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from packings import REFERENCE
+from packings import REFERENCE, reference, skewed
 from serving import CLOSED, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
@@ -185,6 +185,45 @@ def test_dumps_are_dropped_reported_and_shown(visit):
     page.get_by_text("dimension h of S").wait_for()
     page.get_by_text("imported").first.wait_for()
     page.wait_for_function("() => /packing=/.test(location.search)")
+
+
+def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
+    """Its cell is a parallelogram on screen and in the picture, and all of it is in the window."""
+    packing = skewed(reference("n100_mu1_s12"))[0]
+    gf.save_packing(packing, tmp_path / "tilted.npz")
+    page = visit("?tab=upload")
+    page.locator("input[type=file]").set_input_files(tmp_path / "tilted.npz")
+    page.get_by_text("imported").first.wait_for()
+    page.wait_for_function(
+        "e => e.scene.geometry.tilt !== 0", arg=page.locator(".scene").element_handle()
+    )
+    page.get_by_text(f"tilted by {packing.tilt:.2f}".replace("-", "−")).first.wait_for()
+    corners = page.locator(".scene").evaluate(
+        """({scene}) => {
+            const corners = [], context = {
+                beginPath() {}, closePath() {}, setLineDash() {}, stroke() {},
+                lineTo(x, y) { corners.push([x, y]) },
+            }
+            scene.drawBox(context)
+            return corners
+        }"""
+    )
+    assert np.array(corners) == pytest.approx(packing.cell.corners[:4], abs=1e-5)
+    left, right, bottom, top = scene(page, "scene.geometry.window")
+    x, y = np.array(corners).T
+    assert left < x.min() and x.max() < right and bottom < y.min() and y.max() < top
+    # As many disks as by brute force reach into the strip of one radius around the cell.
+    steps = np.mgrid[-6:7, -6:7].reshape(2, -1).T
+    at = packing.cell.across(packing.x[:, None] + steps @ packing.cell.vectors)
+    reach = packing.r[:, None, None] + packing.r.max()
+    seen = np.all((at > -reach) & (at < packing.cell.heights + reach), axis=-1)
+    assert scene(page, "scene.geometry.x.length") == np.count_nonzero(seen)
+    page.get_by_role("tab", name="Export").click()
+    button = page.get_by_role("button", name="SVG", exact=True)
+    whole = ElementTree.fromstring(download(page, button.click, tmp_path).read_text())
+    (polygon,) = (e for e in whole.iter() if e.tag.endswith("polygon") and e.get("points"))
+    points = np.array([point.split(",") for point in polygon.get("points").split()], float)
+    assert points * [1, -1] == pytest.approx(packing.cell.corners[:4], abs=1e-2)
 
 
 # The server tells of another title just before a component begins to listen.

@@ -3,10 +3,11 @@
 import holoviews as hv
 import numpy as np
 import pytest
-from packings import packed
+from packings import packed, skewed
 
 from granforce.figures import style
 from granforce.figures.displacement import LONGEST_ARROW, displacement
+from granforce.figures.networks import contact_points, overlaid, places
 
 
 @pytest.mark.parametrize("backend", ["bokeh", "matplotlib"])
@@ -29,3 +30,20 @@ def test_arrows_are_proportional_to_displacements_and_rattlers_have_none(backend
     suffix = "html" if backend == "bokeh" else "png"
     style.save(figure, tmp_path / f"figure.{suffix}")
     assert (tmp_path / f"figure.{suffix}").stat().st_size > 0
+
+
+def test_tilted_cells_are_outlined_and_grains_lie_inside():
+    packing = skewed(packed(20, 0.3))[0]
+    field = np.random.default_rng(0).normal(size=(20, 2))
+    figure = displacement(packing, field, contact=0)
+    (curve,) = figure.traverse(lambda element: element, [hv.Curve])
+    outline = np.column_stack([curve.dimension_values(0), curve.dimension_values(1)])
+    assert outline == pytest.approx(packing.cell.corners)
+    at = contact_points(packing, np.arange(len(packing.contacts.i)))
+    for points in (at, packing.cell.wrapped(packing.x)):
+        parts = packing.cell.parts(points)
+        assert parts.min() > -1e-12 and parts.max() < 1 + 1e-12
+    groups = {0.3: (packing, np.arange(len(at)), packing.forces[:, 0], packing.forces[:, 0])}
+    for drawn in (places(groups), overlaid(groups)):
+        frames = drawn.traverse(lambda element: element, [hv.Overlay])
+        assert frames and all(frame.traverse(lambda e: e, [hv.Curve]) for frame in frames)

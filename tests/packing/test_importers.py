@@ -9,9 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from packings import skewed
 
 from granforce.forces.ensemble import ensemble
-from granforce.packing.importers import load_packing, read_lammps, read_table, report, save_packing
+from granforce.packing.importers import (
+    lammps,
+    load_packing,
+    read_lammps,
+    read_table,
+    report,
+    save_packing,
+)
 from granforce.packing.importers.text import make_table
 from granforce.records import InputError, NotJammedError, make_contacts, make_packing
 
@@ -114,11 +122,12 @@ def wide(packing):
     [
         lambda p: p,
         wide,
+        lambda p: skewed(p)[0],
         lambda p: cluster(p, 5.0),
         lambda p: p._replace(info={"seed": 3, "steps": np.int64(7), "note": "μ", "x": 0.1 + 0.2}),
         lambda p: read_lammps(PARTICLES, CONTACTS, 0.3),
     ],
-    ids=["periodic", "rectangular", "open", "info", "soft"],
+    ids=["periodic", "rectangular", "tilted", "open", "info", "soft"],
 )
 def test_saved_packings_come_back_to_the_last_bit(tmp_path, variant):
     packing = variant(load_packing(SMALL))
@@ -311,6 +320,105 @@ def _x_of(grain):
     return float(lines(PARTICLES)[8 + int(grain)].split()[2])
 
 
+def tilted_text(flags, xy, xz):
+    """The particle dump with another box, but its bounds and positions as they were."""
+    text = lines(PARTICLES)
+    text[4] = f"ITEM: BOX BOUNDS xy xz yz {flags}"
+    for k, tilt in enumerate((xy, xz, 0.0)):
+        text[5 + k] += f" {tilt!r}"
+    return io.StringIO("\n".join(text)), CONTACTS
+
+
+def triclinic(packing, basis):
+    """The dumps of a packing in another cell of its lattice, turned so that a lies along x.
+
+    Written as LAMMPS documents it (docs.lammps.org, Howto triclinic): bounds are those of the
+    rectangle around the cell, tilts stand in a third column.
+    """
+    other, turn = skewed(packing, basis)
+    (width, height), tilt = other.box.tolist(), other.tilt
+    low = [-2.5, 4.0]
+    bounds = [
+        "ITEM: BOX BOUNDS xy xz yz pp pp pp",
+        f"{low[0] + min(0.0, tilt)!r} {low[0] + width + max(0.0, tilt)!r} {tilt!r}",
+        f"{low[1]!r} {low[1] + height!r} 0.0",
+        "-0.5 0.5 0.0",
+    ]
+    x = other.cell.wrapped(other.x) + low
+
+    def placed(row):
+        across, up = x[int(row[0]) - 1].tolist()
+        return f"{row[0]} {row[1]} {across!r} {up!r} {row[4]}"
+
+    def turned(row):
+        forces = np.array(row[3:7], float).reshape(2, 2) @ turn
+        return " ".join([*row[:3], *map(repr, forces.ravel().tolist())])
+
+    files = []
+    for path, change in ((PARTICLES, placed), (CONTACTS, turned)):
+        text = lines(path)
+        rows = [change(line.split()) for line in text[9:]]
+        files.append(io.StringIO("\n".join([*text[:4], *bounds, text[8], *rows])))
+    return files
+
+
+@pytest.mark.parametrize(
+    "basis", [((2, 1), (1, 1)), ((1, 1), (0, 1)), ((1, -1), (1, 0)), ((1, 3), (0, 1))]
+)
+def test_lammps_tilted_boxes_are_read(basis):
+    """The same structure in another cell: the same forces, pressure, contacts and dimension."""
+    plain = read_lammps(PARTICLES, CONTACTS, 0.3)
+    packing = read_lammps(*triclinic(plain, basis), 0.3)
+    other, turn = skewed(plain, basis)
+    assert packing.tilt == pytest.approx(other.tilt, abs=1e-9) and packing.tilt != 0
+    np.testing.assert_allclose(packing.box, other.box, rtol=1e-12)
+    parts = packing.cell.parts(packing.x)
+    assert parts.min() >= -1e-12 and parts.max() < 1 + 1e-12
+    apart = packing.cell.nearest(packing.x - plain.x @ turn)
+    np.testing.assert_allclose(apart, 0, atol=1e-11)
+    np.testing.assert_array_equal(packing.contacts.i, plain.contacts.i)
+    np.testing.assert_allclose(packing.contacts.normal, plain.contacts.normal @ turn, atol=1e-11)
+    mean = plain.forces[:, 0].mean()
+    np.testing.assert_allclose(packing.forces, plain.forces, atol=1e-9 * mean)
+    assert packing.pressure == pytest.approx(plain.pressure, rel=1e-11)
+    assert packing.info["residual"] < 1e-9
+    S, T = ensemble(plain), ensemble(packing)
+    assert (T.dimension, len(T.grains), len(T.index)) == (
+        S.dimension,
+        len(S.grains),
+        len(S.index),
+    )
+
+
+def test_lammps_bounds_are_those_of_the_manual():
+    """A box of sides 9.838049, 8.52 tilted by 4.91902 is dumped as 0 … 14.757069."""
+    text = lines(PARTICLES)
+    text[3] = "1"
+    text[4:8] = ["ITEM: BOX BOUNDS xy xz yz", "0 14.757069 4.91902", "0 8.52 0", "0 15 0"]
+    items = lammps._snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
+    low, cell = lammps._cell("dump", items)
+    assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
+    assert cell.tilt == 4.91902
+    text[5] = "-4.91902 9.838049 -4.91902"
+    items = lammps._snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
+    low, cell = lammps._cell("dump", items)
+    assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
+    assert cell.tilt == -4.91902
+
+
+def test_lammps_boxes_tilted_by_whole_sides_are_straight():
+    """``box tilt large`` lets a box lean as far as it was sheared."""
+    side = 29.747389457354078
+    text = lines(PARTICLES)
+    text[4:7] = ["ITEM: BOX BOUNDS xy xz yz pp pp pp", f"0 {2 * side!r} {side!r}", f"0 {side!r} 0"]
+    text[7] += " 0"
+    packing = read_lammps(io.StringIO("\n".join(text)), CONTACTS, 0.3)
+    assert abs(packing.tilt) < 1e-12
+    plain = read_lammps(PARTICLES, CONTACTS, 0.3)
+    np.testing.assert_allclose(packing.cell.nearest(packing.x - plain.x), 0, atol=1e-11)
+    np.testing.assert_allclose(packing.forces, plain.forces, rtol=1e-9, atol=1e-15)
+
+
 def particle_text(old, new):
     return io.StringIO(PARTICLES.read_text().replace(old, new)), CONTACTS
 
@@ -336,7 +444,12 @@ def swapped_columns(rows):
         (lambda: particle_text("1900000", "19"), "no timestep in common"),
         (lambda: particle_text("1900000", "-1"), "line 2: '-1' is not a whole number"),
         (lambda: particle_text("\n400\n", "\n401\n"), "400 rows where 401 are announced"),
-        (lambda: particle_text("pp pp pp", "xy xz yz pp pp pp"), "tilted"),
+        (lambda: particle_text("pp pp pp", "xy xz yz pp pp pp"), "line 6: 2 fields for 3 columns"),
+        (lambda: particle_text("pp pp pp", "abc origin pp pp pp"), "triclinic/general"),
+        (lambda: tilted_text("pp pp pp", 0.0, 1.0), "line 7: tilted out of the plane; only xy"),
+        (lambda: tilted_text("ff pp pp", 5.0, 0.0), "line 5: a cell tilted by 5 must be periodic"),
+        (lambda: tilted_text("pp pp pp", 31.0, 0.0), "line 6: the upper bound of the box"),
+        (lambda: tilted_text("pp pp pp", 1.0, 0.0), "overlap by .* check positions"),
         (lambda: particle_text("2.9747389457354078e+01", "-1"), "line 6: the upper bound"),
         (lambda: particle_text("2.9747389457354078e+01", "2.9e+01"), "line"),
         (lambda: particle_text(" radius", " mass"), "no column radius"),
@@ -369,6 +482,35 @@ def test_pulling_networks_are_refused():
 
 
 # Tables
+
+
+def test_tables_of_tilted_boxes_are_read():
+    """With and without contacts, the nearest images and the normals given."""
+    plain = load_packing(SMALL)
+    packing = skewed(plain)[0]
+    told = {"mu": 0.1, "box": packing.box, "tilt": packing.tilt}
+    again = read_table(*tables(packing), **told)
+    assert again.tilt == packing.tilt
+    np.testing.assert_allclose(again.forces, packing.forces, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(again.contacts.normal, packing.contacts.normal, atol=1e-12)
+    assert again.pressure == pytest.approx(plain.pressure, rel=1e-9)
+    c = packing.contacts
+    nearest = read_table(
+        csv(x=packing.x[:, 0], y=packing.x[:, 1], r=packing.r),
+        csv(i=c.i, j=c.j, fn=packing.forces[:, 0], ft=packing.forces[:, 1]),
+        **told,
+    )
+    np.testing.assert_allclose(nearest.contacts.normal, c.normal, atol=1e-8)
+    grains, _ = tables(packing)
+    found = read_table(grains, **told)
+    straight = read_table(tables(plain)[0], mu=0.1, box=plain.box)
+    assert ensemble(found).dimension == ensemble(straight).dimension
+    assert found.volume == pytest.approx(straight.volume)
+    assert len(found.contacts.i) == len(straight.contacts.i)
+    with pytest.raises(InputError, match="periodic in both directions"):
+        read_table(tables(packing)[0], mu=0.1, tilt=1.0)
+    with pytest.raises(InputError, match="overlap by"):
+        read_table(*tables(packing), mu=0.1, box=packing.box, tilt=packing.tilt + 0.7)
 
 
 @pytest.mark.parametrize("path", REFERENCES, ids=lambda path: path.stem)

@@ -7,7 +7,7 @@ import numpy as np
 from granforce.packing.importers.geometry import MISFIT, check_disks, listed
 from granforce.packing.importers.network import adopt
 from granforce.packing.importers.text import check_grains, make_table, read_text, some_of
-from granforce.records import Cell, InputError, friction, make_packing
+from granforce.records import InputError, friction, make_cell, make_packing
 
 # Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
 CONTACT_COLUMNS = ("atom1", "atom2", "distance", "fx", "fy", "px", "py")
@@ -33,10 +33,10 @@ def read_lammps(particles, contacts, mu, *, columns=None, most_grains=None):
     the first: columns named atom1 atom2 distance fx fy px py, or seven in this order, or those
     that ``columns`` names in this order. Pairs without force are neighbours, not contacts.
 
-    The last timestep in both files is read; grains are sorted by id. Directions that are not
-    periodic are open, what grains lack to balance is their load there. packing.info holds
-    timestep, residual and violation (in ⟨f_n⟩), rattlers and contacts_skipped. most_grains: how
-    many are taken.
+    The last timestep in both files is read; grains are sorted by id. The box may be tilted in the
+    plane (xy). Directions that are not periodic are open, what grains lack to balance is their load
+    there. packing.info holds timestep, residual and violation (in ⟨f_n⟩), rattlers and
+    contacts_skipped. most_grains: how many are taken.
 
     Raises InputError naming file and line.
     """
@@ -54,7 +54,8 @@ def read_lammps(particles, contacts, mu, *, columns=None, most_grains=None):
     low, cell = _cell(first[0], first[1][step])
     x, r, index = _disks(atoms, low, cell)
     joined, forces, skipped = _contacts(pairs, columns, x, r, cell, index)
-    packing = make_packing(x, r, cell.box, joined, forces, mu, info={"source": "lammps"})
+    info = {"source": "lammps"}
+    packing = make_packing(x, r, cell.box, joined, forces, mu, info=info, tilt=cell.tilt)
     return adopt(packing, timestep=step, contacts_skipped=skipped)
 
 
@@ -114,21 +115,40 @@ def _table(name, items, title):
 
 
 def _cell(name, items):
-    """Origin (2,) and Cell of the box, open along directions that are not periodic."""
+    """Origin (2,) and Cell of the box, open along directions that are not periodic.
+
+    Bounds of a tilted box (title ``xy xz yz``, tilts in a third column) are those of the rectangle
+    around it: x_lo + min(0, xy), x_hi + max(0, xy) (docs.lammps.org, Howto triclinic).
+    """
     item = _item(name, items, "BOX BOUNDS")
-    flags = item.words
+    place, flags = f"{name}, line {item.line}", item.words
+    tilted = flags[:3] == ["xy", "xz", "yz"]
+    flags = flags[3:] if tilted else flags
     if len(flags) > 3 or any(len(flag) != 2 or not set(flag) <= set("pfsm") for flag in flags):
-        raise InputError(f"{name}, line {item.line}: a tilted box; only rectangular ones are read")
-    if len(item.body) < 2:
-        raise InputError(f"{name}, line {item.line}: the box bounds are incomplete")
-    lines = [item.line + 1, item.line + 2]
-    bounds = make_table(name, ["lo", "hi"], [row[:2] for row in item.body[:2]], lines)
-    low, high = bounds.numbers("lo"), bounds.numbers("hi")
+        raise InputError(
+            f"{place}: a box of kind {' '.join(item.words)!r}, which is not read; dump it with its "
+            "first side along x (without triclinic/general)"
+        )
+    # The height of the layer does not matter, its tilts do.
+    columns = ["lo", "hi", "tilt"] if tilted else ["lo", "hi"]
+    rows = [row[: len(columns)] for row in item.body[: len(columns)]]
+    if len(rows) < len(columns):
+        raise InputError(f"{place}: the box bounds are incomplete")
+    bounds = make_table(name, columns, rows, [item.line + 1 + k for k in range(len(rows))])
+    low, high = bounds.numbers("lo")[:2], bounds.numbers("hi")[:2]
+    tilt = bounds.numbers("tilt") if tilted else np.zeros(1)
+    for k in np.flatnonzero(tilt[1:])[:1] + 1:
+        raise InputError(f"{bounds.place(k)}: tilted out of the plane; only xy may differ from 0")
+    low[0] -= min(0.0, tilt[0])
+    high[0] -= max(0.0, tilt[0])
     for k in np.flatnonzero(high <= low)[:1]:
         raise InputError(f"{bounds.place(k)}: the upper bound of the box is not above the lower")
     # Dumps of old versions have no flags, and were periodic by default.
     is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
-    return low, Cell(np.where(is_open, np.inf, high - low), 0.0)
+    try:
+        return low, make_cell(np.where(is_open, np.inf, high - low), tilt[0])
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from None
 
 
 def _disks(table, low, cell):

@@ -15,6 +15,7 @@ def read_table(
     *,
     mu,
     box=None,
+    tilt=0.0,
     forces=None,
     pressure=1.0,
     tolerance=TOUCHING,
@@ -26,14 +27,14 @@ def read_table(
     contacts: columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny,
     length (else the nearest images are joined) and fn, ft. Without it, grains closer than
     tolerance (in largest radii) touch. box: (L_x, L_y), inf for an open direction; None: open.
-    forces: whether to take fn, ft, by default if they are there; the pressure is then what they
-    carry (in an open set: the loads). Otherwise the network nearest to equal normal forces at the
-    given pressure (or the given loads) is found; pressure is not used with fn, ft. most_grains:
-    how many are taken.
+    tilt: of the cell, whose upper side begins at (tilt, L_y). forces: whether to take fn, ft, by
+    default if they are there; the pressure is then what they carry (in an open set: the loads).
+    Otherwise the network nearest to equal normal forces at the given pressure (or the given loads)
+    is found; pressure is not used with fn, ft. most_grains: how many are taken.
 
     Raises InputError naming file and line, NotJammedError where no network exists.
     """
-    mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box)
+    mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     pressure = positive(pressure, "pressure")
     table = read_csv(grains)
     check_grains(len(table.rows), most_grains, table.name)
@@ -57,6 +58,7 @@ def read_table(
         pressure if closed else np.nan,
         load,
         {"source": "table"},
+        cell.tilt,
     )
     if given is None:
         return find(packing, forces="found")
