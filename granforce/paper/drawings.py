@@ -3,11 +3,12 @@
 import numpy as np
 
 from granforce import figures
-from granforce.paper.claims import BIN, SAMPLERS, drawn
+from granforce.paper.claims.groups import SAMPLERS, drawn
 from granforce.system.files import make_folder
 
 SHOWN = (0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
 LARGEST = 5.0  # ΔF_n of Figure 4, ⟨f_n⟩
+BIN = 0.25  # of P(ΔF_n), ⟨f_n⟩
 EVERY = 10**9  # contact is drawn in Figure 3
 
 FORMATS = ("html", "png", "svg")
