@@ -291,7 +291,12 @@ def test_a_verdict_at_a_knife_edge_is_undecided(rng):
     turned = packings({1: [1.0] * 10, 10: [10.0] * 10, 100: [12.0] * 10})
     found = over_all(turned, (0.45, 1.1))
     assert found.verdict == verdicts.UNDECIDED
-    assert "without 1" in found.why
+    assert "without μ = 1" in found.why
+    # Certainly outside, but not always beyond the wider range.
+    found = over_all(turned, (1.2, 2), (0.8, 2))
+    assert over_all(turned, (1.2, 2), (0.2, 2)).verdict == verdicts.DIFFERS
+    assert found.verdict == verdicts.DIFFERS
+    assert "differs without μ = 100" in found.why
 
 
 def test_another_seed_of_the_bootstrap_never_turns_a_verdict(rng, monkeypatch):

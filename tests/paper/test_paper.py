@@ -14,7 +14,7 @@ from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.ensemble import ensemble
-from granforce.paper import claims, drawings, tables
+from granforce.paper import claims, documents, drawings, tables
 from granforce.paper import plan as plans
 from granforce.records import InputError
 from granforce.study import kinds
@@ -180,7 +180,10 @@ def test_a_table_survives_its_store(done, tmp_path):
     assert found.skipped == table.skipped
     for name, values in table.samples.items():
         np.testing.assert_allclose(found.samples[name], values, rtol=1e-6, atol=1e-7)
-    assert [k for k, _ in found.shown] == [k for k, _ in table.shown]
+    for (one, counted), (other, counts) in zip(found.shown, table.shown, strict=True):
+        assert one == other
+        assert np.array_equal(counted, counts)
+        assert counts.sum(axis=1).max() == TINY.states  # all of them
     assert found.packings.keys() == table.packings.keys()
     for family in (claims.maximum, claims.correlation, claims.counts, claims.pairs):
         told = (family(each, "nearest") for each in (found, table))
@@ -225,10 +228,10 @@ def test_rows_that_a_store_lacks_come_from_the_older_table(done):
         for mu, group in joined.extents(part).items():
             for one, other in zip(group, new.extents(part)[mu], strict=True):
                 assert np.array_equal(one, other)
-    for k, normal in joined.shown:
-        assert joined.rows[k]["part"] in tables.SHOWN_PARTS
+    for k, counts in joined.shown:
+        assert joined.rows[k]["part"] in plans.SHOWN_PARTS
         assert k in joined.packings
-        assert normal.shape[1] == joined.rows[k]["contacts"]
+        assert len(counts) == joined.rows[k]["contacts"]
 
 
 def test_every_figure_of_the_table_is_made(done):
@@ -276,9 +279,55 @@ def test_the_command_draws(done, tmp_path):
     assert {"figure1.html", "figure1.png", "figure1.svg", "distances.png"} <= names
 
 
+def test_a_study_tells_what_is_left_and_ends_in_time(done, tmp_path, capsys):
+    folder = linked(done, tmp_path / "out")
+    assert main([*WORDS, "--out", folder, "--status", "--json"]) == 0
+    rows = {row["part"]: row for row in json.loads(capsys.readouterr().out)}
+    assert all(row["cells"] == row["done"] > 0 for row in rows.values())
+    assert {row["minutes left"] for row in rows.values()} == {0.0}
+    # A larger study: the time of what is left is that of what is done.
+    more = [*WORDS[:6], "4", *WORDS[7:]]
+    assert main([*more, "--out", folder, "--status", "--json", "--parts", "walk"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert (row["cells"], row["done"]) == (12, 6)
+    assert row["minutes left"] == pytest.approx(row["minutes"], abs=0.2)
+    # No time: nothing is begun, and what is missing is told.
+    late = ["study", "--quick", "--parts", "walk", "--minutes", "1e-9", "--workers", "1"]
+    assert main([*late, "--out", str(tmp_path / "late"), "--formats", ""]) == 2
+    assert "holds nothing of this study" in capsys.readouterr().err
+    assert not list((tmp_path / "late" / "cells.zarr").glob("walk-*"))
+
+
+def test_tables_in_documents_are_renewed(done, tmp_path):
+    table = tables.reduce(done / "cells.zarr", TINY)
+    told = [claim._asdict() for claim in claims.judged(table)]
+    page = tmp_path / "page.md"
+    blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
+    page.write_text("before\n" + blocks.format("measures") + blocks.format("claims") + "after\n")
+    (path,) = documents.named(str(page))
+    documents.renew([path], table, told)
+    text = page.read_text()
+    assert text.startswith("before\n<!-- study: measures -->\n| μ | z |")
+    assert text.endswith("<!-- end -->\nafter\n")
+    assert "\nold\n" not in text
+    walk = np.mean([row["eta2"] for row in table.part("walk") if row["mu"] == 0.3])
+    (line,) = [line for line in text.splitlines() if line.startswith("| 0.3 | ")]
+    assert f"{walk:.3f}" in line
+    for claim in told:
+        assert claim["statement"] in text
+    documents.renew([path], table, told)
+    assert page.read_text() == text
+    page.write_text(blocks.format("everything"))
+    with pytest.raises(InputError, match="no table 'everything'"):
+        documents.renew([path], table, told)
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (["--minutes", "0"], "--minutes"),
+        (["--status"], "no store"),
+        (["--documents", "nowhere.md"], "--documents"),
         (["--mu", "0.1;1"], "--mu"),
         (["--packings", "0"], "packings must be at least 1"),
         (["--parts", "everything"], "unknown part"),
