@@ -3,9 +3,10 @@
 Two kinds of claims. `over_all` judges one number of all μ, such as a slope or the place of a
 maximum: its interval comes from packings drawn anew at each μ (percentile bootstrap). The verdict
 has to be the same for the whole interval, wherever chance may leave its ends with other draws, and
-the number has to stay in the same range when any one μ is left out. `at_each` judges a number at
-every μ by Student's interval over its packings, which no draw moves; together they hold with 95 %
-confidence (Bonferroni).
+the number has to stay in the same range when any one μ is left out; what stays outside of the first
+range, but not always beyond the wider one, differs. `at_each` judges a number at every μ by
+Student's interval over its packings, which no draw moves; together they hold with 95 % confidence
+(Bonferroni).
 """
 
 from typing import NamedTuple
@@ -97,23 +98,21 @@ def over_all(statement, sampler, source, measured, statistic, groups, *, good, f
         ends = unknown[:2] if single else statistics.percentile_ends(found)[0]
         return Claim(*said, value, *ends, str(ranges), FEW)
     (low, high), farthest = statistics.percentile_ends(found[np.isfinite(found)])
-    verdict, why = ranges.verdict(low, high), ""
+    verdict = ranges.verdict(low, high)
     if verdict == UNDECIDED:
         why = "the interval lies across an end of the range"
-    elif ranges.verdict(*farthest) != verdict:
-        verdict, why = UNDECIDED, "another draw of packings may tell otherwise"
-    elif turned := _turned(statistic, keys, means, ranges, verdict, least):
-        verdict, why = UNDECIDED, turned
-    return Claim(*said, value, low, high, str(ranges), verdict, why)
-
-
-def _turned(statistic, keys, means, ranges, verdict, least):
-    """Which key, when it is left out, leaves the number in another range; "" if none."""
+        return Claim(*said, value, low, high, str(ranges), verdict, why)
+    turned = {"another draw of packings": ranges.verdict(*farthest)}
     for k, key in enumerate(keys) if len(keys) > least else ():
-        value = statistic(np.delete(keys, k), np.delete(means, k, axis=0))
-        if np.isfinite(value) and ranges.verdict(value, value) != verdict:
-            return f"{value:.3g} without {key:g}: {ranges.verdict(value, value)}"
-    return ""
+        without = statistic(np.delete(keys, k), np.delete(means, k, axis=0))
+        if np.isfinite(without):
+            turned[f"without μ = {key:g}"] = ranges.verdict(without, without)
+    why = ", ".join(f"{told} {cause}" for cause, told in turned.items() if told != verdict)
+    if why:
+        # What is outside of the good range for certain does not become open.
+        outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
+        verdict = DIFFERS if outside else UNDECIDED
+    return Claim(*said, value, low, high, str(ranges), verdict, why)
 
 
 def at_each(statement, sampler, source, measured, groups, *, good, fair=None, interval=None):
