@@ -100,9 +100,8 @@ def over_all(statement, sampler, source, measured, statistic, groups, *, good, f
     (low, high), farthest = statistics.percentile_ends(found[np.isfinite(found)])
     verdict = ranges.verdict(low, high)
     if verdict == UNDECIDED:
-        why = "the interval lies across an end of the range"
-        return Claim(*said, value, low, high, str(ranges), verdict, why)
-    turned = {"another draw of packings": ranges.verdict(*farthest)}
+        return Claim(*said, value, low, high, str(ranges), verdict)
+    turned = {"with another draw of packings": ranges.verdict(*farthest)}
     for k, key in enumerate(keys) if len(keys) > least else ():
         without = statistic(np.delete(keys, k), np.delete(means, k, axis=0))
         if np.isfinite(without):
