@@ -12,8 +12,8 @@ DATA = Path(__file__).resolve().parent.parent / "data"
 # What the claims of each statistic begin with; see data/claims.json.
 ABOUT = {
     "eta": ("η", "z "),
-    "extent": ("P(ΔF_n)", "tail of P(ΔF_n)"),
-    "correlation": ("corr(",),
+    "extent": ("P(ΔF_n)", "tail of P(ΔF_n)", "S is more elongated"),
+    "correlation": ("corr(", "strong contacts"),
     "store": ("F_crit", "α "),
 }
 

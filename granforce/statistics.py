@@ -1,4 +1,6 @@
-"""Statistics over packings: means with intervals, bootstraps, the tail of a distribution."""
+"""Statistics over packings: means, intervals, bootstraps, and the shape of distributions."""
+
+from functools import cache
 
 import numpy as np
 from scipy import optimize, stats
@@ -7,7 +9,7 @@ LEVEL = 0.95  # of every confidence interval
 RESAMPLES = 999
 
 
-def mean_interval(values):
+def mean_interval(values, level=LEVEL):
     """Mean and its confidence interval (Student's t): (mean, low, high); NaN where unknown.
 
     values: one number per packing; NaN are left out. One packing has no interval.
@@ -18,8 +20,23 @@ def mean_interval(values):
     mean = float(values.mean())
     if len(values) < 2:
         return mean, float("nan"), float("nan")
-    reach = stats.t.ppf((1 + LEVEL) / 2, len(values) - 1) * stats.sem(values)
+    reach = stats.t.ppf((1 + level) / 2, len(values) - 1) * stats.sem(values)
     return mean, float(mean - reach), float(mean + reach)
+
+
+def jackknife(statistic, items, level=LEVEL):
+    """(value, low, high) of statistic(items), by leaving out each item once (Student's t).
+
+    items: one per packing. The interval is a function of the data alone, and wants a statistic
+    that changes little with any one item. One item has no interval (NaN).
+    """
+    items, count = list(items), len(items)
+    value = float(statistic(items))
+    if count < 2:
+        return value, float("nan"), float("nan")
+    without = np.array([statistic(items[:k] + items[k + 1 :]) for k in range(count)])
+    reach = stats.t.ppf((1 + level) / 2, count - 1) * np.sqrt((count - 1) * without.var())
+    return value, float(value - reach), float(value + reach)
 
 
 def grouped(rows, name, by="mu"):
@@ -66,10 +83,90 @@ def bootstrap(statistic, groups, seed=0, resamples=RESAMPLES):
     return float(statistic(*groups)), float(low), float(high)
 
 
+def resampled_means(groups, seed=0, resamples=RESAMPLES):
+    """Means (resamples, groups, …) of groups whose items, one per packing, are drawn anew."""
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for group in map(np.asarray, groups):
+        chosen = rng.integers(len(group), size=(resamples, len(group)))
+        drawn.append(group[chosen].mean(axis=1))
+    return np.stack(drawn, axis=1)
+
+
+def percentile_ends(drawn):
+    """Percentile interval of draws, (low, high), and the farthest that chance may put its ends.
+
+    With other draws from the same distribution an end would have another rank among these: it is
+    not beyond the farthest with 99 % confidence.
+    """
+    drawn, tail = np.sort(drawn), (1 - LEVEL) / 2
+    rank = int(stats.binom.ppf(0.01, len(drawn), tail))
+    low, high = np.percentile(drawn, [100 * tail, 100 * (1 - tail)])
+    return (float(low), float(high)), (float(drawn[rank]), float(drawn[-1 - rank]))
+
+
+def rank_correlation(x, y):
+    """Spearman's rank correlation; ties share their rank."""
+    ranks = stats.rankdata(x), stats.rankdata(y)
+    return float(np.corrcoef(*ranks)[0, 1])
+
+
 def density(values, edges):
     """Probability density of values in the bins of edges; values outside count in the norm."""
     counts = np.histogram(values, edges)[0]
     return counts / (len(values) * np.diff(edges))
+
+
+def departure(values):
+    """How far a density on x ≥ 0 is from falling everywhere: sup of Ĉ − F over x.
+
+    F is the distribution function of the values (n,), Ĉ its least concave majorant, whose slope
+    is Grenander's estimate of a density that never rises (Skand. Aktuarietidskr. 39, 125 (1956)).
+    It is the part of the values that lie too far right for that, and Hartigan's dip (Ann. Stat.
+    13, 70 (1985)) with the mode held at 0: no bins, the same in any unit; 0.002 for 20,000 numbers
+    of an exponential distribution, 0.05 and 0.11 of Weibull's with exponents 1.5 and 2.
+    """
+    at, count = np.unique(np.asarray(values, float), return_counts=True)
+    if at[0] > 0:
+        at, count = np.r_[0.0, at], np.r_[0, count]
+    reached = np.cumsum(count) / count.sum()
+    gap = np.diff(at)
+    slope = optimize.isotonic_regression(np.diff(reached) / gap, weights=gap, increasing=False).x
+    majorant = reached[0] + np.r_[0.0, np.cumsum(slope * gap)]
+    # F is lowest just before it rises.
+    return float((majorant[1:] - reached[:-1]).max(initial=0.0))
+
+
+def chance_departure(number, level=LEVEL):
+    """The departure that so many values of a falling density exceed in 1 − level of cases.
+
+    The uniform density comes nearest to rising, so it is the null; √n times its departure has a
+    distribution of its own, drawn once.
+    """
+    return float(np.quantile(_uniform_departures(), level) / np.sqrt(number))
+
+
+@cache
+def _uniform_departures(size=1000, repeats=4999):
+    rng = np.random.default_rng(0)
+    return np.sqrt(size) * np.array([departure(rng.random(size)) for _ in range(repeats)])
+
+
+def effective_number(groups):
+    """How many independent values groups of values, one per packing, are worth for their F.
+
+    The variance of F over packings at its deciles, over that of as many independent values: values
+    of one packing go together, and packings differ.
+    """
+    joined = np.concatenate(groups)
+    if len(groups) < 2:
+        return float("nan")
+    part = np.arange(1, 10) / 10
+    at = np.quantile(joined, part)
+    reached = np.array([(np.asarray(group)[:, None] <= at).mean(axis=0) for group in groups])
+    size = np.mean([len(group) for group in groups])
+    excess = (reached.var(axis=0, ddof=1) * size / (part * (1 - part))).mean()
+    return len(joined) / max(1.0, float(excess))
 
 
 def tail_exponent(values, quantile=0.5):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from granforce import statistics
 
@@ -55,3 +56,66 @@ def test_values_are_grouped_in_order_of_friction():
 
 def test_density_is_normed_by_all_values():
     assert statistics.density(np.array([0.1, 0.2, 9.0, 9.0]), [0, 0.5]).tolist() == [1.0]
+
+
+def test_a_jackknife_of_the_mean_is_its_interval(rng):
+    values = list(rng.normal(3, 2, 7))
+    told = statistics.jackknife(np.mean, values, 0.9)
+    np.testing.assert_allclose(told, statistics.mean_interval(values, 0.9))
+    assert np.isnan(statistics.jackknife(np.mean, [1.0])[1:]).all()
+
+
+def test_means_are_drawn_anew_packing_by_packing(rng):
+    groups = [rng.normal(0, 1, 50), rng.normal(5, 2, (20,))]
+    drawn = statistics.resampled_means(groups, resamples=4000)
+    np.testing.assert_allclose(drawn.mean(axis=0), [g.mean() for g in groups], atol=0.03)
+    expected = [g.std() / np.sqrt(len(g)) for g in groups]
+    np.testing.assert_allclose(drawn.std(axis=0), expected, rtol=0.05)
+    (low, high), (lowest, highest) = statistics.percentile_ends(drawn[:, 0])
+    assert lowest < low < high < highest
+    # Other draws leave the ends within the farthest.
+    for seed in range(1, 9):
+        other = statistics.resampled_means(groups, seed, 4000)[:, 0]
+        ends, _ = statistics.percentile_ends(other)
+        assert lowest < ends[0] + 0.2 * (low - lowest)
+        assert ends[1] - 0.2 * (highest - high) < highest
+
+
+def test_the_departure_from_a_falling_density_needs_no_bins(rng):
+    falling = rng.exponential(1.0, 20_000)
+    assert statistics.departure(falling) < 0.01
+    assert statistics.departure(np.r_[np.zeros(5000), falling]) < 0.01  # an atom at 0 falls, too
+    raised = rng.weibull(2.0, 20_000)
+    # Ĉ leaves F on the tangent through 0: at x with F(x) = x P(x).
+    assert statistics.departure(raised) == pytest.approx(0.112, abs=0.01)
+    assert statistics.departure(7 * raised) == pytest.approx(statistics.departure(raised))
+    assert statistics.departure(np.full(10, 3.0)) == 1
+    assert statistics.departure(np.zeros(10)) == 0
+
+
+def test_chance_exceeds_its_departure_as_often_as_it_says(rng):
+    for draw, most in ((rng.random, 0.08), (rng.exponential, 0.02)):
+        exceeds = [
+            statistics.departure(draw(size=400)) > statistics.chance_departure(400)
+            for _ in range(500)
+        ]
+        assert np.mean(exceeds) < most
+    uniform = [
+        statistics.departure(rng.random(400)) > statistics.chance_departure(400, 0.5)
+        for _ in range(500)
+    ]
+    assert 0.4 < np.mean(uniform) < 0.6
+
+
+def test_values_of_one_packing_count_for_less_where_packings_differ(rng):
+    alike = [rng.random(300) for _ in range(20)]
+    assert statistics.effective_number(alike) == pytest.approx(6000, rel=0.4)
+    apart = [width * values for width, values in zip(np.linspace(0.5, 2, 20), alike, strict=True)]
+    assert statistics.effective_number(apart) < 600
+    assert np.isnan(statistics.effective_number(alike[:1]))
+
+
+def test_ranks_are_spearmans(rng):
+    x, y = rng.normal(size=(2, 12))
+    y[3] = y[4]
+    assert statistics.rank_correlation(x, y) == pytest.approx(stats.spearmanr(x, y).statistic)

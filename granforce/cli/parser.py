@@ -324,6 +324,16 @@ def _add_study(commands):
     )
     command.add_argument("--parts", help="compute only these parts, names separated by commas")
     command.add_argument(
+        "--minutes",
+        type=float,
+        help="begin no cell after so many minutes; the same command goes on where it was",
+    )
+    command.add_argument(
+        "--status",
+        action="store_true",
+        help="compute nothing: tell what of the parts is done, and about how long the rest takes",
+    )
+    command.add_argument(
         "--table",
         metavar="STORE",
         help="compute nothing: take this reduced study, as data/study.zarr",
@@ -332,6 +342,12 @@ def _add_study(commands):
         "--reduce",
         metavar="STORE",
         help="compute nothing: reduce the cells of this store, and take what it lacks from --table",
+    )
+    command.add_argument(
+        "--documents",
+        metavar="FILES",
+        help="renew the tables in these files, between <!-- study: claims --> (or measures) and "
+        "<!-- end -->; names separated by commas",
     )
     group = command.add_argument_group("size")
     group.add_argument("-n", type=int, help="number of disks (default 400)")
@@ -343,7 +359,7 @@ def _add_study(commands):
     )
     group.add_argument("--gauss-seidel-packings", type=int, help="walks as in the paper (10)")
     group.add_argument("--exact-packings", type=int, help="with exact intervals (default 3)")
-    group.add_argument("--uniform-packings", type=int, help="with uniform states (default 3)")
+    group.add_argument("--uniform-packings", type=int, help="with uniform states (default 10)")
     group.add_argument("--response-packings", type=int, help="pushed at contacts (default 10)")
     group.add_argument("--response-contacts", type=int, help="contacts pushed in each (default 20)")
     group.add_argument("--perturb-packings", type=int, help="pushed in larger steps (default 3)")

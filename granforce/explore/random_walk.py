@@ -128,6 +128,7 @@ def walk(
     relax=nearest,
     max_attempts=None,
     whole=True,
+    skip=True,
     progress=None,
     watch=None,
     cancel=None,
@@ -142,7 +143,8 @@ def walk(
     progress(done, total); watch(Found) gets each state as it is accepted, from the thread that
     found it; neither changes the result. cancel() returning True raises Cancelled.
 
-    Where S is a single point (h = 0) every state is that point and no relaxation is done. Raises
+    Where S is a single point (h = 0) every state is that point and no relaxation is done, unless
+    skip is False: sweeps end where the unbalance is small, which is not quite that point. Raises
     InputError for sizes below 1, NotJammedError when max_attempts bring too few of a whole walk.
     """
     if states < 1 or chains < 1 or workers < 1 or chains > states:
@@ -158,7 +160,7 @@ def walk(
         if progress is not None:
             progress(sum(chain.counts["accepted"] for chain in all_chains), states)
 
-    if ensemble.dimension == 0:
+    if ensemble.dimension == 0 and skip:
         parts = [chain.single_point() for chain in all_chains]
     else:
         with cancelling.threads(workers) as pool:

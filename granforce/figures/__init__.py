@@ -8,7 +8,13 @@ are means and bars their standard errors.
 from granforce.figures.bench import benchmark
 from granforce.figures.displacement import displacement
 from granforce.figures.indeterminacy import correlations, extents, indeterminacy
-from granforce.figures.networks import overlaid, places, possible_forces
+from granforce.figures.networks import (
+    force_densities,
+    overlaid,
+    places,
+    possible_forces,
+    ratio_counts,
+)
 from granforce.figures.response import perturbation
 from granforce.figures.style import save
 from granforce.figures.variations import (
@@ -28,6 +34,7 @@ __all__ = [
     "distances",
     "effort",
     "extents",
+    "force_densities",
     "frozen",
     "indeterminacy",
     "opened",
@@ -35,6 +42,7 @@ __all__ = [
     "perturbation",
     "places",
     "possible_forces",
+    "ratio_counts",
     "samplers",
     "save",
     "sizes",

@@ -60,39 +60,63 @@ def indeterminacy(rows, *, beside=None, backend="bokeh"):
     return style.page(frames, backend)
 
 
+# Up to which μ a distribution is drawn among those of small and of intermediate friction.
+_SMALL, _MIDDLE = 0.02, 0.3
+
+
 def extents(groups, *, backend="bokeh", largest=4.0, bins=24, unit=None):
-    """Figure 4: P(ΔF_n) for several μ, linear and semi-logarithmic, with the tail exponents b.
+    """Figure 4: P(ΔF_n) for several μ, linear, and semi-logarithmic by ranges of μ.
 
     groups: {μ: list of arrays (N_c,) of ΔF_n, one for each packing}. ΔF_n is drawn in units of its
-    mean, or in the unit that it has and that is named, such as "⟨f_n⟩"; tails P(ΔF_n > x) ~
-    exp(−(λx)^b) are fitted beyond the median.
+    mean, or in the unit that it has and that is named, such as "⟨f_n⟩"; bars are standard errors
+    over packings, empty bins interrupt the lines, and tails P(ΔF_n > x) ~ exp(−(λx)^b) are fitted
+    beyond the upper quartile.
     """
     style.ready(backend)
     edges = np.linspace(0, largest, bins + 1)
-    middle = (edges[1:] + edges[:-1]) / 2
-    linear, log = [], []
-    for k, mu in enumerate(sorted(groups)):
-        values = np.concatenate(groups[mu])
-        if not values.any():
-            continue
-        if unit is None:
-            values = values / values.mean()
-        colour, marker = style.COLOURS[k % 8], style.MARKERS[k % 5]
-        b = statistics.tail_exponent(values)
+    drawn = {mu: group for mu, group in sorted(groups.items()) if any(v.any() for v in group)}
+    series = {}
+    for k, (mu, group) in enumerate(drawn.items()):
+        scale = np.concatenate(group).mean() if unit is None else 1.0
+        group = [values / scale for values in group if len(values)]
+        b = statistics.tail_exponent(np.concatenate(group), 0.75)
         label = f"μ = {mu:g}" + (f", b = {b:.2f}" if np.isfinite(b) else "")
-        height = statistics.density(values, edges)
-        points = list(zip(middle, height, strict=True))
-        linear += [style.line(points, label, colour, backend)]
-        linear += [style.dots(points, label, colour, backend, marker)]
-        seen = [(x, y) for x, y in points if y > 0]
-        log += [style.line(seen, label, colour, backend)]
-        log += [style.dots(seen, label, colour, backend, marker)]
+        series[mu] = _density(group, edges), label, style.COLOURS[k % 7], style.MARKERS[k % 5]
     axes = {"x": f"ΔF_n / {unit or '⟨ΔF_n⟩'}", "y": "P(ΔF_n)"}
-    legend = style.beside("top_right", backend)
-    outer = style.frame(linear, backend, title="Extent", legend=legend, **axes)
-    inner = style.frame(log, backend, title="semi-logarithmic", logy=True, **axes)
-    both = style.inset(outer, inner, (0.52, 0.5, 0.46, 0.48), backend)
-    return style.page(both, backend, columns=2)
+    # As the paper's insets.
+    words = "small μ", "intermediate μ", "large μ"
+    ranges = [[mu for mu in series if (mu > _SMALL) + (mu > _MIDDLE) == k] for k in range(3)]
+    frames = [_densities(series, series, False, backend, title="Extent", **axes)]
+    for word, some in zip(words, ranges, strict=True):
+        if some:
+            top = max(p for mu in some for _, p, _ in series[mu][0])
+            room = {"legend": "top_right", "ylim": (None, 20 * top)}  # above what falls
+            frames.append(_densities(series, some, True, backend, title=word, **room, **axes))
+    return style.page(frames, backend, columns=2)
+
+
+def _density(group, edges):
+    """Points (x, P, standard error over packings) of the bins up to the last that holds any."""
+    heights = np.array([statistics.density(values, edges) for values in group])
+    sizes = np.array([len(values) for values in group])
+    mean = sizes @ heights / sizes.sum()
+    error = heights.std(axis=0, ddof=1) / np.sqrt(len(group)) if len(group) > 1 else 0 * mean
+    last = np.flatnonzero(mean > 0).max(initial=0) + 1
+    return list(zip(((edges[1:] + edges[:-1]) / 2)[:last], mean[:last], error[:last], strict=True))
+
+
+def _densities(series, some, logy, backend, *, x, y, **options):
+    """A frame of the densities at some μ."""
+    drawn = []
+    for mu in some:
+        points, label, colour, marker = series[mu]
+        joined = [(at, p if p > 0 or not logy else np.nan) for at, p, _ in points]
+        shown = [point for point in points if point[1] > 0]
+        drawn.append(style.line(joined, label, colour, backend))
+        drawn.append(style.dots([point[:2] for point in shown], label, colour, backend, marker))
+        reach = [(at, p, min(e, 0.9 * p) if logy else e, e) for at, p, e in shown if e > 0]
+        drawn.append(style.bars(reach, colour, backend))
+    return style.frame(drawn, backend, x=x, y=y, logy=logy, **options)
 
 
 def correlations(rows, *, beside=None, chance=None, backend="bokeh"):
@@ -100,7 +124,8 @@ def correlations(rows, *, beside=None, chance=None, backend="bokeh"):
 
     rows: dicts with mu, correlation, correlation_low and correlation_high (the least and largest
     with any other sampled network in place of the original); means over rows of one μ. beside:
-    {name: rows} with mu and correlation. chance: what shuffled forces reach either way, dotted.
+    {name: rows} with mu and correlation. chance: {μ: what means of as many packings with shuffled
+    forces reach either way}, dotted.
     """
     style.ready(backend)
     middle, low, high = (
@@ -114,10 +139,9 @@ def correlations(rows, *, beside=None, chance=None, backend="bokeh"):
         points = [p[:2] for p in statistics.means(sources[label], "correlation") if p[0] > 0]
         drawn.append(style.line(points, label, style.COLOURS[k], backend, dash))
         drawn.append(style.dots(points, label, style.COLOURS[k], backend, style.MARKERS[k]))
-    if chance is not None and middle:
-        ends = min(middle), max(middle)
-        for side in (-chance, chance):
-            level = [(mu, side) for mu in ends]
+    if chance:
+        for side in (-1, 1):
+            level = [(mu, side * chance[mu]) for mu in sorted(chance) if mu > 0]
             drawn.append(style.line(level, "chance", style.GREY, backend, "dotted"))
     return style.frame(
         drawn,

@@ -1,45 +1,93 @@
 """Figures 3 and 5: the forces that single contacts can have, and where those contacts are."""
 
+import holoviews as hv
 import numpy as np
 
 from granforce.figures import style
 
 SHOWN_CONTACTS = 40
+LARGEST = 3.0  # f_n / f_n,orig at which frames are cut
+RATIOS = np.linspace(0, LARGEST, 121)  # edges of the bins that states are counted in
 
 
-def possible_forces(groups, *, backend="bokeh", largest=3.0, contacts=SHOWN_CONTACTS):
+def possible_forces(groups, *, backend="bokeh", largest=LARGEST, contacts=SHOWN_CONTACTS):
     """Figure 3: values of f_n / f_n,orig of contacts, weak to strong, for several μ.
 
     groups: {μ: (original (N_c,), states (S, N_c), least (N_c,), extent (N_c,))}: normal forces of
     the original network and of some states, and the interval seen in all of them, in one unit.
     So many contacts, evenly spaced in the order of their force, are drawn (all where there are no
-    more): the interval as a bar, states as points.
+    more): the interval as a bar, states as points. Frames are cut at the largest ratio.
     """
     style.ready(backend)
     frames = []
     for k, mu in enumerate(sorted(groups)):
         original, states, least, extent = (np.asarray(values) for values in groups[mu])
-        order = np.argsort(original, kind="stable")
-        order = order[original[order] > 0]
-        chosen = order[np.linspace(0, len(order) - 1, min(contacts, len(order))).astype(int)]
-        scale = original[chosen]
-        x = np.arange(1, len(chosen) + 1)
+        chosen = _weak_to_strong(original)
+        chosen = chosen[np.linspace(0, len(chosen) - 1, min(contacts, len(chosen))).astype(int)]
+        ratio = states[:, chosen] / original[chosen]
+        points = [(a, b) for a, column in enumerate(ratio.T, 1) for b in column if b <= largest]
         colour = style.COLOURS[k % len(style.COLOURS)]
-        low, high = least[chosen] / scale, (least + extent)[chosen] / scale
-        inside = low <= largest
-        low, high = low[inside], np.minimum(high[inside], largest)
-        bars = list(zip(x[inside], low, np.zeros_like(low), high - low, strict=True))
-        ratio = states[:, chosen] / scale
-        points = [(a, b) for column, a in zip(ratio.T, x, strict=True) for b in column]
-        points = [(a, b) for a, b in points if b <= largest]
-        drawn = [
-            style.bars(bars, style.GREY, backend),
-            style.dots(points, "states", colour, backend, size=2),
-            style.line([(0, 1), (len(x) + 1, 1)], "original", style.GREY, backend, "dashed"),
-        ]
-        axes = {"x": "contacts, weak to strong", "y": "f_n / f_n,orig", "ylim": (0, largest)}
-        frames.append(style.frame(drawn, backend, title=f"μ = {mu:g}", **axes))
+        drawn = [style.dots(points, "states", colour, backend, size=2)]
+        frames.append(_ratios(mu, drawn, original, least, extent, chosen, largest, backend))
     return style.page(frames, backend, columns=2)
+
+
+def force_densities(groups, *, backend="bokeh"):
+    """Figure 3 of every contact and any number of states, counted by `ratio_counts`.
+
+    groups: {μ: (original (N_c,), counts (N_c, bins), least (N_c,), extent (N_c,))}. Colours tell
+    which part of the states has the ratio, bars the interval seen in all of them.
+    """
+    style.ready(backend)
+    frames = []
+    for k, mu in enumerate(sorted(groups)):
+        original, counts, least, extent = (np.asarray(values) for values in groups[mu])
+        chosen = _weak_to_strong(original)
+        part = counts[chosen].T / max(1, counts.sum(axis=1).max(initial=0))
+        middles = (RATIOS[1:] + RATIOS[:-1]) / 2
+        x = np.arange(1, len(chosen) + 1)
+        image = hv.Image((x, middles, np.where(part > 0, part, np.nan)), ["x", "y"], "part")
+        look = {"cmap": "viridis_r", "clim": (1e-3, 1), "logz": True}
+        look["colorbar"] = k % 2 == 1 or len(groups) == 1  # there is room at the right edge
+        drawn = [image.opts(backend=backend, clabel="part of the states", **look)]
+        frames.append(_ratios(mu, drawn, original, least, extent, chosen, LARGEST, backend))
+    return style.page(frames, backend, columns=2)
+
+
+def ratio_counts(original, states):
+    """How many states (S, N_c) have f_n / f_n,orig in each bin of RATIOS: (N_c, bins).
+
+    States beyond the last edge are in none; contacts without a force are not counted.
+    """
+    counts = np.zeros((len(original), len(RATIOS) - 1), dtype=np.int64)
+    for c in np.flatnonzero(original > 0):
+        counts[c] = np.histogram(states[:, c] / original[c], RATIOS)[0]
+    return counts
+
+
+def _weak_to_strong(original):
+    """Contacts that carry, in order of their force."""
+    order = np.argsort(original, kind="stable")
+    return order[original[order] > 0]
+
+
+def _ratios(mu, drawn, original, least, extent, chosen, largest, backend):
+    """A frame of what is drawn over the intervals of chosen contacts; it says what is cut."""
+    x, scale = np.arange(1, len(chosen) + 1), original[chosen]
+    low, high = least[chosen] / scale, (least + extent)[chosen] / scale
+    cut = int((high > largest).sum())
+    inside = low <= largest
+    low, high = low[inside], np.minimum(high[inside], largest)
+    bars = list(zip(x[inside], low, np.zeros_like(low), high - low, strict=True))
+    drawn = [
+        style.bars(bars, style.GREY, backend),
+        *drawn,
+        style.line([(0, 1), (len(x) + 1, 1)], "original", "#000000", backend, "dashed"),
+    ]
+    beyond = f"{cut} of {len(chosen)} reach beyond {largest:g}"
+    axes = {"x": "contacts, weak to strong", "y": f"f_n / f_n,orig, cut at {largest:g}"}
+    title = f"μ = {mu:g}: {beyond}"
+    return style.frame(drawn, backend, title=title, ylim=(0, largest), **axes)
 
 
 def places(groups, *, backend="bokeh", part=0.1):
@@ -59,7 +107,7 @@ def places(groups, *, backend="bokeh", part=0.1):
             count = max(1, round(part * len(at)))
             chosen = np.argsort(-np.asarray(values), kind="stable")[:count]
             drawn = [
-                style.dots(at, "contacts", style.GREY, backend, size=2),
+                style.dots(at, "contacts", style.GREY, backend, size=4),
                 style.dots(at[chosen], word, colour, backend, size=5),
             ]
             frames.append(
@@ -85,9 +133,9 @@ def overlaid(groups, *, backend="bokeh"):
         at, normal, extent = contact_points(packing, contacts), *map(np.asarray, (normal, extent))
         strong, loose = normal > 2 * normal.mean(), extent > extent.mean()
         drawn = [
-            style.dots(at, "contacts", style.GREY, backend, size=1),
-            style.dots(at[loose], "ΔF_n > ⟨ΔF_n⟩", style.COLOURS[4], backend, "s", size=6),
-            style.dots(at[strong], "f_n > 2⟨f_n⟩", style.COLOURS[1], backend, size=4),
+            style.dots(at, "contacts", style.GREY, backend, size=4),
+            style.dots(at[loose], "ΔF_n > ⟨ΔF_n⟩", style.COLOURS[4], backend, "s", size=7),
+            style.dots(at[strong], "f_n > 2⟨f_n⟩", style.COLOURS[1], backend, size=5),
         ]
         last = mu == max(groups)
         frames.append(

@@ -1,35 +1,34 @@
 """Figure 2: how a packing answers to a local force, against its indeterminacy."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from granforce import statistics
 from granforce.figures import style
 
 
-def perturbation(rows, *, backend="bokeh"):
+def perturbation(rows, *, limit=False, backend="bokeh"):
     """Figure 2: ⟨F_crit⟩/⟨f_n⟩ and the decay exponent α against η2, joined in order of μ.
 
     rows: dicts with mu, eta2, critical_force (mean over contacts, in ⟨f_n⟩) and decay_exponent, one
-    for each packing; points are means over packings. Rows may also have limit_load, in ⟨f_n⟩.
+    for each packing; points are means over packings, each μ with a symbol of its own. limit: with
+    the mean limit load (limit_load, in ⟨f_n⟩) beside the critical force.
     """
     style.ready(backend)
-    forces = [("critical_force", "critical force"), ("limit_load", "limit load")]
+    forces = [("critical_force", "critical force", "solid")]
+    if limit:
+        forces.append(("limit_load", "limit load", "dashed"))
+    exponents = [("decay_exponent", "in order of μ", "solid")]
     panels = [
         (forces, "Critical force", "⟨F_crit⟩ / ⟨f_n⟩"),
-        ([("decay_exponent", "α")], "Decay of displacements", "α of |u| ~ r^−α"),
+        (exponents, "Decay of displacements", "α of |u| ~ r^−α"),
     ]
+    looks = style.looks(sorted({row["mu"] for row in rows}))
     frames = []
     for names, title, label in panels:
-        drawn, strokes = [], []
-        lines = [_points(rows, name) for name, _ in names]
-        for k, ((_, word), points) in enumerate(zip(names, lines, strict=True)):
-            drawn += _joined(points, word, style.COLOURS[k], k, backend)
-            strokes += _strokes(points)
-        # μ is told once.
-        drawn += style.words([(x, y, f"{mu:g}") for mu, x, y, *_ in lines[0]], strokes, backend)
-        legend = "top_left" if len(names) > 1 else None
+        drawn = []
+        for name, word, dash in names:
+            drawn += _joined(_points(rows, name), word, dash, looks, backend)
+        legend = style.beside("top_left", backend) if label.startswith("α") else None
         frames.append(style.frame(drawn, backend, title=title, x="η2", y=label, legend=legend))
     return style.page(frames, backend, columns=2)
 
@@ -41,21 +40,12 @@ def _points(rows, name):
     return [(mu, x, y, dx, dy) for (mu, x, dx), (_, y, dy) in zip(across, up, strict=True)]
 
 
-def _strokes(points):
-    """Ends (x, y, x, y) of what is drawn: lines from point to point, and error bars."""
-    for (_, x, y, *_), (_, x_next, y_next, *_) in pairwise(points):
-        yield x, y, x_next, y_next
-    for _, x, y, dx, dy in points:
-        yield x - dx, y, x + dx, y
-        yield x, y - dy, x, y + dy
-
-
-def _joined(points, label, colour, k, backend):
+def _joined(points, word, dash, looks, backend):
     if not points:
         return
-    places = [point[1:3] for point in points]
-    yield style.line(places, label, colour, backend)
-    yield style.dots(places, label, colour, backend, style.MARKERS[k])
-    yield style.bars([(x, y, dy, dy) for _, x, y, _, dy in points], colour, backend)
-    across = [(x, y, dx, dx) for _, x, y, dx, _ in points]
-    yield style.bars(across, colour, backend, horizontal=True)
+    yield style.line([point[1:3] for point in points], word, style.GREY, backend, dash)
+    for mu, x, y, dx, dy in points:
+        colour, marker = looks[mu]
+        yield style.bars([(x, y, dy, dy)], colour, backend)
+        yield style.bars([(x, y, dx, dx)], colour, backend, horizontal=True)
+        yield style.dots([(x, y)], f"μ = {mu:g}", colour, backend, marker, size=10)

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 import holoviews as hv
-import numpy as np
+from holoviews.plotting.util import process_cmap
 
 from granforce.records import InputError
 from granforce.system.files import written
@@ -18,9 +18,6 @@ MARKERS = ("o", "s", "^", "d", "v", "+", "x", "*")
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
 FRAME_INCHES = (4.2, 3.5)
-# A letter's width and height, and how far words may be from their points, in parts of a frame.
-_LETTER = 0.022, 0.055
-_FAR = 0.05, 0.07, 0.09, 0.12, 0.15, 0.18, 0.22
 
 # Symbols as they are written here: as mathtext for pictures, in Unicode for pages.
 SYMBOLS = {
@@ -99,50 +96,10 @@ def bars(points, colour, backend, horizontal=False):
     )
 
 
-def words(points, strokes, backend):
-    """Words for points (x, y, text), clear of strokes (x, y, x, y) where there is room for them.
-
-    A thin line leads from each word to its point.
-    """
-    look, thin = {"text_font_size": "8pt", "text_color": "#555555"}, {"line_width": 0.5}
-    if backend == "matplotlib":
-        look, thin = {"size": 8, "color": "#555555"}, {"linewidth": 0.5}
-    places = _clear_places(points, np.array(strokes, dtype=float).reshape(-1, 2, 2))
-    labels = [(x, y, text) for (x, y), (*_, text) in zip(places, points, strict=True)]
-    leaders = [(*point[:2], x, y) for (x, y), point in zip(places, points, strict=True)]
-    yield hv.Segments(leaders).opts(backend=backend, color="#999999", **thin)
-    yield hv.Labels(labels, ["x", "y"], "text").opts(backend=backend, **look)
-
-
-def _clear_places(points, strokes):
-    """Middles (n, 2) of words for points (x, y, text), none over strokes (m, 2, 2) if possible.
-
-    Of places around each point the nearest that covers least is taken, in parts of the frame.
-    """
-    at = np.array([point[:2] for point in points], dtype=float).reshape(-1, 2)
-    ends = np.concatenate([at, strokes.reshape(-1, 2)])
-    low, span = ends.min(axis=0), np.ptp(ends, axis=0)
-    span[span == 0] = 1.0
-    at, strokes = (at - low) / span, (strokes - low) / span
-    along = np.linspace(0, 1, 100)[:, None, None]
-    ink = (strokes[:, 0] + along * (strokes[:, 1] - strokes[:, 0])).reshape(-1, 2)
-    ink, angle = np.concatenate([ink, at]), np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    places = []
-    for here, (*_, text) in zip(at, points, strict=True):
-        size = np.array([_LETTER[0] * (len(text) + 1), _LETTER[1]])
-        tried = [(far, here + far * around) for far in _FAR]
-        distance = np.repeat([far for far, _ in tried], len(around))
-        tried = np.concatenate([place for _, place in tried])
-        covered = (np.abs(tried[:, None] - ink) < size / 2).all(axis=2).sum(axis=1)
-        outside = (np.abs(tried - 0.5) > 0.53).any(axis=1)
-        best = tried[np.argmin(covered + 1000 * outside + 10 * distance)]
-        places.append(best)
-        # Words and their leaders are in the way of others.
-        corners = best + size / 2 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1], [0, 0]])
-        leader = here + along[:, 0] * (best - here)
-        ink = np.concatenate([ink, np.repeat(corners, 20, axis=0), leader])
-    return low + span * np.array(places).reshape(-1, 2)
+def looks(keys):
+    """{key: (colour, marker)} of points in order, from dark blue to yellow, each of its own."""
+    names = process_cmap("viridis", len(keys) + 1)
+    return {key: (names[k], MARKERS[k % 5]) for k, key in enumerate(keys)}
 
 
 def curves(series, backend, logx=False, logy=False):
@@ -170,12 +127,13 @@ def beside(corner, backend):
 
 def frame(elements, backend, *, title, x, y, legend=None, **options):
     """Elements in one frame. legend: its corner, such as "top_right"; options: logx, ylim, …"""
+    elements = list(elements)
     if backend == "bokeh":
         width, height = FRAME_PIXELS
         options = {"frame_width": width, "frame_height": height, "toolbar": "above"} | options
     else:
         options = {"aspect": "auto", "fontscale": 0.9} | options
-        options["hooks"] = [_typeset_legend]
+        options["hooks"] = [_legend_of(elements)]
     if legend is not None:
         options["legend_position"] = legend
     words = {"title": title, "xlabel": x, "ylabel": y}
@@ -184,7 +142,11 @@ def frame(elements, backend, *, title, x, y, legend=None, **options):
     # Ranges are each frame's own: by their names HoloViews would share them along a layout.
     elements = [element.opts(axiswise=True, backend=backend) for element in elements]
     return hv.Overlay(elements).opts(
-        backend=backend, show_legend=legend is not None, axiswise=True, **options
+        backend=backend,
+        show_legend=legend is not None,
+        legend_limit=len(elements) + 1,
+        axiswise=True,
+        **options,
     )
 
 
@@ -205,13 +167,30 @@ def inset(outer, inner, place, backend):
         made._close_figures = False  # the outer frame's is not done
         made.initialize_plot()
 
-    return [outer.opts(backend=backend, clone=True, hooks=[_typeset_legend, draw])]
+    hooks = [_legend_of(outer.values()), draw]
+    return [outer.opts(backend=backend, clone=True, hooks=hooks)]
 
 
-def _typeset_legend(plot, element):
-    legend = plot.handles["axis"].get_legend()
-    for text in [] if legend is None else legend.get_texts():
-        text.set_text(typeset(text.get_text(), "matplotlib"))
+def _legend_of(elements):
+    """A hook that typesets a picture's legend, and shows the symbols of its points on its lines."""
+    looks = {
+        element.label: element.opts.get("style", backend="matplotlib").kwargs
+        for element in elements
+        if isinstance(element, hv.Scatter)
+    }
+
+    def finish(plot, _):
+        legend = plot.handles["axis"].get_legend()
+        if legend is None:
+            return
+        for text, handle in zip(legend.get_texts(), legend.legend_handles, strict=True):
+            look = looks.get(text.get_text())
+            if look is not None and hasattr(handle, "set_marker"):
+                handle.set_marker(look["marker"])
+                handle.set_markersize(max(3, look["s"] ** 0.5))
+            text.set_text(typeset(text.get_text(), "matplotlib"))
+
+    return finish
 
 
 def equal_scales(box, backend):

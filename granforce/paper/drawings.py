@@ -3,32 +3,34 @@
 import numpy as np
 
 from granforce import figures
-from granforce.paper.claims import BIN, SAMPLERS, drawn
+from granforce.paper.claims.groups import SAMPLERS, drawn
 from granforce.system.files import make_folder
 
-SHOWN = (0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
+SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
 LARGEST = 5.0  # ΔF_n of Figure 4, ⟨f_n⟩
-EVERY = 10**9  # contact is drawn in Figure 3
+BIN = 0.25  # of P(ΔF_n), ⟨f_n⟩
 
 FORMATS = ("html", "png", "svg")
 
 _POINTS = "points are means over packings, bars standard errors"
 _TAILS = (
-    "linear and semi-logarithmic; b is the exponent of tails exp(−(λ ΔF_n)^b), fitted beyond the "
-    "median"
+    "linear, and semi-logarithmic for small, intermediate and large friction; bars are standard "
+    "errors over packings; b is the exponent of tails exp(−(λ ΔF_n)^b), fitted beyond the upper "
+    "quartile"
 )
 # What each figure shows, kept in its file; {walk}: how the states of the walk were relaxed.
 # Figures 1 to 6 are the paper's, by its own relaxation where the study has it at every μ.
 CAPTIONS = {
     "figure1": "Indeterminacy η1, η2 and 0.15 η3 of the random walk's states ({walk}), "
     f"{_POINTS}; and the coordination z of the backbone, against the friction coefficient μ.",
-    "figure2": "Mean critical force and limit load of pushed contacts in ⟨f_n⟩, and exponent α of "
-    "the decay |u| ~ r^−α of the first motion, against η2 of the walk ({walk}), joined in order of "
-    "the friction coefficient μ, which is written at the points; bars are standard errors over "
-    "packings.",
-    "figure3": "Normal forces that contacts can have over those they have in the original "
-    "network: intervals (bars) and some states (points) of the random walk ({walk}), for several "
-    "friction coefficients μ; every contact, from weak to strong.",
+    "figure2": "Mean critical force of pushed contacts in ⟨f_n⟩, and exponent α of the decay "
+    "|u| ~ r^−α of the first motion, against η2 of the walk ({walk}), joined in order of the "
+    "friction coefficient μ; bars are standard errors over packings.",
+    "figure2_limit": "As Figure 2, with the limit load (dashed) beside the critical force.",
+    "figure3": "Normal forces that contacts can have over those they have in the original network: "
+    "the interval seen (bars), and by its colour which part of the states of the random walk "
+    "({walk}) has which ratio, for several friction coefficients μ; every contact, from weak to "
+    "strong. The ordinate is cut at 3; titles count the contacts that reach beyond.",
     "figure4": "Distribution of the extent ΔF_n of normal forces, in units of ⟨f_n⟩, that the "
     f"random walk ({{walk}}) has seen, {_TAILS}.",
     "figure5": "Contacts with f_n > 2⟨f_n⟩ over those with ΔF_n > ⟨ΔF_n⟩ ({walk}); grey, all "
@@ -36,7 +38,7 @@ CAPTIONS = {
     "figure6": "Correlation over contacts of the original f_n with its extent ΔF_n against the "
     "friction coefficient μ ({walk}); bars reach from the least to the largest with any other "
     "state of the walk in place of the original network; dotted, two standard deviations of what "
-    "shuffled forces give.",
+    "as many packings with shuffled forces give.",
     "samplers": "Indeterminacy η1, η2 and 0.15 η3 of states drawn in several ways, against the "
     f"friction coefficient μ; {_POINTS}.",
     "effort": "Accepted part of the attempts, and sweeps per accepted state, of walks by "
@@ -122,9 +124,10 @@ def _of_the_paper(table):
     answers = [row for row in table.answers(part) if np.isfinite(row.get("decay_exponent", np.nan))]
     if answers:
         made["figure2"] = _later(figures.perturbation, answers)
+        made["figure2_limit"] = _later(figures.perturbation, answers, limit=True)
     forces, places = _shown_forces(table, part), _shown_places(table, part)
     if forces:
-        made["figure3"] = _later(figures.possible_forces, forces, contacts=EVERY)
+        made["figure3"] = _later(figures.force_densities, forces)
     if places:
         made["figure5"] = _later(figures.overlaid, places)
     return made
@@ -174,9 +177,13 @@ def _beyond(table):
 
 
 def _chance(rows):
-    """Two standard deviations of the correlation of shuffled forces, for the mean packing."""
-    contacts = [row["contacts"] for row in rows if row.get("contacts")]
-    return 2 / np.sqrt(np.mean(contacts) - 1) if contacts else None
+    """{μ: two standard deviations of the mean correlation of packings with shuffled forces}."""
+    free = {}
+    for row in rows:
+        if row["mu"] > 0 and row.get("contacts"):
+            free.setdefault(row["mu"], []).append(row["contacts"] - 1)
+    # Each of k packings has a variance of 1/(N_c − 1), their mean 1/k of that.
+    return {mu: 2 * np.sqrt(np.mean(1 / np.array(n)) / len(n)) for mu, n in free.items()}
 
 
 def _loose(groups):
@@ -208,9 +215,9 @@ def _shown_contacts(table, part):
 
 
 def _shown_forces(table, part):
-    states = dict(table.shown)
+    counts = dict(table.shown)
     return {
-        row["mu"]: (normal, states[k], least, extent)
+        row["mu"]: (normal, counts[k], least, extent)
         for k, row, _, normal, least, extent in _shown_contacts(table, part)
     }
 

@@ -7,24 +7,18 @@ packing. They tell why a claim holds or does not.
 import numpy as np
 
 from granforce import statistics
-from granforce.paper.claims import (
-    BIN,
-    LARGE,
+from granforce.paper.claims.figure4 import departure
+from granforce.paper.claims.groups import (
     LEAST_DYNAMIC,
-    MIDDLE,
-    OURS,
+    RANGES,
     SAMPLERS,
     SMALL,
-    Claim,
-    dip,
+    each,
     items,
-    peak,
     sampled,
-    slope,
-    tail,
+    within,
 )
-
-_RANGES = (("small", SMALL), ("intermediate", MIDDLE), ("large", LARGE))
+from granforce.paper.claims.verdicts import OURS, Claim, peak, slope
 
 
 def found(table):
@@ -76,41 +70,24 @@ def exact_shape(table):
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
         groups = {mu: v for mu, v in _values(table.part(part), name).items() if mu > 0}
         if len(groups) > 2:
-            yield _finding(f"μ where {label} is largest", peak(list(groups)), groups)
+            yield _trend(f"μ where {label} is largest", peak, groups)
         yield from _growth(groups, label)
 
 
 def distribution(table):
-    """How P(ΔF_n) depends on bins and units, and its tail on the range of the fit."""
+    """How far P(ΔF_n) is from falling at each μ, in units of each packing's mean, and its width."""
     for sampler in SAMPLERS:
         groups = sampled(table, sampler)
-        for word, (low, high) in _RANGES:
-            chosen = [[v for _, v in g] for mu, g in groups.items() if low <= mu <= high]
-            if not chosen:
-                continue
-            own = [[v / v.mean() for v in group] for group in chosen]
-            for width, unit, drawn_in in (
-                (0.1, "⟨f_n⟩", chosen),
-                (BIN, "⟨f_n⟩", chosen),
-                (0.2, "⟨ΔF_n⟩", own),
-            ):
+        for mu, values in each(groups, lambda values: values / values.mean()).items():
+            if mu > 0:
+                told = f"departure of P(ΔF_n/⟨ΔF_n⟩) from a falling density, {sampler}, μ = {mu:g}"
+                yield _told(told, *departure([v for _, v in values], statistics.LEVEL))
+        for word, span in RANGES:
+            chosen = [[v for _, v in g] for g in within(groups, span).values()]
+            if chosen:
                 yield _finding(
-                    f"depth of P(ΔF_n) at 0, bins of {width:g} {unit}, {sampler}, {word} μ",
-                    lambda *g, width=width: np.mean([dip(values, width) for values in g]),
-                    drawn_in,
-                    resamples=99,
-                )
-            yield _finding(
-                f"width of P(ΔF_n), ⟨f_n⟩, {sampler}, {word} μ",
-                lambda *g: np.mean([np.concatenate(values).std() for values in g]),
-                chosen,
-                resamples=99,
-            )
-            for quantile in (0.5, 0.75):
-                yield _finding(
-                    f"b of the tail of P(ΔF_n) beyond its quantile {quantile:g}, {sampler}, "
-                    f"{word} μ",
-                    lambda *g, quantile=quantile: tail(*g, quantile=quantile),
+                    f"width of P(ΔF_n), ⟨f_n⟩, {sampler}, {word} μ",
+                    lambda *g: np.mean([np.concatenate(values).std() for values in g]),
                     chosen,
                     resamples=99,
                 )
@@ -128,7 +105,7 @@ def _growth(groups, label):
         few = {mu: groups[mu] for mu in groups if low <= mu <= high and mu > 0}
         if len(few) > 1:
             ends = f"μ = {min(few):g} … {max(few):g}"
-            yield _finding(f"slope of log {label} against log μ, {ends}", slope(few), few)
+            yield _trend(f"slope of log {label} against log μ, {ends}", slope, few)
 
 
 def size(table):
@@ -137,9 +114,7 @@ def size(table):
     for mu in sorted({row["mu"] for row in table.part("size_exact")}):
         groups = statistics.grouped([row for row in rows if row["mu"] == mu], "eta3", "n")
         if len(groups) > 1:
-            yield _finding(
-                f"slope of log exact η3 against log N, μ = {mu:g}", slope(groups), groups
-            )
+            yield _trend(f"slope of log exact η3 against log N, μ = {mu:g}", slope, groups)
 
 
 def preparation(table):
@@ -187,7 +162,7 @@ def shear(table):
     rows, uniform = table.part("stress"), table.part("stress_uniform")
     groups = _values(rows, "friction")
     if len(groups) > 2:
-        yield _finding("μ where the largest shear stress is largest", peak(list(groups)), groups)
+        yield _trend("μ where the largest shear stress is largest", peak, groups)
     told = "shear stress over pressure"
     yield from _by_range(groups, f"largest {told}")
     yield from _by_range(_values(rows, "own_shear"), f"{told} of the original network")
@@ -227,13 +202,24 @@ def _ratios(table, name, above, below):
 
 
 def _by_range(groups, statement):
-    for word, (low, high) in _RANGES:
+    for word, (low, high) in RANGES:
         values = [v for mu, group in groups.items() if low <= mu <= high for v in group]
         if values:
             yield _finding(f"{statement}, {word} μ", np.mean, [values])
 
 
+def _trend(statement, statistic, groups):
+    """A number of all means over packings: statistic(keys, means)."""
+    keys = np.array(list(groups), dtype=float)
+    value = statistic(keys, np.array([np.mean(group) for group in groups.values()]))
+    drawn = [statistic(keys, means) for means in statistics.resampled_means(groups.values())]
+    return _told(statement, float(value), *statistics.percentile_ends(drawn)[0])
+
+
 def _finding(statement, statistic, groups, **options):
     groups = list(groups.values()) if isinstance(groups, dict) else list(groups)
-    value, low, high = statistics.bootstrap(statistic, groups, **options)
+    return _told(statement, *statistics.bootstrap(statistic, groups, **options))
+
+
+def _told(statement, value, low, high):
     return Claim(statement, "", OURS, statement, value, low, high, "", "measured")

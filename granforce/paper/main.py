@@ -2,14 +2,16 @@
 
 import json
 import sys
+import time
+from pathlib import Path
 
-from granforce.paper import claims, drawings, findings, tables
+from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
-from granforce.records import InputError, check_memory, friction, whole
+from granforce.records import InputError, check_memory, friction, positive, whole
 from granforce.study import scan
 from granforce.study.store import open_store
 from granforce.system.files import make_folder, written
-from granforce.system.terminal import Bar, table
+from granforce.system.terminal import Bar, print_list, table
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
 _NUMBERS = (
@@ -24,12 +26,18 @@ def main(arguments):
 
     The folder gets cells.zarr (every cell), study.zarr (the reduced table), figures, and the claims
     as claims.json. With --reduce the cells of another store are taken as they are, and rows that
-    they lack from --table; with --table alone nothing is computed or reduced.
+    they lack from --table; with --table alone nothing is computed or reduced. With --status what is
+    done is told, and nothing else.
     """
     formats = [word for word in arguments.formats.split(",") if word]
     if set(formats) - set(drawings.FORMATS):
         raise InputError(f"--formats {arguments.formats!r}: take some of html, png, svg")
     whole(arguments.workers, "--workers", 1)
+    if arguments.minutes is not None:
+        positive(arguments.minutes, "--minutes")
+    renewed = documents.named(arguments.documents)
+    if arguments.status:
+        return status(arguments)
     failed = []
     if arguments.reduce is not None:
         reduced = tables.reduce(arguments.reduce, plan_of(arguments))
@@ -57,8 +65,18 @@ def main(arguments):
     }
     with written(folder / "claims.json") as file:
         file.write(json.dumps(told, indent=1, ensure_ascii=False).encode())
+    documents.renew(renewed, reduced, told["claims"])
     report(told, arguments.json)
     return 1 if failed else 0
+
+
+def status(arguments):
+    """What of the parts of the plan the folder has, on stdout; returns 0."""
+    path = Path(arguments.out) / "cells.zarr"
+    wanted = plans.chosen(plan_of(arguments), _parts(arguments))
+    rows = plans.remaining(open_store(path, readonly=True).path, wanted)
+    print_list(rows, ("part", "cells", "done", "minutes", "minutes left"), arguments.json)
+    return 0
 
 
 def _parts(arguments):
@@ -114,7 +132,11 @@ def _numbers(option, text, cast):
 
 def compute(path, wanted, arguments):
     """Compute the tasks, with bars on stderr; returns what failed."""
-    bars = []
+    bars, begin = [], time.monotonic()
+
+    def enough():
+        limit = arguments.minutes
+        return limit is not None and time.monotonic() - begin > 60 * limit
 
     def bar(what):
         bars.append(Bar(what, "cell"))
@@ -128,6 +150,7 @@ def compute(path, wanted, arguments):
             scheduler=arguments.scheduler,
             dtypes={"states": "float32"},
             progress=bar,
+            enough=enough,
         )
     finally:
         for each in bars:

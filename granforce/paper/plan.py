@@ -7,8 +7,8 @@ loads raised in tenths of the way), "response_long" (some of them with four time
 steps) and "perturb" (loads raised by 0.4 of the way), "frozen" and "frozen_large" (exact intervals
 of the inner part with all forces outside held), "prepared_…" (walks in packings made with another
 time step or accuracy), "opened" and "opened_exact" (packings made without friction, cones opened
-to μ), "size" and "size_exact" (other numbers of disks), "stress" (outlines of the stresses that
-the contacts can carry) and "stress_uniform" (uniform states, for their stresses).
+to μ), "size", "size_sweeps" and "size_exact" (other numbers of disks), "stress" (outlines of the
+stresses that the contacts can carry) and "stress_uniform" (uniform states, for their stresses).
 """
 
 from typing import NamedTuple
@@ -26,6 +26,9 @@ FRICTIONS = (0, 0.00001, 0.0001, 0.001, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 
 LEAST_FOLLOWED = 0.001
 SLICE = (0.2, 0.8, 0.2, 0.8)  # inner part whose surroundings are frozen, in parts of the box
 KEPT_STATES = 100  # of each walk, evenly spaced: measures come from all
+# All states are kept of these, of the first packing: Figures 3 and 5 show them.
+SHOWN_FRICTIONS = (0.01, 0.1, 1.0, 10.0)
+SHOWN_PARTS = ("sweeps_1e-3", "walk")
 # The paper's walk. It does not say where its sweeps end. Most attempts end in no equilibrium at
 # large μ: a walk is kept with the states that it has after so many attempts for each.
 SWEEPS = {"sweeps_1e-3": 1e-3, "sweeps_1e-4": 1e-4}
@@ -154,7 +157,9 @@ def _walk(part, n, seed, mu, plan, *, packing_mu=None, states=None, made=None, *
         n, mu if packing_mu is None else packing_mu, seed, **made or {}
     )
     states = plan.states if states is None else states
-    named = kinds.WALK.parameters(packing, states, mu=mu, keep=min(KEPT_STATES, states), **how)
+    shown = part in SHOWN_PARTS and seed == 1 and mu in SHOWN_FRICTIONS
+    keep = states if shown else min(KEPT_STATES, states)
+    named = kinds.WALK.parameters(packing, states, mu=mu, keep=keep, **how)
     return Task(part, Cell(kinds.WALK, named), n, mu, seed)
 
 
@@ -183,16 +188,18 @@ def _sweeps(plan, seed):
     return found
 
 
-def _swept(part, residual, seed, mu, plan, states=None):
+def _swept(part, residual, seed, mu, plan, states=None, n=None):
     how = {"relax": "gauss_seidel_only", "residual": residual, "attempts": ATTEMPTS}
     how["chains"] = min(CHAINS, states or plan.states)
-    return _walk(part, plan.n, seed, mu, plan, states=states, **how)
+    # Where S is one point, sweeps end beside it: how far is measured, but not to where none ends.
+    how["skip"] = mu > 0 or part == HARDEST[0]
+    return _walk(part, n or plan.n, seed, mu, plan, states=states, **how)
 
 
 def _walks(plan, seed):
     many = plan.fine_frictions + plan.large_frictions
     frictions = _frictions(plan, seed, plan.packings, many)
-    return [_walk("walk", plan.n, seed, mu, plan) for mu in frictions]
+    return [_walk("walk", plan.n, seed, mu, plan, skip=mu > 0) for mu in frictions]
 
 
 def _exacts(plan, seed):
@@ -265,6 +272,10 @@ def _sizes(plan, seed):
         if seed > max(1, min(plan.packings, plan.packings * plan.n // n)):
             continue
         found += [_walk("size", n, seed, mu, plan) for mu in plan.size_frictions]
+        (residual,) = (SWEEPS[part] for part in SHOWN_PARTS if part in SWEEPS)
+        found += [
+            _swept("size_sweeps", residual, seed, mu, plan, n=n) for mu in plan.size_frictions
+        ]
         few = max(plan.exact_packings, plan.exact_packings * plan.n // n)
         if n <= plan.largest_exact and seed <= few:
             found += [_exact("size_exact", n, seed, mu) for mu in plan.size_frictions]
@@ -315,6 +326,33 @@ def chosen(plan, parts=None):
 
 def _family(part):
     return "response" if part == "perturb" else part.split("_")[0]
+
+
+def remaining(path, wanted):
+    """A row for each part of some tasks: cells, how many are done, and the minutes they took.
+
+    To these, minutes that the others will take: as the mean of those done of the same part and
+    size, at the same μ where there are any; NaN where nothing is known.
+    """
+    store, took, counts = open_store(path), {}, {}
+    for task in wanted:
+        dataset = load(store, *task.cell)
+        counts.setdefault(task.part, []).append((task, dataset is not None))
+        if dataset is not None:
+            for key in ((task.part, task.n, task.mu), (task.part, task.n)):
+                took.setdefault(key, []).append(float(dataset["seconds"]) / 60)
+    rows = []
+    for part, tasks_of in counts.items():
+        done = [task for task, there in tasks_of if there]
+        left = [task for task, there in tasks_of if not there]
+        known = [took.get((part, t.n, t.mu)) or took.get((part, t.n)) for t in left]
+        spent = sum(sum(v) for key, v in took.items() if key[0] == part and len(key) == 3)
+        ahead = sum(sum(v) / len(v) if v else float("nan") for v in known)
+        rows.append(
+            {"part": part, "cells": len(tasks_of), "done": len(done)}
+            | {"minutes": round(spent, 1), "minutes left": round(float(ahead), 1)}
+        )
+    return rows
 
 
 def finished(path, plan):

@@ -9,6 +9,7 @@ from scipy.spatial.distance import pdist
 
 from granforce import measures
 from granforce.explore.stress_outline import plane_of
+from granforce.figures import ratio_counts
 from granforce.forces.ensemble import stress_of
 from granforce.paper import plan as plans
 from granforce.records import InputError
@@ -17,9 +18,6 @@ from granforce.study.schema import labelled
 from granforce.study.store import open_store
 
 VERSION = 1
-SHOWN_FRICTIONS = (0.01, 0.1, 1.0, 10.0)  # whose states and packings are kept for Figures 3 and 5
-SHOWN_STATES = 30
-SHOWN_PARTS = ("sweeps_1e-3", "walk")
 
 # Parts whose contacts are kept one by one.
 SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "walk", "exact", "uniform")
@@ -39,7 +37,7 @@ class Table(NamedTuple):
     plan: dict  # fields of `plans.Plan`
     rows: list  # dicts: part, n, mu, seed, and the columns of the schema's row_… that apply
     samples: dict  # {name of SAMPLES: array}: row, contact, f_n, its least value, ΔF_n in ⟨f_n⟩
-    shown: list  # (row, normal forces (S, N_c) in ⟨f_n⟩) of some walks
+    shown: list  # (row, counts of states (N_c, bins of `figures.ratio_counts`)) of some walks
     packings: dict  # {row: Packing} of those walks
     skipped: dict  # counts: cells of the plan that the store lacked
 
@@ -94,9 +92,10 @@ def reduce(path, plan, wanted=None):
             samples.append(_samples(k, dataset))
         if task.part == "uniform":
             centres[task.mu, task.seed] = dataset["states"].values.mean(axis=0), rows[k]
-        first = task.part in SHOWN_PARTS and task.seed == 1 and _has_states(dataset)
-        if first and task.mu in SHOWN_FRICTIONS:
-            shown.append((k, _shown(dataset)))
+        first = task.part in plans.SHOWN_PARTS and task.seed == 1 and _has_states(dataset)
+        if first and task.mu in plans.SHOWN_FRICTIONS:
+            original, states = (dataset[name].values[..., 0] for name in ("original", "states"))
+            shown.append((k, ratio_counts(original, states)))
             packings[k] = kinds.get_packing(store, task.cell.parameters["packing"])[0]
     _compare_distances(store, every, centres)
     if not rows:
@@ -139,6 +138,10 @@ def row_of(task, dataset):
         # A walk may have ended with fewer states than wanted, or none.
         done = int(dataset["accepted"] + dataset["skipped"])
         row["reached_part"] = done / task.cell.parameters["states"]
+    if "accepted" in dataset:
+        row["skipped_part"] = float(dataset["skipped"]) / max(
+            1.0, float(dataset["accepted"] + dataset["skipped"])
+        )
     if "states" in dataset and dataset.sizes["state"] > 2:
         row["mean_distance"] = float(dataset["distance_to_centre"].mean())
         if row["dimension"] > 0:
@@ -194,12 +197,6 @@ def _samples(k, dataset):
     }
 
 
-def _shown(dataset):
-    states = dataset["states"].values[:, :, 0] / dataset["force_scale"].item()
-    pick = np.linspace(0, len(states) - 1, min(SHOWN_STATES, len(states))).astype(int)
-    return states[pick]
-
-
 def merged(new, old):
     """The Table `new` with the rows of its plan that it lacks and `old` has, after its own.
 
@@ -220,7 +217,7 @@ def merged(new, old):
     return new._replace(
         rows=[older.get(_name(row), {}) | row for row in new.rows] + [old.rows[k] for k in kept],
         samples=samples,
-        shown=new.shown + [(place[k], normal) for k, normal in old.shown if k in place],
+        shown=new.shown + [(place[k], counts) for k, counts in old.shown if k in place],
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
         skipped={"missing_cells": new.skipped["missing_cells"] - len(kept)},
     )
@@ -236,7 +233,7 @@ def save(table, path):
     dataset = _dataset(table)
     store.clear("study")
     digest = hashlib.sha256(json.dumps(table.rows).encode()).hexdigest()[:16]
-    single = ("sample_normal", "sample_least", "sample_extent", "shown_normal")
+    single = ("sample_normal", "sample_least", "sample_extent")
     store.save(
         "study",
         {**table.plan, "rows": digest},
@@ -266,8 +263,8 @@ def _dataset(table):
     arrays["row_part"] = [parts.index(row["part"]) for row in table.rows]
     arrays |= {f"sample_{name}": values for name, values in table.samples.items()}
     if table.shown:
-        arrays["shown_row"] = np.concatenate([np.full(s.shape[1], k) for k, s in table.shown])
-        arrays["shown_normal"] = np.concatenate([s for _, s in table.shown], axis=1)
+        arrays["shown_row"] = np.concatenate([np.full(len(s), k) for k, s in table.shown])
+        arrays["shown_count"] = np.concatenate([s for _, s in table.shown])
     return labelled(arrays, {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)})
 
 
@@ -292,7 +289,11 @@ def _table(store, entry, dataset):
     if "shown_row" in dataset:
         for k in np.unique(dataset["shown_row"]).tolist():
             chosen = dataset["shown_row"].values == k
-            shown.append((k, dataset["shown_normal"].values[:, chosen]))
+            if "shown_count" in dataset:
+                shown.append((k, dataset["shown_count"].values[chosen]))
+            else:  # as tables had it once: some states
+                original = samples["normal"][samples["row"] == k]
+                shown.append((k, ratio_counts(original, dataset["shown_normal"].values[:, chosen])))
             named = kinds.PACKING.parameters(rows[k]["n"], rows[k]["mu"], rows[k]["seed"])
             packings[k] = kinds.get_packing(store, named)[0]
     plan = {name: value for name, value in entry.params.items() if name != "rows"}

@@ -165,6 +165,7 @@ def _walk_parameters(
     keep=None,
     residual=None,
     attempts=None,
+    skip=True,
     **asked,
 ):
     """The parameters that name a walk: those of its packing, and how it goes.
@@ -173,7 +174,7 @@ def _walk_parameters(
     spaced states that are stored (measures always come from all). residual: in ⟨f_n⟩, at which
     sweeps alone (relax="gauss_seidel_only") end, by default EQUILIBRIUM. attempts: after so many
     per state the walk is kept with the states it has; by default too few states are an error.
-    asked: the conditions.
+    skip: whether nothing is relaxed where S is one point. asked: the conditions.
     """
     if relax not in RELAXATIONS:
         raise InputError(f"unknown relaxation {relax!r}: take one of {', '.join(RELAXATIONS)}")
@@ -195,6 +196,8 @@ def _walk_parameters(
         named["residual"] = positive(residual, "residual")
     if attempts is not None:
         named["attempts"] = whole(attempts, "attempts per state", 1)
+    if not skip:
+        named["skip"] = False
     return named
 
 
@@ -221,6 +224,7 @@ def _walk(store, parameters, *, workers, progress, watch=None, begun=None):
     if "attempts" in parameters:
         share = -(-parameters["states"] // parameters["chains"])
         options |= {"max_attempts": parameters["attempts"] * share, "whole": False}
+    options["skip"] = parameters.get("skip", True)
     if begun is not None:
         begun(S)
     begin = time.perf_counter()

@@ -52,14 +52,26 @@ def scan(path, cells, *, on_row=None, **options):
     return [rows[k] for k in sorted(rows)], [(cell.parameters, text) for cell, text in failed]
 
 
-def run(path, cells, *, workers=2, scheduler=None, dtypes=None, progress=None, on_done=None):
+def run(
+    path,
+    cells,
+    *,
+    workers=2,
+    scheduler=None,
+    dtypes=None,
+    progress=None,
+    on_done=None,
+    enough=None,
+):
     """Compute cells into the store at path, on one processor each; finished ones are found.
 
     workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
     the same folder, in place of processes. dtypes: as for Store.save, for the states.
     progress(cells done, cells in all) counts quarters of cells and never goes back;
-    on_done(position in cells, whether it was found) after each. Returns a list of (cell, error
-    message). Interrupted, it loses the cells under way only, and workers end with this process.
+    on_done(position in cells, whether it was found) after each. Once enough() is true no cell is
+    begun; those under way are finished (not asked with a scheduler, whose cells are all handed
+    over at once). Returns a list of (cell, error message). Interrupted, it loses the cells under
+    way only, and workers end with this process.
     Raises InputError where the scheduler cannot be reached.
     """
     store = open_store(path)
@@ -95,19 +107,19 @@ def run(path, cells, *, workers=2, scheduler=None, dtypes=None, progress=None, o
     if todo:
         tasks = {k: (str(store.path), cells[k], dtypes) for k in todo}
         if scheduler is None:
-            _over_processes(tasks, workers, finished, tell)
+            _over_processes(tasks, workers, finished, tell, enough or (lambda: False))
         else:
             _over_dask(tasks, scheduler, finished)
     return [(cells[k], failed[k]) for k in sorted(failed)]
 
 
-def _over_processes(tasks, workers, finished, advanced):
+def _over_processes(tasks, workers, finished, advanced, enough):
     warm_up({cell.kind for _, cell, _ in tasks.values()})
     count = len(tasks)
     for _ in range(TRIES):
         before = count - len(tasks)
-        tasks = _one_pool(tasks, workers, finished, advanced, before)
-        if not tasks:
+        tasks = _one_pool(tasks, workers, finished, advanced, before, enough)
+        if not tasks or enough():
             return
     for k in tasks:
         finished(k, _lost)
@@ -117,21 +129,31 @@ def _lost():
     raise InputError(f"worker processes died {TRIES} times at it, or at cells beside it")
 
 
-def _one_pool(tasks, workers, finished, advanced, before):
+def _one_pool(tasks, workers, finished, advanced, before, enough):
     """Run tasks over processes, `before` have ended; those that a dead worker left are returned."""
     context = multiprocessing.get_context("spawn")
     counter = context.Value("d", 0.0)
-    left = dict(tasks)
+    left, todo, waiting, broken = dict(tasks), list(tasks), {}, False
     workers = min(workers, len(tasks))
     pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
     try:
-        with _single_threaded():
-            waiting = {pool.submit(run_cell, *task): k for k, task in tasks.items()}
-        while waiting:
+        while True:
+            # One for each worker: what the pool was given it would begin.
+            while todo and len(waiting) < workers and not broken and not enough():
+                k = todo.pop(0)
+                with _single_threaded():
+                    try:
+                        waiting[pool.submit(run_cell, *tasks[k])] = k
+                    except BrokenProcessPool:
+                        broken = True
+            if not waiting:
+                break
             ended, _ = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
             for future in ended:
                 k = waiting.pop(future)
-                if not isinstance(future.exception(), BrokenProcessPool):
+                if isinstance(future.exception(), BrokenProcessPool):
+                    broken = True
+                else:
                     finished(k, future.result)
                     del left[k]
             advanced(before + counter.value)

@@ -246,6 +246,9 @@ VARIABLES |= {
     "row_reached_part": Variable(
         ("row",), "float64", "1", "states that the walk reached, of those wanted"
     ),
+    "row_skipped_part": Variable(
+        ("row",), "float64", "1", "states that are the one point that S is, of all"
+    ),
     "row_pair_spread": Variable(
         ("row",), "float64", "1", "standard deviation over mean of distances between pairs"
     ),
@@ -274,6 +277,9 @@ VARIABLES |= {
     "sample_extent": Variable(("sample",), "float64", _FORCE, "ΔF_n"),
     "shown_row": Variable(("shown",), "int64", "1", "row that the shown contact belongs to"),
     "shown_normal": Variable(("shown_state", "shown"), "float64", _FORCE, "f_n in some states"),
+    "shown_count": Variable(
+        ("shown", "ratio"), "int64", "1", "states of the walk by f_n over its original value"
+    ),
 }
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from packings import packed, two_disks
 
+from granforce import measures
 from granforce.explore import random_walk
 from granforce.explore.random_walk import init, judge, step, walk
 from granforce.forces.ensemble import ensemble
@@ -149,3 +150,19 @@ def test_an_original_outside_the_cones_is_replaced_by_the_nearest():
 def test_sizes_below_one_are_refused(S, sizes):
     with pytest.raises(InputError):
         walk(S, seed=0, **sizes)
+
+
+def test_sweeps_at_a_single_point_end_beside_it():
+    """Without the skip states are relaxed: as far from the one network as the residual allows."""
+    S = ensemble(packed(30, 0.0))
+    assert S.dimension == 0
+    skipped = walk(S, 8, 0)
+    assert skipped.counts["skipped"] == 8
+    options = {"relax": gauss_seidel, "rest": None, "tolerance": 1e-3, "skip": False}
+    swept = walk(S, 8, 0, **options)
+    assert (swept.counts["skipped"], swept.counts["accepted"]) == (0, 8)
+    assert swept.residual.max() <= 1e-3
+    assert measures.eta2(swept.states) > 1e-5
+    exact = walk(S, 8, 0, skip=False)
+    assert exact.counts["accepted"] == 8
+    np.testing.assert_allclose(exact.states, skipped.states, atol=1e-9 * S.force_scale)

@@ -14,7 +14,7 @@ from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.ensemble import ensemble
-from granforce.paper import claims, drawings, findings, tables
+from granforce.paper import claims, documents, drawings, tables
 from granforce.paper import plan as plans
 from granforce.records import InputError
 from granforce.study import kinds
@@ -180,7 +180,10 @@ def test_a_table_survives_its_store(done, tmp_path):
     assert found.skipped == table.skipped
     for name, values in table.samples.items():
         np.testing.assert_allclose(found.samples[name], values, rtol=1e-6, atol=1e-7)
-    assert [k for k, _ in found.shown] == [k for k, _ in table.shown]
+    for (one, counted), (other, counts) in zip(found.shown, table.shown, strict=True):
+        assert one == other
+        assert np.array_equal(counted, counts)
+        assert counts.sum(axis=1).max() == TINY.states  # all of them
     assert found.packings.keys() == table.packings.keys()
     for family in (claims.maximum, claims.correlation, claims.counts, claims.pairs):
         told = (family(each, "nearest") for each in (found, table))
@@ -225,10 +228,10 @@ def test_rows_that_a_store_lacks_come_from_the_older_table(done):
         for mu, group in joined.extents(part).items():
             for one, other in zip(group, new.extents(part)[mu], strict=True):
                 assert np.array_equal(one, other)
-    for k, normal in joined.shown:
-        assert joined.rows[k]["part"] in tables.SHOWN_PARTS
+    for k, counts in joined.shown:
+        assert joined.rows[k]["part"] in plans.SHOWN_PARTS
         assert k in joined.packings
-        assert normal.shape[1] == joined.rows[k]["contacts"]
+        assert len(counts) == joined.rows[k]["contacts"]
 
 
 def test_every_figure_of_the_table_is_made(done):
@@ -241,266 +244,6 @@ def test_every_figure_of_the_table_is_made(done):
     assert "Gauss–Seidel" in drawings.captions(table)["figure1"]
     for figure in made.values():
         assert figure(backend="bokeh") is not None
-
-
-def synthetic(eta, **options):
-    """A table of five packings at each of nine μ whose measures are given functions of μ."""
-    rng = np.random.default_rng(3)
-    rows, samples = [], {name: [] for name in tables.SAMPLES}
-    for mu in (0, 0.001, 0.003, 0.01, 0.05, 0.1, 0.3, 1, 10):
-        for seed in range(5):
-            noise = np.exp(0.05 * rng.normal())
-            row = {"part": SWEEPS, "n": 400, "mu": mu, "seed": seed, "dimension": 5.0}
-            row |= {"eta1": eta(mu) * noise, "eta2": 1.1 * eta(mu) * noise}
-            row |= {"eta3": eta(mu) * noise / 0.15, "coordination": 4 - 0.95 * mu / (mu + 0.1)}
-            row |= {"original_distance": 1.0, "mean_distance": 1.5, "contacts": 600.0}
-            row |= {"pair_spread": 0.1}
-            row["correlation"] = 0.5 * noise if mu < 1 else 0.02 * noise
-            row |= {name: f(mu) * noise for name, f in options.items() if name in row}
-            row["correlation_low"] = row["correlation"] - 0.1
-            row["correlation_high"] = row["correlation"] + 0.1
-            extent = options.get("extent", default_extent)(mu, rng)
-            normal = rng.permutation(np.r_[np.full(380, 3.0), np.full(420, 0.1)])
-            values = (len(rows), 0, options.get("normal", normal), 0, extent)
-            for name, value in zip(tables.SAMPLES, values, strict=True):
-                samples[name].append(np.broadcast_to(value, extent.shape))
-            rows.append(row)
-    for row in list(rows):
-        answer = {"part": "response", "n": 400, "mu": row["mu"], "seed": row["seed"]}
-        answer |= {"critical_force": 1 + eta(row["mu"]), "decay_exponent": 0.5 + eta(row["mu"])}
-        answer |= {name: f(row["mu"]) for name, f in options.items() if name in answer}
-        rows.append(answer | {"limit_load": 2 * answer["critical_force"]})
-    joined = {name: np.concatenate(parts) for name, parts in samples.items()}
-    return tables.Table({}, rows, joined, [], {}, {})
-
-
-SWEEPS = claims.SAMPLERS["gauss_seidel"]
-
-
-def default_extent(mu, rng):
-    """As the paper has it: exponential, with a peak and a fast tail, stretched; ⟨f_n⟩."""
-    width = rise_and_fall(mu) if mu else 1e-14
-    if mu <= 0.01:
-        return width * rng.exponential(1.0, 800)
-    if mu <= 0.3:
-        return 1.5 * rng.weibull(2.5, 800) * (1 + width)
-    return width * rng.weibull(0.6, 800)
-
-
-def rise_and_fall(mu):
-    return 0.2 * mu / (0.1 + mu) / (1 + mu / 0.1) * 4 if mu else 1e-14
-
-
-def verdicts(table, families=None, sampler="gauss_seidel"):
-    """{statement: verdict} of the claims about one sampler and those about packings."""
-    found = claims.judged(table)
-    if families is not None:
-        named = [family(table, sampler) for family in families]
-        found = [claim for family in named for claim in family]
-    return {c.statement: c.verdict for c in found if c.sampler in (sampler, "")}
-
-
-def test_what_the_paper_says_is_reproduced_by_what_it_describes():
-    found = verdicts(synthetic(rise_and_fall))
-    # Its packings all come from contact dynamics.
-    without = {"with only the pressure", "and not in", "with frozen", "linear programs", "N"}
-    for statement, verdict in found.items():
-        if verdict != claims.REPRODUCED:
-            assert verdict in (claims.MISSING, claims.FEW), statement
-            assert any(word in statement for word in without), statement
-    assert sum(verdict == claims.REPRODUCED for verdict in found.values()) >= 30
-
-
-@pytest.mark.parametrize(
-    ("family", "statement", "options"),
-    [
-        (
-            claims.agreement,
-            "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: value of η1/η3",
-            {"eta3": lambda mu: 40 * rise_and_fall(mu)},
-        ),
-        (
-            claims.agreement,
-            "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: η2/η1 is constant",
-            {"eta1": lambda mu: rise_and_fall(mu) * (1 + 4 * mu)},
-        ),
-        (claims.maximum, "η2(μ) is not monotonic: largest near μ = 0.1", {"eta2": lambda mu: mu}),
-        (
-            claims.small_friction,
-            "η ∝ μ at small μ: packings made by contact dynamics",
-            {"eta2": lambda mu: mu**2},
-        ),
-        (
-            claims.counts,
-            "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about as many contacts (μ = 0.1)",
-            {"normal": np.r_[np.full(20, 3.0), np.full(780, 1.0)]},
-        ),
-        (
-            claims.pairs,
-            "distances between pairs of states are sharply peaked",
-            {"pair_spread": lambda mu: 0.5},
-        ),
-        (
-            claims.extents,
-            "ΔF_n is not monotonic: largest at intermediate μ",
-            {"extent": lambda mu, r: mu * r.exponential(1.0, 800)},
-        ),
-        (
-            claims.extents,
-            "P(ΔF_n) is broadest at intermediate μ",
-            {"extent": lambda mu, r: mu * r.exponential(1.0, 800)},
-        ),
-        (
-            claims.correlation,
-            "corr(f_n, ΔF_n) vanishes at large μ, against chance",
-            {"correlation": lambda mu: 0.19},
-        ),
-        (
-            claims.correlation,
-            "the paper's error bar of corr(f_n, ΔF_n) holds 0 at large μ",
-            {"correlation": lambda mu: 0.5},
-        ),
-        (
-            claims.response,
-            "F_crit is similar at equal η on both sides of the maximum",
-            {"critical_force": lambda mu: 3 if mu > 0.1 else 1 + rise_and_fall(mu)},
-        ),
-        (
-            claims.small_friction,
-            "η vanishes at μ = 0 within the solver's accuracy",
-            {"eta2": lambda mu: 0.01 + mu},
-        ),
-        (claims.coordination, "z → 3 at the largest μ", {"coordination": lambda mu: 3.5}),
-        (claims.coordination, "z falls with μ", {"coordination": lambda mu: 3 + mu}),
-        (
-            claims.extents,
-            "P(ΔF_n) at small μ falls monotonically",
-            {"extent": lambda mu, r: 2 * r.weibull(3, 800)},
-        ),
-        (
-            claims.extents,
-            "P(ΔF_n) at intermediate μ has a peak",
-            {"extent": lambda mu, r: r.weibull(0.9, 800)},
-        ),
-        (
-            claims.extents,
-            "tail of P(ΔF_n) at small μ: exponential",
-            {"extent": lambda mu, r: r.weibull(2, 800)},
-        ),
-        (
-            claims.correlation,
-            "corr(f_n, ΔF_n) vanishes at large μ",
-            {"correlation": lambda mu: 0.5},
-        ),
-        (
-            claims.correlation,
-            "corr(f_n, ΔF_n) is significant at intermediate μ",
-            {"correlation": lambda mu: -0.2},
-        ),
-        (
-            claims.response,
-            "F_crit rises with η",
-            {"critical_force": lambda mu: 2 - rise_and_fall(mu)},
-        ),
-        (claims.perturbation, "α is largest near μ = 0.1", {"decay_exponent": lambda mu: 1 + mu}),
-        (
-            claims.centre,
-            "the original network lies closer to the centre than sampled states",
-            {"original_distance": lambda mu: 2.0},
-        ),
-    ],
-)
-def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options):
-    found = verdicts(synthetic(rise_and_fall, **options), [family])
-    assert found[statement] == claims.FAILED
-
-
-def test_findings_compare_the_same_packings():
-    table = synthetic(rise_and_fall)
-    for part, eta3, eta2 in (("walk", 1, 1), ("exact", 2, np.nan), ("uniform", 1, 0.5)):
-        for row in table.part(SWEEPS):
-            copied = row | {"part": part, "eta3": eta3 * row["eta3"], "eta2": eta2 * row["eta2"]}
-            table.rows.append(copied | {"walk_ratio": 1.5, "original_ratio": 0.5})
-    told = {finding.statement: finding for finding in findings.found(table)}
-    for word in ("small", "intermediate", "large"):
-        ratio = told[f"η3 of the walk's states over exact η3, {word} μ"]
-        assert (ratio.value, ratio.low, ratio.high) == pytest.approx((0.5, 0.5, 0.5))
-        assert told[f"η2 of the walk over η2 of S, {word} μ"].value == pytest.approx(2)
-        assert told[f"η2 of gauss_seidel over η2 of nearest, {word} μ"].value == pytest.approx(1)
-    assert told["μ where exact η3 is largest"].value == pytest.approx(0.1, rel=0.3)
-    slope = told["slope of log exact η3 against log μ, μ = 0.001 … 0.01"]
-    assert slope.low < slope.value < slope.high
-    assert slope.value == pytest.approx(0.95, abs=0.1)  # the function given, not quite ∝ μ
-    assert told["⟨F_crit⟩ over ⟨limit load⟩, large μ"].value == pytest.approx(0.5)
-    # The pair's share of the pressure: one contact of 600.
-    left_out = told[
-        "⟨F_crit⟩ with the pair left out of the pressure over the same with it, large μ"
-    ]
-    assert 1 < left_out.value < 1.01
-    table.rows[:] = table.part(SWEEPS)
-    for values in table.samples.values():
-        values.resize(0, refcheck=False)
-    assert not [f for f in findings.found(table) if "sweeps_1e" not in f.statement]
-
-
-def test_the_range_of_the_maximum_is_not_biased_by_where_the_grid_lies():
-    """A parabola in log μ is found where it is, between grid points and with uneven neighbours."""
-    frictions = [0.01, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 1]
-    for top in (0.08, 0.12, 0.18):
-        heights = [[np.exp(-(np.log(mu / top) ** 2))] for mu in frictions]
-        assert claims.peak(frictions)(*heights) == pytest.approx(top, rel=1e-6)
-
-
-def test_the_maximum_is_found_beside_packings_without_indeterminacy():
-    assert 0.1 < claims.peak([0.1, 1, 10])([0.2], [0.3], [-1e-17]) < 1
-    assert claims.peak([0.01, 0.1, 10])([0.0], [0.0], [0.2]) == 10
-
-
-def test_a_distribution_has_a_dip_where_its_first_bin_is_low():
-    even = np.linspace(0, 1, 1001)[:-1]
-    assert claims.dip([even]) == pytest.approx(0, abs=0.01)
-    assert claims.dip([even, 0.3 + even / 10]) == pytest.approx(1 - 0.25 / (0.25 + 0.95), abs=0.05)
-
-
-def test_a_wide_interval_decides_nothing():
-    table = synthetic(rise_and_fall)
-    for row in table.rows:
-        row["correlation"] = 0.9 if row["seed"] == 0 and row["mu"] == 0.3 else 0.11
-        if row["mu"] >= 1:
-            row["correlation"] = 0.5 * (-1) ** row["seed"] - 0.1
-    found = verdicts(table, [claims.correlation])
-    assert found["corr(f_n, ΔF_n) vanishes at large μ"] == claims.UNDECIDED
-
-
-def test_few_disks_decide_nothing():
-    table = synthetic(rise_and_fall)
-    for row in table.rows:
-        row["n"] = 40
-    families = [claims.agreement, claims.maximum, claims.correlation, claims.counts, claims.pairs]
-    assert set(verdicts(table, families).values()) == {claims.FEW}
-
-
-def test_a_walk_that_reached_few_states_is_not_judged():
-    table = synthetic(rise_and_fall)
-    for row in table.part(SWEEPS):
-        row["reached_part"] = 0.1 if row["mu"] == 10 else 1.0
-    assert 10 not in claims.items(claims.drawn(table, "gauss_seidel"), "eta2")
-    assert 10 not in claims.sampled(table, "gauss_seidel")
-
-
-def test_every_claim_names_its_sampler_and_its_source():
-    table = synthetic(rise_and_fall)
-    table.rows[:] = [row for row in table.rows if row["mu"] < 0.01]
-    for values in table.samples.values():
-        values.resize(0, refcheck=False)
-    for claim in claims.judged(table):
-        assert claim.sampler in {"", *claims.SAMPLERS}
-        assert claim.source in {claims.PRE, claims.PRL, claims.OURS}
-
-
-def test_without_data_there_is_no_verdict():
-    empty = tables.Table({}, [], {name: np.zeros(0) for name in tables.SAMPLES}, [], {}, {})
-    assert set(verdicts(empty).values()) == {claims.MISSING}
 
 
 def linked(done, folder):
@@ -536,9 +279,55 @@ def test_the_command_draws(done, tmp_path):
     assert {"figure1.html", "figure1.png", "figure1.svg", "distances.png"} <= names
 
 
+def test_a_study_tells_what_is_left_and_ends_in_time(done, tmp_path, capsys):
+    folder = linked(done, tmp_path / "out")
+    assert main([*WORDS, "--out", folder, "--status", "--json"]) == 0
+    rows = {row["part"]: row for row in json.loads(capsys.readouterr().out)}
+    assert all(row["cells"] == row["done"] > 0 for row in rows.values())
+    assert {row["minutes left"] for row in rows.values()} == {0.0}
+    # A larger study: the time of what is left is that of what is done.
+    more = [*WORDS[:6], "4", *WORDS[7:]]
+    assert main([*more, "--out", folder, "--status", "--json", "--parts", "walk"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert (row["cells"], row["done"]) == (12, 6)
+    assert row["minutes left"] == pytest.approx(row["minutes"], abs=0.2)
+    # No time: nothing is begun, and what is missing is told.
+    late = ["study", "--quick", "--parts", "walk", "--minutes", "1e-9", "--workers", "1"]
+    assert main([*late, "--out", str(tmp_path / "late"), "--formats", ""]) == 2
+    assert "holds nothing of this study" in capsys.readouterr().err
+    assert not list((tmp_path / "late" / "cells.zarr").glob("walk-*"))
+
+
+def test_tables_in_documents_are_renewed(done, tmp_path):
+    table = tables.reduce(done / "cells.zarr", TINY)
+    told = [claim._asdict() for claim in claims.judged(table)]
+    page = tmp_path / "page.md"
+    blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
+    page.write_text("before\n" + blocks.format("measures") + blocks.format("claims") + "after\n")
+    (path,) = documents.named(str(page))
+    documents.renew([path], table, told)
+    text = page.read_text()
+    assert text.startswith("before\n<!-- study: measures -->\n| μ | z |")
+    assert text.endswith("<!-- end -->\nafter\n")
+    assert "\nold\n" not in text
+    walk = np.mean([row["eta2"] for row in table.part("walk") if row["mu"] == 0.3])
+    (line,) = [line for line in text.splitlines() if line.startswith("| 0.3 | ")]
+    assert f"{walk:.3f}" in line
+    for claim in told:
+        assert claim["statement"] in text
+    documents.renew([path], table, told)
+    assert page.read_text() == text
+    page.write_text(blocks.format("everything"))
+    with pytest.raises(InputError, match="no table 'everything'"):
+        documents.renew([path], table, told)
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (["--minutes", "0"], "--minutes"),
+        (["--status"], "no store"),
+        (["--documents", "nowhere.md"], "--documents"),
         (["--mu", "0.1;1"], "--mu"),
         (["--packings", "0"], "packings must be at least 1"),
         (["--parts", "everything"], "unknown part"),

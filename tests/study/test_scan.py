@@ -134,7 +134,7 @@ def test_progress_of_cells_never_goes_back(tmp_path, monkeypatch):
     """However late the end of a cell is seen, and however often cells are begun anew."""
     told = []
 
-    def pool(tasks, workers, finished, advanced, before):
+    def pool(tasks, workers, finished, advanced, before, enough):
         advanced(before + 1.26)  # the first cell has ended, the second is under way
         finished(next(iter(tasks)), lambda: False)
         advanced(before + 1.9)

@@ -1,0 +1,80 @@
+"""The paper's claims, judged by the reduced study: for each way to draw states of S on its own.
+
+Every claim has a number, its 95 % confidence interval over packings, and two ranges: what the
+claim's words are taken to mean, and a wider one. It is "reproduced" where the whole interval lies
+in the first, "differs" where all of it lies outside of that, "not reproduced" where all of it lies
+outside of the wider one, too, and "undecided" where it lies across an end of the first range, or
+where another draw of the bootstrap or one μ less would tell otherwise (`verdicts`). What is claimed
+of a range of μ is judged at each μ of it, so that no mean hides a change of sign. Claims about the
+shape of P(ΔF_n) use no bins.
+
+Samplers: "gauss_seidel", the paper's relaxation, whose sweeps end at 10⁻³ of ⟨f_n⟩ here, which they
+reach at every μ; "gauss_seidel_1e-4", the same to 10⁻⁴; "nearest" networks; "uniform" states; and
+"exact" bounds. Claims about packings alone have none. Sources: "PRE", the paper; "PRL", the letter
+before it; "ours".
+
+The modules are named for the paper's figures that the claims belong to.
+"""
+
+from granforce.paper.claims.figure1 import (
+    agreement,
+    coordination,
+    maximum,
+    measure,
+    size,
+    small_friction,
+    vanishing,
+)
+from granforce.paper.claims.figure2 import perturbation, response
+from granforce.paper.claims.figure3 import centre, pairs
+from granforce.paper.claims.figure4 import elongation, shape, tails, widths
+from granforce.paper.claims.figure5 import counts, enrichment, frozen, place
+from granforce.paper.claims.figure6 import correlation, error_bars
+from granforce.paper.claims.groups import SAMPLERS
+from granforce.paper.claims.verdicts import FEW, MISSING
+
+BY_STATES = ("gauss_seidel", "gauss_seidel_1e-4", "nearest", "uniform")  # have η1 and η2
+BY_WALKS = ("gauss_seidel", "gauss_seidel_1e-4", "nearest")
+
+# The families, and the samplers that each takes: none for claims about packings alone.
+FAMILIES = {
+    agreement: BY_STATES,
+    maximum: tuple(SAMPLERS),
+    small_friction: tuple(SAMPLERS),
+    vanishing: tuple(SAMPLERS),
+    measure: BY_STATES,
+    coordination: (),
+    shape: tuple(SAMPLERS),
+    tails: tuple(SAMPLERS),
+    widths: tuple(SAMPLERS),
+    elongation: tuple(SAMPLERS),
+    correlation: tuple(SAMPLERS),
+    error_bars: BY_WALKS,
+    counts: tuple(SAMPLERS),
+    enrichment: tuple(SAMPLERS),
+    pairs: BY_STATES,
+    centre: BY_STATES,
+    place: ("exact",),
+    frozen: ("exact",),
+    size: ("gauss_seidel", "nearest", "exact"),
+    perturbation: (),
+    response: tuple(SAMPLERS),
+}
+
+
+def judged(table):
+    """All claims about a `tables.Table`, the paper's sampler first; those without data say so.
+
+    Samplers of which the table has no row are left out, except the paper's.
+    """
+    known = [name for name, part in SAMPLERS.items() if table.part(part)]
+    samplers = ["gauss_seidel", *(name for name in known if name != "gauss_seidel")]
+    found = []
+    for family, takes in FAMILIES.items():
+        for sampler in samplers if takes else [""]:
+            if takes and sampler not in takes:
+                continue
+            for claim in family(table, sampler):
+                lacking = claim.verdict == MISSING and table.rows and sampler in ("", *known)
+                found.append(claim._replace(verdict=FEW) if lacking else claim)
+    return found

@@ -1,0 +1,191 @@
+"""Claims about η1, η2 and η3 against μ (Figure 1), about z, and about the number of disks."""
+
+import numpy as np
+
+from granforce import statistics
+from granforce.paper.claims.groups import (
+    LEAST_DYNAMIC,
+    SMALL,
+    drawn,
+    dynamic,
+    items,
+    positive_friction,
+)
+from granforce.paper.claims.verdicts import (
+    NEAR_PEAK,
+    PRE,
+    PRL,
+    UNMEASURED,
+    at_each,
+    over_all,
+    peak,
+    slope,
+)
+
+PEAK = f"μ of the maximum (parabola in log μ through what lies within a factor {NEAR_PEAK:g} of it)"
+_MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
+
+
+def agreement(table, sampler):
+    """η1 ≈ η2 ≈ 0.15 η3 over all μ, up to a constant factor."""
+    rows = dynamic(drawn(table, sampler))
+    for above, below, word, good, fair in (
+        ("eta2", "eta1", "η2/η1", (1 / 1.5, 1.5), (0.5, 2)),
+        ("eta1", "eta3", "η1/η3", (0.12, 0.18), (0.1, 0.225)),
+        ("eta2", "eta3", "η2/η3", (0.12, 0.18), (0.1, 0.225)),
+    ):
+        groups = items(
+            rows, lambda r, a=above, b=below: np.log(r[a] / r[b]), positive=(above, below)
+        )
+        told = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
+        yield over_all(
+            f"{told}: {word} is constant",
+            sampler,
+            PRE,
+            f"largest {word} over the smallest, μ ≥ {LEAST_DYNAMIC:g}",
+            lambda _, logs: np.exp(np.ptp(logs)),
+            groups,
+            good=(1, 1.5),
+            fair=(1, 2),
+            least=3,
+        )
+        yield over_all(
+            f"{told}: value of {word}",
+            sampler,
+            PRE,
+            f"geometric mean of {word} over μ ≥ {LEAST_DYNAMIC:g}",
+            lambda _, logs: np.exp(np.mean(logs)),
+            groups,
+            good=good,
+            fair=fair,
+        )
+
+
+def peaked(claim, sampler, groups, what=PEAK, good=(0.05, 0.2), fair=(0.02, 0.5)):
+    """A claim of the paper that what is grouped by μ is largest near 0.1."""
+    return over_all(claim, sampler, PRE, what, peak, groups, good=good, fair=fair, least=3)
+
+
+def maximum(table, sampler):
+    """η(μ) is largest near μ = 0.1."""
+    rows = drawn(table, sampler)
+    names = (("eta3", "η3"),) if sampler == "exact" else _MEASURES
+    for name, label in names:
+        groups = positive_friction(items(rows, name, positive=(name,)))
+        rises_and_falls = {"good": (0.02, 0.5), "fair": (0.005, 2)}
+        yield peaked(f"{label}(μ) is not monotonic", sampler, groups, **rises_and_falls)
+        yield peaked(f"{label}(μ) is largest near μ = 0.1", sampler, groups)
+
+
+def _measure_of(sampler):
+    return ("eta3", "η3") if sampler == "exact" else ("eta2", "η2")
+
+
+def small_friction(table, sampler):
+    """η ∝ μ at small μ."""
+    name, label = _measure_of(sampler)
+    groups = positive_friction(items(drawn(table, sampler), name, positive=(name,)))
+    for low, high, word in (
+        (LEAST_DYNAMIC, SMALL[1], "packings made by contact dynamics"),
+        (0, LEAST_DYNAMIC / 10, "packings finished by linear programs"),
+        (0, SMALL[1], "all packings"),
+    ):
+        few = {mu: groups[mu] for mu in groups if low <= mu <= high}
+        span = f", μ = {min(few):g} … {max(few):g}" if few else ""
+        yield over_all(
+            f"η ∝ μ at small μ: {word}",
+            sampler,
+            PRL,
+            f"slope of log {label} against log μ{span}",
+            slope,
+            few,
+            good=(0.9, 1.1),
+            fair=(0.7, 1.3),
+        )
+
+
+def vanishing(table, sampler):
+    """η vanishes at μ = 0, where S is one point: as measured, not as it must be."""
+    name, label = _measure_of(sampler)
+    at_rest = [row for row in drawn(table, sampler) if row["mu"] == 0]
+    measured = [row for row in at_rest if sampler == "exact" or not skipped(row)]
+    claim = at_each(
+        "η vanishes at μ = 0 within 10⁻⁷",
+        sampler,
+        PRL,
+        f"mean {label} at μ = 0",
+        items(measured, lambda row: abs(row[name])),
+        good=(-np.inf, 1e-7),
+    )
+    if at_rest and not measured:
+        why = "S is one point there: no state was relaxed or drawn"
+        return [claim._replace(verdict=UNMEASURED, why=why)]
+    return [claim]
+
+
+def skipped(row):
+    """Whether a row's states are the one point that S is, without any relaxation."""
+    return row.get("skipped_part", float(row["dimension"] == 0)) > 0
+
+
+def measure(table, sampler):
+    """η3, from largest and smallest forces, does not depend on how states are drawn."""
+    exact = {(row["mu"], row["seed"]): row.get("eta3", 0) for row in table.part("exact")}
+    rows = [
+        row | {"part_seen": row["eta3"] / exact[row["mu"], row["seed"]]}
+        for row in dynamic(drawn(table, sampler))
+        if row.get("eta3", 0) > 0 and exact.get((row["mu"], row["seed"]), 0) > 0
+    ]
+    yield at_each(
+        "η3 does not depend on how states are drawn",
+        sampler,
+        PRE,
+        f"η3 over exact η3 of the same packing, μ ≥ {LEAST_DYNAMIC:g}",
+        items(rows, "part_seen"),
+        good=(0.9, 1.1),
+        fair=(0.75, 1.25),
+    )
+
+
+def coordination(table, sampler):
+    """z falls from 4 towards 3."""
+    rows = table.part("walk") or drawn(table, "gauss_seidel")
+    groups = items(rows, "coordination")
+    ends = ({mu: groups[mu]} for mu in (min(groups), max(groups))) if groups else ({}, {})
+    for group, word, limit, good in zip(
+        ends, ("smallest", "largest"), (4, 3), ((3.9, 4.0), (3.0, 3.1)), strict=True
+    ):
+        told = f"z → {limit} at the {word} μ"
+        yield at_each(told, sampler, PRE, "mean z there", group, good=good)
+    yield over_all(
+        "z falls with μ",
+        sampler,
+        PRE,
+        "rank correlation of mean z with μ",
+        statistics.rank_correlation,
+        groups,
+        good=(-1, -0.95),
+        fair=(-1, -0.8),
+        least=3,
+    )
+
+
+def size(table, sampler):
+    """η hardly depends on N."""
+    name, label = _measure_of(sampler)
+    part = {"exact": "size_exact", "nearest": "size", "gauss_seidel": "size_sweeps"}[sampler]
+    everywhere = table.part(part) + drawn(table, sampler)
+    for mu in sorted({row["mu"] for row in table.part(part)}) or (0.1, 1):
+        rows = [row for row in everywhere if row["mu"] == mu and table.part(part)]
+        groups = items(rows, name, by="n", positive=(name,))
+        span = f", N = {min(groups)} … {max(groups)}" if groups else ""
+        yield over_all(
+            f"η hardly depends on N (μ = {mu:g})",
+            sampler,
+            PRE,
+            f"slope of log {label} against log N{span}",
+            slope,
+            groups,
+            good=(-0.1, 0.1),
+            fair=(-0.3, 0.3),
+        )

@@ -1,0 +1,64 @@
+"""Claims about the response to a local force, against η (Figure 2)."""
+
+import numpy as np
+
+from granforce import statistics
+from granforce.paper.claims.figure1 import peaked
+from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
+from granforce.paper.claims.verdicts import PRE, over_all
+
+_ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
+
+
+def perturbation(table, sampler):
+    """F_crit and α are largest near μ = 0.1."""
+    for name, label in _ANSWERS:
+        groups = positive_friction(items(table.responses(), name))
+        yield peaked(f"{label} is largest near μ = 0.1", sampler, groups)
+
+
+def response(table, sampler):
+    """F_crit and α rise with η, and are similar where η is."""
+    eta, word = ("eta3", "exact η3") if sampler == "exact" else ("eta2", "η2")
+    rows = table.answers(SAMPLERS[sampler], eta)
+    for name, label in _ANSWERS:
+        groups = items(rows, lambda r, name=name: (r[eta], r.get(name, np.nan)), positive=(eta,))
+        groups = positive_friction(groups)
+        yield over_all(
+            f"{label} rises with η",
+            sampler,
+            PRE,
+            f"rank correlation of mean {label} with mean {word} over μ > 0",
+            lambda _, means: statistics.rank_correlation(*means.T),
+            groups,
+            good=(0.7, 1),
+            fair=(0.3, 1),
+            least=3,
+        )
+        yield over_all(
+            f"{label} is similar at equal η on both sides of the maximum",
+            sampler,
+            PRE,
+            f"{label} beyond the maximum of {word}(μ) over that below it at the same {word}, "
+            "mean of the ratios",
+            lambda _, means: branches(means),
+            groups,
+            good=(0.8, 1.25),
+            fair=(1 / 1.5, 1.5),
+            least=3,
+        )
+
+
+def branches(means):
+    """Ratio of answers at equal η beyond and below the maximum of η(μ): means (k, 2) of both.
+
+    NaN where no η beyond the maximum is reached below it.
+    """
+    eta, answer = means.T
+    top = int(np.argmax(eta))
+    order = np.argsort(eta[: top + 1])
+    below, known = eta[: top + 1][order], answer[: top + 1][order]
+    beyond = [k for k in range(top + 1, len(eta)) if below[0] <= eta[k] <= below[-1]]
+    if not beyond:
+        return np.nan
+    return np.mean([answer[k] / np.interp(eta[k], below, known) for k in beyond])

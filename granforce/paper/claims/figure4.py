@@ -1,0 +1,122 @@
+"""Claims about the distribution P(ΔF_n) (Figure 4): its shape, its tail, its width."""
+
+import numpy as np
+
+from granforce import statistics
+from granforce.paper.claims.figure1 import PEAK, peaked
+from granforce.paper.claims.groups import (
+    LARGE,
+    MIDDLE,
+    SMALL,
+    each,
+    positive_friction,
+    sampled,
+    told,
+    within,
+)
+from granforce.paper.claims.verdicts import PRE, at_each, over_all
+
+# Of `statistics.departure`: 0.05 is that of a Weibull distribution with exponent 1.5.
+FLAT, RAISED = 0.05, 0.1
+TAILS = ((0.5, "median"), (0.75, "upper quartile"), (0.9, "upper decile"))
+
+
+def shape(table, sampler):
+    """P(ΔF_n) falls monotonically at small and large μ and has a peak between."""
+    everywhere = sampled(table, sampler)
+    scaled = each(everywhere, lambda values: values / values.mean())
+    for groups, unit in ((everywhere, "⟨f_n⟩"), (scaled, "each packing's own ⟨ΔF_n⟩")):
+        for word, span, has_peak in (
+            ("small", SMALL, False),
+            ("intermediate", MIDDLE, True),
+            ("large", LARGE, False),
+        ):
+            yield at_each(
+                f"P(ΔF_n) at {word} μ {'has a peak' if has_peak else 'falls monotonically'}, "
+                f"in {unit}",
+                sampler,
+                PRE,
+                "part of the contacts that lie too far right for a density that never rises "
+                "(departure; 0 where chance makes as much)",
+                within(groups, span),
+                good=(RAISED, np.inf) if has_peak else (-np.inf, FLAT),
+                fair=(FLAT, np.inf) if has_peak else (-np.inf, RAISED),
+                interval=departure,
+            )
+
+
+def departure(values, level):
+    """Departure of the values of all packings from a falling density, with its interval.
+
+    The interval reaches down to 0 where chance makes as much of as many values.
+    """
+    value, low, high = statistics.jackknife(
+        lambda groups: statistics.departure(np.concatenate(groups)), values, level
+    )
+    if value <= statistics.chance_departure(statistics.effective_number(values), level):
+        low = min(low, 0.0)
+    return value, max(low, 0.0), high
+
+
+def tails(table, sampler):
+    """How the tail of P(ΔF_n) falls at each μ, beyond several quantiles."""
+    everywhere = sampled(table, sampler)
+    for quantile, beyond in TAILS:
+        for word, span, how, good, fair in (
+            ("small", SMALL, "exponential", (0.85, 1.15), (0.7, 1.3)),
+            ("intermediate", MIDDLE, "falls faster than exponentially", (1, np.inf), None),
+            ("large", LARGE, "falls slower than exponentially", (-np.inf, 1), None),
+        ):
+            yield at_each(
+                f"tail of P(ΔF_n) at {word} μ, beyond the {beyond}: {how}",
+                sampler,
+                PRE,
+                f"b of exp(−(λ ΔF_n)^b) beyond the {beyond}",
+                within(everywhere, span),
+                good=good,
+                fair=fair,
+                interval=_exponents(quantile),
+            )
+
+
+def _exponents(quantile):
+    """The exponent b beyond a quantile with its interval, that of log b."""
+
+    def log_exponent(groups):
+        return np.log(statistics.tail_exponent(np.concatenate(groups), quantile))
+
+    return lambda values, level: np.exp(statistics.jackknife(log_exponent, values, level))
+
+
+def widths(table, sampler):
+    """ΔF_n and the width of its distribution are largest at intermediate μ."""
+    everywhere = positive_friction(sampled(table, sampler))
+    for measure, statement, what in (
+        (np.mean, "ΔF_n is not monotonic: largest at intermediate μ", "⟨ΔF_n⟩/⟨f_n⟩"),
+        (np.std, "P(ΔF_n) is broadest at intermediate μ", "the standard deviation of ΔF_n/⟨f_n⟩"),
+    ):
+        groups = each(everywhere, measure)
+        yield peaked(statement, sampler, groups, f"{PEAK}, of {what}", good=(0.05, 0.3))
+
+
+def elongation(table, sampler):
+    """S is elongated at small and at large μ: some of its extents are much larger than others."""
+    ratio = each(sampled(table, sampler), lambda values: values.std() / values.mean())
+    middle = within(ratio, MIDDLE)
+    for word, span in (("small", SMALL), ("large", LARGE)):
+        groups = middle | within(ratio, span)
+        yield over_all(
+            f"S is more elongated at {word} than at intermediate μ",
+            sampler,
+            PRE,
+            f"mean std/mean of ΔF_n of μ in {told(span)} over that in {told(MIDDLE)}",
+            lambda keys, means, span=span: _over_middle(keys, means, span),
+            dict(sorted(groups.items())),
+            good=(1, np.inf),
+        )
+
+
+def _over_middle(keys, means, span):
+    """The mean of a range of μ over that of the intermediate ones; NaN where one is empty."""
+    outer, inner = ((keys >= low) & (keys <= high) for low, high in (span, MIDDLE))
+    return means[outer].mean() / means[inner].mean() if outer.any() and inner.any() else np.nan

@@ -1,0 +1,128 @@
+"""Claims about where the strong and the undetermined contacts are (Figure 5)."""
+
+import numpy as np
+
+from granforce.paper.claims.groups import (
+    BARELY_RIGID,
+    MIDDLE,
+    SAMPLERS,
+    enough,
+    items,
+    told,
+    within,
+)
+from granforce.paper.claims.verdicts import PRE, PRL, at_each
+
+
+def _marked(table, sampler, measure):
+    """{μ: [(disks, measure(strong, loose))]}, masks (N_c,) of f_n > 2⟨f_n⟩, ΔF_n > ⟨ΔF_n⟩."""
+    found = {}
+    for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
+        if enough(row) and row["mu"] > 0 and len(extent):
+            value = measure(normal > 2 * normal.mean(), extent > extent.mean())
+            if np.isfinite(value):
+                found.setdefault(row["mu"], []).append((row["n"], value))
+    return dict(sorted(found.items()))
+
+
+def counts(table, sampler):
+    """As many strong forces as large extents at μ = 0.1."""
+    groups = _marked(
+        table,
+        sampler,
+        lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan,
+    )
+    yield at_each(
+        "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about as many contacts (μ = 0.1)",
+        sampler,
+        PRE,
+        "number of the first over that of the second",
+        within(groups, (0.1, 0.1)),
+        good=(0.8, 1.25),
+        fair=(0.5, 2),
+    )
+
+
+def enrichment(table, sampler):
+    """Strong contacts are less determined than others at intermediate μ."""
+    groups = _marked(
+        table,
+        sampler,
+        lambda strong, loose: (
+            loose[strong].mean() / loose.mean() if strong.any() and loose.any() else np.nan
+        ),
+    )
+    yield at_each(
+        "strong contacts are less determined at intermediate μ",
+        sampler,
+        PRE,
+        "part with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
+        f"μ in {told(MIDDLE)}",
+        within(groups, MIDDLE),
+        good=(1, np.inf),
+    )
+
+
+def place(table, sampler):
+    """Indeterminacy is everywhere in a periodic packing."""
+    rows = [row for row in table.part("exact") if row["mu"] > 0 and row.get("contacts")]
+    yield at_each(
+        "with only the pressure prescribed, indeterminacy is everywhere",
+        sampler,
+        PRE,
+        "undetermined part of the contacts that carry",
+        items(rows, "undetermined_part"),
+        good=(0.9, np.inf),
+        fair=(0.5, np.inf),
+    )
+    yield at_each(
+        "and not in clusters",
+        sampler,
+        PRE,
+        "number of clusters of undetermined contacts",
+        items([row for row in rows if row["undetermined"]], "clusters"),
+        good=(-np.inf, 1.1),
+        fair=(-np.inf, 2),
+    )
+
+
+def frozen(table, sampler):
+    """Inside a frozen boundary indeterminacy is everywhere at small μ, in clusters at large μ."""
+    for part in ("frozen", "frozen_large"):
+        rows = [row for row in table.part(part) if row.get("contacts")]
+        word = f"N = {rows[0]['n']}" if rows else "N = 400" if part == "frozen" else "N = 1600"
+        for claim, measured, what, span, good, fair in (
+            (
+                "at small μ contacts are undetermined everywhere",
+                "undetermined part of the contacts inside",
+                "undetermined_part",
+                (0, 0.05),
+                (0.75, np.inf),
+                (0.5, np.inf),
+            ),
+            (
+                "at large μ most contacts are determined",
+                "determined part of the contacts inside",
+                lambda row: 1 - row["undetermined_part"],
+                (BARELY_RIGID, np.inf),
+                (0.5, np.inf),
+                (0.25, np.inf),
+            ),
+            (
+                "at large μ those that are not lie in small clusters",
+                "part of the contacts inside that are in the largest cluster",
+                lambda row: row["largest_cluster"] / row["contacts"],
+                (BARELY_RIGID, np.inf),
+                (-np.inf, 0.25),
+                (-np.inf, 0.5),
+            ),
+        ):
+            yield at_each(
+                f"with frozen boundary forces, {claim} ({word})",
+                sampler,
+                PRL,
+                f"{measured}, μ in {told(span)}",
+                within(items(rows, what), span),
+                good=good,
+                fair=fair,
+            )

@@ -1,0 +1,78 @@
+"""Claims about the correlation of a contact's force with its extent (Figure 6)."""
+
+import numpy as np
+
+from granforce.paper.claims.groups import LARGE, MIDDLE, SMALL, drawn, items, told, within
+from granforce.paper.claims.verdicts import PRE, at_each, over_all
+
+
+def correlation(table, sampler):
+    """corr(f_n, ΔF_n): significant at intermediate μ, weaker at small, vanishing at large μ."""
+    rows = [row for row in drawn(table, sampler) if row["mu"] > 0]
+    everywhere = items(rows, "correlation")
+    scores = items(
+        [row for row in rows if "correlation" in row],
+        lambda row: row["correlation"] * np.sqrt(row["contacts"] - 1),
+    )
+    strong, none = ((0.1, np.inf), (0, np.inf)), ((-0.1, 0.1), (-0.2, 0.2))
+    sure, chance = ((3, np.inf), (2, np.inf)), ((-2, 2), (-3, 3))
+    for word, span, (good, fair), (limits, wider) in (
+        ("is significant at intermediate", MIDDLE, strong, sure),
+        ("vanishes at large", LARGE, none, chance),
+    ):
+        yield at_each(
+            f"corr(f_n, ΔF_n) {word} μ",
+            sampler,
+            PRE,
+            f"mean over packings, μ in {told(span)}",
+            within(everywhere, span),
+            good=good,
+            fair=fair,
+        )
+        yield at_each(
+            f"corr(f_n, ΔF_n) {word} μ, against chance",
+            sampler,
+            PRE,
+            "the same in standard deviations 1/√(N_c − 1) of a packing whose f_n are shuffled",
+            within(scores, span),
+            good=limits,
+            fair=wider,
+        )
+    for word, span in (("small", SMALL), ("large", LARGE)):
+        yield over_all(
+            f"corr(f_n, ΔF_n) is weaker at {word} than at intermediate μ",
+            sampler,
+            PRE,
+            f"mean of μ in {told(span)} less that in {told(MIDDLE)}",
+            lambda keys, means, span=span: _mean_difference(keys, means, span),
+            dict(sorted((within(everywhere, MIDDLE) | within(everywhere, span)).items())),
+            good=(-np.inf, 0),
+        )
+
+
+def _mean_difference(keys, means, span):
+    """Mean of a range of μ less that of the intermediate ones; NaN where one is empty."""
+    outer, inner = ((keys >= low) & (keys <= high) for low, high in (span, MIDDLE))
+    return means[outer].mean() - means[inner].mean() if outer.any() and inner.any() else np.nan
+
+
+def error_bars(table, sampler):
+    """The paper's error bars, the range over all other networks of the walk."""
+    rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
+    for word, span, test in (
+        ("excludes 0 at intermediate", MIDDLE, lambda r: r["correlation_low"] > 0),
+        (
+            "holds 0 at large",
+            LARGE,
+            lambda r: r["correlation_low"] <= 0 <= r["correlation_high"],
+        ),
+    ):
+        yield at_each(
+            f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
+            sampler,
+            PRE,
+            "part of packings in which the range over all other networks of the walk does so",
+            within(items(rows, lambda r, test=test: float(test(r))), span),
+            good=(0.9, np.inf),
+            fair=(0.5, np.inf),
+        )

@@ -1,0 +1,79 @@
+"""What claims are judged on: {μ: [(disks, value) of each packing]}, and the ranges of μ."""
+
+import numpy as np
+
+SAMPLERS = {  # parts of the table
+    "gauss_seidel": "sweeps_1e-3",
+    "gauss_seidel_1e-4": "sweeps_1e-4",
+    "nearest": "walk",
+    "uniform": "uniform",
+    "exact": "exact",
+}
+# Packings at smaller μ are finished by linear programs; those of the paper all come from dynamics.
+LEAST_DYNAMIC = 0.001
+SMALL, MIDDLE, LARGE = (LEAST_DYNAMIC, 0.01), (0.05, 0.3), (5, np.inf)  # ranges of μ, ends included
+RANGES = (("small", SMALL), ("intermediate", MIDDLE), ("large", LARGE))
+BARELY_RIGID = 0.5  # μ from which on S has few dimensions
+# Part of the states wanted that a walk must have reached to be judged.
+WHOLE_WALK = 0.3
+DETERMINED = 1e-9  # ⟨f_n⟩: mean extents below this are rounding
+
+
+def drawn(table, sampler):
+    """Rows of a sampler; walks that reached too few of their states are left out."""
+    return [row for row in table.part(SAMPLERS[sampler]) if enough(row)]
+
+
+def enough(row):
+    """Whether a row's walk, if it has one, reached the states that it takes to be judged."""
+    return row.get("reached_part", 1.0) >= WHOLE_WALK
+
+
+def dynamic(rows):
+    """Rows of packings that contact dynamics made."""
+    return [row for row in rows if row["mu"] >= LEAST_DYNAMIC]
+
+
+def items(rows, what, by="mu", positive=()):
+    """{μ: [(disks, value)]} in order of μ; what: a name, or a function of the row.
+
+    Rows whose value is unknown, or that lack a positive value of some names, are left out.
+    """
+    found = {}
+    for row in rows:
+        if not all(row.get(name, 0) > 0 for name in positive):
+            continue
+        value = row.get(what, np.nan) if isinstance(what, str) else what(row)
+        if np.all(np.isfinite(value)):
+            found.setdefault(row[by], []).append((row["n"], value))
+    return {key: found[key] for key in sorted(found)}
+
+
+def sampled(table, sampler):
+    """{μ: [(disks, ΔF_n (N_c,) in ⟨f_n⟩)]} of packings with indeterminacy."""
+    found = {}
+    for row, *_, extent in table.contacts(SAMPLERS[sampler]):
+        if enough(row) and len(extent) and extent.mean() > DETERMINED:
+            found.setdefault(row["mu"], []).append((row["n"], extent))
+    return {mu: found[mu] for mu in sorted(found)}
+
+
+def each(groups, measure):
+    """The groups with a number in place of each packing's value."""
+    return {key: [(n, measure(value)) for n, value in group] for key, group in groups.items()}
+
+
+def within(groups, span):
+    """The groups of a range of μ."""
+    return {mu: group for mu, group in groups.items() if span[0] <= mu <= span[1]}
+
+
+def positive_friction(groups):
+    """The groups but that of μ = 0."""
+    return {mu: group for mu, group in groups.items() if mu > 0}
+
+
+def told(span):
+    """A range of μ in words."""
+    low, high = span
+    return f"{low:g} … {high:g}" if np.isfinite(high) else f"{low:g} …"

@@ -1,0 +1,185 @@
+"""How a claim is judged: a number with its interval, two ranges, and what could turn the verdict.
+
+Two kinds of claims. `over_all` judges one number of all μ, such as a slope or the place of a
+maximum: its interval comes from packings drawn anew at each μ (percentile bootstrap). The verdict
+has to be the same for the whole interval, wherever chance may leave its ends with other draws, and
+the number has to stay in the same range when any one μ is left out; what stays outside of the first
+range, but not always beyond the wider one, differs. `at_each` judges a number at every μ by
+Student's interval over its packings, which no draw moves; together they hold with 95 % confidence
+(Bonferroni).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce import statistics
+
+REPRODUCED, UNDECIDED, DIFFERS = "reproduced", "undecided", "differs"
+FAILED, FEW, MISSING = "not reproduced", "too few data", "no data"
+UNMEASURED = "not measured"
+
+LEAST_DISKS = 1000  # in all packings of one μ
+NEAR_PEAK = 2.0  # in μ: what lies within this factor of the largest says where the maximum is
+
+
+class Claim(NamedTuple):
+    """One claim, what was measured, and the verdict."""
+
+    statement: str
+    sampler: str  # of SAMPLERS; "" where no states are needed
+    source: str  # who claims it: PRE, PRL or OURS
+    measured: str  # what the number is
+    value: float
+    low: float
+    high: float
+    criterion: str  # range for "reproduced", in brackets the wider one
+    verdict: str
+    why: str = ""  # where it does not hold, or what leaves it open
+
+
+PRE, PRL, OURS = "PRE", "PRL", "ours"
+
+
+class Ranges(NamedTuple):
+    """What a claim's words are taken to mean, and a wider range around it."""
+
+    good: tuple
+    fair: tuple
+
+    def verdict(self, low, high):
+        """The verdict of an interval: UNDECIDED across an end of the good range.
+
+        What lies outside of that for certain differs, and failed where it lies outside of the wider
+        range for certain, too.
+        """
+        if self.good[0] <= low and high <= self.good[1]:
+            return REPRODUCED
+        if high < self.fair[0] or low > self.fair[1]:
+            return FAILED
+        if high < self.good[0] or low > self.good[1]:
+            return DIFFERS
+        return UNDECIDED
+
+    def __str__(self):
+        good, fair = _range(self.good), _range(self.fair)
+        return good if self.fair == self.good else f"{good} [{fair}]"
+
+
+def _range(ends):
+    low, high = ends
+    if not np.isfinite(high):
+        return f"≥ {low:g}"
+    if not np.isfinite(low):
+        return f"≤ {high:g}"
+    return f"{low:.3g} … {high:.3g}"
+
+
+def over_all(statement, sampler, source, measured, statistic, groups, *, good, fair=None, least=2):
+    """The Claim about one number, statistic(keys, means over packings), of all groups.
+
+    groups: {μ: [(disks, value)]}, with values of any shape; least: so many it takes.
+    """
+    ranges = Ranges(good, good if fair is None else fair)
+    said, unknown = (statement, sampler, source, measured), (float("nan"),) * 3
+    if len(groups) < least:
+        return Claim(*said, *unknown, str(ranges), MISSING)
+    keys = np.array(list(groups), dtype=float)
+    values = [np.array([value for _, value in group]) for group in groups.values()]
+    means = np.array([value.mean(axis=0) for value in values])
+    value = float(statistic(keys, means))
+    if not np.isfinite(value):
+        return Claim(*said, *unknown, str(ranges), MISSING)
+    drawn = statistics.resampled_means(values)
+    found = np.array([statistic(keys, draw) for draw in drawn])
+    single = max(map(len, values)) < 2
+    few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
+    if single or few or np.isfinite(found).mean() < 0.9:
+        ends = unknown[:2] if single else statistics.percentile_ends(found)[0]
+        return Claim(*said, value, *ends, str(ranges), FEW)
+    (low, high), farthest = statistics.percentile_ends(found[np.isfinite(found)])
+    verdict = ranges.verdict(low, high)
+    if verdict == UNDECIDED:
+        return Claim(*said, value, low, high, str(ranges), verdict)
+    turned = {"with another draw of packings": ranges.verdict(*farthest)}
+    for k, key in enumerate(keys) if len(keys) > least else ():
+        without = statistic(np.delete(keys, k), np.delete(means, k, axis=0))
+        if np.isfinite(without):
+            turned[f"without μ = {key:g}"] = ranges.verdict(without, without)
+    why = ", ".join(f"{told} {cause}" for cause, told in turned.items() if told != verdict)
+    if why:
+        # What is outside of the good range for certain does not become open.
+        outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
+        verdict = DIFFERS if outside else UNDECIDED
+    return Claim(*said, value, low, high, str(ranges), verdict, why)
+
+
+def at_each(statement, sampler, source, measured, groups, *, good, fair=None, interval=None):
+    """The Claim about a number at each μ: what is told is the one farthest from the good range.
+
+    groups: {μ: [(disks, value)]}. interval: (values, level) → (value, low, high), by default the
+    mean and Student's interval.
+    """
+    ranges = Ranges(good, good if fair is None else fair)
+    said, interval = (statement, sampler, source), interval or statistics.mean_interval
+    if not groups:
+        unknown = (float("nan"),) * 3
+        return Claim(*said, measured, *unknown, str(ranges), MISSING)
+    level = 1 - (1 - statistics.LEVEL) / len(groups)
+    found, verdicts = {}, {}
+    for mu, group in groups.items():
+        found[mu] = tuple(map(float, interval([value for _, value in group], level)))
+        few = sum(n for n, _ in group) < LEAST_DISKS or not np.isfinite(found[mu][1])
+        verdicts[mu] = FEW if few else ranges.verdict(*found[mu][1:])
+    place = max(found, key=lambda mu: _beyond(found[mu][0], ranges.good))
+    where = f"{measured}, at the worst μ ({place:g})" if len(found) > 1 else measured
+    return Claim(*said, where, *found[place], str(ranges), *_together(verdicts))
+
+
+def _beyond(value, ends):
+    """How far a number lies outside of a range, or how near its ends it is inside: negative."""
+    return max(ends[0] - value, value - ends[1])
+
+
+def _together(verdicts):
+    """The verdict of a claim from those at each μ, and where it is another one."""
+    kinds = set(verdicts.values())
+    if len(kinds) == 1:
+        return kinds.pop(), ""
+    where = {kind: [f"{mu:g}" for mu in verdicts if verdicts[mu] == kind] for kind in kinds}
+    why = "; ".join(f"{kind} at {', '.join(where[kind])}" for kind in sorted(kinds))
+    if FEW in kinds:
+        return FEW, why
+    if FAILED in kinds and REPRODUCED not in kinds:
+        return FAILED, why
+    return DIFFERS if kinds & {DIFFERS, FAILED} else UNDECIDED, why
+
+
+# Statistics of keys (k,) and means over packings (k, …)
+
+
+def slope(keys, means):
+    """Slope of the logarithm of the means against that of the keys."""
+    return np.polyfit(np.log(keys), np.log(means), 1)[0]
+
+
+def peak(keys, means):
+    """μ where the means are largest, between grid values; the end of the grid if they rise there.
+
+    The top of a parabola in log μ through the means within a factor NEAR_PEAK of the largest one,
+    and its neighbours; where the top lies beyond them, through the next ones on that side, too.
+    """
+    x = np.log(keys)
+    k = int(np.argmax(means))
+    near = np.abs(x - x[k]) <= np.log(NEAR_PEAK) * (1 + 1e-9)
+    near[max(0, k - 1) : k + 2] = True
+    first, last = np.flatnonzero(near)[[0, -1]]
+    if last - first < 2:
+        return float(keys[k])
+    while first >= 0 and last < len(x):
+        a, b, _ = np.polyfit(x[first : last + 1] - x[k], means[first : last + 1], 2)
+        top = x[k] - b / (2 * a) if a < 0 else np.copysign(np.inf, b)
+        if x[first] <= top <= x[last]:
+            return float(np.exp(top))
+        first, last = (first, last + 1) if top > x[last] else (first - 1, last)
+    return float(keys[0] if first < 0 else keys[-1])

@@ -1,0 +1,408 @@
+"""Claims: those of the paper are reproduced by what it describes; at a knife edge none is."""
+
+import numpy as np
+import pytest
+
+from granforce import statistics
+from granforce.paper import claims, findings, tables
+from granforce.paper.claims import figure1, figure2, figure4, groups, verdicts
+
+PACKINGS, CONTACTS = 10, 2000
+
+
+def synthetic(eta, **options):
+    """A table of ten packings at each of nine μ whose measures are given functions of μ."""
+    rng = np.random.default_rng(3)
+    rows, samples = [], {name: [] for name in tables.SAMPLES}
+    for mu in (0, 0.001, 0.003, 0.01, 0.05, 0.1, 0.3, 1, 10):
+        for seed in range(PACKINGS):
+            noise = np.exp(0.05 * rng.normal())
+            row = {"part": SWEEPS, "n": 400, "mu": mu, "seed": seed, "dimension": 5.0}
+            row |= {"eta1": eta(mu) * noise, "eta2": 1.1 * eta(mu) * noise}
+            row |= {"eta3": eta(mu) * noise / 0.15, "coordination": 4 - 0.95 * mu / (mu + 0.1)}
+            row |= {"original_distance": 1.0, "mean_distance": 1.5, "contacts": 600.0}
+            row |= {"pair_spread": 0.1}
+            row["correlation"] = noise * (0.3 if mu < 0.05 else 0.5 if mu < 1 else 0.02)
+            row |= {name: f(mu) * noise for name, f in options.items() if name in row}
+            row["correlation_low"] = row["correlation"] - 0.1
+            row["correlation_high"] = row["correlation"] + 0.1
+            extent = options.get("extent", default_extent)(mu, rng)
+            # Nearly half of the contacts are strong, most of them with large extents.
+            rank = np.argsort(np.argsort(extent * np.exp(0.3 * rng.normal(size=len(extent)))))
+            normal = np.where(rank >= 0.53 * len(extent), 3.0, 0.1)
+            values = (len(rows), 0, options.get("normal", normal), 0, extent)
+            for name, value in zip(tables.SAMPLES, values, strict=True):
+                samples[name].append(np.broadcast_to(value, extent.shape))
+            rows.append(row)
+    for row in list(rows):
+        answer = {"part": "response", "n": 400, "mu": row["mu"], "seed": row["seed"]}
+        answer |= {"critical_force": 1 + eta(row["mu"]), "decay_exponent": 0.5 + eta(row["mu"])}
+        answer |= {name: f(row["mu"]) for name, f in options.items() if name in answer}
+        rows.append(answer | {"limit_load": 2 * answer["critical_force"]})
+    joined = {name: np.concatenate(parts) for name, parts in samples.items()}
+    return tables.Table({}, rows, joined, [], {}, {})
+
+
+SWEEPS = groups.SAMPLERS["gauss_seidel"]
+
+
+def default_extent(mu, rng):
+    """As the paper has it: exponential, with a peak and a fast tail, stretched; ⟨f_n⟩."""
+    width = rise_and_fall(mu) if mu else 1e-14
+    if mu <= 0.01:
+        return width * rng.exponential(1.0, CONTACTS)
+    if mu <= 0.3:
+        return 1.5 * rng.weibull(2.5, CONTACTS) * (1 + width)
+    return width * rng.weibull(0.6, CONTACTS)
+
+
+def rise_and_fall(mu):
+    return 0.4 * (mu / 0.1) / (1 + (mu / 0.1) ** 2) if mu else 1e-14
+
+
+def judged(table, families=None, sampler="gauss_seidel"):
+    """{statement: verdict} of the claims about one sampler and those about packings."""
+    found = claims.judged(table)
+    if families is not None:
+        named = [family(table, sampler) for family in families]
+        found = [claim for family in named for claim in family]
+    return {c.statement: c.verdict for c in found if c.sampler in (sampler, "")}
+
+
+def test_what_the_paper_says_is_reproduced_by_what_it_describes():
+    found = judged(synthetic(rise_and_fall))
+    # Its packings all come from contact dynamics.
+    without = {"with only the pressure", "and not in", "with frozen", "linear programs", "N"}
+    without.add("η3 does not depend on")  # there are no exact bounds
+    for statement, verdict in found.items():
+        if "upper" in statement and "exponential" in statement:  # of few contacts
+            assert verdict in (verdicts.REPRODUCED, verdicts.UNDECIDED)
+        elif verdict != verdicts.REPRODUCED:
+            assert verdict in (verdicts.MISSING, verdicts.FEW), statement
+            assert any(word in statement for word in without), statement
+    assert sum(verdict == verdicts.REPRODUCED for verdict in found.values()) >= 45
+
+
+def weak_first(mu, rng):
+    """Extents of contacts of which the first, the strong ones, are determined best."""
+    return np.sort(rng.weibull(2.5, CONTACTS))
+
+
+@pytest.mark.parametrize(
+    ("family", "statement", "options"),
+    [
+        (
+            claims.agreement,
+            "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: value of η1/η3",
+            {"eta3": lambda mu: 40 * rise_and_fall(mu)},
+        ),
+        (
+            claims.agreement,
+            "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: η2/η1 is constant",
+            {"eta1": lambda mu: rise_and_fall(mu) * (1 + 4 * mu)},
+        ),
+        (claims.maximum, "η2(μ) is not monotonic", {"eta2": lambda mu: 1 / (mu + 1e-4)}),
+        (
+            claims.small_friction,
+            "η ∝ μ at small μ: packings made by contact dynamics",
+            {"eta2": lambda mu: mu**2},
+        ),
+        (
+            claims.counts,
+            "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about as many contacts (μ = 0.1)",
+            {"normal": np.r_[np.full(20, 3.0), np.full(CONTACTS - 20, 1.0)]},
+        ),
+        (
+            claims.pairs,
+            "distances between pairs of states are sharply peaked",
+            {"pair_spread": lambda mu: 0.5},
+        ),
+        (
+            claims.widths,
+            "ΔF_n is not monotonic: largest at intermediate μ",
+            {"extent": lambda mu, r: mu * r.exponential(1.0, CONTACTS)},
+        ),
+        (
+            claims.widths,
+            "P(ΔF_n) is broadest at intermediate μ",
+            {"extent": lambda mu, r: mu * r.exponential(1.0, CONTACTS)},
+        ),
+        (
+            claims.correlation,
+            "corr(f_n, ΔF_n) vanishes at large μ, against chance",
+            {"correlation": lambda mu: 0.19},
+        ),
+        (
+            claims.error_bars,
+            "the paper's error bar of corr(f_n, ΔF_n) holds 0 at large μ",
+            {"correlation": lambda mu: 0.5},
+        ),
+        (
+            claims.response,
+            "F_crit is similar at equal η on both sides of the maximum",
+            {"critical_force": lambda mu: 3 if mu > 0.1 else 1 + rise_and_fall(mu)},
+        ),
+        (
+            claims.vanishing,
+            "η vanishes at μ = 0 within 10⁻⁷",
+            {"eta2": lambda mu: 0.01 + mu},
+        ),
+        (claims.coordination, "z → 3 at the largest μ", {"coordination": lambda mu: 3.5}),
+        (claims.coordination, "z falls with μ", {"coordination": lambda mu: 3 + mu}),
+        (
+            claims.shape,
+            "P(ΔF_n) at small μ falls monotonically, in ⟨f_n⟩",
+            {"extent": lambda mu, r: 2 * r.weibull(3, CONTACTS)},
+        ),
+        (
+            claims.shape,
+            "P(ΔF_n) at intermediate μ has a peak, in each packing's own ⟨ΔF_n⟩",
+            {"extent": lambda mu, r: r.weibull(0.9, CONTACTS)},
+        ),
+        (
+            claims.tails,
+            "tail of P(ΔF_n) at small μ, beyond the median: exponential",
+            {"extent": lambda mu, r: r.weibull(2, CONTACTS)},
+        ),
+        (
+            claims.correlation,
+            "corr(f_n, ΔF_n) vanishes at large μ",
+            {"correlation": lambda mu: 0.5},
+        ),
+        (
+            claims.correlation,
+            "corr(f_n, ΔF_n) is significant at intermediate μ",
+            {"correlation": lambda mu: -0.2},
+        ),
+        (
+            claims.response,
+            "F_crit rises with η",
+            {"critical_force": lambda mu: 2 - rise_and_fall(mu)},
+        ),
+        (claims.perturbation, "α is largest near μ = 0.1", {"decay_exponent": lambda mu: 1 + mu}),
+        (
+            claims.correlation,
+            "corr(f_n, ΔF_n) is weaker at small than at intermediate μ",
+            {"correlation": lambda mu: 0.7 if mu < 0.05 else 0.5},
+        ),
+        (
+            claims.enrichment,
+            "strong contacts are less determined at intermediate μ",
+            {"normal": np.r_[np.full(20, 3.0), np.full(CONTACTS - 20, 1.0)], "extent": weak_first},
+        ),
+        (
+            claims.elongation,
+            "S is more elongated at large than at intermediate μ",
+            {"extent": lambda mu, r: r.weibull(2.5 if mu < 1 else 4, CONTACTS)},
+        ),
+        (
+            claims.centre,
+            "the original network lies closer to the centre than sampled states",
+            {"original_distance": lambda mu: 2.0},
+        ),
+    ],
+)
+def test_what_contradicts_the_paper_is_not_reproduced(family, statement, options):
+    found = judged(synthetic(rise_and_fall, **options), [family])
+    assert found[statement] == verdicts.FAILED
+
+
+def test_findings_compare_the_same_packings():
+    table = synthetic(rise_and_fall)
+    for part, eta3, eta2 in (("walk", 1, 1), ("exact", 2, np.nan), ("uniform", 1, 0.5)):
+        for row in table.part(SWEEPS):
+            copied = row | {"part": part, "eta3": eta3 * row["eta3"], "eta2": eta2 * row["eta2"]}
+            table.rows.append(copied | {"walk_ratio": 1.5, "original_ratio": 0.5})
+    told = {finding.statement: finding for finding in findings.found(table)}
+    for word in ("small", "intermediate", "large"):
+        ratio = told[f"η3 of the walk's states over exact η3, {word} μ"]
+        assert (ratio.value, ratio.low, ratio.high) == pytest.approx((0.5, 0.5, 0.5))
+        assert told[f"η2 of the walk over η2 of S, {word} μ"].value == pytest.approx(2)
+        assert told[f"η2 of gauss_seidel over η2 of nearest, {word} μ"].value == pytest.approx(1)
+    assert told["μ where exact η3 is largest"].value == pytest.approx(0.1, rel=0.3)
+    slope = told["slope of log exact η3 against log μ, μ = 0.001 … 0.01"]
+    assert slope.low < slope.value < slope.high
+    assert slope.value == pytest.approx(1, abs=0.05)
+    assert told["⟨F_crit⟩ over ⟨limit load⟩, large μ"].value == pytest.approx(0.5)
+    # The pair's share of the pressure: one contact of 600.
+    left_out = told[
+        "⟨F_crit⟩ with the pair left out of the pressure over the same with it, large μ"
+    ]
+    assert 1 < left_out.value < 1.01
+    table.rows[:] = table.part(SWEEPS)
+    for values in table.samples.values():
+        values.resize(0, refcheck=False)
+    assert not [f for f in findings.found(table) if "sweeps_1e" not in f.statement]
+
+
+def peak_of(heights):
+    keys = np.array(list(heights), dtype=float)
+    return verdicts.peak(keys, np.array(list(heights.values())))
+
+
+def test_the_range_of_the_maximum_is_not_biased_by_where_the_grid_lies():
+    """A parabola in log μ is found where it is, between grid points and with uneven neighbours."""
+    for top in (0.08, 0.12, 0.18):
+        heights = {
+            mu: 5 - np.log(mu / top) ** 2 for mu in (0.01, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 1)
+        }
+        assert peak_of(heights) == pytest.approx(top, rel=1e-6)
+
+
+def test_a_maximum_beyond_the_window_of_its_parabola_is_not_clipped():
+    """The largest mean is an outlier at 0.2; all others lie on a parabola with its top at 0.45."""
+    heights = {mu: 5 - np.log(mu / 0.45) ** 2 for mu in (0.1, 0.14, 0.2, 0.3, 0.5, 1, 2)}
+    heights[0.2] += 0.2 + heights[0.5] - heights[0.2]
+    heights[0.14] = heights[0.1] = 0
+    assert peak_of(heights) > 0.3 * (1 + 1e-6)  # the last mean within the window of 0.2
+    assert peak_of({0.1: 1, 1: 2, 10: 3}) == 10
+    assert peak_of({0.1: 0.2, 1: 0.3, 10: -1e-17}) < 1
+    assert peak_of({0.01: -0.3, 0.1: -0.1, 1: -0.3}) == pytest.approx(0.1)  # of any sign
+
+
+def test_negative_exponents_count():
+    table = synthetic(rise_and_fall)
+    for row in table.part("response"):
+        if row["mu"] == 0.1:
+            row["decay_exponent"] = -0.1 if row["seed"] < 5 else 0.1
+    _, alpha = figure2.perturbation(table, "")
+    assert alpha.value != pytest.approx(0.1, rel=0.5)
+    rises = {c.statement: c for c in figure2.response(table, "gauss_seidel")}
+    assert rises["α rises with η"].verdict != verdicts.REPRODUCED
+
+
+def packings(values, n=400):
+    return {mu: [(n, value) for value in group] for mu, group in values.items()}
+
+
+def over_all(groups, good, fair=None, statistic=verdicts.slope):
+    return verdicts.over_all("", "", "", "", statistic, groups, good=good, fair=fair)
+
+
+def test_a_verdict_at_a_knife_edge_is_undecided(rng):
+    """A slope of 0.5 ± 0.02: clear of an end of the range, across it, and turned by one μ."""
+    clear = packings({mu: mu**0.5 * np.exp(0.1 * rng.normal(size=10)) for mu in (0.1, 1, 10, 100)})
+    assert over_all(clear, (0.3, 0.7)).verdict == verdicts.REPRODUCED
+    assert over_all(clear, (0.7, 0.9)).verdict == verdicts.FAILED
+    assert over_all(clear, (0.7, 0.9), (0.2, 0.9)).verdict == verdicts.DIFFERS
+    edge = over_all(clear, (0.3, 0.5))
+    assert edge.verdict == verdicts.UNDECIDED
+    assert edge.low < 0.5 < edge.high
+    turned = packings({1: [1.0] * 10, 10: [10.0] * 10, 100: [12.0] * 10})
+    found = over_all(turned, (0.45, 1.1))
+    assert found.verdict == verdicts.UNDECIDED
+    assert "without μ = 1" in found.why
+    # Certainly outside, but not always beyond the wider range.
+    found = over_all(turned, (1.2, 2), (0.8, 2))
+    assert over_all(turned, (1.2, 2), (0.2, 2)).verdict == verdicts.DIFFERS
+    assert found.verdict == verdicts.DIFFERS
+    assert "differs without μ = 100" in found.why
+
+
+def test_another_seed_of_the_bootstrap_never_turns_a_verdict(rng, monkeypatch):
+    """Ranges that end about where the interval does: reproduced becomes undecided at the most."""
+    groups = packings({mu: mu**0.5 * np.exp(0.1 * rng.normal(size=10)) for mu in (0.1, 1, 10, 100)})
+    high = over_all(groups, (0, 1)).high
+    means = statistics.resampled_means
+    for end in high + np.linspace(-0.01, 0.01, 9):
+        told = set()
+        for seed in range(3):
+            monkeypatch.setattr(
+                statistics, "resampled_means", lambda values, seed=seed: means(values, seed)
+            )
+            told.add(over_all(groups, (0.3, end)).verdict)
+        assert told <= {verdicts.REPRODUCED, verdicts.UNDECIDED}
+        if end < high - 0.004 or end > high + 0.008:
+            assert len(told) == 1
+
+
+def test_a_change_of_sign_at_one_friction_is_not_averaged_away(rng):
+    values = {mu: 0.5 + 0.02 * rng.normal(size=10) for mu in (0.1, 1, 10)}
+    claim = verdicts.at_each("", "", "", "", packings(values), good=(0, 1))
+    assert claim.verdict == verdicts.REPRODUCED
+    values[1] = 1.2 + 0.02 * rng.normal(size=10)
+    claim = verdicts.at_each("", "", "", "distance", packings(values), good=(0, 1))
+    assert claim.verdict == verdicts.DIFFERS
+    assert claim.why == "not reproduced at 1; reproduced at 0.1, 10"
+    assert claim.value == pytest.approx(1.2, abs=0.05)
+    assert claim.measured == "distance, at the worst μ (1)"
+    values = {mu: group + 1 for mu, group in values.items()}
+    claim = verdicts.at_each("", "", "", "", packings(values), good=(0, 1))
+    assert claim.verdict == verdicts.FAILED
+    assert verdicts.at_each("", "", "", "", packings(values, 1), good=(0, 1)).verdict == (
+        verdicts.FEW
+    )
+
+
+def test_a_peak_that_packings_of_different_width_hide_shows_in_their_own_units(rng):
+    """Weibull distributions of widths that differ tenfold look monotonic when they are joined."""
+    values = [width * rng.weibull(2, 500) for width in np.geomspace(0.1, 1, 12)]
+    joined = figure4.departure(values, 0.95)
+    own = figure4.departure([v / v.mean() for v in values], 0.95)
+    assert joined[1] == 0
+    assert own[1] > 0.05
+
+
+def test_what_was_not_relaxed_was_not_measured():
+    table = synthetic(rise_and_fall)
+    (claim,) = figure1.vanishing(table, "gauss_seidel")
+    assert claim.verdict == verdicts.REPRODUCED
+    for row in table.part(SWEEPS):
+        row["dimension"] = 5.0 * (row["mu"] > 0)
+    (claim,) = figure1.vanishing(table, "gauss_seidel")
+    assert claim.verdict == verdicts.UNMEASURED
+    for row in table.part(SWEEPS):
+        row |= {"skipped_part": 0.0, "eta2": 0.024}
+    (claim,) = figure1.vanishing(table, "gauss_seidel")
+    assert (claim.verdict, claim.value) == (verdicts.FAILED, pytest.approx(0.024))
+
+
+def test_eta3_is_compared_with_the_exact_one_of_the_same_packing():
+    table = synthetic(rise_and_fall)
+    for row in table.part(SWEEPS):
+        table.rows.append(row | {"part": "exact", "eta3": row["eta3"] * 2})
+    (claim,) = figure1.measure(table, "gauss_seidel")
+    assert (claim.verdict, claim.value) == (verdicts.FAILED, pytest.approx(0.5))
+
+
+def test_the_papers_own_walks_are_compared_over_sizes():
+    table = synthetic(rise_and_fall)
+    for row in table.part(SWEEPS):
+        if row["mu"] == 0.1:
+            for n in (100, 1600):
+                larger = {"part": "size_sweeps", "n": n, "eta2": row["eta2"] * (n / 400) ** 0.5}
+                table.rows.append(row | larger)
+    (claim,) = figure1.size(table, "gauss_seidel")
+    assert claim.value == pytest.approx(0.5, abs=0.02)
+    assert claim.verdict == verdicts.FAILED
+
+
+def test_few_disks_decide_nothing():
+    table = synthetic(rise_and_fall)
+    for row in table.rows:
+        row["n"] = 40
+    families = [claims.agreement, claims.maximum, claims.correlation, claims.counts, claims.pairs]
+    assert set(judged(table, families).values()) == {verdicts.FEW}
+
+
+def test_a_walk_that_reached_few_states_is_not_judged():
+    table = synthetic(rise_and_fall)
+    for row in table.part(SWEEPS):
+        row["reached_part"] = 0.1 if row["mu"] == 10 else 1.0
+    assert 10 not in groups.items(groups.drawn(table, "gauss_seidel"), "eta2")
+    assert 10 not in groups.sampled(table, "gauss_seidel")
+
+
+def test_every_claim_names_its_sampler_and_its_source():
+    table = synthetic(rise_and_fall)
+    table.rows[:] = [row for row in table.rows if row["mu"] < 0.01]
+    for values in table.samples.values():
+        values.resize(0, refcheck=False)
+    for claim in claims.judged(table):
+        assert claim.sampler in {"", *groups.SAMPLERS}
+        assert claim.source in {verdicts.PRE, verdicts.PRL, verdicts.OURS}
+
+
+def test_without_data_there_is_no_verdict():
+    empty = tables.Table({}, [], {name: np.zeros(0) for name in tables.SAMPLES}, [], {}, {})
+    assert set(judged(empty).values()) == {verdicts.MISSING}
