@@ -1,6 +1,5 @@
 """The command `granforce study`: compute, reduce, draw, judge."""
 
-import json
 import sys
 
 from granforce.paper import claims, drawings, findings, tables
@@ -9,6 +8,7 @@ from granforce.records import InputError, check_memory, friction, whole
 from granforce.study import scan
 from granforce.study.store import open_store
 from granforce.system.files import make_folder, written
+from granforce.system.plain import json_text
 from granforce.system.terminal import Bar, table
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
@@ -56,7 +56,7 @@ def main(arguments):
         "skipped": reduced.skipped,
     }
     with written(folder / "claims.json") as file:
-        file.write(json.dumps(told, indent=1, ensure_ascii=False).encode())
+        file.write(json_text(told, ascii_only=False).encode())
     report(told, arguments.json)
     return 1 if failed else 0
 
@@ -140,7 +140,7 @@ def compute(path, wanted, arguments):
 def report(told, as_json):
     """Claims with their verdicts, and findings, on stdout."""
     if as_json:
-        print(json.dumps(told, indent=1))
+        print(json_text(told))
         return
     for word, names in (
         ("claims", ("claim", "sampler", "from", "measured", "95 %", "criterion", "verdict")),
