@@ -257,7 +257,7 @@ def _positions(ensemble, contacts):
     """Positions (k,) in the ensemble of contacts by their numbers in the packing, or of all."""
     if contacts is None:
         return np.arange(len(ensemble.index))
-    contacts = np.asarray(contacts, dtype=np.int64).ravel()
+    contacts = np.asarray(contacts).ravel()
     if len(np.unique(contacts)) < len(contacts):
         raise InputError("a contact is named twice")
     return ensemble.positions(contacts)

@@ -20,6 +20,7 @@ from granforce.records import (
     InputError,
     NotJammedError,
     Packing,
+    are_whole,
     float_array,
     friction,
 )
@@ -149,8 +150,8 @@ class Ensemble:
 
     def positions(self, contacts):
         """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
-        contacts = np.asarray(contacts, dtype=int)
-        unknown = np.setdiff1d(contacts, self.index)
+        contacts = np.asarray(contacts)
+        unknown = contacts[~np.isin(contacts, self.index)]
         if len(unknown):
             raise InputError(
                 f"contact {unknown[0]} is none of the {len(self.index)} that carry a load in this "
@@ -360,7 +361,7 @@ def _frozen_positions(frozen, count):
         if frozen.shape != (count,):
             raise InputError(f"frozen must mask {count} contacts, got shape {frozen.shape}")
         return np.flatnonzero(frozen)
-    if frozen.size and (frozen.min() < 0 or frozen.max() >= count):
+    if not are_whole(frozen, count - 1).all():
         raise InputError(f"a frozen contact lies outside 0 … {count - 1}")
     return frozen.astype(np.int64)
 

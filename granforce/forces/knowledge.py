@@ -11,7 +11,7 @@ from scipy import sparse
 
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import InputError, NotJammedError
+from granforce.records import InputError, NotJammedError, are_whole
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
 _NAMES = "f_n", "f_t"
@@ -58,8 +58,7 @@ def bounds_of(known, count):
     """
     try:
         contacts, low, high = known
-        numbers = np.atleast_1d(np.asarray(contacts))
-        contacts = numbers.astype(np.int64)
+        contacts = np.atleast_1d(np.asarray(contacts, dtype=np.float64))
         low, high = (
             np.broadcast_to(np.asarray(side, dtype=np.float64), (len(contacts), 2))
             for side in (low, high)
@@ -69,8 +68,9 @@ def bounds_of(known, count):
             "known must be Known(contacts, low, high): contact numbers (k,), and bounds (k, 2) on "
             "f_n and f_t"
         ) from None
-    if np.any(contacts != numbers) or np.any((contacts < 0) | (contacts >= count)):
+    if not are_whole(contacts, count - 1).all():
         raise InputError(f"a known contact is none of the packing's 0 … {count - 1}")
+    contacts = contacts.astype(np.int64)
     if np.isnan(low).any() or np.isnan(high).any():
         raise InputError("a bound is NaN; give −inf and inf where nothing is known")
     bounds = np.empty((count, 2, 2))
