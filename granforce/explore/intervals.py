@@ -17,6 +17,7 @@ import numpy as np
 
 from granforce import measures, notebook
 from granforce.forces.contact_problem import make_system
+from granforce.forces.ensemble import LARGEST_RANK
 from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
@@ -114,7 +115,7 @@ def intervals(
     solver = Solver(system, seen=seen, **options)
     pinned = _pinned(ensemble, upper + tangential + lower)
     report(len(pinned))
-    if ensemble.known is not None and ensemble.dimension == 0:
+    if _is_a_point(ensemble, system):
         keys = [key for key in upper + tangential + lower if key not in pinned]
         pinned |= _determined(ensemble, keys)
         report(len(keys))
@@ -179,13 +180,21 @@ def _pinned(ensemble, keys):
     return found
 
 
+def _is_a_point(ensemble, system):
+    """Whether balance leaves no freedom; asked where S has no inside, or something is known."""
+    asked = ensemble.known is not None or not system.middle.reached
+    return asked and ensemble.A.shape[0] <= LARGEST_RANK and ensemble.dimension == 0
+
+
 def _determined(ensemble, keys):
-    """The same where the balance leaves no freedom: every component follows from what is known.
+    """The same where the balance leaves no freedom: every component follows from the equations.
 
     For each there are rows λ with Aᵀλ = 1 there and 0 elsewhere, hence x = b·λ, in all of S. What
     rounding leaves of Aᵀλ bounds the error.
     """
-    free = np.flatnonzero(~ensemble.to_vector(ensemble.known.pinned).astype(bool))
+    held = np.zeros((len(ensemble.index), 2), bool)
+    held = held if ensemble.known is None else ensemble.known.pinned
+    free = np.flatnonzero(~ensemble.to_vector(held).astype(bool))
     x = ensemble.to_vector(starting_network(ensemble)) / ensemble.force_scale
     fixed = np.where(np.isin(np.arange(len(x)), free), 0.0, x)
     A = ensemble.A.tocsc()[:, free].toarray()

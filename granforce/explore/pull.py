@@ -15,7 +15,7 @@ from granforce.forces.contact_problem import (
     make_system,
     problem_of,
 )
-from granforce.forces.nearest import Search, nearest, starting_network
+from granforce.forces.nearest import Search, some_network, starting_network
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import LANES
@@ -131,18 +131,39 @@ def _near_ends(ensemble, contact, values, state):
         )
     width = found.upper - found.lower
     if width <= _AT_WALL * ensemble.force_scale:  # every network has this f_n
-        return np.stack([nearest(ensemble, state).forces] * len(values))
+        return np.stack([_without_pulling(ensemble, contact, state)] * len(values))
     (position,) = ensemble.positions([contact])
     for part in _INWARD:
         inside = found.lower + part * width, found.upper - part * width
         states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
         if np.all(admitted := _admitted(ensemble, states)):
             return states
+    between = np.clip((values - found.lower) / width, 0.0, 1.0)[:, None, None]
+    # On the line between both ends lies a network with each value: S with that known has one.
+    on_the_line = (1 - between) * found.states[0] + between * found.states[1]
+    for k in np.flatnonzero(~admitted):
+        there = on_the_line[k]
+        states[k] = some_network(ensemble.with_normal(position, there[position, 0], there), state)
+    if np.all(admitted := _admitted(ensemble, states)):
+        return states
     raise UndecidedError(
         f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
         f"{contact} was not reached; take a value further from the ends of its interval, "
         f"{found.lower:.9g} to {found.upper:.9g}"
     )
+
+
+def _without_pulling(ensemble, contact, state):
+    """The network nearest to state, which has the only f_n there is."""
+    found = some_network(ensemble, state)
+    if not ensemble.admits(found) and ensemble.dimension == 0 and ensemble.member is not None:
+        found = ensemble.member
+    if not ensemble.admits(found):
+        raise UndecidedError(
+            f"the network nearest to the given one was not reached; contact {contact} has the same "
+            "normal force in all of them"
+        )
+    return found
 
 
 @cancelling.cancellable

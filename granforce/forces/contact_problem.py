@@ -15,6 +15,7 @@ from granforce.numerics import (
     linear_programs,
 )
 from granforce.system import cancelling
+from granforce.tolerances import BALANCED
 
 # Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
 # slows no step, only bounds them.
@@ -175,8 +176,23 @@ def _new_system(ensemble):
         A, b, _ = knowledge.extended(A, b + _instead(ensemble), T, known, mu, value)
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
+    if ensemble.member is not None:
+        # Multipliers of rows that follow from others may be large: what the own unbalance of a
+        # network, up to BALANCED, contradicts there would pass for a bound.
+        given = A @ _coordinates(ensemble, ensemble.member)
+        b = given if np.abs(given - b).max(initial=0.0) <= 2 * BALANCED else b
     problem = independent_problem_of(ensemble)
     return certified_values.make_system(problem, A.tocsr(), b, loads.tocsc(), bounding)
+
+
+def _coordinates(ensemble, forces):
+    """y (n,) ≥ 0 of a Problem nearest to forces (N_c, 2)."""
+    y = ensemble.coordinates(forces)
+    parts = ensemble.per_contact * len(ensemble.index)
+    pairs = y[:parts].reshape(-1, ensemble.per_contact).repeat(2 // ensemble.per_contact, axis=1)
+    if ensemble.known is not None:
+        pairs = np.where(ensemble.known.wholly[:, None], 1.0, pairs)
+    return np.append(pairs, y[parts:])
 
 
 def cone_costs(ensemble, forces):

@@ -201,10 +201,11 @@ def pins(known, mu):
     return np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
 
 
-def contradiction(A, b, T, known, mu, index, scale):
+def contradiction(A, b, T, known, mu, index, scale, slack):
     """The message that names what cannot hold together, with proof; None where none was found.
 
-    A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩. The statements are those
+    A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩; slack:
+    `Ensemble.slack`. The statements are those
     with a multiplier in the program that lets them give as little as possible in sum.
     """
     whole, right, _ = extended(A, b, T, known, mu, known.value)
@@ -220,7 +221,7 @@ def contradiction(A, b, T, known, mu, index, scale):
         if status != programs.OPTIMAL:
             continue
         multiplier = programs.multipliers(model, relaxed, cost)
-        if certificates.proves_empty(whole, right, multiplier):
+        if certificates.proves_empty(whole, right, multiplier, slack):
             given = y[n + sides :][:count]
             given[sides:] += y[n + sides + count :]
             return _statements(known, mu, index, scale, multiplier[rows:], given)

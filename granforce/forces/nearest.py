@@ -17,7 +17,8 @@ import time
 import numpy as np
 
 from granforce.forces.contact_problem import problem_of
-from granforce.numerics import certificates, contact_program
+from granforce.forces.nearest_piqp import likeliest_piqp, restored
+from granforce.numerics import certificates, contact_program, highs
 from granforce.numerics.contact_program import OPTIMUM, PINNED, PROJECTED
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.records import Relaxation
@@ -88,16 +89,41 @@ def _batch(ensemble, starts, tolerance, max_iterations):
 
 
 def starting_network(ensemble):
-    """The packing's own network (N_c, 2), or the nearest admissible one if that left S.
+    """The packing's own network (N_c, 2), or another one that is admitted if that left S.
 
     Raises NotJammedError where S is empty, UndecidedError where neither could be shown.
     """
     if ensemble.admits(ensemble.original):
         return ensemble.original
-    found = nearest(ensemble, ensemble.original)
-    if not found.converged:
-        raise certificates.why_unsolved(*ensemble.scaled_form[:2])
-    return found.forces
+    found = nearest(ensemble, ensemble.original).forces
+    if not ensemble.admits(found):
+        found = ensemble.member
+    if found is None:
+        found = some_network(ensemble, ensemble.original)
+        if not ensemble.admits(found):
+            A, b, _ = ensemble.scaled_form
+            raise certificates.why_unsolved(A, b, slack=ensemble.slack)
+    return found
+
+
+def some_network(ensemble, start):
+    """A network (N_c, 2) of S, the one nearest to start where that is reached.
+
+    Where it is not, others are asked: PIQP, then HiGHS, whose vertices are exact to rounding. What
+    none of them reaches is the last iterate, which is not admitted.
+    """
+    found = nearest(ensemble, start).forces
+    if ensemble.admits(found):
+        return found
+    other = likeliest_piqp(ensemble, np.ones_like(start), start)
+    if ensemble.admits(other):
+        return other
+    A, b, _ = ensemble.scaled_form
+    for y in highs.points(A, b):
+        other = restored(ensemble, y)
+        if ensemble.admits(other):
+            return other
+    return found
 
 
 class Search:
@@ -156,7 +182,7 @@ class Search:
                 there = unbalance[k] <= tolerance and slackness[k] <= near[k]
                 if there and product[k] <= near[k] ** 2:
                     self._end(k, True)
-                elif product[k] <= attempt[k]:
+                elif product[k] < attempt[k]:  # once only where it is 0
                     ready.append(k)
                 elif (
                     self.steps[k] >= most
