@@ -84,5 +84,5 @@ def test_a_contact_that_is_no_whole_number_is_named_with_its_line(number, text, 
     changed = text.replace("\n3,", f"\n{number},")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with pytest.raises(InputError, match="line 3: contact is .* whole number, at least 0"):
+        with pytest.raises(InputError, match=r"line 3: contact is .* whole number, at least 0"):
             read(io.StringIO(changed))
