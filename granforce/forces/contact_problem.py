@@ -23,6 +23,8 @@ SHIFT = 1e-11
 # Rows whose pivot is below this, relative to the largest, follow from others; of so many rows at
 # most that is asked of dense matrices.
 DEPENDENT, MOST_DENSE = 1e-10, 3000
+# Unbalance of a centre, rows of order 1, up to which charts restore its balance; steps it takes.
+UNBALANCED, _RESTORED = 1e-9, 3
 # Least cone coordinate (in ⟨f_n⟩) of a centre that is one for sure.
 WELL_INSIDE = 1e-5
 
@@ -215,7 +217,9 @@ def known_part(ensemble, axes):
 def inner_network(ensemble):
     """The analytic centre of S in the coordinates of `Ensemble.scaled_form`, None without one.
 
-    S has none where some contact's force is fixed at the wall of its cone, or nearly so.
+    S has none where some contact's force is fixed at the wall of its cone, or nearly so. Rows that
+    are scaled up, or all but follow from others, magnify what the centre is out of balance by: that
+    is taken off first.
     """
     middle = linear_programs.centre(independent_problem_of(ensemble))
     y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
@@ -226,4 +230,19 @@ def inner_network(ensemble):
         own = np.stack([forces @ (1 / unit), forces @ (np.array([1.0, -1.0]) / unit)], axis=1)
         y = np.where(ensemble.known.wholly[:, None], np.maximum(own, 0.0), y)
     inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
-    return np.append(inner, middle.y[y.size :])
+    inner = np.append(inner, middle.y[y.size :])
+    A, b, _ = ensemble.scaled_form
+    if np.abs(A @ inner - b).max(initial=0.0) <= UNBALANCED or A.shape[0] > MOST_DENSE:
+        return inner
+    inner = in_balance(A, b, inner)
+    return inner if inner.min(initial=1.0) > 0 else None
+
+
+def in_balance(A, b, y, away=0.0):
+    """y (n,), what it lacks of A y = b added by the least change in proportion to y + away."""
+    dense = A.toarray()
+    for _ in range(_RESTORED):
+        size = np.abs(y) + away
+        least = partial(linalg.lstsq, cond=1e-13, lapack_driver="gelsy")
+        y = y + size * cancelling.apart(least, dense * size, b - A @ y)[0]
+    return y

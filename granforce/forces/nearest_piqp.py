@@ -9,14 +9,14 @@ import numpy as np
 import piqp
 from scipy import sparse
 
+from granforce.forces.contact_problem import MOST_DENSE, in_balance
 from granforce.numerics import highs as programs
 from granforce.records import Relaxation
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 
-# Rows up to which balance is restored by a dense least-squares problem; coordinates y (in ⟨f_n⟩)
-# far below this hardly change in it.
-_MOST_DENSE, _AWAY = 3000, 1e-6
+# Coordinates y (in ⟨f_n⟩) far below this hardly change where balance is restored.
+_AWAY = 1e-6
 
 
 def nearest_piqp(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
@@ -64,12 +64,8 @@ def restored(ensemble, y):
     A program ends at its tolerance: what is left is taken off by the least change in proportion.
     """
     A, b, T = ensemble.scaled_form
-    if A.shape[0] <= _MOST_DENSE:
-        dense = A.toarray()
-        for _ in range(3):
-            size = y + _AWAY
-            change = cancelling.apart(np.linalg.lstsq, dense * size, b - A @ y, 1e-13)[0]
-            y = np.maximum(y + size * change, 0.0)
+    if A.shape[0] <= MOST_DENSE:
+        y = np.maximum(in_balance(A, b, y, _AWAY), 0.0)
     return ensemble.pin(ensemble.to_forces(T @ y * ensemble.force_scale))
 
 

@@ -64,3 +64,18 @@ def test_bounds_at_the_largest_friction_are_those_of_other_programs():
     assert S.residual(reach.states).max() <= BALANCED
     assert S.violation(reach.states).max() <= ADMISSIBLE
     assert reach.upper == pytest.approx(reach.states[1, place, 0], rel=1e-9)
+
+
+def test_uniform_states_under_known_forces_are_balanced():
+    """μ = 10⁻⁶: what is known of f_n bounds differences of f_t by rows 5·10⁻⁸ times the largest.
+
+    They kept an unbalance of 10⁻⁷ ⟨f_n⟩.
+    """
+    packing, rng = attack("n20_mu1e-6"), np.random.default_rng(2)
+    S = gf.ensemble(packing)
+    state = S.expand(gf.sample_uniform(S, 4, seed=2).flat[-1])
+    held = rng.choice(S.index, 4, replace=False)
+    width = np.where(rng.random((4, 2)) < 0.3, 0.0, 0.1) * np.abs(state[held])
+    K = gf.ensemble(packing, known=gf.Known(held, state[held] - width, state[held] + width))
+    sample = gf.sample_uniform(K, 8)
+    assert sample.residual.max() <= BALANCED and sample.violation.max() <= ADMISSIBLE
