@@ -33,10 +33,12 @@ class Case(NamedTuple):
     rng: np.random.Generator
 
 
-def case(number):
-    """The Case of a number; None where its disks did not jam within the steps allowed."""
+def case(number, most=60):
+    """The Case of a number, of `most` disks; None where they did not jam within the steps."""
     rng = np.random.default_rng([25, number])
-    n = 2 + int(59 * rng.random() ** 3)  # small ones are many: they cost least, and are strangest
+    n = 2 + int(
+        (most - 1) * rng.random() ** 3
+    )  # small ones are many: they cost least, and are strangest
     mu = 0.0 if rng.random() < 0.1 else float(10 ** rng.uniform(-8, 4))
     sizes, pressure = SIZES[rng.integers(len(SIZES))], float(10 ** rng.uniform(-9, 9))
     length, seed = float(10 ** rng.uniform(-9, 9)), int(rng.integers(2**31))
@@ -89,7 +91,7 @@ def _own(S):
 def walks(S, rng):
     done = gf.walk(S, 4, 1)
     _balanced(S, done.states)
-    assert done.counts["rejected"] == done.counts["unconverged"] == 0, done.counts
+    assert done.counts["rejected"] == 0, done.counts
 
 
 def sweeps(S, rng):
@@ -135,9 +137,12 @@ def bounds(S, rng):
 
 
 def limit_loads(S, rng):
+    """Not below 0; NaN, which says uncertified, only where more is asked than the packing's own."""
     contacts = S.index[rng.permutation(len(S.index))[:3]]
     load = gf.limit_loads(S, contacts)
-    assert np.all(load >= -INTERVAL_GAP * S.force_scale), f"uncertified: {load}"
+    assert not np.any(load < -INTERVAL_GAP * S.force_scale), load
+    plain = S.prescribed == "pressure" and S.known is None
+    assert not plain or np.all(np.isfinite(load)), f"uncertified: {load}"
 
 
 def reaches(S, rng):
@@ -205,25 +210,26 @@ STAGES = (
 )
 
 
-def faults(number):
+def faults(number, most=60, every=1):
     """What did not stand in a case, [(space, stage, what)], and how many stages were gone through.
 
-    A refusal is a fault, as every space has a network that is at hand.
+    A refusal is a fault, as every space has a network that is at hand. every: of each space only
+    one stage in so many is gone through, by turns.
     """
-    one, wrong, done = case(number), [], 0
+    one, wrong, done = case(number, most), [], 0
     if one is None:
         return wrong, done
     try:
         found = spaces(one)
     except Exception as error:
         return [("", "spaces", _told(error))], 1
-    for name, (S, member) in found.items():
+    for turn, (name, (S, member)) in enumerate(found.items()):
         try:
             inside = member[S.index]
             assert S.residual(inside) <= 2 * BALANCED, "what is at hand is not balanced"
         except Exception as error:
             wrong.append((name, "member", _told(error)))
-        for stage in STAGES:
+        for stage in STAGES[(number + turn) % every :: every]:
             done += 1
             try:
                 stage(S, np.random.default_rng([number, done]))

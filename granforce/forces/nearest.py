@@ -35,11 +35,13 @@ INSIDE = 1.0
 # each time it has fallen by LOWER since; it may take so many steps, and is given up where the
 # unbalance (in ⟨f_n⟩) exceeds LOST.
 ATTEMPT, LOWER, FINAL_STEPS, LOST = 1e-6, 1e-2, 3, 1.0
+# Steps after which no network will be reached: usual are 10 to 40.
+MOST_STEPS = 100
 # Steps shorter than this, so many in a row, mean that no network will be reached.
 SHORT, SHORT_IN_A_ROW = 1e-4, 8
 
 
-def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=100, cancel=None):
+def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=MOST_STEPS, cancel=None):
     """The point of S with the least Σ |F_c − F_start,c|²; a Relaxation.
 
     start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
@@ -51,7 +53,9 @@ def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=100, cancel=N
     return nearest_of_many(ensemble, [start], **options)[0]
 
 
-def nearest_of_many(ensemble, starts, *, tolerance=BALANCED, max_iterations=100, cancel=None):
+def nearest_of_many(
+    ensemble, starts, *, tolerance=BALANCED, max_iterations=MOST_STEPS, cancel=None
+):
     """`nearest` of each start, LANES of them side by side: the same results, bit for bit."""
     if cancel is not None:
         with cancelling.watched(cancel):
@@ -73,6 +77,12 @@ def _batch(ensemble, starts, tolerance, max_iterations):
     search = Search(problem, targets / ensemble.force_scale)
     search.run(min(tolerance, BALANCED) / 4, max_iterations, len(starts))
     forces = ensemble.pin(search.forces() * ensemble.force_scale)
+    converged = [search.ended[k] for k in range(len(starts))]
+    if ensemble.member is not None and max_iterations >= MOST_STEPS:
+        # S is not empty, and the steps were not cut short: at μ ≳ 10³ they may lead nowhere.
+        for k in np.flatnonzero(~np.array(converged)):
+            forces[k] = likeliest_piqp(ensemble, np.ones_like(forces[k]), starts[k])
+            converged[k] = ensemble.admits(forces[k])
     residual = ensemble.residual(forces[: len(starts)])
     seconds = (time.perf_counter() - begin) / len(starts)
     return [
@@ -81,7 +91,7 @@ def _batch(ensemble, starts, tolerance, max_iterations):
             search.steps[k],
             float(residual[k]),
             ensemble.violation(forces[k]),
-            bool(search.ended[k] and residual[k] <= tolerance),
+            bool(converged[k] and residual[k] <= tolerance),
             seconds,
         )
         for k in range(len(starts))
