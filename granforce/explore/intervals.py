@@ -115,9 +115,9 @@ def intervals(
     solver = Solver(system, seen=seen, **options)
     pinned = _pinned(ensemble, upper + tangential + lower)
     report(len(pinned))
-    if _is_a_point(ensemble, system):
+    if is_a_point(ensemble, system):
         keys = [key for key in upper + tangential + lower if key not in pinned]
-        pinned |= _determined(ensemble, keys)
+        pinned |= determined(ensemble, keys)
         report(len(keys))
     for key, value in pinned.items():
         found(key, *value)
@@ -180,14 +180,14 @@ def _pinned(ensemble, keys):
     return found
 
 
-def _is_a_point(ensemble, system):
+def is_a_point(ensemble, system):
     """Whether balance leaves no freedom; asked where S has no inside, or something is known."""
     asked = ensemble.known is not None or not system.middle.reached
     return asked and ensemble.A.shape[0] <= LARGEST_RANK and ensemble.dimension == 0
 
 
-def _determined(ensemble, keys):
-    """The same where the balance leaves no freedom: every component follows from the equations.
+def determined(ensemble, keys):
+    """{key: (value attained, value that bounds it)} where the equations leave no freedom.
 
     For each there are rows λ with Aᵀλ = 1 there and 0 elsewhere, hence x = b·λ, in all of S. What
     rounding leaves of Aᵀλ bounds the error.
@@ -203,8 +203,8 @@ def _determined(ensemble, keys):
     left = np.abs(np.eye(len(free)) - rows @ A).sum(axis=1) * np.abs(x).max(initial=0.0)
     follows = rows @ b
     place = {(k // ensemble.per_contact, k % ensemble.per_contact): n for n, k in enumerate(free)}
-    found = {}
-    for c, component, side in keys:
+    found = _pinned(ensemble, keys)
+    for c, component, side in (key for key in keys if key not in found):
         n = place[c, component]
         sign = -1.0 if side else 1.0
         found[c, component, side] = sign * x[free[n]], sign * follows[n] - left[n]

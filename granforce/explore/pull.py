@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.explore.intervals import bound_of
+from granforce.explore.intervals import bound_of, determined, is_a_point
 from granforce.forces.contact_problem import (
     forces_of,
     independent_problem_of,
@@ -16,6 +16,7 @@ from granforce.forces.contact_problem import (
     problem_of,
 )
 from granforce.forces.nearest import Search, some_network, starting_network
+from granforce.forces.nearest_piqp import restored
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import LANES
@@ -176,16 +177,31 @@ def reach(ensemble, contact, *, cancel=None):
     not be certified, NotJammedError where S is empty.
     """
     (position,) = ensemble.positions([contact])
-    tasks = [bound_of(ensemble, int(position), 0, side) for side in (0, 1)]
-    points = {}
-    bounds = Solver(make_system(ensemble)).solve([0, 1], tasks, points)
-    cancelling.check("exact interval")
+    keys, points = [(int(position), 0, side) for side in (0, 1)], {}
+    system = make_system(ensemble)
+    if is_a_point(ensemble, system):
+        found = determined(ensemble, keys)
+        states = np.stack([starting_network(ensemble)] * 2)
+    else:
+        found = Solver(system).solve(keys, [bound_of(ensemble, *key) for key in keys], points)
+        cancelling.check("exact interval")
+        states = np.stack([_balanced(ensemble, points[key]) for key in keys])
+    bounds = [found[key] for key in keys]
     gap = np.array([abs(bounds[side][0] - bounds[side][1]) for side in (0, 1)])
     if not np.all(gap <= INTERVAL_GAP):
         raise UndecidedError(f"the interval of contact {contact} could not be certified")
-    states = np.stack([forces_of(ensemble, points[side]) for side in (0, 1)])
+    if not np.all(_admitted(ensemble, states)):
+        raise UndecidedError(f"no balanced network at the ends of contact {contact} was reached")
     lower, upper = bounds[0][0] * ensemble.force_scale, -bounds[1][0] * ensemble.force_scale
     return Reach(int(contact), lower, upper, gap, states, *_at_walls(ensemble, states))
+
+
+def _balanced(ensemble, y):
+    """The network (N_c, 2) of a vertex, balanced to rounding where it is not to BALANCED."""
+    forces = forces_of(ensemble, y)
+    if ensemble.residual(forces) <= BALANCED:
+        return forces
+    return restored(ensemble, ensemble.coordinates(forces))
 
 
 def _at_walls(ensemble, states):

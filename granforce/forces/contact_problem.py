@@ -221,6 +221,9 @@ def inner_network(ensemble):
     are scaled up, or all but follow from others, magnify what the centre is out of balance by: that
     is taken off first.
     """
+    if _is_a_point(ensemble):
+        y = ensemble.coordinates(ensemble.member)
+        return np.where(y > 0.1 * BALANCED, y, 0.0)
     middle = linear_programs.centre(independent_problem_of(ensemble))
     y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
     if not middle.reached or not middle.y.min(initial=1.0) > WELL_INSIDE:
@@ -236,6 +239,12 @@ def inner_network(ensemble):
         return inner
     inner = in_balance(A, b, inner)
     return inner if inner.min(initial=1.0) > 0 else None
+
+
+def _is_a_point(ensemble):
+    """Whether S is the network at hand alone, as far as that is asked of dense matrices."""
+    few = ensemble.A.shape[0] <= MOST_DENSE
+    return few and ensemble.member is not None and ensemble.dimension == 0
 
 
 def in_balance(A, b, y, away=0.0):

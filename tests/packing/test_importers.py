@@ -785,3 +785,21 @@ def test_mutants_are_refused_or_whole(kind):
 def test_a_hundred_thousand_mutants_are_refused_or_whole(kind, seed):
     """2500 of each kind and seed: 100,000 tried, none let through, no other error than the one."""
     assert 250 < mutants(kind, 2500, seed)
+
+
+@pytest.mark.parametrize("soft", [False, True])
+def test_single_precision_is_taken_and_its_unbalance_told(soft, tmp_path):
+    """Seven digits: forces are out of balance by 10⁻⁷, and S is that of the whole packing."""
+    packing = read_lammps(PARTICLES, CONTACTS, 0.3) if soft else load_packing(SMALL)
+    whole, short = io.BytesIO(), tmp_path / "single.npz"
+    save_packing(packing, whole)
+    whole.seek(0)
+    arrays = dict(np.load(whole))
+    for name, array in arrays.items():
+        arrays[name] = array.astype(np.float32) if array.dtype == np.float64 else array
+    np.savez(short, **arrays)
+    found = load_packing(short)
+    assert 1e-9 < report(found)["residual"] < 1e-6
+    S, T = ensemble(packing), ensemble(found)
+    assert S.dimension == T.dimension and np.array_equal(S.index, T.index)
+    assert np.abs(np.hypot(*found.contacts.normal.T) - 1).max() < 1e-15
