@@ -1,6 +1,7 @@
 """The finished study that comes with the page: its numbers, and the paper's claims judged."""
 
 import json
+import math
 import threading
 from functools import cache
 from pathlib import Path
@@ -36,12 +37,19 @@ def _study():
 
 @cache
 def claims(about):
-    """The paper's claims about one of ABOUT: dicts with statement, value, low, high, verdict."""
+    """The paper's claims about one of ABOUT: dicts with statement, value, low, high, verdict.
+
+    What could not be measured is NaN, null in the file.
+    """
     path = DATA / "claims.json"
     if not path.exists():
         return []
     found = json.loads(path.read_text())["claims"]
-    return [claim for claim in found if claim["statement"].startswith(ABOUT[about])]
+    return [
+        {name: math.nan if value is None else value for name, value in claim.items()}
+        for claim in found
+        if claim["statement"].startswith(ABOUT[about])
+    ]
 
 
 def rows(*parts):

@@ -258,6 +258,19 @@ def whole(value, name, least=0, most=LARGEST_WHOLE):
     return number
 
 
+def are_whole(values, most=LARGEST_WHOLE):
+    """Mask of values (…) that are whole numbers from 0 to `most`: those that a cast to int keeps.
+
+    To be asked before every cast: what int64 cannot hold becomes another number in silence.
+    """
+    values = np.asarray(values)
+    try:
+        with np.errstate(invalid="ignore"):
+            return (values >= 0) & (values <= most) & (values % 1 == 0)
+    except TypeError:  # no numbers at all
+        return np.zeros(values.shape, dtype=bool)
+
+
 def random_seed(value, name="seed"):
     """The value as an int ≥ 0 of any size; InputError otherwise."""
     return whole(value, name, most=None)
@@ -296,12 +309,13 @@ def make_contacts(i, j, normal, length, r):
     Raises InputError for grain numbers outside 0 … N − 1, self-contacts, normals that are not unit
     vectors, or distances ≤ 0.
     """
-    i, j = (np.ascontiguousarray(k, dtype=np.int64) for k in (i, j))
+    i, j = np.asarray(i), np.asarray(j)
     if i.ndim != 1 or i.shape != j.shape:
         raise InputError(f"contact lists i and j differ in shape: {i.shape} and {j.shape}")
     count = len(i)
-    if count and (min(i.min(), j.min()) < 0 or max(i.max(), j.max()) >= len(r)):
+    if not all(are_whole(k, len(r) - 1).all() for k in (i, j)):
         raise InputError(f"a contact names a grain outside 0 … {len(r) - 1}")
+    i, j = (np.ascontiguousarray(k, dtype=np.int64) for k in (i, j))
     if np.any(i == j):
         raise InputError(f"contact {int(np.argmax(i == j))} joins a grain with itself")
     normal = float_array(normal, (count, 2), "contact normals")

@@ -19,6 +19,9 @@ OVERLAP = 1e-9
 # point lies midway in the overlap. Below it disks are rigid and lever arms are the radii.
 RIGID_OVERLAP = 1e-5
 
+# Entries of the balance (of order 1) below this are 0 but for rounding.
+ROUNDING = 1e-14
+
 # Residual at which Gauss–Seidel sweeps end and the nearest admissible network takes over. Against
 # sweeping on to 1e-6 it moved the state by at most 2 % (mostly below 0.9 %), of steps of 5–20 %,
 # and saved four fifths of the sweeps or more.

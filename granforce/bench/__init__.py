@@ -4,7 +4,6 @@
 (dicts of plain numbers and strings).
 """
 
-import json
 import time
 
 from granforce.bench.conditions import knowledge
@@ -17,6 +16,7 @@ from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
 from granforce.bench.states import batches, interval_methods, intervals, walks
 from granforce.bench.uniform import uniform
 from granforce.system.files import make_folder, written
+from granforce.system.plain import json_text
 
 __all__ = [
     "PARTS",
@@ -85,7 +85,7 @@ def run(folder=None, quick=True, *, parts=None, show=print):
         show(table(heading, results[name]))
         if folder is not None:
             with written(folder / "bench.json") as file:
-                file.write(json.dumps(results, indent=1, ensure_ascii=False).encode())
+                file.write(json_text(results, ascii_only=False).encode())
     if folder is not None:
         _draw(folder, results)
     return results
@@ -104,7 +104,7 @@ def main(out=None, quick=False, as_json=False):
     """The command `granforce bench`: tables or JSON on stdout, progress on stderr; returns 0."""
     results = run(out, quick, show=(lambda text: None) if as_json else print)
     if as_json:
-        print(json.dumps(results, indent=1, ensure_ascii=False))
+        print(json_text(results, ascii_only=False))
     else:
         print(table("Environment", [{**results["environment"], **_versions(results)}]))
     return 0

@@ -570,7 +570,7 @@ def _report_scan(rows, failed, as_json):
     summary = {"cells": len(rows) + len(failed), "found": found, "failed": len(failed)}
     if as_json:
         errors = [{"cell": cell, "error": message} for cell, message in failed]
-        print(json.dumps({"rows": rows, "errors": errors, **summary}, indent=1))
+        report({"rows": rows, "errors": errors, **summary}, as_json)
         return
     heads = {"packing_fraction": "φ", "coordination": "z", "dimension": "h", "mu": "μ"}
     heads |= {"eta1": "η1", "eta2": "η2", "eta3": "η3"}

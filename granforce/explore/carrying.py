@@ -72,7 +72,7 @@ def carrying(
         )
         bounds = np.stack([np.maximum(bounds[..., 0], low), np.minimum(bounds[..., 1], high)], -1)
     known = knowledge.polygons(bounds, ensemble.mu, ensemble.force_scale, ensemble.index)
-    bounded = replace(ensemble, known=known)
+    bounded = replace(ensemble, known=known, found=best.forces)
     if contacts is None:
         places = np.flatnonzero(np.isnan(m[:, 0]))
     else:

@@ -1,6 +1,5 @@
 """Which measurement next: where one more known force would tell most about all others."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +7,6 @@ import numpy as np
 from granforce import measures, notebook
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import sample_uniform
-from granforce.forces import knowledge
 from granforce.records import InputError, whole
 from granforce.system import cancelling
 from granforce.tolerances import FLAT
@@ -55,7 +53,7 @@ def informative(
     """
     k, check = whole(k, "k", 1), whole(check, "check")
     sample = sample_uniform(ensemble, states, seed=seed, workers=workers)
-    normal = sample.flat[..., 0] / ensemble.force_scale
+    normal, mean = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)
     expected = _expected(normal)
     if not expected.any():
         raise InputError("nothing is left to measure: every force is known by balance")
@@ -69,8 +67,8 @@ def informative(
     for done, c in enumerate(best):
         if not done:
             before = _mean_interval(ensemble, workers)
-        value = normal[:, c].mean() * ensemble.force_scale
-        after[done] = _mean_interval(_with_normal(ensemble, c, value), workers)
+        with_it = ensemble.with_normal(c, mean[c, 0], mean)
+        after[done] = _mean_interval(with_it, workers)
         if progress is not None:
             progress(done + 1, len(best))
     place = np.append(np.argsort(after[: len(best)], kind="stable"), range(len(best), len(order)))
@@ -86,18 +84,6 @@ def _expected(normal):
     correlation = np.clip(unit.T @ unit / len(unit), -1.0, 1.0)
     left = np.sqrt(1 - correlation**2)
     return np.where(spread > FLAT, 1 - left @ spread / max(spread.sum(), FLAT), 0.0)
-
-
-def _with_normal(ensemble, c, value):
-    """The ensemble with f_n of the contact at position c known as well."""
-    bounds = np.empty((len(ensemble.index), 2, 2))
-    bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
-    if ensemble.known is not None:
-        bounds[..., 0] = ensemble.known.low * ensemble.force_scale
-        bounds[..., 1] = ensemble.known.high * ensemble.force_scale
-    bounds[c, 0] = value
-    known = knowledge.polygons(bounds, ensemble.mu, ensemble.force_scale, ensemble.index)
-    return replace(ensemble, known=known)
 
 
 def _mean_interval(ensemble, workers):

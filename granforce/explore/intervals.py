@@ -17,6 +17,7 @@ import numpy as np
 
 from granforce import measures, notebook
 from granforce.forces.contact_problem import make_system
+from granforce.forces.ensemble import LARGEST_RANK
 from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
@@ -114,9 +115,9 @@ def intervals(
     solver = Solver(system, seen=seen, **options)
     pinned = _pinned(ensemble, upper + tangential + lower)
     report(len(pinned))
-    if ensemble.known is not None and ensemble.dimension == 0:
+    if is_a_point(ensemble, system):
         keys = [key for key in upper + tangential + lower if key not in pinned]
-        pinned |= _determined(ensemble, keys)
+        pinned |= determined(ensemble, keys)
         report(len(keys))
     for key, value in pinned.items():
         found(key, *value)
@@ -179,13 +180,21 @@ def _pinned(ensemble, keys):
     return found
 
 
-def _determined(ensemble, keys):
-    """The same where the balance leaves no freedom: every component follows from what is known.
+def is_a_point(ensemble, system):
+    """Whether balance leaves no freedom; asked where S has no inside, or something is known."""
+    asked = ensemble.known is not None or not system.middle.reached
+    return asked and ensemble.A.shape[0] <= LARGEST_RANK and ensemble.dimension == 0
+
+
+def determined(ensemble, keys):
+    """{key: (value attained, value that bounds it)} where the equations leave no freedom.
 
     For each there are rows λ with Aᵀλ = 1 there and 0 elsewhere, hence x = b·λ, in all of S. What
     rounding leaves of Aᵀλ bounds the error.
     """
-    free = np.flatnonzero(~ensemble.to_vector(ensemble.known.pinned).astype(bool))
+    held = np.zeros((len(ensemble.index), 2), bool)
+    held = held if ensemble.known is None else ensemble.known.pinned
+    free = np.flatnonzero(~ensemble.to_vector(held).astype(bool))
     x = ensemble.to_vector(starting_network(ensemble)) / ensemble.force_scale
     fixed = np.where(np.isin(np.arange(len(x)), free), 0.0, x)
     A = ensemble.A.tocsc()[:, free].toarray()
@@ -194,8 +203,8 @@ def _determined(ensemble, keys):
     left = np.abs(np.eye(len(free)) - rows @ A).sum(axis=1) * np.abs(x).max(initial=0.0)
     follows = rows @ b
     place = {(k // ensemble.per_contact, k % ensemble.per_contact): n for n, k in enumerate(free)}
-    found = {}
-    for c, component, side in keys:
+    found = _pinned(ensemble, keys)
+    for c, component, side in (key for key in keys if key not in found):
         n = place[c, component]
         sign = -1.0 if side else 1.0
         found[c, component, side] = sign * x[free[n]], sign * follows[n] - left[n]
@@ -257,7 +266,7 @@ def _positions(ensemble, contacts):
     """Positions (k,) in the ensemble of contacts by their numbers in the packing, or of all."""
     if contacts is None:
         return np.arange(len(ensemble.index))
-    contacts = np.asarray(contacts, dtype=np.int64).ravel()
+    contacts = np.asarray(contacts).ravel()
     if len(np.unique(contacts)) < len(contacts):
         raise InputError("a contact is named twice")
     return ensemble.positions(contacts)

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.explore.intervals import bound_of
+from granforce.explore.intervals import bound_of, determined, is_a_point
 from granforce.forces.contact_problem import (
     forces_of,
     independent_problem_of,
     make_system,
     problem_of,
 )
-from granforce.forces.nearest import Search, nearest, starting_network
+from granforce.forces.nearest import Search, some_network, starting_network
+from granforce.forces.nearest_piqp import restored
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import LANES
@@ -131,18 +132,39 @@ def _near_ends(ensemble, contact, values, state):
         )
     width = found.upper - found.lower
     if width <= _AT_WALL * ensemble.force_scale:  # every network has this f_n
-        return np.stack([nearest(ensemble, state).forces] * len(values))
+        return np.stack([_without_pulling(ensemble, contact, state)] * len(values))
     (position,) = ensemble.positions([contact])
     for part in _INWARD:
         inside = found.lower + part * width, found.upper - part * width
         states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
         if np.all(admitted := _admitted(ensemble, states)):
             return states
+    between = np.clip((values - found.lower) / width, 0.0, 1.0)[:, None, None]
+    # On the line between both ends lies a network with each value: S with that known has one.
+    on_the_line = (1 - between) * found.states[0] + between * found.states[1]
+    for k in np.flatnonzero(~admitted):
+        there = on_the_line[k]
+        states[k] = some_network(ensemble.with_normal(position, there[position, 0], there), state)
+    if np.all(admitted := _admitted(ensemble, states)):
+        return states
     raise UndecidedError(
         f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
         f"{contact} was not reached; take a value further from the ends of its interval, "
         f"{found.lower:.9g} to {found.upper:.9g}"
     )
+
+
+def _without_pulling(ensemble, contact, state):
+    """The network nearest to state, which has the only f_n there is."""
+    found = some_network(ensemble, state)
+    if not ensemble.admits(found) and ensemble.dimension == 0 and ensemble.member is not None:
+        found = ensemble.member
+    if not ensemble.admits(found):
+        raise UndecidedError(
+            f"the network nearest to the given one was not reached; contact {contact} has the same "
+            "normal force in all of them"
+        )
+    return found
 
 
 @cancelling.cancellable
@@ -155,16 +177,31 @@ def reach(ensemble, contact, *, cancel=None):
     not be certified, NotJammedError where S is empty.
     """
     (position,) = ensemble.positions([contact])
-    tasks = [bound_of(ensemble, int(position), 0, side) for side in (0, 1)]
-    points = {}
-    bounds = Solver(make_system(ensemble)).solve([0, 1], tasks, points)
-    cancelling.check("exact interval")
+    keys, points = [(int(position), 0, side) for side in (0, 1)], {}
+    system = make_system(ensemble)
+    if is_a_point(ensemble, system):
+        found = determined(ensemble, keys)
+        states = np.stack([starting_network(ensemble)] * 2)
+    else:
+        found = Solver(system).solve(keys, [bound_of(ensemble, *key) for key in keys], points)
+        cancelling.check("exact interval")
+        states = np.stack([_balanced(ensemble, points[key]) for key in keys])
+    bounds = [found[key] for key in keys]
     gap = np.array([abs(bounds[side][0] - bounds[side][1]) for side in (0, 1)])
     if not np.all(gap <= INTERVAL_GAP):
         raise UndecidedError(f"the interval of contact {contact} could not be certified")
-    states = np.stack([forces_of(ensemble, points[side]) for side in (0, 1)])
+    if not np.all(_admitted(ensemble, states)):
+        raise UndecidedError(f"no balanced network at the ends of contact {contact} was reached")
     lower, upper = bounds[0][0] * ensemble.force_scale, -bounds[1][0] * ensemble.force_scale
     return Reach(int(contact), lower, upper, gap, states, *_at_walls(ensemble, states))
+
+
+def _balanced(ensemble, y):
+    """The network (N_c, 2) of a vertex, balanced to rounding where it is not to BALANCED."""
+    forces = forces_of(ensemble, y)
+    if ensemble.residual(forces) <= BALANCED:
+        return forces
+    return restored(ensemble, ensemble.coordinates(forces))
 
 
 def _at_walls(ensemble, states):

@@ -15,6 +15,7 @@ from granforce.numerics import (
     linear_programs,
 )
 from granforce.system import cancelling
+from granforce.tolerances import BALANCED
 
 # Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
 # slows no step, only bounds them.
@@ -22,6 +23,8 @@ SHIFT = 1e-11
 # Rows whose pivot is below this, relative to the largest, follow from others; of so many rows at
 # most that is asked of dense matrices.
 DEPENDENT, MOST_DENSE = 1e-10, 3000
+# Unbalance of a centre, rows of order 1, up to which charts restore its balance; steps it takes.
+UNBALANCED, _RESTORED = 1e-9, 3
 # Least cone coordinate (in ⟨f_n⟩) of a centre that is one for sure.
 WELL_INSIDE = 1e-5
 
@@ -175,8 +178,23 @@ def _new_system(ensemble):
         A, b, _ = knowledge.extended(A, b + _instead(ensemble), T, known, mu, value)
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
+    if ensemble.member is not None:
+        # Multipliers of rows that follow from others may be large: what the own unbalance of a
+        # network, up to BALANCED, contradicts there would pass for a bound.
+        given = A @ _coordinates(ensemble, ensemble.member)
+        b = given if np.abs(given - b).max(initial=0.0) <= 2 * BALANCED else b
     problem = independent_problem_of(ensemble)
     return certified_values.make_system(problem, A.tocsr(), b, loads.tocsc(), bounding)
+
+
+def _coordinates(ensemble, forces):
+    """y (n,) ≥ 0 of a Problem nearest to forces (N_c, 2)."""
+    y = ensemble.coordinates(forces)
+    parts = ensemble.per_contact * len(ensemble.index)
+    pairs = y[:parts].reshape(-1, ensemble.per_contact).repeat(2 // ensemble.per_contact, axis=1)
+    if ensemble.known is not None:
+        pairs = np.where(ensemble.known.wholly[:, None], 1.0, pairs)
+    return np.append(pairs, y[parts:])
 
 
 def cone_costs(ensemble, forces):
@@ -199,8 +217,13 @@ def known_part(ensemble, axes):
 def inner_network(ensemble):
     """The analytic centre of S in the coordinates of `Ensemble.scaled_form`, None without one.
 
-    S has none where some contact's force is fixed at the wall of its cone, or nearly so.
+    S has none where some contact's force is fixed at the wall of its cone, or nearly so. Rows that
+    are scaled up, or all but follow from others, magnify what the centre is out of balance by: that
+    is taken off first.
     """
+    if _is_a_point(ensemble):
+        y = ensemble.coordinates(ensemble.member)
+        return np.where(y > 0.1 * BALANCED, y, 0.0)
     middle = linear_programs.centre(independent_problem_of(ensemble))
     y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
     if not middle.reached or not middle.y.min(initial=1.0) > WELL_INSIDE:
@@ -210,4 +233,25 @@ def inner_network(ensemble):
         own = np.stack([forces @ (1 / unit), forces @ (np.array([1.0, -1.0]) / unit)], axis=1)
         y = np.where(ensemble.known.wholly[:, None], np.maximum(own, 0.0), y)
     inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
-    return np.append(inner, middle.y[y.size :])
+    inner = np.append(inner, middle.y[y.size :])
+    A, b, _ = ensemble.scaled_form
+    if np.abs(A @ inner - b).max(initial=0.0) <= UNBALANCED or A.shape[0] > MOST_DENSE:
+        return inner
+    inner = in_balance(A, b, inner)
+    return inner if inner.min(initial=1.0) > 0 else None
+
+
+def _is_a_point(ensemble):
+    """Whether S is the network at hand alone, as far as that is asked of dense matrices."""
+    few = ensemble.A.shape[0] <= MOST_DENSE
+    return few and ensemble.member is not None and ensemble.dimension == 0
+
+
+def in_balance(A, b, y, away=0.0):
+    """y (n,), what it lacks of A y = b added by the least change in proportion to y + away."""
+    dense = A.toarray()
+    for _ in range(_RESTORED):
+        size = np.abs(y) + away
+        least = partial(linalg.lstsq, cond=1e-13, lapack_driver="gelsy")
+        y = y + size * cancelling.apart(least, dense * size, b - A @ y)[0]
+    return y

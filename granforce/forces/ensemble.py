@@ -3,7 +3,7 @@
 Unknowns x = (f_n1, f_t1, f_n2, …), or (f_n1, f_n2, …) at μ = 0 where no contact can carry f_t.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from scipy import sparse
 
 from granforce import notebook
 from granforce.forces import knowledge
-from granforce.forces.nearest import nearest
+from granforce.forces.nearest import nearest, some_network
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import (
@@ -20,11 +20,12 @@ from granforce.records import (
     InputError,
     NotJammedError,
     Packing,
+    are_whole,
     float_array,
     friction,
 )
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING, SEEN_CARRYING
+from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING, ROUNDING, SEEN_CARRYING
 
 # What is prescribed, by its number of values.
 _NAMES = {1: "pressure", 3: "stress"}
@@ -50,6 +51,7 @@ class Ensemble:
     skipped: dict  # counts of what was left out: rattlers, unloaded contacts, tangential unknowns
     prescribed: str  # "pressure", "stress" (with the pressure) or "none"
     known: knowledge.Polygons | None  # bounds on single forces, in ⟨f_n⟩; None without any
+    found: np.ndarray | None = None  # (N_c, 2) a network met while these contacts were sorted out
 
     @property
     def per_contact(self):
@@ -112,21 +114,66 @@ class Ensemble:
         return sparse.csc_matrix(self.A @ T), T
 
     @cached_property
+    def member(self):
+        """A network (N_c, 2) of S that is at hand, force; None without one.
+
+        It is a certificate that S is not empty, which no program can contradict.
+        """
+        at_hand = (forces for forces in (self.original, self.found) if forces is not None)
+        return next((forces for forces in at_hand if self.admits(forces)), None)
+
+    @cached_property
     def scaled_form(self):
         """(A, b, T) of S = {x = ⟨f_n⟩ T y : A y = b, y ≥ 0}; where forces are known, with slacks.
 
         The largest entry of each row of the balance is 1: torque rows are as small (or large) as μ
-        otherwise, which costs solvers their last digits.
+        otherwise, which costs solvers their last digits. Where a network is at hand, b is what it
+        gives: its own unbalance, up to BALANCED, would be magnified by that scale, and rows that
+        follow from others would contradict them.
         """
+        A, b, T = self._scaled_balance
+        if self.known is not None:
+            A, b, T = knowledge.extended(A, b, T, self.known, self.mu, self.known.value)
+        y = None if self.member is None else self.coordinates(self.member)
+        if y is not None and self.residual(self.to_forces(T @ y * self.force_scale)) <= BALANCED:
+            b = A @ y
+        return A, b, T
+
+    @cached_property
+    def slack(self):
+        """(rows,) of `scaled_form`: up to what it may differ from b in forces that are admitted."""
+        scale = self._row_scale
         if self.known is None:
-            return self._scaled_balance
-        return knowledge.extended(*self._scaled_balance, self.known, self.mu, self.known.value)
+            return BALANCED * scale
+        unit = knowledge.units(self.mu)
+        parts = self.known.component, knowledge.pins(self.known, self.mu)[1]
+        return np.append(BALANCED * scale, ADMISSIBLE / unit[np.concatenate(parts)])
+
+    def coordinates(self, forces):
+        """y (n,) ≥ 0 of `scaled_form` nearest to forces (N_c, 2)."""
+        normal, tangential = forces.T / self.force_scale
+        y = normal[:, None]
+        if self.mu > 0:
+            y = np.column_stack([normal + tangential / self.mu, normal - tangential / self.mu])
+        y = y.ravel()
+        if self.known is not None:
+            known = self.known
+            rest = (
+                known.limit - known.sign * forces[known.contact, known.component] / self.force_scale
+            )
+            y = np.append(y, rest / knowledge.units(self.mu)[known.component])
+        return np.maximum(y, 0.0)
+
+    @cached_property
+    def _row_scale(self):
+        """(rows,) what makes the largest entry of each row of `cone_form` 1."""
+        largest = abs(self.cone_form[0]).max(axis=1).toarray().ravel()
+        return 1 / np.where(largest > 0, largest, 1.0)
 
     @cached_property
     def _scaled_balance(self):
+        scale = self._row_scale
         A, T = self.cone_form
-        largest = abs(A).max(axis=1).toarray().ravel()
-        scale = 1 / np.where(largest > 0, largest, 1.0)
         return sparse.csc_matrix(sparse.diags(scale) @ A), scale * self.b / self.force_scale, T
 
     def _repr_html_(self):
@@ -147,10 +194,24 @@ class Ensemble:
         left_out = {name.replace("_", " "): n for name, n in self.skipped.items() if n}
         return notebook.table("Admissible force networks S", lines | left_out)
 
+    def with_normal(self, position, value, found):
+        """The same where f_n of the contact at `position` is known, too, to be `value` (force).
+
+        found (N_c, 2): a network of S with that f_n, which is then at hand.
+        """
+        bounds = np.empty((len(self.index), 2, 2))
+        bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
+        if self.known is not None:
+            bounds[..., 0] = self.known.low * self.force_scale
+            bounds[..., 1] = self.known.high * self.force_scale
+        bounds[position, 0] = value
+        known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
+        return replace(self, known=known, found=found)
+
     def positions(self, contacts):
         """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
-        contacts = np.asarray(contacts, dtype=int)
-        unknown = np.setdiff1d(contacts, self.index)
+        contacts = np.asarray(contacts)
+        unknown = contacts[~np.isin(contacts, self.index)]
         if len(unknown):
             raise InputError(
                 f"contact {unknown[0]} is none of the {len(self.index)} that carry a load in this "
@@ -258,8 +319,9 @@ def ensemble(
     _check_frozen_and_known(packing, held, bounds, full.force_scale)
     if not prune:
         return full
-    carrying = _carrying(full)
+    carrying, found = _carrying(full)
     pruned = full if carrying.all() else _assemble(packing, asked, free[carrying])
+    pruned = replace(pruned, found=None if found is None else found[carrying])
     _check_idle_and_known(pruned, bounds)
     return pruned
 
@@ -360,7 +422,7 @@ def _frozen_positions(frozen, count):
         if frozen.shape != (count,):
             raise InputError(f"frozen must mask {count} contacts, got shape {frozen.shape}")
         return np.flatnonzero(frozen)
-    if frozen.size and (frozen.min() < 0 or frozen.max() >= count):
+    if not are_whole(frozen, count - 1).all():
         raise InputError(f"a frozen contact lies outside 0 … {count - 1}")
     return frozen.astype(np.int64)
 
@@ -403,6 +465,7 @@ def _assemble(packing, asked, free):
         A = sparse.vstack([A, sparse.csr_matrix(rows)], format="csr")
         b, scale = np.append(b, values), values[0]
     scale = float(scale) or 1.0
+    A = _without_rounding(A, len(grains) * (3 if mu > 0 else 2), contacts)
     if held.any():
         b = _held_in_balance(A, b, original if mu > 0 else original[:, :1], BALANCED * scale)
     known = None
@@ -446,6 +509,20 @@ def _balance(packing, contacts, grains, held, mu):
     if mu == 0:
         A = A[:, ::2]
     return sparse.csr_matrix(A), b
+
+
+def _without_rounding(A, balance, contacts):
+    """A without entries that are rounding of 0: n_y of contacts along x, n_x² − n_y² at 45°.
+
+    A row of nothing else would be a condition of its own once it is scaled. Entries of the
+    `balance` rows are of order 1, those of what is prescribed of order ℓ/Σℓ.
+    """
+    unit = np.ones(A.shape[0])
+    unit[balance:] = contacts.length.max() / contacts.length.sum()
+    A = sparse.csr_matrix(A)
+    A.data[np.abs(A.data) < ROUNDING * np.repeat(unit, np.diff(A.indptr))] = 0.0
+    A.eliminate_zeros()
+    return A
 
 
 def _held_in_balance(A, b, original, tolerance):
@@ -496,7 +573,7 @@ def _conditions(packing, contacts, mu, stress):
 
 
 def _carrying(full):
-    """Mask of contacts whose largest f_n over S is positive, exactly.
+    """Mask of contacts whose largest f_n over S is positive, exactly; and a network, or None.
 
     What presses in a known state carries; known are the original network, or the one nearest to
     equal f_n, and one that is pulled towards forces on the contacts without any. Contacts of grains
@@ -506,7 +583,7 @@ def _carrying(full):
     """
     known = full.original
     if not full.admits(known):
-        known = _nearest_to(full, np.zeros_like(known), np.ones(len(known), bool))
+        known = some_network(full, np.zeros_like(known))
     trusted = full.admits(known)
     if not trusted and full.known is not None:
         _tell_contradiction(full)
@@ -519,12 +596,13 @@ def _carrying(full):
         if open_ones.any():
             pulled = _nearest_to(full, known, open_ones)
             idle &= (pulled[:, 0] <= SEEN_CARRYING * full.force_scale) | (not full.admits(pulled))
-    return ~(dead | _proven_idle(full, idle & ~dead, trusted))
+    carrying = ~(dead | _proven_idle(full, idle & ~dead, trusted))
+    return carrying, known if trusted else None
 
 
 def _tell_contradiction(full):
     """NotJammedError with the statements that cannot hold together, where that can be proved."""
-    where = full.known, full.mu, full.index, full.force_scale
+    where = full.known, full.mu, full.index, full.force_scale, full.slack
     message = knowledge.contradiction(*full._scaled_balance, *where)
     if message is not None:
         raise NotJammedError(message)
@@ -604,7 +682,7 @@ def _proven_idle(full, idle, trusted):
         return shown
     if trusted:
         return idle  # feasible within BALANCED but not exactly: no more is known to carry
-    raise certificates.why_unsolved(A, b, _unbalanced_message(full))
+    raise certificates.why_unsolved(A, b, _unbalanced_message(full), slack=full.slack)
 
 
 def _unbalanced_message(full):

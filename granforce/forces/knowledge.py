@@ -11,7 +11,7 @@ from scipy import sparse
 
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import InputError, NotJammedError
+from granforce.records import InputError, NotJammedError, are_whole
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
 _NAMES = "f_n", "f_t"
@@ -58,8 +58,7 @@ def bounds_of(known, count):
     """
     try:
         contacts, low, high = known
-        numbers = np.atleast_1d(np.asarray(contacts))
-        contacts = numbers.astype(np.int64)
+        contacts = np.atleast_1d(np.asarray(contacts, dtype=np.float64))
         low, high = (
             np.broadcast_to(np.asarray(side, dtype=np.float64), (len(contacts), 2))
             for side in (low, high)
@@ -69,8 +68,9 @@ def bounds_of(known, count):
             "known must be Known(contacts, low, high): contact numbers (k,), and bounds (k, 2) on "
             "f_n and f_t"
         ) from None
-    if np.any(contacts != numbers) or np.any((contacts < 0) | (contacts >= count)):
+    if not are_whole(contacts, count - 1).all():
         raise InputError(f"a known contact is none of the packing's 0 … {count - 1}")
+    contacts = contacts.astype(np.int64)
     if np.isnan(low).any() or np.isnan(high).any():
         raise InputError("a bound is NaN; give −inf and inf where nothing is known")
     bounds = np.empty((count, 2, 2))
@@ -201,10 +201,11 @@ def pins(known, mu):
     return np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
 
 
-def contradiction(A, b, T, known, mu, index, scale):
+def contradiction(A, b, T, known, mu, index, scale, slack):
     """The message that names what cannot hold together, with proof; None where none was found.
 
-    A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩. The statements are those
+    A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩; slack:
+    `Ensemble.slack`. The statements are those
     with a multiplier in the program that lets them give as little as possible in sum.
     """
     whole, right, _ = extended(A, b, T, known, mu, known.value)
@@ -220,7 +221,7 @@ def contradiction(A, b, T, known, mu, index, scale):
         if status != programs.OPTIMAL:
             continue
         multiplier = programs.multipliers(model, relaxed, cost)
-        if certificates.proves_empty(whole, right, multiplier):
+        if certificates.proves_empty(whole, right, multiplier, slack):
             given = y[n + sides :][:count]
             given[sides:] += y[n + sides + count :]
             return _statements(known, mu, index, scale, multiplier[rows:], given)

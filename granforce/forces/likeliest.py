@@ -12,6 +12,7 @@ from scipy.sparse.linalg import splu
 
 from granforce.forces import knowledge
 from granforce.forces.contact_problem import forces_of, problem_of
+from granforce.forces.nearest_piqp import likeliest_piqp
 from granforce.numerics import certificates, contact_program
 from granforce.numerics.contact_program import OPTIMUM, PINNED
 from granforce.numerics.lanes import ONE
@@ -104,9 +105,14 @@ def fitted(ensemble, m, s, unmeasured=UNMEASURED):
             break
         contact_program.advance(problem, False, OPTIMUM, at, work, ONE)
     forces = forces_of(ensemble, at.y[:-1, 0])
-    if not ensemble.residual(forces) <= BALANCED:
-        raise certificates.why_unsolved(*ensemble.scaled_form[:2])
-    return forces
+    if ensemble.residual(forces) <= BALANCED:
+        return forces
+    forces = likeliest_piqp(ensemble, 1 / np.where(np.isnan(m), unmeasured * unit, s), m)
+    if ensemble.admits(forces):
+        return forces
+    if ensemble.member is not None and ensemble.dimension == 0:
+        return ensemble.member
+    raise certificates.why_unsolved(*ensemble.scaled_form[:2], slack=ensemble.slack)
 
 
 def _adapted(ensemble, m, forces):

@@ -17,7 +17,8 @@ import time
 import numpy as np
 
 from granforce.forces.contact_problem import problem_of
-from granforce.numerics import certificates, contact_program
+from granforce.forces.nearest_piqp import likeliest_piqp, restored
+from granforce.numerics import certificates, contact_program, highs
 from granforce.numerics.contact_program import OPTIMUM, PINNED, PROJECTED
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.records import Relaxation
@@ -34,11 +35,13 @@ INSIDE = 1.0
 # each time it has fallen by LOWER since; it may take so many steps, and is given up where the
 # unbalance (in ⟨f_n⟩) exceeds LOST.
 ATTEMPT, LOWER, FINAL_STEPS, LOST = 1e-6, 1e-2, 3, 1.0
+# Steps after which no network will be reached: usual are 10 to 40.
+MOST_STEPS = 100
 # Steps shorter than this, so many in a row, mean that no network will be reached.
 SHORT, SHORT_IN_A_ROW = 1e-4, 8
 
 
-def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=100, cancel=None):
+def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=MOST_STEPS, cancel=None):
     """The point of S with the least Σ |F_c − F_start,c|²; a Relaxation.
 
     start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
@@ -50,7 +53,9 @@ def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=100, cancel=N
     return nearest_of_many(ensemble, [start], **options)[0]
 
 
-def nearest_of_many(ensemble, starts, *, tolerance=BALANCED, max_iterations=100, cancel=None):
+def nearest_of_many(
+    ensemble, starts, *, tolerance=BALANCED, max_iterations=MOST_STEPS, cancel=None
+):
     """`nearest` of each start, LANES of them side by side: the same results, bit for bit."""
     if cancel is not None:
         with cancelling.watched(cancel):
@@ -72,6 +77,12 @@ def _batch(ensemble, starts, tolerance, max_iterations):
     search = Search(problem, targets / ensemble.force_scale)
     search.run(min(tolerance, BALANCED) / 4, max_iterations, len(starts))
     forces = ensemble.pin(search.forces() * ensemble.force_scale)
+    converged = [search.ended[k] for k in range(len(starts))]
+    if ensemble.member is not None and max_iterations >= MOST_STEPS:
+        # S is not empty, and the steps were not cut short: at μ ≳ 10³ they may lead nowhere.
+        for k in np.flatnonzero(~np.array(converged)):
+            forces[k] = likeliest_piqp(ensemble, np.ones_like(forces[k]), starts[k])
+            converged[k] = ensemble.admits(forces[k])
     residual = ensemble.residual(forces[: len(starts)])
     seconds = (time.perf_counter() - begin) / len(starts)
     return [
@@ -80,7 +91,7 @@ def _batch(ensemble, starts, tolerance, max_iterations):
             search.steps[k],
             float(residual[k]),
             ensemble.violation(forces[k]),
-            bool(search.ended[k] and residual[k] <= tolerance),
+            bool(converged[k] and residual[k] <= tolerance),
             seconds,
         )
         for k in range(len(starts))
@@ -88,16 +99,41 @@ def _batch(ensemble, starts, tolerance, max_iterations):
 
 
 def starting_network(ensemble):
-    """The packing's own network (N_c, 2), or the nearest admissible one if that left S.
+    """The packing's own network (N_c, 2), or another one that is admitted if that left S.
 
     Raises NotJammedError where S is empty, UndecidedError where neither could be shown.
     """
     if ensemble.admits(ensemble.original):
         return ensemble.original
-    found = nearest(ensemble, ensemble.original)
-    if not found.converged:
-        raise certificates.why_unsolved(*ensemble.scaled_form[:2])
-    return found.forces
+    found = nearest(ensemble, ensemble.original).forces
+    if not ensemble.admits(found):
+        found = ensemble.member
+    if found is None:
+        found = some_network(ensemble, ensemble.original)
+        if not ensemble.admits(found):
+            A, b, _ = ensemble.scaled_form
+            raise certificates.why_unsolved(A, b, slack=ensemble.slack)
+    return found
+
+
+def some_network(ensemble, start):
+    """A network (N_c, 2) of S, the one nearest to start where that is reached.
+
+    Where it is not, others are asked: PIQP, then HiGHS, whose vertices are exact to rounding. What
+    none of them reaches is the last iterate, which is not admitted.
+    """
+    found = nearest(ensemble, start).forces
+    if ensemble.admits(found):
+        return found
+    other = likeliest_piqp(ensemble, np.ones_like(start), start)
+    if ensemble.admits(other):
+        return other
+    A, b, _ = ensemble.scaled_form
+    for y in highs.points(A, b):
+        other = restored(ensemble, y)
+        if ensemble.admits(other):
+            return other
+    return found
 
 
 class Search:
@@ -156,7 +192,7 @@ class Search:
                 there = unbalance[k] <= tolerance and slackness[k] <= near[k]
                 if there and product[k] <= near[k] ** 2:
                     self._end(k, True)
-                elif product[k] <= attempt[k]:
+                elif product[k] < attempt[k]:  # once only where it is 0
                     ready.append(k)
                 elif (
                     self.steps[k] >= most

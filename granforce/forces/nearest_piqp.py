@@ -1,4 +1,7 @@
-"""The admissible network nearest to given forces by PIQP: an independent witness of `nearest`."""
+"""The admissible network nearest to given forces by PIQP: an independent witness of `nearest`.
+
+And what takes over where the project's own method, of nearest or likeliest networks, reached none.
+"""
 
 import time
 
@@ -6,9 +9,14 @@ import numpy as np
 import piqp
 from scipy import sparse
 
+from granforce.forces.contact_problem import MOST_DENSE, in_balance
 from granforce.numerics import highs as programs
 from granforce.records import Relaxation
+from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+
+# Coordinates y (in ⟨f_n⟩) far below this hardly change where balance is restored.
+_AWAY = 1e-6
 
 
 def nearest_piqp(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
@@ -22,27 +30,54 @@ def nearest_piqp(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
     solved before, and the same start would no longer give the same forces.
     """
     begin = time.perf_counter()
-    A, b, T = ensemble.scaled_form
-    target = ensemble.to_vector(start) / ensemble.force_scale
-    solver = programs.quadratic_solver(max_iterations)
-    solver.setup(
-        sparse.csc_matrix(T.T @ T),
-        -(T.T @ target),
-        A,
-        b,
-        x_l=np.zeros(A.shape[1]),
-    )
-    status = solver.solve()
-    # The interior-point iterate may be negative by its tolerance: y ≥ 0 is set exactly, so that
-    # only the residual has to be judged.
-    y = np.maximum(solver.result.x, 0.0)
+    T = ensemble.scaled_form[2]
+    y, status, steps = _least(ensemble, T, ensemble.to_vector(start), max_iterations)
     forces = ensemble.to_forces(T @ y * ensemble.force_scale)
     residual = ensemble.residual(forces)
     return Relaxation(
         forces,
-        int(solver.result.info.iter),
+        steps,
         residual,
         ensemble.violation(forces),
         bool(status == piqp.PIQP_SOLVED and residual <= tolerance),
         time.perf_counter() - begin,
     )
+
+
+def likeliest_piqp(ensemble, weights, target):
+    """The forces (N_c, 2) of S with the least Σ (weights (f − target))², balanced to rounding.
+
+    weights (N_c, 2), 1/force; target (N_c, 2), force, NaN counts as 0. Whether they are admitted is
+    for the judges.
+    """
+    target = np.nan_to_num(target)
+    weigh = ensemble.to_vector(weights) * ensemble.force_scale
+    weigh = weigh / weigh.max(initial=1e-300)
+    W = sparse.diags(weigh) @ ensemble.scaled_form[2]
+    y, _, _ = _least(ensemble, W, weigh * ensemble.to_vector(target), 200)
+    return restored(ensemble, y)
+
+
+def restored(ensemble, y):
+    """Forces (N_c, 2) of y ≥ 0 (n,) of `Ensemble.scaled_form`, balanced to rounding.
+
+    A program ends at its tolerance: what is left is taken off by the least change in proportion.
+    """
+    A, b, T = ensemble.scaled_form
+    if A.shape[0] <= MOST_DENSE:
+        y = np.maximum(in_balance(A, b, y, _AWAY), 0.0)
+    return ensemble.pin(ensemble.to_forces(T @ y * ensemble.force_scale))
+
+
+def _least(ensemble, W, target, max_iterations):
+    """y ≥ 0 (n,) of S with the least |W y − target/⟨f_n⟩|², PIQP's verdict and its iterations.
+
+    The interior-point iterate may be negative by its tolerance: y ≥ 0 is set exactly, so that only
+    the residual has to be judged.
+    """
+    A, b, _ = ensemble.scaled_form
+    solver = programs.quadratic_solver(max_iterations)
+    slope = -(W.T @ (target / ensemble.force_scale))
+    solver.setup(sparse.csc_matrix(W.T @ W), slope, A, b, x_l=np.zeros(A.shape[1]))
+    status = cancelling.apart(solver.solve)
+    return np.maximum(solver.result.x, 0.0), status, int(solver.result.info.iter)

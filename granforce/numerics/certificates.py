@@ -24,12 +24,15 @@ _BALANCED_DIRECTION = 1e-13
 _USUAL_MEAN = 2.0
 
 
-def why_unsolved(A, b, empty="no admissible force network exists on these contacts"):
+def why_unsolved(
+    A, b, empty="no admissible force network exists on these contacts", *, slack=BALANCED
+):
     """The exception to raise where a program over S has no optimum, by what can be proved.
 
-    A sparse (m, n), rows of order 1; b (m,). empty: the message for an empty S.
+    A sparse (m, n), rows of order 1; b (m,). empty: the message for an empty S. slack: as in
+    `proves_empty`.
     """
-    if empty_ray(A, b) is not None:
+    if empty_ray(A, b, slack) is not None:
         return NotJammedError(empty)
     if recession(A) is not None:
         return InputError(
@@ -42,7 +45,7 @@ def why_unsolved(A, b, empty="no admissible force network exists on these contac
     )
 
 
-def empty_ray(A, b):
+def empty_ray(A, b, slack=BALANCED):
     """λ (m,) that proves S to be empty, None where no proof was found.
 
     From the duals of the least Σ |A y − b|, and from the least |A y − b|², whose own unbalance is
@@ -52,20 +55,24 @@ def empty_ray(A, b):
     unit = sparse.identity(len(b))
     slackened = sparse.csc_matrix(sparse.hstack([A, unit, -unit]))
     for y, multiplier in _proposals(slackened, b, cost):
-        if proves_empty(A, b, multiplier):
+        if proves_empty(A, b, multiplier, slack):
             return multiplier
-        if np.abs(A @ np.maximum(y[: A.shape[1]], 0.0) - b).max(initial=0.0) <= BALANCED:
+        if np.all(np.abs(A @ np.maximum(y[: A.shape[1]], 0.0) - b) <= slack):
             return None
     multiplier = -programs.least_unbalanced(A, b)[1]
-    return multiplier if proves_empty(A, b, multiplier) else None
+    return multiplier if proves_empty(A, b, multiplier, slack) else None
 
 
-def proves_empty(A, b, multiplier):
-    """Whether Aᵀλ ≤ 0 < b·λ, beyond what rounding and unbalance up to BALANCED could hide."""
+def proves_empty(A, b, multiplier, slack=BALANCED):
+    """Whether Aᵀλ ≤ 0 < b·λ, beyond what rounding, and what is admitted, could hide.
+
+    slack (m,) or one number: |A y − b| of forces that judges admit, more where rows are scaled up.
+    """
     if not np.all(np.isfinite(multiplier)):
         return False
     wrong = (A.T @ multiplier).max(initial=0.0) * _LARGEST_MEAN * A.shape[1]
-    return bool(b @ multiplier > 2 * (wrong + BALANCED * np.abs(multiplier).sum()))
+    allowed = (slack * np.abs(multiplier)).sum()
+    return bool(b @ multiplier > 2 * (wrong + allowed))
 
 
 def recession(A):

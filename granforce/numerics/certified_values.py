@@ -119,9 +119,11 @@ class Solver:
                 self._take([outcome], keys, tasks, bounds, points)
         for number in self._open(keys, bounds):
             cancelling.check()
-            outcome = from_scratch(self.system, number, tasks[number])
             self.counts["again"] += 1
-            self._take([outcome], keys, tasks, bounds, points)
+            for outcome in from_scratch(self.system, number, tasks[number]):
+                self._take([outcome], keys, tasks, bounds, points)
+                if not self._open([keys[number]], bounds):
+                    break
 
     def _carry(self, keys, tasks, numbers, refined, bounds, points):
         """Take what the interior-point method makes of the tasks of these numbers."""
@@ -204,20 +206,40 @@ def one_after_another(system, tasks):
     Each goes on from the vertex of the one before, which takes a tenth of the time: for S without
     an inside, where some contacts can do nothing but slide or open.
     """
-    model = highs.going_on(system.A, system.b)
+    scale = _row_scale(system.A)
+    model = highs.going_on(sparse.diags(scale) @ system.A, scale * system.b)
     for number, task in enumerate(tasks):
         if task.loaded < 0:
             cancelling.check()
-            yield _outcome(system, model, system.A, _cost_of(system, task), number, task)
+            cost = _cost_of(system, task)
+            highs.set_cost(model, _DEARER * cost)
+            yield _outcome(
+                system, model, highs.solve(model)[1], system.A, scale, cost, number, task
+            )
 
 
 def from_scratch(system, number, task):
-    """The outcome of one program by HiGHS: presolve, no start, tightest tolerances."""
+    """Yield the outcomes of one program by one of HiGHS's methods after another, without a start.
+
+    The first takes presolve and tightest tolerances.
+    """
     A, cost = system.A, _cost_of(system, task)
     if task.loaded >= 0:
         A = sparse.hstack([A, system.loads[:, [task.loaded]]], format="csc")
         cost = np.append(cost, -1.0)
-    return _outcome(system, highs.standard_form(A, system.b), A, cost, number, task)
+    scale = _row_scale(A)
+    model = highs.standard_form(sparse.diags(scale) @ A, scale * system.b)
+    highs.set_cost(model, _DEARER * cost)
+    for _, y in highs.solutions(model):
+        cancelling.check()
+        if len(y) == len(cost):
+            yield _outcome(system, model, y, A, scale, cost, number, task)
+
+
+def _row_scale(A):
+    """What makes the largest entry of each row 1: feasibility is asked of rows of that size."""
+    largest = abs(A).max(axis=1).toarray().ravel()
+    return 1 / np.where(largest > 0, largest, 1.0)
 
 
 def _cost_of(system, task):
@@ -226,14 +248,13 @@ def _cost_of(system, task):
     return cost
 
 
-def _outcome(system, model, A, cost, number, task):
-    """What HiGHS makes of a program, from its basis, if any, to rounding."""
-    highs.set_cost(model, _DEARER * cost)
-    _, y = highs.solve(model)
-    multiplier = np.array(model.getSolution().row_dual) / _DEARER
+def _outcome(system, model, y, A, scale, cost, number, task):
+    """What HiGHS made of a program whose rows were scaled, from its basis, if any, to rounding."""
+    multiplier = scale * np.array(model.getSolution().row_dual) / _DEARER
     basis = highs.basis(model)
     if basis is not None:
-        y, multiplier = highs.vertex(A, system.b, cost, *basis)
+        with suppress(RuntimeError):  # it is singular to rounding
+            y, multiplier = highs.vertex(A, system.b, cost, *basis)
     y = np.maximum(y, 0.0)
     load = float(y[-1]) if task.loaded >= 0 else 0.0
     outcome = Outcome(number, task.loaded, y[: len(system.weight)], load, multiplier, None, 0)

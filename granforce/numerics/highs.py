@@ -3,6 +3,8 @@
 And quadratic ones by PIQP. What a solver says of its own result proves nothing: see `certificates`.
 """
 
+from contextlib import suppress
+
 import highspy
 import numpy as np
 import piqp
@@ -95,6 +97,17 @@ def solutions(model):
 def optimal(model):
     """The first point (n,) that some method calls an optimum; None where none does."""
     return next((y for status, y in solutions(model) if status == OPTIMAL), None)
+
+
+def points(A, b):
+    """Points y (n,) ≥ 0 of {A y = b} as one method after another proposes them, rounding apart."""
+    model = standard_form(A, b, solver="simplex")
+    for _, y in solutions(model):
+        yield np.maximum(y, 0.0)
+        found = basis(model)
+        if found is not None:
+            with suppress(RuntimeError):  # the basis is singular to rounding
+                yield np.maximum(vertex(A, b, np.zeros(A.shape[1]), *found)[0], 0.0)
 
 
 def multipliers(model, A, cost):

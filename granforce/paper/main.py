@@ -1,6 +1,5 @@
 """The command `granforce study`: compute, reduce, draw, judge."""
 
-import json
 import sys
 import time
 from pathlib import Path
@@ -11,6 +10,7 @@ from granforce.records import InputError, check_memory, friction, positive, whol
 from granforce.study import scan
 from granforce.study.store import open_store
 from granforce.system.files import make_folder, written
+from granforce.system.plain import json_text
 from granforce.system.terminal import Bar, print_list, table
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
@@ -64,7 +64,7 @@ def main(arguments):
         "skipped": reduced.skipped,
     }
     with written(folder / "claims.json") as file:
-        file.write(json.dumps(told, indent=1, ensure_ascii=False).encode())
+        file.write(json_text(told, ascii_only=False).encode())
     documents.renew(renewed, reduced, told["claims"])
     report(told, arguments.json)
     return 1 if failed else 0
@@ -163,7 +163,7 @@ def compute(path, wanted, arguments):
 def report(told, as_json):
     """Claims with their verdicts, and findings, on stdout."""
     if as_json:
-        print(json.dumps(told, indent=1))
+        print(json_text(told))
         return
     for word, names in (
         ("claims", ("claim", "sampler", "from", "measured", "95 %", "criterion", "verdict")),

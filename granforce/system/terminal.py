@@ -1,15 +1,16 @@
 """What commands print: reports and tables on stdout, progress on stderr."""
 
-import json
 import math
 import sys
 
 from tqdm import tqdm
 
+from granforce.system.plain import json_text
+
 
 def print_list(rows, names, as_json):
     if as_json:
-        print(json.dumps(rows, indent=1))
+        print(json_text(rows))
     else:
         table(rows, names, {})
 
@@ -17,7 +18,7 @@ def print_list(rows, names, as_json):
 def report(lines, as_json):
     """A report on stdout: names and numbers in two columns, or JSON."""
     if as_json:
-        print(json.dumps(lines, indent=1))
+        print(json_text(lines))
         return
     width = max(len(name) for name in lines)
     for name, value in lines.items():

@@ -83,6 +83,18 @@ def test_pack_reports_and_saves(run, tmp_path):
     assert json.loads(out)["accepted"] == 4
 
 
+@pytest.mark.parametrize(
+    "words",
+    ["uniform -n 8 --mu 0 --seed 1 --states 8", "perturb -n 8 --mu 0 --seed 1 --contacts 0"],
+)
+def test_reports_are_json_where_nothing_can_be_told(run, words):
+    """S is one point there: nothing mixes, and no exponent can be fitted."""
+    code, out, _ = run(*words.split(), "--json")
+    assert code == 0
+    told = json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert None in told.values()
+
+
 def test_walk_and_measure_agree(run, tmp_path):
     file = tmp_path / "contacts.csv"
     walked = json.loads(run("walk", *SMALL, "--json")[1])

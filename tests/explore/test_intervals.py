@@ -80,7 +80,7 @@ def test_bounds_where_some_contacts_can_do_nothing_but_slide():
     for c in range(len(S.index)):
         for side, value in enumerate((found.lower, found.upper)):
             program = module.bound_of(S, c, 0, side)
-            alone = certified_values.from_scratch(system, 0, program)
+            alone = next(certified_values.from_scratch(system, 0, program))
             ((attained,), _) = certified_values.certify(system, [alone], [program])
             assert abs(value[c, 0] / S.force_scale - (1 - 2 * side) * attained) <= 2 * INTERVAL_GAP
 
@@ -197,7 +197,7 @@ def test_certificates_see_a_wrong_optimum(first):
     system, _ = first
     cones = make_system(system)
     task = module.bound_of(system, 0, 0, 1)
-    outcome = certified_values.from_scratch(cones, 0, task)
+    outcome = next(certified_values.from_scratch(cones, 0, task))
     attained, bound = certified_values.certify(cones, [outcome], [task])
     assert abs(attained[0] - bound[0]) <= INTERVAL_GAP
     unbalanced = outcome._replace(y=outcome.y * (1 + 1e-6))

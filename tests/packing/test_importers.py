@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mutants import mutant
 from packings import skewed
 
 from granforce.forces.ensemble import ensemble
@@ -887,45 +888,6 @@ def small_dumps():
     return [dump.encode() for dump in dumps]
 
 
-PIECES = [
-    b"",
-    b"0",
-    b"-1",
-    b"9",
-    b"nan",
-    b"inf",
-    b"1e999",
-    b"1e-320",
-    b",",
-    b"\n",
-    b" ",
-    b'"',
-    b"\0",
-]
-
-
-def mutant(contents, rng):
-    """The files with one to four changes: bytes replaced, pieces put in or lines moved, cuts."""
-    changed = [bytearray(content) for content in contents]
-    for _ in range(rng.integers(1, 5)):
-        content = changed[rng.integers(len(changed))]
-        at = int(rng.integers(len(content) + 1))
-        to = min(len(content), at + int(rng.integers(0, 9)))
-        change = rng.integers(5)
-        if change == 0 and at < len(content):
-            content[at] = rng.integers(256)
-        elif change == 1:
-            content[at:to] = PIECES[rng.integers(len(PIECES))]
-        elif change == 2:
-            other = int(rng.integers(len(content) + 1))
-            content[at:at] = content[other : other + 20]
-        elif change == 3:
-            del content[at:to]
-        elif rng.random() < 0.1:
-            del content[at:]
-    return [bytes(content) for content in changed]
-
-
 def judge(read, contents):
     """Whether a file was refused, in one line; what is taken must be a packing throughout."""
     try:
@@ -965,3 +927,21 @@ def test_mutants_are_refused_or_whole(kind):
 def test_a_hundred_thousand_mutants_are_refused_or_whole(kind, seed):
     """2500 of each kind and seed: 100,000 tried, none let through, no other error than the one."""
     assert 250 < mutants(kind, 2500, seed)
+
+
+@pytest.mark.parametrize("soft", [False, True])
+def test_single_precision_is_taken_and_its_unbalance_told(soft, tmp_path):
+    """Seven digits: forces are out of balance by 10⁻⁷, and S is that of the whole packing."""
+    packing = read_lammps(PARTICLES, CONTACTS, 0.3) if soft else load_packing(SMALL)
+    whole, short = io.BytesIO(), tmp_path / "single.npz"
+    save_packing(packing, whole)
+    whole.seek(0)
+    arrays = dict(np.load(whole))
+    for name, array in arrays.items():
+        arrays[name] = array.astype(np.float32) if array.dtype == np.float64 else array
+    np.savez(short, **arrays)
+    found = load_packing(short)
+    assert 1e-9 < report(found)["residual"] < 1e-6
+    S, T = ensemble(packing), ensemble(found)
+    assert S.dimension == T.dimension and np.array_equal(S.index, T.index)
+    assert np.abs(np.hypot(*found.contacts.normal.T) - 1).max() < 1e-15

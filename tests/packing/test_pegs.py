@@ -144,3 +144,27 @@ def test_what_is_wrong_is_told(change, words):
     for options in ({"reach": -1}, {"scale": 0}, {"error": -1.0}):
         with pytest.raises(InputError):
             read(grains, rows, mu=0.3, **options)
+
+
+@pytest.mark.parametrize("reach", [0, 0.5])
+def test_a_frame_whose_grains_are_all_at_walls_is_taken(reach):
+    """No balance is left to be judged."""
+    grains, rows, _ = frame(30)
+    found = read([[*row[:-1], 1] for row in grains], rows, mu=0.3, reach=reach)
+    assert found.report["unbalanced"] == 0 == found.report["unbalance"]
+    assert found.report["grains_at_walls"] == 30
+
+
+def test_a_frame_of_one_contact_is_taken():
+    grains, rows, _ = frame(30)
+    pair = [row for row in grains if row[1] in rows[0][1:3]]
+    found = read([[*row[:-1], 1] for row in pair], rows[:1], mu=0.3)
+    assert found.report["contacts_listed"] == 1 and found.report["unbalanced"] == 0
+
+
+def test_walls_are_noted_for_whole_grain_numbers_only():
+    grains, rows, _ = frame(30)
+    inner = next(row for row in grains if not row[-1])
+    wall = [[1, -1, inner[1] + 0.5, 0.0, 0.1]]
+    at_walls = sum(row[-1] for row in grains)
+    assert read(grains, rows + wall, mu=0.3).report["grains_at_walls"] == at_walls

@@ -256,7 +256,7 @@ def linked(done, folder):
 def test_the_command_computes_and_judges(done, tmp_path, capsys):
     folder = linked(done, tmp_path / "out")
     assert main([*WORDS, "--out", folder, "--formats", "", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert told["skipped"]["missing_cells"] == 0
     assert [claim["statement"] for claim in told["claims"]]
     assert json.loads((tmp_path / "out" / "claims.json").read_text()) == told

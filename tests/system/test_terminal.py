@@ -1,8 +1,10 @@
-"""What commands print besides their results."""
+"""What commands print, beside the numbers themselves."""
 
+import json
+import math
 import re
 
-from granforce.system.terminal import Bar, Steps, one_line
+from granforce.system.terminal import Bar, Steps, one_line, print_list, report
 
 
 def shown(capsys):
@@ -44,3 +46,20 @@ def test_a_note_stands_behind_the_bar(capsys):
 def test_a_warning_is_one_line():
     told = one_line(UserWarning("two\nlines"), UserWarning, "file.py", 3)
     assert told == "granforce: two lines\n"
+
+
+def strict(text):
+    """What JSON means by a text; a ValueError where it means nothing."""
+
+    def refuse(word):
+        raise ValueError(f"{word} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_what_is_not_a_number_is_null_in_json(capsys):
+    report({"eta": math.nan, "deciles": [1.0, math.inf], "fit": (-math.inf, {"x": math.nan})}, True)
+    told = strict(capsys.readouterr().out)
+    assert told == {"eta": None, "deciles": [1.0, None], "fit": [None, {"x": None}]}
+    print_list([{"gap": math.nan}], ("gap",), True)
+    assert strict(capsys.readouterr().out) == [{"gap": None}]

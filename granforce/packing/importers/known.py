@@ -18,10 +18,7 @@ def read_known(source):
     wrong.
     """
     table = read_csv(source)
-    contacts = table.numbers("contact")
-    wrong = np.flatnonzero((contacts != np.floor(contacts)) | (contacts < 0))
-    if len(wrong):
-        raise InputError(f"{table.place(wrong[0])}: contact must be a whole number, at least 0")
+    contacts = table.whole("contact")
     low, high = np.full((2, len(contacts), 2), np.inf)
     low *= -1
     told = False
@@ -41,7 +38,7 @@ def read_known(source):
             f"{table.name}: no column f_n, f_t, f_n_min, f_n_max, f_t_min or f_t_max: nothing "
             "would be known"
         )
-    return Known(contacts.astype(np.int64), low, high)
+    return Known(contacts, low, high)
 
 
 def _numbers(table, column):

@@ -39,10 +39,8 @@ def read_measurement(source):
     Raises InputError naming file and line.
     """
     table = read_csv(source)
-    contacts = table.numbers("contact")
-    for row in table.index("contact").values():
-        if not (contacts[row].is_integer() and contacts[row] >= 0):
-            raise InputError(f"{table.place(row)}: {contacts[row]:g} is no number of a contact")
+    contacts = table.whole("contact")
+    table.index("contact")  # each is given once
     values = np.empty((len(contacts), 4))
     for k, name in enumerate(COLUMNS):
         for row, text in enumerate(table.fields(name)):
@@ -52,7 +50,7 @@ def read_measurement(source):
         raise InputError(f"{table.name}: no component has both a force and a standard error")
     for row in np.flatnonzero((sigma <= 0).any(axis=1))[:1]:
         raise InputError(f"{table.place(row)}: a standard error is not above 0")
-    return Measurement(contacts.astype(np.int64), forces, sigma)
+    return Measurement(contacts, forces, sigma)
 
 
 def _value(text, name, place):

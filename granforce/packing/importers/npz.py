@@ -11,6 +11,7 @@ from granforce.records import InputError, float_array, make_contacts, make_packi
 from granforce.system.files import written
 
 _GRAINS = ("x", "r", "P", "mu")
+_ARMS = "arm_i", "arm_j"
 _CONTACTS = ("i", "j", "nx", "ny", "branch", "fn", "ft")
 
 # Bytes of the unpacked arrays: a small archive may announce far more than memory holds.
@@ -140,16 +141,19 @@ def _contacts(arrays, r, info):
     normal = np.column_stack(normal)
     contacts = make_contacts(i, j, normal, arrays["branch"], r)
     check_contacts(contacts, r, "contact {}".format, _gap_allowed(info))
-    if not {"arm_i", "arm_j"} <= set(arrays):
+    if not set(_ARMS) <= set(arrays):
         return contacts
+    # Single precision is taken as it is; what it leaves out of balance is for the judges to tell.
+    exact = all(arrays[key].dtype != np.float32 for key in ("r", "nx", "ny", "branch", *_ARMS))
+    rounding = 1e-9 if exact else 1e-6
     arms = {}
-    for key, grain in (("arm_i", contacts.i), ("arm_j", contacts.j)):
+    for key, grain in zip(_ARMS, (contacts.i, contacts.j), strict=True):
         arms[key] = float_array(arrays[key], grain.shape, key)
         # From the rigid disk's radius to the middle of the overlap, and no farther.
-        if np.any(np.abs(arms[key] - r[grain]) > np.abs(contacts.gap) / 2 + 1e-9 * r[grain]):
+        if np.any(np.abs(arms[key] - r[grain]) > np.abs(contacts.gap) / 2 + rounding * r[grain]):
             raise InputError(f"lever arms {key} do not fit the radii; remove them")
     # A file written by save_packing: its normals have been divided by their length before.
-    return contacts._replace(normal=normal, **arms)
+    return contacts._replace(**arms | ({"normal": normal} if exact else {}))
 
 
 def _gap_allowed(info):

@@ -225,8 +225,8 @@ def _listed(table, index, at_wall):
     rows = np.flatnonzero(~walls.any(axis=1))
     for row in np.flatnonzero(walls.any(axis=1)):
         for end in ends[row][~walls[row]]:
-            if int(end) in index:
-                at_wall[index[int(end)]] = True
+            if end in index:
+                at_wall[index[end]] = True
     inner = table._replace(rows=[table.rows[k] for k in rows], lines=[table.lines[k] for k in rows])
     if not len(rows):
         raise InputError(f"{table.name}: no contact between two grains")
@@ -316,7 +316,7 @@ def _unbalance(packing, m, unit):
     found = highs.optimal(model)
     if found is None:
         raise UndecidedError("which grains can be balanced is undecided: no solver reached an end")
-    off = np.abs(A @ np.maximum(found[:columns], 0.0)).reshape(len(S.grains), -1)
+    off = np.abs(A @ np.maximum(found[:columns], 0.0)).reshape(-1, 1 + S.per_contact)
     unbalance = np.zeros(len(packing.r))
     unbalance[S.grains] = off.sum(axis=1)
     return np.where(unbalance > _BALANCED, unbalance, 0.0)

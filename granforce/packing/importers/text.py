@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.records import InputError
+from granforce.records import InputError, are_whole
 
 # Numbers beyond this size cannot be lengths or forces, and their squares would overflow.
 LARGEST = 1e100
@@ -55,6 +55,16 @@ class Table(NamedTuple):
                     "repair or remove the row"
                 )
         return values
+
+    def whole(self, column):
+        """One column as int64 (rows,) ≥ 0; InputError names the line of what is not whole."""
+        values = self.numbers(column)
+        for row in np.flatnonzero(~are_whole(values))[:1]:
+            raise InputError(
+                f"{self.place(row)}: {column} is {_shown(self.fields(column)[row])}, and must be a "
+                "whole number, at least 0; repair or remove the row"
+            )
+        return values.astype(np.int64)
 
     def index(self, column):
         """Row number of each label in a column, a dict; InputError for a label given twice."""

@@ -1,0 +1,17 @@
+"""Values as JSON has them (RFC 8259), which knows neither NaN nor infinities."""
+
+import json
+import math
+
+
+def json_text(value, *, ascii_only=True):
+    """JSON text of plain values; numbers that are not finite become null."""
+    return json.dumps(_finite(value), indent=1, ensure_ascii=ascii_only, allow_nan=False)
+
+
+def _finite(value):
+    if isinstance(value, dict):
+        return {name: _finite(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
