@@ -26,7 +26,8 @@ from granforce.records import (
     whole,
 )
 
-# A disk touches a wall or another disk where the gap (in largest radii) is below this.
+# A disk touches a wall or another disk where the gap (in largest radii) is below this, if nothing
+# else is said.
 SNAPPED = 1e-9
 # Radius of the grain behind a place where a wall is touched, relative to the disk's.
 STUD = 0.25
@@ -77,10 +78,11 @@ def sketched(name, mu=None, **options):
     return made._replace(info=made.info | {"scene": name})
 
 
-def assembled(x, r, walls, load, mu):
+def assembled(x, r, walls, load, mu, *, tolerance=SNAPPED):
     """The Packing of a Sketch, with a contact wherever disks and walls touch, without a network.
 
-    Its info has the walls, as lists of four numbers.
+    Its info has the walls, as lists of four numbers. tolerance: gap (in largest radii) up to which
+    a disk touches.
 
     Raises InputError where disks overlap each other or a wall, and as `make_packing`.
     """
@@ -92,10 +94,10 @@ def assembled(x, r, walls, load, mu):
         raise InputError("there is no disk; put one")
     i, j = np.triu_indices(len(r), 1)
     branch, reach = x[j] - x[i], r[i] + r[j]
-    between = _touching(np.hypot(*branch.T) - reach, r, "two disks")
+    between = _touching(np.hypot(*branch.T) - reach, r, "two disks", tolerance)
     disk, place = _places(x, walls)
     away = place - x[disk]
-    against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall")
+    against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall", tolerance)
     disk, away = disk[against], away[against]
     away /= np.hypot(*away.T)[:, None]
     stud = STUD * r[disk]
@@ -147,11 +149,11 @@ def weights(r):
     return load
 
 
-def _touching(gap, r, what):
+def _touching(gap, r, what, tolerance):
     scale = r.max()
-    for value in gap[gap < -SNAPPED * scale][:1]:
+    for value in gap[gap < -tolerance * scale][:1]:
         raise InputError(f"{what} overlap by {-value / scale:.2g} of the largest radius")
-    return gap <= SNAPPED * scale
+    return gap <= tolerance * scale
 
 
 def _places(x, walls):
@@ -247,6 +249,6 @@ SCENES = {
     "leaning": _Scene("A pyramid against a wall", 0.4, _leaning),
     "column": _Scene("Ten disks in a column", 0.3, _column),
     "six": _Scene("Six disks under pressure", 0.5, _six),
-    "solid": _Scene("Six disks, one force more", 0.5, partial(_six, dimension=3)),
+    "solid": _Scene("Six disks, one dimension more", 0.5, partial(_six, dimension=3)),
     "many": _Scene("400 disks under pressure", 0.1, _many),
 }
