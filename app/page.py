@@ -50,6 +50,8 @@ EARLY = """{%% extends "base.html" %%}
   }, true)
 </script>{%% endblock %%}"""
 TITLE = "granforce — see force space"
+# The template's bar, which never shows anything here but which screen readers would tell.
+BAR, HIDDEN = "& .MuiAppBar-root .MuiLinearProgress-root", {"display": "none"}
 # Packing and tabs; under each other where there is no room.
 SIDE_BY_SIDE = {
     "& .main-content": {
@@ -59,8 +61,7 @@ SIDE_BY_SIDE = {
         "alignContent": "start",
         "columnGap": "8px",
     },
-    # The template's bar, which never shows anything here but which screen readers would tell.
-    "& .MuiAppBar-root .MuiLinearProgress-root": {"display": "none"},
+    BAR: HIDDEN,
 }
 POLL_MS = 200  # how often the page asks running work how far it is
 WAITING_MS = 250  # how often what Panel has kept back is sent
@@ -102,6 +103,7 @@ def _small(document, asked):
     whole = pmui.Page(
         title=TITLE,
         main=[view],
+        sx={BAR: HIDDEN},
         template=EARLY % pmui.Page._render_esm(server=True),
         busy_indicator=None,
     )

@@ -38,7 +38,7 @@ export function render({ model, view }) {
     <section class="card" role="dialog" aria-labelledby="small-title" hidden>
       <h2 id="small-title" tabindex="-1"></h2><p></p>
       <div class="row"><span class="of"></span><button type="button" class="earlier">Back</button>
-        <button type="button" class="on">Next</button><button type="button" class="close">Close</button></div>
+        <button type="button" class="next">Next</button><button type="button" class="close">Close</button></div>
     </section>`
   const part = (name) => root.querySelector(`.${name}`)
   const now = { contact: null, disk: null, side: null, contacts: new Set(), fall: null, filled: false, path: [], walk: null, undo: [], push: false, limit: null }
@@ -409,7 +409,7 @@ export function render({ model, view }) {
   }
   part("tourist").addEventListener("click", () => tour(1))
   part("earlier").addEventListener("click", () => tour(step - 1))
-  part("on").addEventListener("click", onwards)
+  part("next").addEventListener("click", onwards)
   part("close").addEventListener("click", () => tour(0))
   part("bars").addEventListener("pointerover", (event) => {
     const row = event.target.closest("[data-contact]")
