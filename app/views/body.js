@@ -218,7 +218,7 @@ class Body {
 
   /** Go to the network nearest to u; whether there is one. */
   goTo(u, inverse = null) {
-    let found = this.nearest(u, inverse)
+    let found = this.least(u) >= 0 ? u : this.nearest(u, inverse)
     if (this.least(found) < -1e-7 && this.whole && !this.empty) found = this.inwards(found)
     if (this.least(found) < -1e-5 || this.empty) return false
     this.u = found

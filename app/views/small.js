@@ -3,6 +3,7 @@
 const MOST_MU = 1.5 // on the slider; larger ones can be typed
 const REST_MS = 150 // after which what only the server tells is asked for
 const PATH = 60
+const NARROW = "(max-width: 759.95px)" // where S lies below the scene
 const UNSEEN = "granforce.tour" // remembered in the browser: that the tour was seen
 
 export function render({ model, view }) {
@@ -130,7 +131,7 @@ export function render({ model, view }) {
     part("count").innerHTML = `<b>${forces} forces − ${equations} equations = ${h} free</b> ` +
       `<span>(${count} contact${count === 1 ? "" : "s"} with a normal and a tangential force each; every disk's forces and torque must balance` +
       `${scene.box[0] ? ", and the pressure is given" : ""})</span>`
-    part("what").textContent = body.empty ? "S: empty" : { 0: "S: a single point", 1: "S: a line", 2: "S: a polygon, in its true shape", 3: "S: a body; drag beside the point to turn it" }[h] ??
+    part("what").textContent = body.empty ? "S: empty" : body.whole && body.corners.length === 1 ? "S: a single point" : { 0: "S: a single point", 1: "S: a line", 2: "S: a polygon, in its true shape", 3: "S: a body; drag beside the point to turn it" }[h] ??
       `a shadow of S, which has ${h} dimensions; dots: networks drawn from it`
     part("says").textContent = sentence()
     part("says").classList.toggle("bad", body.empty)
@@ -149,8 +150,10 @@ export function render({ model, view }) {
     if (!h) return "Everything is determined: there is one network of forces, and mechanics finds it."
     if (h > 3) return `${h} free numbers: infinitely many networks of forces hold these disks. What is drawn is a shadow of S. Drag the point or an arrow: all forces follow, and everything stays in balance.`
     const size = h === 1 ? "line" : h === 2 ? "polygon" : "body"
-    const point = body.corners.length === 1 ? "Without friction S is one point: everything is determined. Open the cones with the slider." : null
-    if (point) return point
+    if (body.corners.length === 1) {
+      return mu ? "S is one point: of all forces in balance, only these stay in their cones. Everything is determined."
+        : "Without friction S is one point: everything is determined. Open the cones with the slider."
+    }
     if (!body.bounded) return `S has no end in some direction: the disk${body.scene.r.length > 1 ? "s have" : " has"} wedged ${body.scene.r.length > 1 ? "themselves" : "itself"}, and the forces may be as large as you like. (Proof: a change of forces that is in balance by itself and stays in every cone.)`
     const fixed = body.scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
     const determined = fixed ? ` ${fixed} of ${body.count} normal forces are determined all the same.` : ""
@@ -209,7 +212,8 @@ export function render({ model, view }) {
     now.fall = now.bounds = null
     if (!body.empty && !body.goTo(body.u)) body.empty = true
     if (!body.empty && body.whole && !Number.isFinite(body.u[0] ?? 0)) body.u = body.middle
-    if (now.filled) space.fill()
+    if (now.filled && body.whole) space.fill()
+    else space.dots = [] // many dimensions take their time: once friction rests
     now.path = []
     say()
     soon()
@@ -219,7 +223,8 @@ export function render({ model, view }) {
 
   function rest() {
     if (body.empty) ask(model, view, { fall: { mu, load: [...body.load] } })
-    else if (!body.whole) ask(model, view, { bounds: { mu, load: [...body.load] } })
+    else if (now.filled && !space.dots.length) { space.fill(); soon() }
+    if (!body.empty && !body.whole) ask(model, view, { bounds: { mu, load: [...body.load] } })
     address()
   }
 
@@ -359,6 +364,7 @@ export function render({ model, view }) {
     step = number
     const steps = model.steps, card = part("card")
     card.hidden = !step
+    root.style.paddingBottom = ""
     if (!step) return
     try { localStorage.setItem(UNSEEN, "seen") } catch { /* private */ }
     const [title, text, does] = steps[step - 1]
@@ -366,8 +372,13 @@ export function render({ model, view }) {
     card.querySelector("p").textContent = text
     card.querySelector(".of").textContent = `${step} of ${model.all}`
     part("earlier").disabled = step === 1
+    root.style.paddingBottom = `${card.offsetHeight + 20}px` // what lies under the card can be scrolled to
     if (does.mu !== undefined) setMu(does.mu)
-    requestAnimationFrame(() => card.querySelector("h2").focus({ preventScroll: true }))
+    Object.assign(card.style, { background: colours().paper, color: colours().ink })
+    requestAnimationFrame(() => {
+      if (window.matchMedia(NARROW).matches) part(does.see ?? "pair").scrollIntoView({ block: "start" })
+      card.querySelector("h2").focus({ preventScroll: true })
+    })
   }
 
   const onwards = () => (step < model.steps.length ? tour(step + 1) : window.location.assign("?scene=many&tour=1"))
@@ -425,10 +436,9 @@ export function render({ model, view }) {
   }
 
   function key(event) {
-    if (event.target.matches?.("input, select, textarea") || event.metaKey || event.ctrlKey || !root.isConnected) return
-    const path = event.composedPath()
-    if (path.some((node) => node.matches?.("input, select, textarea, button"))) return
-    const { key } = event
+    if (event.metaKey || event.ctrlKey || !root.isConnected) return
+    const { key } = event, over = (names) => event.composedPath().some((node) => node.matches?.(names))
+    if (over("input, select, textarea") || (key === " " && over("button, summary"))) return
     if (key === "z" || key === "Z") undo()
     else if (key === " ") walk()
     else if (key === "Escape") { tour(0); choose(null); now.chosen = false }

@@ -173,8 +173,26 @@ def test_hover_lights_the_contact_and_keys_go_through_s(look):
     page.keyboard.press("ArrowRight")
     assert ask(page, "small.body.u[0]") > u[0]
     page.keyboard.press("n")
-    page.keyboard.press("]")
     assert ask(page, "small.now.contact") == 0
+    force = ask(page, "small.body.forces()[0]")
+    page.keyboard.press("]")
+    assert ask(page, "small.body.forces()[0]") > force
+    page.keyboard.press("Escape")
+    assert ask(page, "small.now.contact") is None
+
+
+def test_the_forces_on_a_disk_close(look):
+    page = look("?scene=box")
+    box = desk(page).locator("canvas.packing").bounding_box()
+    x, y = ask(page, "small.arrows.px(small.body.scene.x[0], small.body.scene.x[1] + 0.8)")
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    assert ask(page, "small.now.disk") == 0
+    total = """[0, 1].map(k => small.arrows.ends().reduce((sum, end) => {
+        if (end.disk !== 0) return sum
+        const F = small.body.forces(), c = end.contact
+        return sum + F[2 * c] * end.inward[k] + F[2 * c + 1] * end.across[k]
+    }, small.body.load[k]))"""
+    assert ask(page, total) == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_what_falls_is_proved_by_a_motion(look):
