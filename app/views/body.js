@@ -1,7 +1,7 @@
 // S of a small scene, cut anew out of all networks in balance for every μ and every load: corners
 // where sides meet, the nearest network to any other, and a walk through it.
 
-const FAR = 1e4 // where S has no end it is cut so far outside, to find along which rays it goes on
+const FAR = [1e4, 1e8] // where S seems to have no end it is cut so far outside, to find rays along which it goes on
 const SMALL = 1e-9
 const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
 
@@ -91,11 +91,16 @@ class Body {
       const size = Math.hypot(...total.slope)
       return size > 1e-10 ? [{ slope: total.slope.map((v) => -v / size), rest: (reach - total.rest) / size, cap: true }] : []
     }
-    let rows = [...this.rows, ...cap(FAR * scale)]
-    let corners = this.possible ? this.meetings(rows) : []
+    let rows, corners = [], far = []
+    this.rays = []
+    for (const reach of this.possible ? FAR : []) {
+      rows = [...this.rows, ...cap(reach * scale)]
+      corners = this.meetings(rows)
+      far = corners.filter((corner) => corner.cap)
+      this.rays = far.map(({ u }) => this.along(u, total.slope)).filter((ray) => ray && this.isRay(ray))
+      if (!far.length || this.rays.length) break
+    }
     this.empty = !corners.length
-    const far = corners.filter((corner) => corner.cap)
-    this.rays = far.map((corner) => corner.u.map((v) => v / Math.hypot(...corner.u))).filter((ray) => this.isRay(ray))
     this.bounded = !this.rays.length
     if (!this.bounded) { // for the eye, cut nearer
       const reach = Math.max(...corners.filter((corner) => !corner.cap).map((corner) => this.sumAt(corner.u)), scale)
@@ -103,13 +108,23 @@ class Body {
       corners = this.meetings(rows)
     }
     this.corners = corners
+    this.drawn = rows
     this.sides = this.empty ? [] : this.faces(rows)
     this.middle = this.u.map((_, k) => corners.reduce((s, corner) => s + corner.u[k], 0) / corners.length)
   }
 
+  /** Outwards along the sides that meet in a corner far outside, to rounding; null without one. */
+  along(u, total) {
+    const { h } = this, met = this.rows.filter((row) => Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * (1 + Math.hypot(...u)))
+    let ray = h === 1 ? [1] : null
+    if (h === 2 && met.length) ray = [-met[0].slope[1], met[0].slope[0]]
+    for (const other of h === 3 ? met.slice(1) : []) ray ??= independent(cross(met[0].slope, other.slope))
+    return ray && ray.map((v) => (v * Math.sign(dot(ray, total))) / Math.hypot(...ray))
+  }
+
   /** Whether this change of forces, which balances itself, leaves no cone: the proof of no end. */
   isRay(ray) {
-    return this.rows.every((row) => dot(row.slope, ray) > -1e-3)
+    return this.rows.every((row) => dot(row.slope, ray) > -1e-11)
   }
 
   scaleOf() {
@@ -186,8 +201,8 @@ class Body {
     const values = this.corners.map(({ u }) => dot(this.axes.map((axis) => axis[index]), u) + this.origin[index])
     const along = this.rays.map((ray) => dot(this.axes.map((axis) => axis[index]), ray))
     return [
-      along.some((v) => v < -1e-6) ? -Infinity : Math.min(...values),
-      along.some((v) => v > 1e-6) ? Infinity : Math.max(...values),
+      along.some((v) => v < -1e-10) ? -Infinity : Math.min(...values),
+      along.some((v) => v > 1e-10) ? Infinity : Math.max(...values),
     ]
   }
 
@@ -250,7 +265,7 @@ class Body {
   step(u) {
     const direction = u.map(() => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random()))
     let low = -Infinity, high = Infinity
-    for (const row of this.rows) {
+    for (const row of this.whole ? this.drawn : this.rows) { // without an end, as far as it is drawn
       const slope = dot(row.slope, direction), room = dot(row.slope, u) + row.rest
       if (slope > 1e-12) low = Math.max(low, -Math.max(room, 0) / slope)
       if (slope < -1e-12) high = Math.min(high, -Math.max(room, 0) / slope)
@@ -261,4 +276,5 @@ class Body {
   }
 }
 
+const independent = (v) => (Math.hypot(...v) > 1e-6 ? v : null)
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -16,7 +16,7 @@ export function render({ model, view }) {
         <input class="typed" inputmode="decimal" aria-label="μ"></label>
       <span class="buttons">
         <button type="button" class="play" title="Go at random through S">Walk</button>
-        <button type="button" class="fill" title="Networks drawn from S, each as likely as any other">Fill S</button>
+        <button type="button" class="fill" title="Networks of S, by a walk that in the end is everywhere equally often">Fill S</button>
         <button type="button" class="undo" title="Take the last pull back (Z)" disabled>Undo</button>
         <button type="button" class="push" title="Drag a disk to push it">Push a disk</button>
         <button type="button" class="save" title="This scene as a file for granforce: gf.load_packing">Save NPZ</button>

@@ -2,7 +2,7 @@
 // the network on screen as a point in it. With more dimensions, its shadow.
 
 const TURN = 0.008 // radians a pixel
-const DRAWS = 700
+const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
 class Space {
   constructor(canvas, told) {
@@ -86,10 +86,11 @@ class Space {
   fill() {
     const { body } = this
     this.dots = []
-    if (body.empty || !body.h || body.least(body.u) < -1e-6) return
+    if (body.empty || !body.h || (body.whole && !body.bounded) || body.least(body.u) < -1e-6) return
     let u = body.u
     const between = Math.max(1, Math.ceil(body.h / 2))
-    for (let k = 0; k < DRAWS; k++) {
+    const draws = Math.min(DRAWS, WORK / (between * body.h * body.rows.length))
+    for (let k = 0; k < draws; k++) {
       for (let m = 0; m < between; m++) u = body.step(u)
       this.dots.push(u)
     }

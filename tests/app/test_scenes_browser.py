@@ -311,3 +311,16 @@ def test_the_lesson_has_three_questions_and_is_printed(look):
     desk(page).get_by_role("button", name="Print", exact=True).click()
     page.wait_for_function("() => document.querySelector('iframe')?.contentDocument.title")
     assert "The groove" in page.frames[-1].content()
+
+
+@pytest.mark.parametrize("mu", [0.6, 0.414, 0.415])
+def test_where_s_has_no_end_the_page_says_the_same_as_the_library(look, mu):
+    page = look(f"?scene=box&mu={mu}")
+    body = gf.body(gf.ensemble(gf.scene("box", mu)))
+    assert ask(page, "small.body.bounded") == body.bounded
+    assert ask(page, "small.body.rays.length") == len(body.rays)
+    every = "small.body.scene.names.map((_, c) => small.body.interval(2 * c).map(String))"
+    seen = np.array(ask(page, every), dtype=str)
+    seen = np.char.replace(seen, "Infinity", "inf").astype(float)
+    expected = np.column_stack([side[:, 0] for side in body.intervals])
+    np.testing.assert_allclose(seen, expected, rtol=1e-6)
