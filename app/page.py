@@ -8,10 +8,10 @@ import panel_material_ui as pmui
 import param
 from panel.util import edit_readonly
 
-from . import garbage
+from . import garbage, scenes
 from .data import Library
 from .grabs import Hand
-from .jobs import reading
+from .jobs import Task, computing, reading
 from .state import AppState
 from .views.address import Address
 from .views.controls import Controls
@@ -26,9 +26,10 @@ from .views.parts import (
     together,
 )
 from .views.progress import Progress
+from .views.small import FIRST_STEPS, Small
 from .views.stream import Stream
 from .views.summary import tiles
-from .views.tour import Tour
+from .views.tour import STEPS, Tour
 
 # Where it lies over the page, the sidebar begins unseen: player.js shows it once it is closed.
 UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
@@ -48,6 +49,9 @@ EARLY = """{%% extends "base.html" %%}
     if (event.target.src?.includes("es-module-shims")) importShim("%s")
   }, true)
 </script>{%% endblock %%}"""
+TITLE = "granforce — see force space"
+# The template's bar, which never shows anything here but which screen readers would tell.
+BAR, HIDDEN = "& .MuiAppBar-root .MuiLinearProgress-root", {"display": "none"}
 # Packing and tabs; under each other where there is no room.
 SIDE_BY_SIDE = {
     "& .main-content": {
@@ -57,8 +61,7 @@ SIDE_BY_SIDE = {
         "alignContent": "start",
         "columnGap": "8px",
     },
-    # The template's bar, which never shows anything here but which screen readers would tell.
-    "& .MuiAppBar-root .MuiLinearProgress-root": {"display": "none"},
+    BAR: HIDDEN,
 }
 POLL_MS = 200  # how often the page asks running work how far it is
 WAITING_MS = 250  # how often what Panel has kept back is sent
@@ -83,12 +86,40 @@ GROWING = ("intervals", "plane")  # what shows a walk while it is computed
 
 
 def page():
-    """One visitor's page."""
+    """One visitor's page: of a small scene, or of a large packing."""
     pn.extension()
     document = pn.state.curdoc
     mend_late_views(document)
     answer_with_lock()
-    query = pn.state.location.search if pn.state.location else ""
+    asked = scenes.asked(pn.state.location.search if pn.state.location else "")
+    return _large(document, asked.query) if asked.scene == scenes.MANY else _small(document, asked)
+
+
+def _small(document, asked):
+    """The page of a small scene, which asks no store."""
+    task = Task(computing, _turns(document))
+    plain = asked == scenes.asked("")
+    view = Small(asked, task, len(FIRST_STEPS + STEPS), step=asked.step, first=plain)
+    whole = pmui.Page(
+        title=TITLE,
+        main=[view],
+        sx={BAR: HIDDEN},
+        template=EARLY % pmui.Page._render_esm(server=True),
+        busy_indicator=None,
+    )
+    whole.param.watch(lambda event: view.param.update(dark=event.new), "dark_theme")
+    closed = garbage.opened()
+
+    def end(context):
+        task.close()
+        closed()
+
+    pn.state.on_session_destroyed(end)
+    return whole
+
+
+def _large(document, query):
+    """The page of a large packing."""
     state = AppState(pn.state.as_cached("library", _open_library), _turns(document), query)
     state.message = state.message or " ".join(state.library.notes)
     wide = {"sizing_mode": "stretch_width"}
@@ -102,7 +133,7 @@ def page():
     right, sidebar = pn.Column(**wide), pn.Column()
     header = pn.Row(sizing_mode="stretch_width", align="center", margin=(0, 8))
     whole = pmui.Page(
-        title="granforce — see force space",
+        title=TITLE,
         header=[header],
         sidebar=[sidebar],
         sidebar_width=290,

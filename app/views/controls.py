@@ -12,6 +12,7 @@ from ..state import COLOURS, WIDTHS
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
+from .scenelist import SceneList
 
 WIDE = {"sizing_mode": "stretch_width"}
 SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
@@ -97,6 +98,7 @@ class Controls:
     def panel(self):
         """The widgets in order."""
         return [
+            SceneList(**WIDE),
             self.mu,
             pn.Row(self.n, self.seed, **WIDE),
             pn.Row(self.states, self.packed, **WIDE),

@@ -39,8 +39,7 @@ export function render({ model, view }) {
     const [title, text] = steps[step - 1]
     part("h2").textContent = title
     part("p").textContent = text
-    part(".count").textContent = `${step} of ${steps.length}`
-    part(".earlier").disabled = step === 1
+    part(".count").textContent = `${step + model.before} of ${steps.length + model.before}`
     part(".on").textContent = step === steps.length ? "Finish" : "Next"
     card.classList.toggle("aside", target() !== "scene") // not over what it speaks of
     leaveRoom()
@@ -100,8 +99,14 @@ export function render({ model, view }) {
     requestAnimationFrame(() => encircle(found, title, step, tall))
   }
 
+  /** Before the first step are those of the groove, on a page of their own. */
+  function earlier() {
+    if (model.step > 1) go(model.step - 1)
+    else window.location.assign(`?scene=groove&tour=${model.before}`)
+  }
+
   part(".begin").addEventListener("click", () => go(1))
-  part(".earlier").addEventListener("click", () => go(model.step - 1))
+  part(".earlier").addEventListener("click", earlier)
   part(".on").addEventListener("click", () => go(model.step === model.steps.length ? 0 : model.step + 1))
   part(".close").addEventListener("click", () => go(0))
   card.addEventListener("keydown", (event) => {

@@ -8,6 +8,7 @@ import numpy as np
 import param
 
 from .scripts import FOLDER, Scripted, joined
+from .small import FIRST_STEPS
 
 # Title and two sentences of each step, and the part of the page that it is about, see tour.js.
 STEPS = (
@@ -61,6 +62,7 @@ class Tour(Scripted):
 
     step = param.Integer(default=0, doc="1 … 6 while the tour is on, else 0")
     steps = param.List(doc="title, text and target of each step")
+    before = param.Integer(default=len(FIRST_STEPS), doc="steps of the tour on the page before")
     first = param.Boolean(doc="whether the page was opened without a view to show")
 
     _esm = joined("ask", "tour")

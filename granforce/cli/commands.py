@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from granforce import measures
-from granforce.packing import importers
+from granforce.packing import importers, scenes
 from granforce.perturb.critical_force import COUNTS
 from granforce.records import InputError, check_memory, whole
 from granforce.study import cells as study
@@ -75,7 +75,9 @@ def _required_mu(arguments):
 
 
 def pack(arguments):
-    """Make or find a packing; report it."""
+    """Make or find a packing, or a scene; report it."""
+    if arguments.scene is not None:
+        return _scene(arguments)
     parameters = _packing_parameters(arguments, _required_mu(arguments), arguments.seed)
     max_steps = whole(arguments.max_steps, "--max-steps", 1)
     _outputs(arguments.out)
@@ -90,6 +92,14 @@ def pack(arguments):
     work = {name: packing.info[name] for name in told}
     lines = {**importers.report(packing), **work, "cached": cached}
     report(lines, arguments.json)
+
+
+def _scene(arguments):
+    _outputs(arguments.out)
+    packing = scenes.scene(arguments.scene, arguments.mu)
+    if arguments.out is not None:
+        importers.save_packing(packing, arguments.out)
+    report({"scene": arguments.scene, **importers.report(packing)}, arguments.json)
 
 
 def _prepared(arguments, name, *outputs):

@@ -188,7 +188,14 @@ def _add_pack(commands):
         "pack",
         "pack",
         "make a jammed packing, or find it in the store",
-        "granforce pack -n 400 --mu 0.1 --seed 1 --out packing.npz",
+        "granforce pack -n 400 --mu 0.1 --seed 1 --out packing.npz\n"
+        "  granforce pack --scene groove --mu 0.5",
+    )
+    command.add_argument(
+        "--scene",
+        metavar="NAME",
+        help="a small scene in place of a packing made from a gas: groove, box, pyramid, leaning, "
+        "column, six, solid or many; of the other options, it takes --mu alone",
     )
     _add_packing(command)
     _add_store(command)

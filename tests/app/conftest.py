@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from serving import CHROMIUM, FLAGS, painted, serve
+from serving import CHROMIUM, FLAGS, MANY, painted, serve
 from small_store import cell_parameters
 
 from granforce.study import cells as study
@@ -73,7 +73,7 @@ def visit(chromium, address):
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda told: told.type == "error" and errors.append(told.text))
-        page.goto(address + query)
+        page.goto(address + (query or MANY))
         painted(page, PATIENCE)
         page.get_by_role("tab").first.wait_for()
         return page

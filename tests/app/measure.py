@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, CLOSED, FLAGS, MODEL, painted, scene, serve  # noqa: E402
+from serving import CHROMIUM, CLOSED, FLAGS, MANY, MODEL, painted, scene, serve  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
 # A place in the packing where a drag moves the view, and pulls nothing.
@@ -45,7 +45,7 @@ class Stage:
         page = self.browser.new_context(viewport=SIZE, reduced_motion=motion).new_page()
         page.bytes = 0
         page.on("websocket", lambda ws: ws.on("framereceived", lambda data: _count(page, data)))
-        page.goto(self.address + query)
+        page.goto(self.address + (query or MANY))
         painted(page, 120_000)
         mark = "performance.getEntriesByName('packing painted')[0].startTime"
         return page, page.evaluate(mark) / 1000  # since the page was asked for

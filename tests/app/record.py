@@ -17,7 +17,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
 from PIL import Image  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, FLAGS, MODEL, painted, scene, serve  # noqa: E402
+from serving import CHROMIUM, FLAGS, MANY, MODEL, painted, scene, serve  # noqa: E402
 from small_store import ROOT  # noqa: E402
 from test_live_browser import chain, until  # noqa: E402
 from test_space_browser import here, place  # noqa: E402
@@ -157,7 +157,7 @@ def main(path):
             )
             page = context.new_page()
             page.set_default_timeout(300_000)
-            page.goto(address)
+            page.goto(address + MANY)
             painted(page, 60_000)
             page.wait_for_timeout(4000)
             recorder = Recorder(page)

@@ -1,7 +1,7 @@
 """The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
 
 import pytest
-from serving import painted
+from serving import MANY, painted
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
@@ -26,7 +26,7 @@ def findings(page):
 def opened(chromium, address, query, width):
     page = chromium.new_page(viewport={"width": width, "height": 1000})
     page.set_default_timeout(PATIENCE)
-    page.goto(address + query)
+    page.goto(address + (query or MANY))
     painted(page, PATIENCE)
     page.get_by_role("tab").first.wait_for()
     page.wait_for_function("() => !document.querySelector('.pn-loading')")
@@ -48,5 +48,18 @@ def test_no_tab_has_a_serious_finding(chromium, address, tab, dark):
 def test_the_tour_and_a_narrow_page_have_no_serious_finding(chromium, address):
     page = opened(chromium, address, "?tour=2", 390)
     page.get_by_role("dialog").wait_for()
+    assert findings(page) == []
+    page.context.close()
+
+
+@pytest.mark.parametrize("query", ["?scene=groove&tour=1", "?scene=box", "?scene=own"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_no_scene_has_a_serious_finding(chromium, address, query, width):
+    page = chromium.new_page(viewport={"width": width, "height": 900})
+    page.set_default_timeout(PATIENCE)
+    page.goto(address + query)
+    desk = page.locator(".desk")
+    desk.wait_for()
+    page.wait_for_function("e => e.painted > 0", arg=desk.element_handle())
     assert findings(page) == []
     page.context.close()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import MODEL, column, painted, scene, serve
+from serving import MANY, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 from granforce import measures
@@ -44,7 +44,7 @@ def _context(chromium, width):
 
 def _open(context, address):
     page = context.new_page()
-    page.goto(address)
+    page.goto(address if "?" in address else address + MANY)
     painted(page)
     page.wait_for_function(f"() => {MODEL}('bars') || {MODEL}('path')")
     page.wait_for_timeout(300)  # until the layout is at rest

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from serving import MODEL, column, free_port, painted, scene, serve
+from serving import MANY, MODEL, column, free_port, painted, scene, serve
 from small_store import KEPT, ROOT
 
 # Pictures to be looked at; ignored by git.
@@ -49,7 +49,7 @@ def visit(chromium, address, request):
                 and errors.append(told.text)
             ),
         )
-        page.goto((at or address) + query)
+        page.goto((at or address) + (query or MANY))
         painted(page, PATIENCE)
         page.get_by_role("tab").first.wait_for()
         contexts.append((context, page))

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from packings import REFERENCE, reference, skewed
-from serving import CLOSED, MODEL, column, painted, scene, serve
+from serving import CLOSED, MANY, MODEL, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 import granforce as gf
@@ -33,7 +33,7 @@ def visit(chromium, address, request):
         page.set_default_timeout(PATIENCE)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda told: told.type == "error" and errors.append(told.text))
-        page.goto(address + query)
+        page.goto(address + (query or MANY))
         painted(page, PATIENCE)
         pages.append(page)
         return page
@@ -335,7 +335,7 @@ def test_closed_pages_are_forgotten(chromium, shipped, tmp_path):
         pages = []
         for _ in range(3):
             pages.append(chromium.new_page())
-            pages[-1].goto(url)
+            pages[-1].goto(url + MANY)
             painted(pages[-1], PATIENCE)
         for tab in ("Statistics", "Force space", "Perturb", "Your packing", "Export"):
             pages[0].get_by_role("tab", name=tab).click()

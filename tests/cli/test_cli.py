@@ -95,6 +95,17 @@ def test_reports_are_json_where_nothing_can_be_told(run, words):
     assert None in told.values()
 
 
+def test_a_scene_is_packed_without_a_store(run, tmp_path):
+    file = tmp_path / "groove.npz"
+    code, out, _ = run("pack", "--scene", "groove", "--mu", "0.2", "--json", "--out", file)
+    assert code == 0
+    told = json.loads(out)
+    assert (told["scene"], told["dimension"], told["friction"]) == ("groove", 1, 0.2)
+    assert file.exists() and not (tmp_path / "cache").exists()
+    code, _, err = run("pack", "--scene", "grove")
+    assert code == 2 and err.count("\n") == 1 and "groove" in err
+
+
 def test_walk_and_measure_agree(run, tmp_path):
     file = tmp_path / "contacts.csv"
     walked = json.loads(run("walk", *SMALL, "--json")[1])

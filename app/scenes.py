@@ -1,0 +1,178 @@
+"""Small scenes as the page draws them, by name or built by a visitor, and what links say."""
+
+import io
+import re
+from typing import NamedTuple
+from urllib.parse import parse_qsl, urlencode
+
+import numpy as np
+
+from granforce.packing import importers, scenes
+from granforce.records import InputError, NotJammedError, float_array, friction
+from granforce.study import hulls
+
+FIRST, MANY, OWN = "groove", "many", "own"
+MOST_DISKS, MOST_WALLS = 30, 12
+LONGEST = 4000  # characters of a built scene in a link
+BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # what a visitor begins to build with
+SNAP = 1e-6  # of the largest radius: what a visitor's hand left open is closed up to here
+
+
+class Asked(NamedTuple):
+    """What a link asks of the page."""
+
+    scene: str  # MANY for the page of large packings
+    mu: float | None
+    step: int  # of the tour, 0 for none
+    built: str  # a scene of the visitor's, as text
+    query: str  # for the page of large packings
+
+
+def asked(query):
+    """What a link's query asks for; what cannot be read is left out.
+
+    An address without a view begins with the groove; links from before there were scenes name a μ,
+    a tab or the like, and are of large packings.
+    """
+    given = dict(parse_qsl(query.lstrip("?")))
+    name = given.pop("scene", MANY if given else FIRST)
+    if name not in (*scenes.SCENES, OWN):
+        name = FIRST
+    try:
+        mu = friction(given["mu"])
+    except (KeyError, InputError):
+        mu = None
+    step = int(given["tour"]) if re.fullmatch("[1-9]", given.get("tour", "")) else 0
+    if "scene" in dict(parse_qsl(query.lstrip("?"))):
+        query = f"?{urlencode(given)}" if given else ""
+    return Asked(name, mu, step, given.get("built", "")[:LONGEST], query)
+
+
+def titles():
+    """[name, title] of every scene, as the list on the page has them."""
+    return [[name, kind.title] for name, kind in scenes.SCENES.items()] + [[OWN, "Build your own"]]
+
+
+def drawn(name, mu=None, built=""):
+    """What the page draws of a scene: plain numbers and arrays.
+
+    Raises InputError for a built scene that cannot be.
+    """
+    packing = packing_of(name, mu, built)
+    built = (built or BEGIN) if name == OWN else ""
+    return {"name": name, "built": built, "mu": packing.mu, **geometry(packing)}
+
+
+def packing_of(name, mu=None, built=""):
+    """The Packing of a scene, by name or built, whether or not anything balances."""
+    return own(built, mu) if name == OWN else scenes.sketched(name, mu)
+
+
+def geometry(packing):
+    """Disks, walls, contacts and the balance of a packing without its cones."""
+    contacts, count = packing.contacts, packing.info.get("disks", len(packing.r))
+    walls = np.reshape(packing.info.get("walls", []), (-1, 4))
+    found = hulls.hull(packing) if len(contacts.i) else None
+    box = [float(side) if np.isfinite(side) else 0.0 for side in packing.box]
+    return {
+        "x": packing.x[:count].ravel(),
+        "r": packing.r[:count],
+        "load": packing.load[:count].ravel(),
+        "walls": walls.ravel(),
+        "box": box,
+        "i": contacts.i.astype(np.int32),
+        "j": contacts.j.astype(np.int32),
+        "normal": contacts.normal.ravel(),
+        "arm_i": contacts.arm_i,
+        "arm_j": contacts.arm_j,
+        "names": names(packing, count),
+        **({} if found is None else _balance(found)),
+    }
+
+
+def _balance(found):
+    return {
+        "A": found.A.ravel(),
+        "b": found.b,
+        "lift": found.lift.ravel(),
+        "axes": found.axes.ravel(),
+        "h": len(found.axes),
+        "equations": found.equations,
+        "grains": found.grains.astype(np.int32),
+    }
+
+
+def names(packing, count):
+    """Where each contact is, in words."""
+    contacts, said = packing.contacts, []
+    several = count > 1
+    for i, j, (n_x, n_y) in zip(contacts.i, contacts.j, contacts.normal, strict=True):
+        if j < count:
+            said.append(f"between {i + 1} and {j + 1}")
+            continue
+        wall = "floor" if n_y < -0.9 else "ceiling" if n_y > 0.9 else "right wall"
+        wall = "left wall" if wall == "right wall" and n_x < 0 else wall
+        said.append(f"disk {i + 1} at the {wall}" if several else f"at the {wall}")
+    return said
+
+
+def falling(packing, load=None):
+    """Motion (N, 3) of the disks that proves that nothing balances, flat; empty without a proof."""
+    packing, count = _loaded(packing, load), packing.info.get("disks", len(packing.r))
+    try:
+        motion = hulls.fall(packing)
+    except NotJammedError:  # nothing touches: everything falls
+        motion = np.where(np.isnan(packing.load), 0.0, packing.load)
+        motion /= np.abs(motion).max() or 1.0
+    return np.zeros(0) if motion is None else motion[:count].ravel()
+
+
+def bounds(packing, load=None):
+    """[least, largest f_n] of every contact, exactly; None where a contact carries nothing."""
+    found = hulls.bounds(_loaded(packing, load))
+    return [None if np.isnan(low) else [float(low), float(high)] for low, high in found]
+
+
+def _loaded(packing, load):
+    """The packing under other loads on its disks, flat."""
+    if load is None:
+        return packing
+    count = packing.info.get("disks", len(packing.r))
+    changed = packing.load.copy()
+    changed[:count] = float_array(load, (3 * count,), "loads").reshape(-1, 3)
+    return packing._replace(load=changed)
+
+
+def own(text, mu=None):
+    """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", disks and walls, under gravity."""
+    disks, walls = ([*(text or BEGIN).split("|"), ""])[:2]
+    disks, walls = _numbers(disks, 3, MOST_DISKS, "disks"), _numbers(walls, 4, MOST_WALLS, "walls")
+    if not len(disks):
+        raise InputError("there is no disk; put one")
+    x, r = disks[:, :2], disks[:, 2]
+    mu = 0.5 if mu is None else friction(mu)
+    made = scenes.assembled(x, r, walls, scenes.weights(r), mu, tolerance=SNAP)
+    return made._replace(info=made.info | {"scene": OWN})
+
+
+def _numbers(text, width, most, what):
+    try:
+        rows = [[float(part) for part in row.split(",")] for row in text.split(";") if row.strip()]
+        found = np.array(rows, dtype=float).reshape(-1, width)
+    except ValueError:
+        raise InputError(f"this link's {what} cannot be read") from None
+    if len(found) > most:
+        raise InputError(f"a scene may have {most} {what} at most, got {len(found)}")
+    return float_array(found, (-1, width), what)
+
+
+def file_of(packing, load=None):
+    """The packing under these loads as an NPZ file, with a network of its own if there is one."""
+    packing = _loaded(packing, load)
+    try:
+        packing = scenes.with_network(packing)
+    except (InputError, NotJammedError):
+        pass  # kept as it is: S is empty, and the library says why
+    file = io.BytesIO()
+    importers.save_packing(packing, file)
+    return file.getvalue()

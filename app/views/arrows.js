@@ -1,0 +1,283 @@
+// The small scene itself: disks, walls, the force on each disk at each contact as an arrow within its
+// cone, and, for a disk that is looked at, its forces put one after the other: they close.
+
+class Arrows {
+  constructor(root, told) {
+    this.told = told // told(what, …): of a hand on it
+    this.canvas = root
+    this.context = root.getContext("2d")
+    this.hover = null
+    this.held = null
+    const at = (event) => {
+      const box = root.getBoundingClientRect()
+      return [event.clientX - box.left, event.clientY - box.top]
+    }
+    root.addEventListener("pointermove", (event) => this.moved(...at(event), event))
+    root.addEventListener("pointerleave", () => { if (!this.held) { this.hover = null; told("hover", null) } })
+    root.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
+    for (const name of ["pointerup", "pointercancel"]) root.addEventListener(name, () => { this.held = null; told("release") })
+  }
+
+  /** Fit disks and walls into the canvas. */
+  fit(body, same = false) {
+    this.body = body
+    if (same) return // where it is built, nothing moves but what the hand moves
+    const { scene } = body, { x, r, walls, box } = scene
+    const xs = [], ys = []
+    for (let g = 0; g < r.length; g++) {
+      xs.push(x[2 * g] - r[g], x[2 * g] + r[g])
+      ys.push(x[2 * g + 1] - r[g], x[2 * g + 1] + r[g])
+    }
+    for (let k = 0; k < walls.length; k += 2) { xs.push(walls[k]); ys.push(walls[k + 1]) }
+    if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
+    const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
+    const width = this.canvas.clientWidth, height = this.canvas.clientHeight
+    const room = box[0] ? 0.12 : 0.1
+    this.unit = Math.min(width / ((right - left) * (1 + 2 * room)), height / ((high - low) * (1 + 2 * room)))
+    this.unit = Math.min(this.unit, 0.22 * Math.min(width, height) / Math.max(...r))
+    this.x0 = width / 2 - (this.unit * (left + right)) / 2
+    this.y0 = height / 2 + (this.unit * (low + high)) / 2
+    const mean = body.sumAt(body.u) / body.count
+    this.forceUnit = (0.75 * Math.max(...r)) / (Math.max(Math.abs(mean), 1e-6) || 1)
+  }
+
+  px(x, y) { return [this.x0 + this.unit * x, this.y0 - this.unit * y] }
+  back(px, py) { return [(px - this.x0) / this.unit, (this.y0 - py) / this.unit] }
+
+  /** Both ends of every contact: {contact, disk, at, inward: force on the disk of f_n = 1, across}. */
+  ends() {
+    const { scene } = this.body, disks = scene.r.length, found = []
+    for (let c = 0; c < scene.i.length; c++) {
+      const [nx, ny] = [scene.normal[2 * c], scene.normal[2 * c + 1]]
+      for (const [disk, sign, arm] of [[scene.i[c], -1, scene.arm_i[c]], [scene.j[c], 1, scene.arm_j[c]]]) {
+        if (disk >= disks) continue
+        const at = [scene.x[2 * disk] - sign * arm * nx, scene.x[2 * disk + 1] - sign * arm * ny]
+        found.push({ contact: c, disk, at, inward: [sign * nx, sign * ny], across: [-sign * ny, sign * nx] })
+      }
+    }
+    return found
+  }
+
+  draw(look) {
+    const { context: g, canvas, body } = this, ratio = window.devicePixelRatio || 1
+    const width = canvas.clientWidth, height = canvas.clientHeight
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio)
+      canvas.height = Math.round(height * ratio)
+    }
+    g.setTransform(ratio, 0, 0, ratio, 0, 0)
+    g.clearRect(0, 0, width, height)
+    this.look = look
+    this.drawWalls(look.wall ?? [])
+    this.drawDisks()
+    const F = body.empty ? null : body.forces()
+    if (F) for (const end of this.ends()) this.drawEnd(end, F)
+    if (look.fall) this.drawFall(look.fall)
+    this.drawLoads()
+    if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
+  }
+
+  /** more: a wall that is being drawn. */
+  drawWalls(more) {
+    const { context: g, body, look } = this, { box } = body.scene, walls = [...body.scene.walls, ...more]
+    g.strokeStyle = look.ink
+    g.lineWidth = 3
+    g.lineCap = g.lineJoin = "round"
+    g.beginPath()
+    for (let k = 0; k < walls.length; k += 4) {
+      g.moveTo(...this.px(walls[k], walls[k + 1]))
+      g.lineTo(...this.px(walls[k + 2], walls[k + 3]))
+    }
+    g.stroke()
+    if (!box[0]) return
+    g.setLineDash([5, 5])
+    g.lineWidth = 1
+    const [left, top] = this.px(0, box[1])
+    g.strokeRect(left, top, box[0] * this.unit, box[1] * this.unit)
+    g.setLineDash([])
+  }
+
+  drawDisks() {
+    const { context: g, body, look } = this, { x, r, box } = body.scene
+    const shifts = box[0] ? [-1, 0, 1] : [0]
+    for (let d = 0; d < r.length; d++) {
+      for (const a of shifts) for (const b of shifts) {
+        const [px, py] = this.px(x[2 * d] + a * box[0], x[2 * d + 1] + b * box[1]), R = r[d] * this.unit
+        g.beginPath()
+        g.arc(px, py, R, 0, 7)
+        g.globalAlpha = a || b ? 0.3 : 1
+        g.fillStyle = look.disk === d ? look.lit : look.fill
+        g.fill()
+        g.strokeStyle = look.edge
+        g.lineWidth = 1.5
+        g.stroke()
+        g.globalAlpha = 1
+        if (a || b || r.length < 2) continue
+        g.fillStyle = look.ink
+        g.font = "12px sans-serif"
+        g.textAlign = "center"
+        g.textBaseline = "middle"
+        g.fillText(String(d + 1), px - 0.42 * R, py - 0.42 * R)
+      }
+    }
+  }
+
+  drawEnd({ contact, disk, at, inward, across }, F) {
+    const { context: g, body, look } = this, { mu } = body
+    const [normal, tangential] = [F[2 * contact], F[2 * contact + 1]]
+    const [px, py] = this.px(...at), lit = look.contacts.has(contact), long = this.unit * body.scene.r[disk] * 0.62
+    const edge = mu * normal - Math.abs(tangential), slides = mu > 0 && edge < 1e-6 * Math.max(1, normal)
+    // The cone: where the force on the disk may point.
+    const wide = Math.atan(mu), middle = Math.atan2(-inward[1], inward[0])
+    g.beginPath()
+    g.moveTo(px, py)
+    g.arc(px, py, long, middle - wide, middle + wide)
+    g.closePath()
+    g.fillStyle = lit ? look.coneLit : slides ? look.coneFull : look.cone
+    g.fill()
+    if (mu < 0.01) { g.strokeStyle = look.coneLit; g.lineWidth = 1; g.stroke() }
+    if (normal < 1e-9) {
+      g.beginPath()
+      g.arc(px, py, 4, 0, 7)
+      g.strokeStyle = look.warm
+      g.lineWidth = 1.5
+      g.stroke()
+      return
+    }
+    const force = [0, 1].map((k) => normal * inward[k] + tangential * across[k])
+    this.arrow(px, py, force, lit ? look.hand : slides ? look.warm : look.cold, lit ? 3.5 : 2.5)
+  }
+
+  arrow(px, py, force, colour, thick) {
+    const { context: g } = this, unit = this.unit * this.forceUnit
+    let [dx, dy] = [force[0] * unit, -force[1] * unit], size = Math.hypot(dx, dy)
+    const most = 0.45 * Math.min(this.canvas.clientWidth, this.canvas.clientHeight)
+    if (size < 1.5) return
+    const cut = size > most
+    if (cut) { dx *= most / size; dy *= most / size; size = most }
+    const head = Math.min(11, 0.5 * size + 2), [ux, uy] = [dx / size, dy / size]
+    g.strokeStyle = g.fillStyle = colour
+    g.lineWidth = thick
+    g.lineCap = "butt"
+    g.beginPath()
+    if (cut) g.setLineDash([8, 4])
+    g.moveTo(px, py)
+    g.lineTo(px + dx - head * 0.8 * ux, py + dy - head * 0.8 * uy)
+    g.stroke()
+    g.setLineDash([])
+    g.beginPath()
+    g.moveTo(px + dx, py + dy)
+    g.lineTo(px + dx - head * ux - 0.45 * head * uy, py + dy - head * uy + 0.45 * head * ux)
+    g.lineTo(px + dx - head * ux + 0.45 * head * uy, py + dy - head * uy - 0.45 * head * ux)
+    g.fill()
+  }
+
+  /** Weights, and what the visitor added. */
+  drawLoads() {
+    const { body, look } = this, { x, r } = body.scene
+    for (let d = 0; d < r.length; d++) {
+      const load = [body.load[3 * d], body.load[3 * d + 1]]
+      if (Math.hypot(...load) > 1e-9) this.arrow(...this.px(x[2 * d], x[2 * d + 1] ), load, look.weight, 2.5)
+    }
+  }
+
+  drawFall(motion) {
+    const { body, look, context: g } = this, { x, r } = body.scene
+    for (let d = 0; d < r.length; d++) {
+      const [vx, vy, spin] = [motion[3 * d], motion[3 * d + 1], motion[3 * d + 2]]
+      const [px, py] = this.px(x[2 * d], x[2 * d + 1]), big = 0.9 * r[d] / this.forceUnit
+      this.arrow(px, py, [vx * big, vy * big], look.warm, 4)
+      if (Math.abs(spin) < 0.05) continue
+      const R = 0.55 * r[d] * this.unit, turn = Math.max(-2.5, Math.min(2.5, 2 * spin))
+      g.strokeStyle = look.warm
+      g.lineWidth = 2.5
+      g.beginPath()
+      g.arc(px, py, R, -Math.PI / 2, -Math.PI / 2 - turn, turn > 0)
+      g.stroke()
+    }
+  }
+
+  /** The forces on one disk, weight first, put one after the other: they come back to the start. */
+  drawPolygon(disk, F) {
+    const { context: g, body, look } = this, forces = [[body.load[3 * disk], body.load[3 * disk + 1], look.weight]]
+    for (const { contact, disk: own, inward, across } of this.ends()) {
+      if (own !== disk || F[2 * contact] < 1e-9) continue
+      const [n, t] = [F[2 * contact], F[2 * contact + 1]]
+      forces.push([n * inward[0] + t * across[0], n * inward[1] + t * across[1], look.contacts.has(contact) ? look.hand : look.cold])
+    }
+    let [sx, sy] = [0, 0], corners = [[0, 0]]
+    for (const [x, y] of forces) corners.push([(sx += x), (sy += y)])
+    const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.canvas.clientWidth)
+    const span = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys), 1e-9)
+    const unit = (side - 34) / span, left = this.canvas.clientWidth - side - 8, top = 8
+    g.fillStyle = look.paper
+    g.strokeStyle = look.edge
+    g.lineWidth = 1
+    g.beginPath()
+    g.roundRect(left, top, side, side + 18, 6)
+    g.fill()
+    g.stroke()
+    g.fillStyle = look.ink
+    g.font = "11px sans-serif"
+    g.textAlign = "center"
+    g.textBaseline = "alphabetic"
+    g.fillText(body.scene.r.length > 1 ? `forces on disk ${disk + 1} close` : "its forces close: balance", left + side / 2, top + side + 12)
+    const x0 = left + 17 - unit * Math.min(...xs) + ((side - 34) - unit * (Math.max(...xs) - Math.min(...xs))) / 2
+    const y0 = top + 17 + unit * Math.max(...ys) + ((side - 34) - unit * (Math.max(...ys) - Math.min(...ys))) / 2
+    const own = this.unit * this.forceUnit
+    forces.forEach(([x, y, colour], k) => {
+      this.arrow(x0 + unit * corners[k][0], y0 - unit * corners[k][1], [(x * unit) / own, (y * unit) / own], colour, 2)
+    })
+  }
+
+  // The hand
+
+  find(px, py) {
+    const { body } = this, { x, r } = body.scene
+    if (!body.empty) {
+      const F = body.forces(), unit = this.unit * this.forceUnit
+      let best = null, least = 26
+      for (const end of this.ends()) {
+        const [ax, ay] = this.px(...end.at), [n, t] = [F[2 * end.contact], F[2 * end.contact + 1]]
+        const tip = [ax + unit * (n * end.inward[0] + t * end.across[0]), ay - unit * (n * end.inward[1] + t * end.across[1])]
+        const far = Math.min(Math.hypot(px - tip[0], py - tip[1]), Math.hypot(px - ax, py - ay) * 1.2)
+        if (far < least) { least = far; best = { ...end, grip: [tip[0] - px, tip[1] - py] } }
+      }
+      if (best) return best
+    }
+    for (let d = 0; d < r.length; d++) {
+      const [cx, cy] = this.px(x[2 * d], x[2 * d + 1])
+      if (Math.hypot(px - cx, py - cy) < r[d] * this.unit) return { disk: d, loose: true }
+    }
+    return null
+  }
+
+  grabbed(px, py, event) {
+    const found = this.find(px, py)
+    if (this.told("press", { found, at: this.back(px, py) })) {
+      this.held = { taken: true }
+      this.canvas.setPointerCapture(event.pointerId)
+      return
+    }
+    this.told("select", found)
+    if (!found || found.loose) return
+    this.held = found
+    this.canvas.setPointerCapture(event.pointerId)
+    event.preventDefault()
+  }
+
+  moved(px, py, event) {
+    if (this.held?.taken) return this.told("carry", { at: this.back(px, py) })
+    if (this.held) return this.pull(px, py)
+    const found = this.find(px, py)
+    this.canvas.style.cursor = found && !found.loose ? "grab" : "default"
+    this.told("hover", found)
+  }
+
+  pull(px, py) {
+    const { contact, at, inward, across, grip } = this.held, [ax, ay] = this.px(...at)
+    const unit = this.unit * this.forceUnit
+    const force = [(px + grip[0] - ax) / unit, -(py + grip[1] - ay) / unit]
+    this.told("pull", { contact, normal: dot(force, inward), tangential: dot(force, across) })
+  }
+}

@@ -1,0 +1,280 @@
+// S of a small scene, cut anew out of all networks in balance for every μ and every load: corners
+// where sides meet, the nearest network to any other, and a walk through it.
+
+const FAR = [1e4, 1e8] // where S seems to have no end it is cut so far outside, to find rays along which it goes on
+const SMALL = 1e-9
+const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
+
+const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0)
+
+/** The solution of a small square system, null where its rows depend on each other. */
+function solve(rows, right) {
+  const n = right.length, M = rows.map((row, k) => [...row, right[k]])
+  for (let c = 0; c < n; c++) {
+    let p = c
+    for (let r = c + 1; r < n; r++) if (Math.abs(M[r][c]) > Math.abs(M[p][c])) p = r
+    if (Math.abs(M[p][c]) < 1e-10) return null
+    ;[M[c], M[p]] = [M[p], M[c]]
+    for (let r = 0; r < n; r++) {
+      if (r === c) continue
+      const part = M[r][c] / M[c][c]
+      if (part) for (let k = c; k <= n; k++) M[r][k] -= part * M[c][k]
+    }
+  }
+  return M.map((row, k) => row[n] / row[k])
+}
+
+class Body {
+  constructor(scene) {
+    this.scene = scene
+    this.h = scene.h ?? 0
+    this.count = scene.i.length
+    const width = 2 * this.count
+    this.axes = Array.from({ length: this.h }, (_, k) => scene.axes.slice(k * width, (k + 1) * width))
+    this.load = Float64Array.from(scene.load)
+    this.u = new Array(this.h).fill(0)
+    this.reload()
+  }
+
+  /** All networks in balance under the present loads: origin + u · axes, if there are any. */
+  reload() {
+    const { scene } = this, rows = scene.b?.length ?? 0, width = 2 * this.count
+    const b = Float64Array.from(scene.b ?? [])
+    ;[...(scene.grains ?? [])].forEach((grain, k) => {
+      if (3 * grain + 2 >= this.load.length) return
+      b[3 * k] = -this.load[3 * grain]
+      b[3 * k + 1] = -this.load[3 * grain + 1]
+      b[3 * k + 2] = -this.load[3 * grain + 2] / scene.r[grain]
+    })
+    this.origin = new Float64Array(width)
+    for (let k = 0; k < width; k++) for (let r = 0; r < rows; r++) this.origin[k] += scene.lift[k * rows + r] * b[r]
+    let unbalanced = 0, size = 1
+    for (let r = 0; r < rows; r++) {
+      let sum = -b[r]
+      for (let k = 0; k < width; k++) sum += scene.A[r * width + k] * this.origin[k]
+      unbalanced = Math.max(unbalanced, Math.abs(sum))
+      size = Math.max(size, Math.abs(b[r]))
+    }
+    this.consistent = unbalanced < 1e-9 * size && this.touched()
+  }
+
+  /** Whether every loaded disk touches anything at all. */
+  touched() {
+    const { scene, load } = this, held = new Set([...scene.i, ...scene.j])
+    return [...scene.r].every((_, g) => held.has(g) || !(load[3 * g] || load[3 * g + 1]))
+  }
+
+  /** Cones at this μ: slope · u + rest ≥ 0, three rows a contact. */
+  cut(mu) {
+    this.mu = mu
+    this.rows = []
+    let still = true // whether cones hold that no u can change
+    for (let c = 0; c < this.count; c++) {
+      for (const what of [1, -1, OPENS]) {
+        const of = (force) => (what === OPENS ? force[2 * c] : mu * force[2 * c] - what * force[2 * c + 1])
+        const slope = this.axes.map(of), rest = of(this.origin), size = Math.hypot(...slope)
+        if (size > 1e-10) this.rows.push({ slope: slope.map((v) => v / size), rest: rest / size, contact: c, what })
+        else if (rest < -SMALL) still = false
+      }
+    }
+    this.possible = still && this.consistent && this.count > 0
+    this.whole = this.h <= 3
+    if (this.whole) this.draw()
+    else this.empty = !this.possible
+    return this
+  }
+
+  /** Corners, sides and rays; three dimensions at most. */
+  draw() {
+    const scale = this.scaleOf(), total = this.sum()
+    const cap = (reach) => {
+      const size = Math.hypot(...total.slope)
+      return size > 1e-10 ? [{ slope: total.slope.map((v) => -v / size), rest: (reach - total.rest) / size, cap: true }] : []
+    }
+    let rows, corners = [], far = []
+    this.rays = []
+    for (const reach of this.possible ? FAR : []) {
+      rows = [...this.rows, ...cap(reach * scale)]
+      corners = this.meetings(rows)
+      far = corners.filter((corner) => corner.cap)
+      this.rays = far.map(({ u }) => this.along(u, total.slope)).filter((ray) => ray && this.isRay(ray))
+      if (!far.length || this.rays.length) break
+    }
+    this.empty = !corners.length
+    this.bounded = !this.rays.length
+    if (!this.bounded) { // for the eye, cut nearer
+      const reach = Math.max(...corners.filter((corner) => !corner.cap).map((corner) => this.sumAt(corner.u)), scale)
+      rows = [...this.rows, ...cap(3 * reach)]
+      corners = this.meetings(rows)
+    }
+    this.corners = corners
+    this.drawn = rows
+    this.sides = this.empty ? [] : this.faces(rows)
+    this.middle = this.u.map((_, k) => corners.reduce((s, corner) => s + corner.u[k], 0) / corners.length)
+  }
+
+  /** Outwards along the sides that meet in a corner far outside, to rounding; null without one. */
+  along(u, total) {
+    const { h } = this, met = this.rows.filter((row) => Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * (1 + Math.hypot(...u)))
+    let ray = h === 1 ? [1] : null
+    if (h === 2 && met.length) ray = [-met[0].slope[1], met[0].slope[0]]
+    for (const other of h === 3 ? met.slice(1) : []) ray ??= independent(cross(met[0].slope, other.slope))
+    return ray && ray.map((v) => (v * Math.sign(dot(ray, total))) / Math.hypot(...ray))
+  }
+
+  /** Whether this change of forces, which balances itself, leaves no cone: the proof of no end. */
+  isRay(ray) {
+    return this.rows.every((row) => dot(row.slope, ray) > -1e-11)
+  }
+
+  scaleOf() {
+    return Math.max(1e-6, ...this.load.map(Math.abs), ...(this.scene.box[0] ? [...this.scene.b].map(Math.abs) : []))
+  }
+
+  /** Σ f_n as slope and rest. */
+  sum() {
+    const of = (force) => { let s = 0; for (let c = 0; c < this.count; c++) s += force[2 * c]; return s }
+    return { slope: this.axes.map(of), rest: of(this.origin) }
+  }
+
+  sumAt(u) { const { slope, rest } = this.sum(); return dot(slope, u) + rest }
+
+  /** Points where h sides meet and none is left, {u, cap}. */
+  meetings(rows) {
+    const { h } = this, found = []
+    const add = (picked) => {
+      const u = h ? solve(picked.map((row) => row.slope), picked.map((row) => -row.rest)) : []
+      if (!u) return
+      const size = 1 + Math.hypot(...u)
+      if (rows.some((row) => dot(row.slope, u) + row.rest < -SMALL * size)) return
+      if (found.some((other) => Math.hypot(...other.u.map((v, k) => v - u[k])) < 1e-7 * size)) return
+      found.push({ u, cap: rows.some((row) => row.cap && Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * size) })
+    }
+    const pick = (from, picked) => {
+      if (picked.length === h) return add(picked)
+      for (let k = from; k < rows.length; k++) pick(k + 1, [...picked, rows[k]])
+    }
+    pick(0, [])
+    return found
+  }
+
+  /** Sides: {corners in order, stops: [[contact, what], …], cap}; those of one place together. */
+  faces(rows) {
+    const { h } = this, found = new Map()
+    for (const row of rows) {
+      const on = []
+      this.corners.forEach(({ u }, k) => {
+        if (Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * (1 + Math.hypot(...u))) on.push(k)
+      })
+      if (on.length < Math.max(1, h) || !h) continue
+      const key = on.join(), side = found.get(key) ?? { corners: on, stops: new Map(), slope: row.slope, rest: row.rest }
+      if (row.cap) side.cap = true
+      else if (side.stops.has(row.contact) && side.stops.get(row.contact) !== row.what) side.stops.set(row.contact, OPENS)
+      else side.stops.set(row.contact, row.what)
+      found.set(key, side)
+    }
+    const sides = [...found.values()].map((side) => ({ ...side, stops: [...side.stops] }))
+    for (const side of sides) if (h === 3) side.corners = this.around(side)
+    return sides
+  }
+
+  around({ corners, slope }) {
+    const middle = [0, 1, 2].map((k) => corners.reduce((s, c) => s + this.corners[c].u[k], 0) / corners.length)
+    const least = slope.map(Math.abs).indexOf(Math.min(...slope.map(Math.abs)))
+    const unit = [0, 1, 2].map((k) => (k === least ? 1 : 0)), across = cross(slope, unit), other = cross(slope, across)
+    const angle = (c) => {
+      const d = this.corners[c].u.map((v, k) => v - middle[k])
+      return Math.atan2(dot(d, other) / Math.hypot(...other), dot(d, across) / Math.hypot(...across))
+    }
+    return [...corners].sort((a, b) => angle(a) - angle(b))
+  }
+
+  /** Forces f_n, f_t of all contacts at u. */
+  forces(u = this.u) {
+    const F = Float64Array.from(this.origin)
+    for (let k = 0; k < this.h; k++) for (let c = 0; c < F.length; c++) F[c] += u[k] * this.axes[k][c]
+    return F
+  }
+
+  /** Least and largest value of a force (2 c for f_n, 2 c + 1 for f_t), where S is drawn whole. */
+  interval(index) {
+    const values = this.corners.map(({ u }) => dot(this.axes.map((axis) => axis[index]), u) + this.origin[index])
+    const along = this.rays.map((ray) => dot(this.axes.map((axis) => axis[index]), ray))
+    return [
+      along.some((v) => v < -1e-10) ? -Infinity : Math.min(...values),
+      along.some((v) => v > 1e-10) ? Infinity : Math.max(...values),
+    ]
+  }
+
+  least(u) { return Math.min(Infinity, ...this.rows.map((row) => dot(row.slope, u) + row.rest)) }
+
+  /**
+   * The network nearest to u, in the metric of H (its inverse; the unit one without): each side in
+   * turn pushes by what it takes (Hildreth 1957).
+   */
+  nearest(target, inverse = null, margin = 0) {
+    if (!this.h) return []
+    const turned = this.rows.map((row) => (inverse ? inverse.map((line) => dot(line, row.slope)) : row.slope))
+    const size = this.rows.map((row, k) => dot(row.slope, turned[k]))
+    const push = new Float64Array(this.rows.length), u = [...target]
+    for (let sweep = 0; sweep < 400; sweep++) {
+      let most = 0
+      this.rows.forEach((row, k) => {
+        const step = Math.max(-push[k], -(dot(row.slope, u) + row.rest - margin) / size[k])
+        if (!step) return
+        push[k] += step
+        for (let d = 0; d < this.h; d++) u[d] += step * turned[k][d]
+        most = Math.max(most, Math.abs(step))
+      })
+      if (most < 1e-12) break
+    }
+    return u
+  }
+
+  /** Go to the network nearest to u; whether there is one. */
+  goTo(u, inverse = null) {
+    let found = this.least(u) >= 0 ? u : this.nearest(u, inverse)
+    if (this.least(found) < -1e-7 && this.whole && !this.empty) found = this.inwards(found)
+    if (this.least(found) < -1e-5 || this.empty) return false
+    this.u = found
+    return true
+  }
+
+  /** What rounding left outside, on the straight line to the middle. */
+  inwards(u) {
+    let inside = 0
+    for (const row of this.rows) {
+      const here = dot(row.slope, u) + row.rest, there = dot(row.slope, this.middle) + row.rest
+      if (here < 0 && there > here) inside = Math.max(inside, Math.min(1, -here / (there - here)))
+    }
+    return u.map((v, k) => v + inside * (this.middle[k] - v))
+  }
+
+  /** Pull the force of a contact towards (f_n, f_t); everything else follows as little as it can. */
+  pull(contact, normal, tangential) {
+    const B = [2 * contact, 2 * contact + 1].map((index) => this.axes.map((axis) => axis[index]))
+    const now = this.forces(), miss = [normal - now[2 * contact], tangential - now[2 * contact + 1]]
+    const H = this.u.map((_, a) => this.u.map((_, b) => B[0][a] * B[0][b] + B[1][a] * B[1][b] + (a === b ? 1e-3 : 0)))
+    const inverse = H.map((_, k) => solve(H, H.map((_, l) => (l === k ? 1 : 0))))
+    if (inverse.some((column) => !column)) return false
+    const gain = this.u.map((_, a) => B[0][a] * miss[0] + B[1][a] * miss[1])
+    return this.goTo(this.u.map((v, k) => v + dot(inverse[k], gain)), inverse)
+  }
+
+  /** A uniform draw by hit-and-run from u: a point of a random chord. */
+  step(u) {
+    const direction = u.map(() => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random()))
+    let low = -Infinity, high = Infinity
+    for (const row of this.whole ? this.drawn : this.rows) { // without an end, as far as it is drawn
+      const slope = dot(row.slope, direction), room = dot(row.slope, u) + row.rest
+      if (slope > 1e-12) low = Math.max(low, -Math.max(room, 0) / slope)
+      if (slope < -1e-12) high = Math.min(high, -Math.max(room, 0) / slope)
+    }
+    if (!Number.isFinite(low) || !Number.isFinite(high)) return u
+    const at = low + Math.random() * (high - low)
+    return u.map((v, k) => v + at * direction[k])
+  }
+}
+
+const independent = (v) => (Math.hypot(...v) > 1e-6 ? v : null)
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

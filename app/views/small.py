@@ -1,0 +1,120 @@
+"""A small scene and the whole of its S: drawn, cut and pulled in the browser; see small.js."""
+
+import base64
+from typing import ClassVar
+
+import param
+
+from granforce.packing import scenes as made
+from granforce.records import InputError, NotJammedError, UndecidedError
+
+from .. import scenes
+from .scripts import FOLDER, Scripted, joined
+
+# Title, text, and what the scene shows, of the steps of the tour before those of large packings.
+FIRST_STEPS = (
+    (
+        "One disk, two walls",
+        "A disk of weight 1 lies in a groove. Each wall presses on it and rubs: four forces. But "
+        "there are only three equations: nothing sideways, nothing up or down, no turning. One "
+        "number stays free: the forces are not determined, although nothing moves.",
+        {"mu": 0.5},
+    ),
+    (
+        "Every way to hold it, at once",
+        "The line is S: each of its points is one set of forces that holds the disk. Drag the "
+        "point, or an arrow: the forces change and stay in balance. S ends where a force meets the "
+        "edge of its wedge, the friction cone: there the disk is about to slide.",
+        {"mu": 0.5},
+    ),
+    (
+        "What friction does",
+        "Drag the friction μ. At μ = 0 the wedges are closed, and S is one point. More friction "
+        "opens the wedges, and S grows. At μ = 1, as steep as the walls, it has no end any more: "
+        "the disk has wedged itself. Next: 400 disks, and the same thing.",
+        {"mu": 0.8, "see": "strip"},
+    ),
+)
+
+
+class Small(Scripted):
+    """The page of a small scene."""
+
+    scene = param.Dict(default={}, doc="see scenes.drawn")
+    titles = param.List(doc="[name, title] of every scene")
+    steps = param.List(doc="title, text and what is shown, of each step of the tour")
+    all = param.Integer(doc="steps of the whole tour")
+    step = param.Integer(doc="of the tour, to begin with; 0 for none")
+    first = param.Boolean(doc="whether the page was opened without a view to show")
+    dark = param.Boolean()
+
+    SCRIPTS: ClassVar = ("ask", "body", "arrows", "space", "builder", "lesson", "small")
+    _esm = joined(*SCRIPTS)
+    _stylesheets: ClassVar = [FOLDER / "small.css"]
+
+    def __init__(self, asked, task, all_steps, **params):
+        """asked: scenes.Asked. task: a jobs.Task of the page, for scenes that take a while."""
+        super().__init__(
+            titles=scenes.titles(),
+            steps=[list(step) for step in FIRST_STEPS],
+            all=all_steps,
+            **params,
+        )
+        self._task = task
+        task.param.watch(self._failed, "message")
+        self._show(asked.scene, asked.mu, asked.built)
+
+    def _show(self, name, mu=None, built=""):
+        if name in ("six", "solid"):  # packed first
+            self._task.start(lambda job: scenes.drawn(name, mu), self._put)
+            return
+        try:
+            self._put(scenes.drawn(name, mu, built))
+        except (InputError, NotJammedError) as error:
+            self._send_msg({"error": str(error)})
+
+    def _put(self, scene):
+        self.scene = scene
+
+    def _failed(self, event):
+        if event.new:
+            self._send_msg({"error": event.new})
+
+    def _handle_msg(self, message):
+        """Another scene, another μ, or the question how it falls."""
+        if not isinstance(message, dict):
+            return
+        try:
+            if message.get("scene") in (*made.SCENES, scenes.OWN):
+                self._show(message["scene"])
+            if isinstance(message.get("built"), str):
+                self._show(scenes.OWN, message.get("mu"), message["built"][: scenes.LONGEST])
+            if isinstance(message.get("save"), dict):
+                self._save(**message["save"])
+            if isinstance(message.get("fall"), dict):
+                self._fall(**message["fall"])
+            if isinstance(message.get("bounds"), dict):
+                self._bound(**message["bounds"])
+        except (InputError, NotJammedError, UndecidedError, TypeError) as error:
+            self._send_msg({"error": str(error)})
+
+    def _fall(self, mu, load):
+        name, built = self.scene["name"], self.scene["built"]
+        self._task.start(
+            lambda job: scenes.falling(scenes.packing_of(name, mu, built), load).tolist(),
+            lambda motion: self._send_msg({"fall": motion}),
+        )
+
+    def _save(self, mu, load):
+        name, built = self.scene["name"], self.scene["built"]
+        self._task.start(
+            lambda job: scenes.file_of(scenes.packing_of(name, mu, built), load),
+            lambda file: self._send_msg({"file": base64.b64encode(file).decode()}),
+        )
+
+    def _bound(self, mu, load):
+        name, built = self.scene["name"], self.scene["built"]
+        self._task.start(
+            lambda job: scenes.bounds(scenes.packing_of(name, mu, built), load),
+            lambda bounds: self._send_msg({"bounds": bounds, "mu": mu}),
+        )

@@ -1,0 +1,374 @@
+// S of a small scene in its true shape: a segment, a polygon, or a body that turns in the hand, with
+// the network on screen as a point in it. With more dimensions, its shadow.
+
+const TURN = 0.008 // radians a pixel
+const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
+
+class Space {
+  constructor(canvas, told) {
+    this.told = told
+    this.canvas = canvas
+    this.context = canvas.getContext("2d")
+    this.view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    this.turn(0.6, -0.5)
+    this.half = 0
+    this.centre = null
+    this.held = null
+    this.shadow = [0, 1] // contacts whose f_n are its axes above three dimensions
+    this.dots = []
+    const at = (event) => {
+      const box = canvas.getBoundingClientRect()
+      return [event.clientX - box.left, event.clientY - box.top]
+    }
+    canvas.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
+    canvas.addEventListener("pointermove", (event) => this.moved(...at(event)))
+    canvas.addEventListener("pointerleave", () => { if (!this.held) told("side", null) })
+    for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { this.held = null })
+    canvas.addEventListener("keydown", (event) => this.key(event))
+  }
+
+  turn(a, b) {
+    const about = ([x, y, z], a, b) => {
+      const [x1, z1] = [x * Math.cos(a) + z * Math.sin(a), -x * Math.sin(a) + z * Math.cos(a)]
+      return [x1, y * Math.cos(b) - z1 * Math.sin(b), y * Math.sin(b) + z1 * Math.cos(b)]
+    }
+    const columns = [0, 1, 2].map((k) => about(this.view.map((row) => row[k]), a, b))
+    this.view = [0, 1, 2].map((k) => columns.map((column) => column[k]))
+  }
+
+  /** Place of u in the plane of the screen, in units of force, and its depth. */
+  flat(u) {
+    const { body } = this
+    if (body.h > 3) {
+      const F = body.forces(u)
+      return [F[2 * this.shadow[0]], F[2 * this.shadow[1]], 0]
+    }
+    if (body.h < 3) return [u[0] ?? 0, u[1] ?? 0, 0]
+    return this.view.map((row) => dot(row, u))
+  }
+
+  /** u whose place moves by so much in the plane of the screen. */
+  moving(u, dx, dy) {
+    const { body } = this
+    if (body.h > 3) {
+      const row = (c) => body.axes.map((axis) => axis[2 * c])
+      const [a, b] = this.shadow.map(row), M = [[dot(a, a), dot(a, b)], [dot(a, b), dot(b, b)]]
+      const part = solve(M, [dx, dy]) ?? [dx / (M[0][0] || 1), 0]
+      return u.map((v, k) => v + part[0] * a[k] + part[1] * b[k])
+    }
+    if (body.h < 3) return u.map((v, k) => v + [dx, dy][k])
+    return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
+  }
+
+  px([x, y]) {
+    const { clientWidth: w, clientHeight: h } = this.canvas, unit = (0.5 * Math.min(w, h) - 46) / this.half
+    return [w / 2 + (x - this.centre[0]) * unit, h / 2 - (y - this.centre[1]) * unit]
+  }
+
+  /** The part of the plane that is seen follows S, so that it is seen to grow: not all the time. */
+  frame(at_once) {
+    const { body } = this
+    const points = (body.whole ? body.corners.map(({ u }) => u) : [...this.dots, body.u]).map((u) => this.flat(u))
+    if (!points.length) return false
+    const [xs, ys] = [0, 1].map((k) => points.map((p) => p[k]))
+    const middle = [xs, ys].map((v) => (Math.max(...v) + Math.min(...v)) / 2)
+    if (body.h === 3) middle.splice(0, 2, ...this.flat(body.middle))
+    const reach = Math.max(...points.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1])), 1e-6)
+    if (!this.centre || at_once) { this.centre = middle; this.half = reach > 1e-3 * body.scaleOf() ? reach * 1.25 : 0.5 * body.scaleOf(); return false }
+    const wanted = reach > this.half ? reach * 1.15 : reach < 0.12 * this.half ? reach * 4 : this.half
+    const away = Math.hypot(middle[0] - this.centre[0], middle[1] - this.centre[1])
+    const moves = Math.abs(wanted - this.half) > 0.01 * this.half || away > 0.02 * this.half
+    this.half += 0.18 * (Math.max(wanted, 0.05 * body.scaleOf()) - this.half)
+    this.centre = this.centre.map((v, k) => v + 0.18 * (middle[k] - v))
+    return moves
+  }
+
+  fill() {
+    const { body } = this
+    this.dots = []
+    if (body.empty || !body.h || (body.whole && !body.bounded) || body.least(body.u) < -1e-6) return
+    let u = body.u
+    const between = Math.max(1, Math.ceil(body.h / 2))
+    const draws = Math.min(DRAWS, WORK / (between * body.h * body.rows.length))
+    for (let k = 0; k < draws; k++) {
+      for (let m = 0; m < between; m++) u = body.step(u)
+      this.dots.push(u)
+    }
+  }
+
+  draw(body, look, path) {
+    this.body = body
+    this.look = look
+    const { context: g, canvas } = this, ratio = window.devicePixelRatio || 1
+    const { clientWidth: w, clientHeight: h } = canvas
+    if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
+      canvas.width = Math.round(w * ratio)
+      canvas.height = Math.round(h * ratio)
+    }
+    g.setTransform(ratio, 0, 0, ratio, 0, 0)
+    g.clearRect(0, 0, w, h)
+    this.labels = []
+    if (body.empty) return this.write(w / 2, h / 2, "S is empty: no forces hold this", look.warm, 14)
+    const moves = this.frame(this.sceneDrawn !== body.scene)
+    this.sceneDrawn = body.scene
+    if (look.dots) this.drawDots()
+    if (body.h === 1) this.drawSegment()
+    if (body.h === 2) this.drawPolygon()
+    if (body.h === 3) this.drawSolid()
+    if (body.h > 3) this.drawShadow()
+    if (body.whole && body.h > 1 && look.contact !== null) this.drawInterval(look.contact)
+    this.drawPath(path)
+    const [x, y] = this.px(this.flat(body.u))
+    g.beginPath()
+    g.arc(x, y, 8, 0, 7)
+    g.fillStyle = look.hand
+    g.fill()
+    g.strokeStyle = look.paper
+    g.lineWidth = 2
+    g.stroke()
+    if (!body.h) this.write(w / 2, h / 2 + 28, "one point: everything is determined", look.ink, 13)
+    return moves
+  }
+
+  write(x, y, text, colour, size = 12, align = "center") {
+    const { context: g, canvas } = this
+    g.font = `${size}px sans-serif`
+    g.textAlign = align
+    g.textBaseline = "middle"
+    const words = [text], wide = g.measureText(text).width
+    if (wide > canvas.clientWidth - 12) { // in two lines
+      const middle = text.indexOf(" ", text.length / 2)
+      if (middle > 0) words.splice(0, 1, text.slice(0, middle), text.slice(middle + 1))
+    }
+    const half = Math.max(...words.map((line) => g.measureText(line).width)) / 2
+    if (align === "center") x = Math.min(Math.max(x, half + 5), canvas.clientWidth - half - 5)
+    g.lineWidth = 3
+    g.strokeStyle = this.look.paper
+    g.fillStyle = colour
+    words.forEach((line, k) => {
+      g.strokeText(line, x, y + 1.2 * size * k)
+      g.fillText(line, x, y + 1.2 * size * k)
+    })
+  }
+
+  drawDots() {
+    const { context: g, look } = this
+    g.fillStyle = look.state
+    for (const u of this.dots) {
+      const [x, y] = this.px(this.flat(u))
+      g.fillRect(x - 1, y - 1, 2, 2)
+    }
+  }
+
+  drawPath(path) {
+    const { context: g, look } = this
+    if (path.length < 2) return
+    g.strokeStyle = look.hand
+    g.globalAlpha = 0.45
+    g.lineWidth = 1.5
+    g.beginPath()
+    path.forEach((u, k) => (k ? g.lineTo(...this.px(this.flat(u))) : g.moveTo(...this.px(this.flat(u)))))
+    g.stroke()
+    g.globalAlpha = 1
+  }
+
+  drawSegment() {
+    const { context: g, body, look } = this
+    const ends = body.corners.map(({ u }) => this.px(this.flat(u)))
+    g.strokeStyle = look.cold
+    g.lineWidth = 7
+    g.lineCap = "butt"
+    g.beginPath()
+    g.moveTo(...ends[0])
+    g.lineTo(...(ends[1] ?? ends[0]))
+    g.stroke()
+    const order = ends.map((_, k) => k).sort((a, b) => ends[a][0] - ends[b][0])
+    body.sides.forEach((side) => {
+      const k = side.corners[0], [x, y] = ends[k], below = order.indexOf(k) ? -1 : 1, lit = this.lit(side)
+      g.fillStyle = side.cap ? look.paper : lit ? look.hand : look.cold
+      if (!side.cap) g.fillRect(x - 3, y - 13, 6, 26)
+      this.write(x, y + below * 34, side.cap ? "no end this way" : this.told("words", side), lit ? look.hand : look.ink)
+      this.labels.push({ side, x, y, reach: 30 })
+    })
+  }
+
+  lit(side) {
+    return this.look.side === side.corners.join() || side.stops.some(([c]) => this.look.contacts.has(c))
+  }
+
+  drawPolygon() {
+    const { context: g, body, look } = this, { corners } = body
+    const middle = this.px(this.flat(body.middle))
+    const places = corners.map(({ u }) => this.px(this.flat(u)))
+    const order = [...places.keys()].sort((a, b) =>
+      Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
+    g.beginPath()
+    order.forEach((k, n) => (n ? g.lineTo(...places[k]) : g.moveTo(...places[k])))
+    g.closePath()
+    g.fillStyle = look.shade
+    g.fill()
+    for (const side of body.sides) {
+      const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)
+      g.strokeStyle = lit ? look.hand : look.cold
+      g.lineWidth = lit ? 5 : 2.5
+      g.setLineDash(side.cap ? [3, 7] : [])
+      g.beginPath()
+      g.moveTo(...a)
+      g.lineTo(...b)
+      g.stroke()
+      g.setLineDash([])
+      const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], away = Math.hypot(x - middle[0], y - middle[1]) || 1
+      const [ux, uy] = [(x - middle[0]) / away, (y - middle[1]) / away], long = Math.hypot(a[0] - b[0], a[1] - b[1])
+      const text = side.cap ? "no end this way" : this.told("words", side)
+      g.font = "11px sans-serif"
+      const far = 10 + 0.5 * g.measureText(text).width * Math.abs(ux)
+      if (long > 14 || lit) this.write(x + far * ux, y + (far + 6) * uy, text, lit ? look.hand : look.ink, 11)
+      this.labels.push({ side, a, b, reach: 14 })
+    }
+  }
+
+  drawSolid() {
+    const { context: g, body, look } = this
+    const places = body.corners.map(({ u }) => this.px(this.flat(u)))
+    const towards = (side) => -dot(this.view[2], side.slope) // sides' slopes point inwards
+    const sides = [...body.sides].sort((a, b) => towards(a) - towards(b))
+    for (const side of sides) {
+      const front = towards(side) > 0, lit = this.lit(side)
+      g.beginPath()
+      side.corners.forEach((k, n) => (n ? g.lineTo(...places[k]) : g.moveTo(...places[k])))
+      g.closePath()
+      if (front) {
+        g.globalAlpha = lit ? 0.5 : 0.15 + 0.35 * towards(side)
+        g.fillStyle = lit ? look.hand : look.cold
+        g.fill()
+        g.globalAlpha = 1
+        this.labels.push({ side, inside: side.corners.map((k) => places[k]) })
+      }
+      g.strokeStyle = lit ? look.hand : look.cold
+      g.lineWidth = front ? 2 : 1
+      g.globalAlpha = front ? 1 : 0.4
+      g.setLineDash(side.cap || !front ? [4, 4] : [])
+      g.stroke()
+      g.setLineDash([])
+      g.globalAlpha = 1
+      if (front && lit) {
+        const [x, y] = [0, 1].map((d) => side.corners.reduce((s, k) => s + places[k][d], 0) / side.corners.length)
+        this.write(x, y - 12, side.cap ? "no end this way" : this.told("words", side), look.ink)
+      }
+    }
+  }
+
+  /** The exact interval of a contact's f_n: the shadow of S on that axis. */
+  drawInterval(contact) {
+    const { context: g, body, look } = this, slope = body.axes.map((axis) => axis[2 * contact])
+    const size = Math.hypot(...slope)
+    if (size < 1e-9) return
+    const along = slope.map((v) => v / size), m = body.middle
+    const [dx, dy] = this.flat(along), flat = Math.hypot(dx, dy)
+    if (flat < 0.2) return
+    const from = this.flat(m), side = [dy / flat, -dx / flat]
+    const below = side[1] > 0 ? side.map((v) => -v) : side
+    const reach = Math.max(...body.corners.map(({ u }) => { const p = this.flat(u); return dot([p[0] - from[0], p[1] - from[1]], below) }))
+    const off = reach + 0.14 * this.half
+    const foot = (u) => {
+      const s = dot(along, u.map((v, k) => v - m[k]))
+      return [from[0] + s * dx + off * below[0], from[1] + s * dy + off * below[1]]
+    }
+    const order = [...body.corners].sort((a, b) => dot(along, a.u) - dot(along, b.u)), ends = [order[0], order.at(-1)]
+    g.strokeStyle = look.hand
+    g.lineWidth = 1
+    g.setLineDash([2, 4])
+    for (const { u } of [...ends, { u: body.u }]) {
+      g.beginPath()
+      g.moveTo(...this.px(this.flat(u)))
+      g.lineTo(...this.px(foot(u)))
+      g.stroke()
+    }
+    g.setLineDash([])
+    g.lineWidth = 4
+    g.beginPath()
+    g.moveTo(...this.px(foot(ends[0].u)))
+    g.lineTo(...this.px(foot(ends[1].u)))
+    g.stroke()
+    const interval = body.interval(2 * contact)
+    ends.forEach(({ u }, k) => {
+      const [x, y] = this.px(foot(u))
+      this.write(x, y + 12, Number.isFinite(interval[k]) ? interval[k].toFixed(2) : "∞", look.hand, 11)
+    })
+  }
+
+  drawShadow() {
+    const { context: g, look, canvas } = this, { clientWidth: w, clientHeight: h } = canvas
+    g.strokeStyle = look.edge
+    g.lineWidth = 1
+    g.strokeRect(30, 8, w - 40, h - 40)
+    const [a, b] = this.shadow.map((c) => this.told("name", c))
+    this.write(w / 2, h - 16, `→ fₙ ${a}`, look.ink, 12)
+    g.save()
+    g.translate(15, h / 2)
+    g.rotate(-Math.PI / 2)
+    this.write(0, 0, `→ fₙ ${b}`, look.ink, 12, "left")
+    g.restore()
+  }
+
+  // The hand
+
+  grabbed(px, py, event) {
+    const { body } = this
+    if (!body || body.empty) return
+    const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 24
+    this.canvas.setPointerCapture(event.pointerId)
+    this.held = { turns: body.h === 3 && !near, px, py, u: [...body.u] }
+    this.told("begin")
+    if (!near && body.h !== 3) { // the point comes to the hand
+      this.held = { px: x, py: y, u: [...body.u] }
+      this.moved(px, py)
+    }
+    event.preventDefault()
+  }
+
+  moved(px, py) {
+    const { body, held } = this
+    if (!body || body.empty) return
+    if (!held) return this.told("side", this.sideAt(px, py))
+    if (held.turns) {
+      this.turn((px - held.px) * TURN, (py - held.py) * TURN)
+      Object.assign(held, { px, py })
+      return this.told("turned")
+    }
+    const unit = (0.5 * Math.min(this.canvas.clientWidth, this.canvas.clientHeight) - 46) / this.half
+    this.told("go", this.moving(held.u, (px - held.px) / unit, -(py - held.py) / unit))
+  }
+
+  sideAt(px, py) {
+    for (const { side, x, y, a, b, inside, reach } of [...this.labels].reverse()) {
+      if (inside ? within(inside, px, py) : a ? distance(a, b, px, py) < reach : Math.hypot(px - x, py - y) < reach) return side
+    }
+    return null
+  }
+
+  key(event) {
+    const [dx, dy] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key] ?? []
+    if (dx === undefined || !this.body || this.body.empty) return
+    event.preventDefault()
+    event.stopPropagation()
+    if (event.shiftKey && this.body.h === 3) { this.turn(0.1 * dx, -0.1 * dy); return this.told("turned") }
+    this.told("begin")
+    this.told("go", this.moving(this.body.u, 0.04 * this.half * dx, 0.04 * this.half * dy))
+  }
+}
+
+function within(points, px, py) {
+  let inside = false
+  points.forEach(([x, y], k) => {
+    const [u, v] = points.at(k - 1)
+    if (y > py !== v > py && px < ((u - x) * (py - y)) / (v - y) + x) inside = !inside
+  })
+  return inside
+}
+
+function distance([ax, ay], [bx, by], px, py) {
+  const [dx, dy] = [bx - ax, by - ay], size = dx * dx + dy * dy || 1
+  const s = Math.max(0, Math.min(1, ((px - ax) * dx + (py - ay) * dy) / size))
+  return Math.hypot(px - ax - s * dx, py - ay - s * dy)
+}

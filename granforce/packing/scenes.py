@@ -1,0 +1,254 @@
+"""Scenes: small sets of disks, walls and weights whose whole S can be seen, and counted by hand.
+
+Disks rest on each other and on straight walls. A wall takes part as a grain behind each place where
+a disk touches it, whose balance is left open (load NaN); weight is a load on each disk, r² in units
+of that of the largest disk; nothing prescribes a pressure, and the box is open on all sides. Such a
+set is a Packing like any other, and nothing else in granforce knows of scenes.
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.forces.ensemble import ensemble
+from granforce.forces.nearest import nearest
+from granforce.packing.compaction import pack
+from granforce.records import (
+    InputError,
+    NotJammedError,
+    UndecidedError,
+    float_array,
+    friction,
+    make_contacts,
+    make_packing,
+    positive,
+    whole,
+)
+
+# A disk touches a wall or another disk where the gap (in largest radii) is below this, if nothing
+# else is said.
+SNAPPED = 1e-9
+# Radius of the grain behind a place where a wall is touched, relative to the disk's.
+STUD = 0.25
+# Friction at which the six disks are pressed together, and how many seeds are tried.
+PACKED_AT, MOST_SEEDS = 0.5, 100
+
+
+class Sketch(NamedTuple):
+    """Disks and walls of a scene."""
+
+    x: np.ndarray  # (N, 2) centres
+    r: np.ndarray  # (N,) radii
+    walls: np.ndarray  # (k, 4) both ends x, y, x, y of each wall
+    load: np.ndarray  # (N, 3) force and torque on each disk
+
+
+class _Scene(NamedTuple):
+    title: str  # on screen
+    mu: float  # unless another is asked for
+    make: object  # make(mu, **options) gives a Sketch, or a Packing
+
+
+def scene(name, mu=None, **options):
+    """The Packing of the scene of this name, with the admissible network nearest to equal f_n.
+
+    name: one of SCENES. mu: friction coefficient, by default the scene's. options: angle (degrees)
+    of the opening of the "groove" and of the lines of centres with the vertical in the "pyramid"
+    and the "column"; disks in the "column".
+
+    Raises InputError for another name, option or geometry, NotJammedError where nothing balances.
+    """
+    return with_network(sketched(name, mu, **options))
+
+
+def sketched(name, mu=None, **options):
+    """The same Packing, whether or not anything balances: its forces are 0, or of another μ."""
+    if name not in SCENES:
+        raise InputError(f"there is no scene {name!r:.40}; choose one of {', '.join(SCENES)}")
+    kind = SCENES[name]
+    mu = kind.mu if mu is None else friction(mu)
+    try:
+        made = kind.make(mu, **options)
+    except TypeError:
+        asked = ", ".join(options)
+        raise InputError(f"the scene {name} has no option {asked}") from None
+    if isinstance(made, Sketch):
+        made = assembled(*made, mu)
+    return made._replace(info=made.info | {"scene": name})
+
+
+def assembled(x, r, walls, load, mu, *, tolerance=SNAPPED):
+    """The Packing of a Sketch, with a contact wherever disks and walls touch, without a network.
+
+    Its info has the walls, as lists of four numbers. tolerance: gap (in largest radii) up to which
+    a disk touches.
+
+    Raises InputError where disks overlap each other or a wall, and as `make_packing`.
+    """
+    r = float_array(r, (-1,), "radii")
+    x = float_array(x, (len(r), 2), "centres")
+    walls = float_array(np.reshape(walls, (-1, 4)), (-1, 4), "walls")
+    load = float_array(load, (len(r), 3), "loads")
+    if not len(r):
+        raise InputError("there is no disk; put one")
+    i, j = np.triu_indices(len(r), 1)
+    branch, reach = x[j] - x[i], r[i] + r[j]
+    between = _touching(np.hypot(*branch.T) - reach, r, "two disks", tolerance)
+    disk, place = _places(x, walls)
+    away = place - x[disk]
+    against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall", tolerance)
+    disk, away = disk[against], away[against]
+    away /= np.hypot(*away.T)[:, None]
+    stud = STUD * r[disk]
+    number = len(r) + np.arange(len(disk))
+    branch, reach = branch[between], reach[between]
+    contacts = make_contacts(
+        np.concatenate([i[between], disk]),
+        np.concatenate([j[between], number]),
+        np.concatenate([branch / np.hypot(*branch.T)[:, None], away]),
+        np.concatenate([reach, r[disk] + stud]),
+        np.concatenate([r, stud]),
+    )
+    return make_packing(
+        np.concatenate([x, x[disk] + away * (r[disk] + stud)[:, None]]),
+        np.concatenate([r, stud]),
+        [np.inf, np.inf],
+        contacts,
+        np.zeros((len(contacts.i), 2)),
+        mu,
+        load=np.concatenate([load, np.full((len(disk), 3), np.nan)]),
+        info={"walls": walls.tolist(), "disks": len(r)},
+    )
+
+
+def with_network(packing):
+    """The Packing with the admissible network nearest to its own, or to equal f_n without one.
+
+    Raises NotJammedError where none exists, UndecidedError where none was reached.
+    """
+    if not packing.forces.any():
+        equal = np.zeros_like(packing.forces)
+        equal[:, 0] = np.nanmean(np.abs(packing.load[:, :2])) or 1.0
+        packing = packing._replace(forces=equal)
+    S = ensemble(packing)
+    if S.admits(S.original):
+        return packing
+    found = nearest(S, S.original)
+    if not S.admits(found.forces):
+        raise UndecidedError(
+            f"no network was reached: residual {found.residual:.2g} ⟨f_n⟩; change μ or a disk"
+        )
+    return packing._replace(forces=S.expand(found.forces))
+
+
+def weights(r):
+    """Loads (N, 3) of gravity: r² for radii r (N,), downwards."""
+    load = np.zeros((len(r), 3))
+    load[:, 1] = -(np.asarray(r) ** 2)
+    return load
+
+
+def _touching(gap, r, what, tolerance):
+    scale = r.max()
+    for value in gap[gap < -tolerance * scale][:1]:
+        raise InputError(f"{what} overlap by {-value / scale:.2g} of the largest radius")
+    return gap <= tolerance * scale
+
+
+def _places(x, walls):
+    """Each disk with each wall: disk (k,) and the wall's nearest place (k, 2), none given twice.
+
+    Walls that meet have one place for a disk in the open angle between them, their common end.
+    """
+    begin, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
+    size = (along**2).sum(axis=1)
+    if np.any(size == 0):
+        raise InputError(f"wall {int(np.argmax(size == 0))} has no length")
+    share = ((x[:, None] - begin) * along).sum(axis=-1) / size
+    place = begin + np.clip(share, 0, 1)[..., None] * along
+    disk = np.repeat(np.arange(len(x)), len(walls))
+    flat = place.reshape(-1, 2)
+    keys = np.column_stack([disk, np.round(flat, 9)])
+    first = np.sort(np.unique(keys, axis=0, return_index=True)[1])
+    return disk[first], flat[first]
+
+
+# The scenes: centres from school geometry, radius 1.
+
+
+def _resting(x, walls):
+    r = np.ones(len(x))
+    return Sketch(np.array(x, dtype=float), r, np.array(walls, dtype=float), weights(r))
+
+
+def _degrees(angle, least, most):
+    angle = positive(angle, "angle")
+    if not least <= angle < most:
+        raise InputError(f"angle must lie between {least:g} and {most:g} degrees, got {angle:g}")
+    return np.radians(angle)
+
+
+def _groove(mu, angle=90.0):
+    half = _degrees(angle, 10, 180) / 2
+    side = 2 / np.tan(half) + 1.2 * np.sin(half)
+    left, height = side * np.sin(half), side * np.cos(half)
+    return _resting([[0, 1 / np.sin(half)]], [[-left, height, 0, 0], [0, 0, left, height]])
+
+
+def _box(mu):
+    offset = np.sqrt(2)  # the line of centres at 45°
+    width = 2 + offset
+    walls = [[0, 4.2, 0, 0], [0, 0, width, 0], [width, 0, width, 4.2]]
+    return _resting([[1, 1], [1 + offset, 1 + offset]], walls)
+
+
+def _pyramid(mu, angle=30.0):
+    half = _degrees(angle, 30, 90)
+    side, height = 2 * np.sin(half), 2 * np.cos(half)
+    if angle == 30:
+        side, height = 1.0, np.sqrt(3)
+    return _resting([[-side, 1], [side, 1], [0, 1 + height]], [[-side - 1.8, 0, side + 1.8, 0]])
+
+
+def _leaning(mu):
+    made = _pyramid(mu)
+    return made._replace(walls=np.array([[-2, 4.2, -2, 0], [-2, 0, 2.8, 0]], dtype=float))
+
+
+def _column(mu, disks=10, angle=30.0):
+    disks = whole(disks, "disks", 1, 1000)
+    slope = _degrees(angle, 1, 60)
+    number = np.arange(disks)
+    step = 2 * np.sin(slope)
+    x = np.column_stack([1 + step * (number % 2), 1 + 2 * np.cos(slope) * number[::-1]])
+    width, height = 2 + step, x[0, 1] + 1.2
+    return _resting(x, [[0, height, 0, 0], [0, 0, width, 0], [width, 0, width, height]])
+
+
+def _six(mu, dimension=2):
+    """Six disks in a periodic box, pressed at PACKED_AT: the first seed with that many of h."""
+    for seed in range(1, MOST_SEEDS):
+        try:
+            made = pack(6, mu=PACKED_AT, seed=seed)
+            if ensemble(made).dimension == dimension:
+                return made._replace(mu=mu)
+        except (NotJammedError, UndecidedError):
+            continue
+    raise InputError(f"no six disks of {MOST_SEEDS} seeds have h = {dimension}")
+
+
+def _many(mu):
+    return pack(400, mu=mu, seed=1)
+
+
+SCENES = {
+    "groove": _Scene("One disk in a groove", 0.5, _groove),
+    "box": _Scene("Two disks in a box", 0.3, _box),
+    "pyramid": _Scene("Three disks as a pyramid", 0.4, _pyramid),
+    "leaning": _Scene("A pyramid against a wall", 0.4, _leaning),
+    "column": _Scene("Ten disks in a column", 0.3, _column),
+    "six": _Scene("Six disks under pressure", 0.5, _six),
+    "solid": _Scene("Six disks, one dimension more", 0.5, partial(_six, dimension=3)),
+    "many": _Scene("400 disks under pressure", 0.1, _many),
+}

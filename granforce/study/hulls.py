@@ -1,0 +1,52 @@
+"""All networks in balance on small sets, with or without their cones: what S is cut out of.
+
+The balance A x = b depends on the disks and their loads, not on friction: its solutions are an
+affine space, x = A⁺ b + u · axes. Cones of any μ cut S out of it, which whoever draws S can do anew
+for every μ and, b being linear in the loads, for every load.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.explore import bodies
+from granforce.explore.intervals import intervals
+from granforce.forces.ensemble import ensemble
+
+# Singular values of A below this, relative to the largest, are 0.
+_RANK = 1e-10
+
+
+class Hull(NamedTuple):
+    """The affine space of all networks on the N_c contacts of a packing that are in balance."""
+
+    A: np.ndarray  # (rows, 2 N_c): forces and torque/r of each grain that must balance, then P
+    b: np.ndarray  # (rows,)
+    lift: np.ndarray  # (2 N_c, rows) the pseudoinverse A⁺
+    axes: np.ndarray  # (h, 2 N_c) orthonormal
+    grains: np.ndarray  # (M,) whose three rows come one after the other
+    equations: int  # independent rows
+
+
+def hull(packing):
+    """The Hull of a packing whose every contact may carry, whatever its friction."""
+    whole = ensemble(packing, 1.0, prune=False)
+    A = whole.A.toarray()
+    left, values, right = np.linalg.svd(A)
+    rank = int(np.sum(values > _RANK * values.max(initial=0.0)))
+    lift = right[:rank].T @ (left[:, :rank] / values[:rank]).T
+    return Hull(A, whole.b, lift, right[rank:], whole.grains, rank)
+
+
+def fall(packing):
+    """The motion (N, 3) that proves that nothing balances, or None; see `bodies.fall`."""
+    return bodies.fall(packing)
+
+
+def bounds(packing):
+    """Least and largest f_n (N_c, 2) of every contact, NaN where not certified; 0 where idle."""
+    S = ensemble(packing)
+    found = intervals(S)
+    both = np.zeros((len(packing.contacts.i), 2))
+    both[S.index] = np.column_stack([found.lower[:, 0], found.upper[:, 0]])
+    return both

@@ -1,0 +1,326 @@
+"""Small scenes as a visitor has them in hand: S whole, pulled, cut by friction, and empty."""
+
+import numpy as np
+import pytest
+from serving import painted
+from small_store import ROOT
+
+import granforce as gf
+from app import scenes
+
+PATIENCE = 60_000  # ms, on a busy machine
+# Pictures to be looked at; ignored by git.
+ARTEFACTS = ROOT / "artefacts" / "scenes"
+WIDTHS = [(390, 844), (1280, 800), (1440, 900), (1920, 1080)]
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def look(chromium, address):
+    """look(query, width, height, …): the page of a scene, drawn; at the end no error was told."""
+    errors, contexts = [], []
+
+    def look(query="", width=1280, height=800, first=False, **options):
+        begin = chromium.fresh_context if first else chromium.new_context
+        context = begin(viewport={"width": width, "height": height}, **options)
+        contexts.append(context)
+        context.set_default_timeout(PATIENCE)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("console", lambda told: told.type == "error" and errors.append(told.text))
+        page.goto(address + query)
+        drawn(page)
+        return page
+
+    yield look
+    for context in contexts:
+        context.close()
+    assert not [error for error in errors if "favicon" not in error]
+
+
+def desk(page):
+    return page.locator(".desk")
+
+
+def drawn(page):
+    desk(page).wait_for()
+    page.wait_for_function("e => e.painted > 0", arg=desk(page).element_handle())
+
+
+def ask(page, expression):
+    return desk(page).evaluate(f"element => {{ const {{ small }} = element; return {expression} }}")
+
+
+def until(page, expression):
+    page.wait_for_function(
+        f"element => {{ const {{ small }} = element; return {expression} }}",
+        arg=desk(page).element_handle(),
+    )
+
+
+@pytest.mark.parametrize("width, height", WIDTHS)
+@pytest.mark.parametrize("name", ["groove", "box", "leaning", "column"])
+def test_scenes_fit_on_every_screen(look, name, width, height):
+    page = look(f"?scene={name}", width, height)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert desk(page).locator("canvas.space").bounding_box()["width"] > 300
+    assert desk(page).locator(".count b").inner_text().endswith("free")
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=ARTEFACTS / f"{name}-{width}.png")
+
+
+def test_the_first_visit_begins_with_the_groove_and_goes_on_to_400_disks(look):
+    page = look(first=True)
+    card = page.get_by_role("dialog")
+    for step in (1, 2, 3):
+        card.get_by_text(f"{step} of 9").wait_for()
+        card.get_by_role("button", name="Next").click()
+    painted(page, PATIENCE)
+    page.get_by_role("dialog").get_by_text("4 of 9").wait_for()
+    page.get_by_role("dialog").get_by_role("button", name="Back").click()
+    drawn(page)
+    page.get_by_role("dialog").get_by_text("3 of 9").wait_for()
+
+
+@pytest.mark.parametrize(
+    "name, mu",
+    [("groove", 0.5), ("pyramid", 0.4), ("box", 0.1), ("box", 0.3), ("leaning", 0.3)],
+)
+def test_the_page_cuts_the_same_body_as_the_library(look, name, mu):
+    page = look(f"?scene={name}&mu={mu}")
+    S = gf.ensemble(gf.scene(name, mu))
+    body = gf.body(S)
+    seen = np.array(ask(page, "small.body.corners.map(c => [...small.body.forces(c.u)])"))
+    expected = body.forces(body.corners).reshape(len(body.corners), -1)
+    assert seen.shape == expected.shape
+    apart = np.linalg.norm(seen[:, None] - expected[None], axis=-1)
+    assert apart.min(axis=0).max() < 1e-8
+    sides = ask(page, "small.body.sides.map(s => JSON.stringify(s.stops))")
+    assert len(sides) == len(body.sides)
+    exact = gf.intervals(S)
+    low, high = np.array(
+        ask(page, "small.body.scene.names.map((_, c) => small.body.interval(2 * c))")
+    ).T
+    np.testing.assert_allclose(low, exact.lower[:, 0], atol=1e-7)
+    np.testing.assert_allclose(high, exact.upper[:, 0], atol=1e-7)
+
+
+def test_friction_is_changed_under_the_eye(look):
+    page = look("?scene=groove&mu=0.5")
+    slider = desk(page).get_by_role("slider", name="friction μ")
+    slider.fill("0")
+    until(page, "small.body.corners.length === 1")
+    assert "one point" in desk(page).locator(".says").inner_text()
+    slider.fill("0.8")
+    until(page, "small.body.corners.length === 2 && small.body.bounded")
+    low, high = ask(page, "small.body.interval(0)")
+    assert low == pytest.approx(np.sqrt(0.5) / 1.8, abs=1e-9)
+    assert high == pytest.approx(np.sqrt(0.5) / 0.2, abs=1e-9)
+    slider.fill("1")
+    until(page, "!small.body.bounded")
+    assert "no end" in desk(page).locator(".says").inner_text()
+    page.wait_for_function("() => location.search.includes('mu=1')")
+
+
+def test_the_point_is_dragged_and_the_forces_follow(look):
+    page = look("?scene=box")
+    before = ask(page, "[...small.body.forces()]")
+    box = desk(page).locator("canvas.space").bounding_box()
+    x, y = ask(page, "small.space.px(small.space.flat(small.body.u))")
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x + 60, box["y"] + y, steps=5)
+    after = np.array(ask(page, "[...small.body.forces()]"))
+    assert np.abs(after - before).max() > 0.1
+    page.mouse.move(box["x"] + x + 5000, box["y"] + y, steps=3)  # far outside: up to the side
+    page.mouse.up()
+    S = gf.ensemble(gf.scene("box"))
+    forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
+    assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-6
+    page.keyboard.press("z")
+    np.testing.assert_allclose(ask(page, "[...small.body.forces()]"), before, atol=1e-9)
+
+
+def test_an_arrow_is_pulled_within_its_cone(look):
+    page = look("?scene=groove&mu=0.5")
+    box = desk(page).locator("canvas.packing").bounding_box()
+    tip = """(() => { const { arrows, body } = small, F = body.forces()
+        const end = arrows.ends()[0], [x, y] = arrows.px(...end.at)
+        const unit = arrows.unit * arrows.forceUnit
+        const along = k => F[0] * end.inward[k] + F[1] * end.across[k]
+        return [x + unit * along(0), y - unit * along(1)] })()"""
+    x, y = ask(page, tip)
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x + 300, box["y"] + y - 10, steps=6)
+    page.mouse.up()
+    assert ask(page, "small.body.forces()[0]") == pytest.approx(np.sqrt(2), abs=1e-6)
+    assert "1.414" in desk(page).locator(".bars .value").first.inner_text()
+
+
+def test_hover_lights_the_contact_and_keys_go_through_s(look):
+    page = look("?scene=box")
+    assert ask(page, "[...small.now.contacts]") == []
+    box = desk(page).locator("canvas.space").bounding_box()
+    until(page, "small.space.labels.length === 5")
+    a, b = ask(page, "[small.space.labels[0].a, small.space.labels[0].b]")
+    page.mouse.move(box["x"] + (a[0] + b[0]) / 2, box["y"] + (a[1] + b[1]) / 2)
+    stops = ask(page, "small.space.labels[0].side.stops.map(stop => stop[0])")
+    assert ask(page, "[...small.now.contacts]") == stops
+    desk(page).locator("canvas.space").focus()
+    u = ask(page, "[...small.body.u]")
+    page.keyboard.press("ArrowRight")
+    assert ask(page, "small.body.u[0]") > u[0]
+    page.keyboard.press("n")
+    assert ask(page, "small.now.contact") == 0
+    force = ask(page, "small.body.forces()[0]")
+    page.keyboard.press("]")
+    assert ask(page, "small.body.forces()[0]") > force
+    page.keyboard.press("Escape")
+    assert ask(page, "small.now.contact") is None
+
+
+def test_the_forces_on_a_disk_close(look):
+    page = look("?scene=box")
+    box = desk(page).locator("canvas.packing").bounding_box()
+    x, y = ask(page, "small.arrows.px(small.body.scene.x[0], small.body.scene.x[1] + 0.8)")
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    assert ask(page, "small.now.disk") == 0
+    total = """[0, 1].map(k => small.arrows.ends().reduce((sum, end) => {
+        if (end.disk !== 0) return sum
+        const F = small.body.forces(), c = end.contact
+        return sum + F[2 * c] * end.inward[k] + F[2 * c + 1] * end.across[k]
+    }, small.body.load[k]))"""
+    assert ask(page, total) == pytest.approx([0, 0], abs=1e-12)
+
+
+def test_what_falls_is_proved_by_a_motion(look):
+    page = look("?scene=pyramid&mu=0.2")
+    until(page, "small.body.empty && small.now.fall")
+    motion = np.reshape(ask(page, "[...small.now.fall]"), (-1, 3))
+    packing = scenes.packing_of("pyramid", 0.2)
+    np.testing.assert_allclose(motion, np.reshape(scenes.falling(packing), (-1, 3)), atol=1e-9)
+    assert "Nothing balances" in desk(page).locator(".says").inner_text()
+    desk(page).get_by_role("slider", name="friction μ").fill("0.4")
+    until(page, "!small.body.empty && !small.now.fall")
+
+
+def test_a_push_shrinks_s_until_nothing_balances(look):
+    page = look("?scene=pyramid")
+    desk(page).get_by_role("button", name="Push a disk").click()
+    box = desk(page).locator("canvas.packing").bounding_box()
+    x, y = ask(page, "small.arrows.px(small.body.scene.x[4], small.body.scene.x[5] + 0.3)")
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x + 4, box["y"] + y, steps=3)
+    assert not ask(page, "small.body.empty")
+    assert "limit load" in desk(page).locator(".says").inner_text()
+    page.mouse.move(box["x"] + x + 400, box["y"] + y, steps=3)
+    until(page, "small.body.empty")
+    page.mouse.up()
+    desk(page).get_by_role("button", name="Push a disk").click()
+    until(page, "!small.body.empty")
+
+
+def test_six_disks_are_packed_and_their_body_turns(look):
+    page = look("?scene=solid")
+    assert ask(page, "small.body.h") == 3
+    box = desk(page).locator("canvas.space").bounding_box()
+    view = ask(page, "small.space.view")
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 120, box["y"] + 60, steps=4)
+    page.mouse.up()
+    assert ask(page, "small.space.view") != view
+    desk(page).get_by_role("button", name="Fill S").click()
+    assert ask(page, "Math.min(...small.space.dots.map(u => small.body.least(u)))") > -1e-9
+
+
+def test_another_scene_is_chosen_from_the_list(look):
+    page = look()
+    desk(page).get_by_role("combobox", name="Scene").select_option("box")
+    until(page, "small.body.h === 2")
+    page.wait_for_function("() => location.search.includes('scene=box')")
+    desk(page).get_by_role("combobox", name="Scene").select_option("many")
+    painted(page, PATIENCE)
+    page.get_by_role("combobox", name="Scene").first.wait_for()
+
+
+def test_a_column_has_a_shadow_and_exact_bounds(look):
+    page = look("?scene=column")
+    assert ask(page, "small.body.h") == 10
+    until(page, "small.now.bounds")
+    S = gf.ensemble(gf.scene("column"))
+    exact = gf.intervals(S)
+    seen = np.array(ask(page, "small.now.bounds"))
+    np.testing.assert_allclose(
+        seen, np.column_stack([exact.lower[:, 0], exact.upper[:, 0]]), atol=1e-7
+    )
+    forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
+    assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-9
+
+
+def test_a_finger_drags_the_point(look):
+    page = look("?scene=groove", 390, 844, has_touch=True)
+    box = desk(page).locator("canvas.space").bounding_box()
+    before = ask(page, "small.body.u[0]")
+    page.touchscreen.tap(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
+    assert ask(page, "small.body.u[0]") > before + 0.01
+
+
+def test_a_scene_is_built_by_hand_and_its_link_carries_it(look, tmp_path):
+    page = look("?scene=own")
+    until(page, "small.body.h === 2")
+    box = desk(page).locator("canvas.packing").bounding_box()
+
+    def at(x, y):
+        across, down = ask(page, f"small.arrows.px({x}, {y})")
+        return box["x"] + across, box["y"] + down
+
+    page.mouse.click(*at(2.1, 2.8))  # near two disks: it snaps onto both
+    until(page, "small.body.h === 3 && small.body.count === 6")
+    page.wait_for_function("() => location.search.includes('built=')")
+    with page.expect_download() as file:
+        desk(page).get_by_role("button", name="Save NPZ").click()
+    file.value.save_as(tmp_path / "own.npz")
+    assert gf.ensemble(gf.load_packing(tmp_path / "own.npz")).dimension == 3
+    page.reload()
+    drawn(page)
+    until(page, "small.body.count === 6")
+    page.mouse.move(*at(2, 2.7))  # taken into the air, it falls
+    page.mouse.down()
+    page.mouse.move(*at(5.5, 3.5), steps=6)
+    page.mouse.up()
+    until(page, "small.body.empty && small.now.fall")
+    assert "disk 3 gives way" in desk(page).locator(".says").inner_text()
+    desk(page).get_by_role("radio", name="Remove").click()
+    page.mouse.click(*at(5.5, 3.5))
+    until(page, "small.body.h === 2 && !small.body.empty")
+
+
+def test_the_lesson_has_three_questions_and_is_printed(look):
+    page = look("?scene=groove")
+    desk(page).locator(".lesson > summary").click()
+    questions = desk(page).locator(".lesson article details")
+    assert questions.count() == 3
+    assert not questions.first.evaluate("e => e.open")
+    questions.first.locator("summary").click()
+    assert questions.first.get_by_text("0.707").is_visible()
+    page.evaluate("window.print = () => {}")
+    desk(page).get_by_role("button", name="Print", exact=True).click()
+    page.wait_for_function("() => document.querySelector('iframe')?.contentDocument.title")
+    assert "The groove" in page.frames[-1].content()
+
+
+@pytest.mark.parametrize("mu", [0.6, 0.414, 0.415])
+def test_where_s_has_no_end_the_page_says_the_same_as_the_library(look, mu):
+    page = look(f"?scene=box&mu={mu}")
+    body = gf.body(gf.ensemble(gf.scene("box", mu)))
+    assert ask(page, "small.body.bounded") == body.bounded
+    assert ask(page, "small.body.rays.length") == len(body.rays)
+    every = "small.body.scene.names.map((_, c) => small.body.interval(2 * c).map(String))"
+    seen = np.array(ask(page, every), dtype=str)
+    seen = np.char.replace(seen, "Infinity", "inf").astype(float)
+    expected = np.column_stack([side[:, 0] for side in body.intervals])
+    np.testing.assert_allclose(seen, expected, rtol=1e-6)

@@ -1,0 +1,139 @@
+"""S drawn whole: its corners against every meeting of sides, its sides, its ends and its falls."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from packings import reference
+
+import granforce as gf
+from granforce.explore import bodies
+from granforce.packing.scenes import sketched
+from granforce.records import InputError
+
+BODIES = [
+    ("groove", 0.5),
+    ("pyramid", 0.4),
+    ("box", 0.1),
+    ("box", 0.3),
+    ("six", 0.3),
+    ("leaning", 0.3),
+    ("leaning", 0.5),
+    ("solid", 0.5),
+    ("solid", 0.3),
+]
+
+
+def every_meeting(S, found):
+    """Corners by brute force: each h walls of the cones meet in a point, and some lie in S."""
+    h, slopes, rests = len(found.axes), [], []
+    for sign in (1, -1):
+        slopes.append(S.mu * found.axes[..., 0] + sign * found.axes[..., 1])
+        rests.append(S.mu * found.origin[:, 0] + sign * found.origin[:, 1])
+    slope, rest = np.concatenate(slopes, axis=1).T, np.concatenate(rests)
+    corners = []
+    for rows in combinations(range(len(slope)), h):
+        part = slope[list(rows)]
+        if abs(np.linalg.det(part)) > 1e-9:
+            u = np.linalg.solve(part, -rest[list(rows)])
+            if np.all(rest + slope @ u > -1e-9):
+                corners.append(u)
+    return np.unique(np.round(corners, 7), axis=0)
+
+
+@pytest.fixture(scope="module", params=BODIES, ids=str)
+def seen(request):
+    S = gf.ensemble(gf.scene(*request.param))
+    return S, gf.body(S)
+
+
+def test_corners_are_those_of_every_meeting_of_sides(seen):
+    S, found = seen
+    expected = every_meeting(S, found)
+    assert len(found.corners) == len(expected)
+    apart = np.linalg.norm(found.corners[:, None] - expected[None], axis=-1)
+    assert apart.min(axis=0).max() < 1e-6
+
+
+def test_corners_are_networks_and_coordinates_are_orthonormal(seen):
+    S, found = seen
+    networks = found.forces(found.corners)
+    assert S.residual(networks).max() < 1e-12 and S.violation(networks).max() < 1e-12
+    flat = found.axes.reshape(len(found.axes), -1)
+    np.testing.assert_allclose(flat @ flat.T, np.eye(len(flat)), atol=1e-12)
+
+
+def test_its_shadows_are_the_exact_intervals(seen):
+    S, found = seen
+    exact = gf.intervals(S)
+    low, high = found.intervals
+    np.testing.assert_allclose(low, exact.lower, atol=2e-8 * S.force_scale)
+    np.testing.assert_allclose(high, exact.upper, atol=2e-8 * S.force_scale)
+
+
+def test_sides_are_named_by_what_stops_there(seen):
+    S, found = seen
+    h = len(found.axes)
+    assert len({tuple(sorted(side.corners)) for side in found.sides}) == len(found.sides)
+    for side in found.sides:
+        networks = found.forces(found.corners[side.corners])
+        assert len(side.corners) >= h and len(side.stops)
+        for contact, what in side.stops:
+            normal, tangential = networks[:, np.searchsorted(S.index, contact)].T
+            if what == bodies.OPENS:
+                np.testing.assert_allclose(normal, 0, atol=1e-10)
+            np.testing.assert_allclose(tangential, what * S.mu * normal, atol=1e-10)
+        reach = found.corners @ side.normal
+        assert reach[side.corners].min() >= reach.max() - 1e-10
+    if h == 3:  # Euler: each edge lies in two faces
+        edges = sum(len(side.corners) for side in found.sides) / 2
+        assert len(found.corners) - edges + len(found.sides) == 2
+
+
+def test_uniform_states_fill_it(seen):
+    S, found = seen
+    states = gf.sample_uniform(S, 50).flat - found.origin
+    u = np.tensordot(states, found.axes, ((1, 2), (1, 2)))
+    np.testing.assert_allclose(np.tensordot(u, found.axes, 1), states, atol=1e-9 * S.force_scale)
+    for side in found.sides:
+        wall = (found.corners[side.corners] @ side.normal).max()
+        assert (u @ side.normal).max() <= wall + 1e-9
+
+
+def test_a_point_is_a_body_of_no_dimension():
+    found = gf.body(gf.ensemble(gf.scene("groove", 0)))
+    assert found.corners.shape == (1, 0) and found.bounded and not found.sides
+    np.testing.assert_allclose(found.intervals[1], [[np.sqrt(0.5), 0]] * 2, atol=1e-12)
+
+
+def test_what_has_no_end_goes_on_inside_all_cones():
+    S = gf.ensemble(gf.scene("box", 0.6))
+    found = gf.body(S)
+    assert len(found.rays) == 2 and not found.bounded
+    for ray in np.tensordot(found.rays, found.axes, 1):
+        assert np.abs(S.A @ S.to_vector(ray)).max() < 1e-12
+        assert np.all(np.abs(ray[:, 1]) <= S.mu * ray[:, 0] + 1e-12)
+        far = found.forces(found.corners[0]) + 1e3 * ray
+        assert S.residual(far) < 1e-9 and S.violation(far) < 1e-9
+    assert np.isinf(found.intervals[1]).any() and np.all(np.isfinite(found.intervals[0][:, 0]))
+
+
+def test_more_dimensions_cannot_be_drawn():
+    with pytest.raises(InputError, match="can be drawn whole"):
+        gf.body(gf.ensemble(reference("n100_mu0.1_s11")))
+
+
+def test_what_nothing_balances_falls_as_the_certificate_says():
+    packing = sketched("pyramid", 0.2)
+    motion = gf.fall(packing)
+    # Loads do work, and no force in a cone takes any: v_n ≥ μ |v_t| at every contact.
+    assert (np.nan_to_num(packing.load)[:, :2] * motion[:, :2]).sum() > 0
+    c = packing.contacts
+    apart = motion[c.j] - motion[c.i]
+    n_x, n_y = c.normal.T
+    normal = apart[:, 0] * n_x + apart[:, 1] * n_y
+    spin = motion[c.i, 2] * c.arm_i / packing.r[c.i] + motion[c.j, 2] * c.arm_j / packing.r[c.j]
+    tangential = -apart[:, 0] * n_y + apart[:, 1] * n_x - spin
+    assert np.all(normal >= packing.mu * np.abs(tangential) - 1e-9)
+    assert motion[2, 1] < 0 and motion[0, 0] < 0 < motion[1, 0]  # the top sinks between the others
+    assert gf.fall(sketched("pyramid", 0.4)) is None

@@ -1,0 +1,204 @@
+"""Scenes against school mechanics: every answer here can be had with pencil and paper."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import granforce as gf
+from granforce.packing.scenes import SCENES, assembled, sketched, weights
+from granforce.records import InputError, NotJammedError
+
+EXACT = 1e-10
+
+
+def ends(S, cost):
+    """Least and largest cost · f over S, cost (N_c, 2), by vertices of HiGHS; inf without end."""
+    A, b, T = S.scaled_form
+    gains = (S.to_vector(cost) @ T) * S.force_scale
+    found = []
+    for sign in (1, -1):
+        answer = linprog(sign * gains, A_eq=A, b_eq=b, method="highs-ds")
+        assert answer.status in (0, 3)  # an optimum, or no end
+        found.append(sign * answer.fun if answer.status == 0 else -sign * np.inf)
+    return found
+
+
+def unit(S, contact, component):
+    cost = np.zeros((len(S.index), 2))
+    cost[contact, component] = 1
+    return cost
+
+
+@pytest.mark.parametrize("angle", [40, 60, 90, 120, 150])
+@pytest.mark.parametrize("mu", [0, 0.1, 0.35])
+def test_the_groove_has_both_ends_of_the_textbook(angle, mu):
+    # Torque: f_t is the same at both walls; f_n too. Vertical: 2 (f_n sin α ± f_t cos α) = 1.
+    half = np.radians(angle / 2)
+    S = gf.ensemble(gf.scene("groove", mu, angle=angle))
+    least = 0.5 / (np.sin(half) + mu * np.cos(half))
+    largest = 0.5 / (np.sin(half) - mu * np.cos(half))
+    for contact in (0, 1):
+        low, high = ends(S, unit(S, contact, 0))
+        assert (low, high) == pytest.approx((least, largest), abs=EXACT)
+    low, high = gf.body(S).intervals
+    np.testing.assert_allclose(low[:, 0], least, atol=EXACT)
+    np.testing.assert_allclose(high[:, 0], largest, atol=EXACT)
+
+
+@pytest.mark.parametrize("angle", [40, 90, 120])
+def test_a_groove_locks_itself_where_friction_is_as_steep_as_its_walls(angle):
+    locks = np.tan(np.radians(angle / 2))
+    assert gf.body(gf.ensemble(gf.scene("groove", locks - 1e-6, angle=angle))).bounded
+    S = gf.ensemble(gf.scene("groove", locks * (1 if angle == 90 else 1 + 1e-6), angle=angle))
+    found = gf.body(S)
+    assert not found.bounded
+    # The certificate: along the ray no contact leaves its cone, and nothing else is balanced.
+    ray = np.tensordot(found.rays[0], found.axes, 1)
+    assert np.abs(S.A @ S.to_vector(ray)).max() < 1e-12
+    assert np.all(ray[:, 0] > 0) and np.all(np.abs(ray[:, 1]) <= S.mu * ray[:, 0] + 1e-12)
+    assert found.intervals[1][:, 0] == pytest.approx([np.inf, np.inf])
+    with pytest.raises(InputError, match="not bounded"):
+        gf.intervals(S)
+
+
+def test_two_disks_in_a_box_carry_their_weight():
+    # The walls' friction F up on each side, the floor N: N + F_left + F_right = 2; and the torque
+    # of both disks about the left wall's place balances.
+    S = gf.ensemble(gf.scene("box", 0.3))
+    contacts = S.contacts
+    up = np.zeros((4, 2))
+    to_wall = contacts.j >= 2
+    up[to_wall, 0] = -contacts.normal[to_wall, 1]
+    up[to_wall, 1] = -contacts.normal[to_wall, 0]
+    assert ends(S, up) == pytest.approx([2, 2], abs=EXACT)
+    # The upper disk rests on the line of centres at 45° and the right wall; without friction its
+    # weight 1 needs f_n = √2 there, 1 at the walls, and 2 on the floor.
+    smooth = gf.ensemble(gf.scene("box", 0))
+    assert smooth.dimension == 0
+    assert sorted(smooth.original[:, 0]) == pytest.approx([1, 1, np.sqrt(2), 2], abs=EXACT)
+    # With friction: torque makes f_t the same on both its contacts (up at the wall, up along the
+    # line): P/√2 + Q/√2 + Q = 1, |Q| ≤ μ P and μ N, N = (P − Q)/√2. Q < μ P is cut first by the
+    # wall's cone, Q = μ (P − Q)/√2: P = 1/(1/√2 + (1/√2 + 1) q), q = μ/√2/(1 + μ/√2).
+    pair = int(np.flatnonzero(contacts.j < 2)[0])
+    q = 0.3 / np.sqrt(2) / (1 + 0.3 / np.sqrt(2))
+    least = 1 / (np.sqrt(0.5) + (np.sqrt(0.5) + 1) * q)
+    assert ends(S, unit(S, pair, 0))[0] == pytest.approx(least, abs=EXACT)
+    assert gf.body(S).intervals[0][pair, 0] == pytest.approx(least, abs=EXACT)
+
+
+@pytest.mark.parametrize("angle", [35, 45, 60])
+def test_a_pyramid_stands_from_a_least_friction_on(angle):
+    # Lower disks apart: torque on one of them makes f_t the same at the floor and at the top disk;
+    # its horizontal forces give f_t/f_n = tan(θ/2) there, its top f_n = 1/2, the floor 3/2.
+    half = np.tan(np.radians(angle / 2))
+    S = gf.ensemble(gf.scene("pyramid", half + 1e-9, angle=angle))
+    assert S.dimension == 0
+    normal, tangential = S.original.T
+    np.testing.assert_allclose(sorted(normal), [0.5, 0.5, 1.5, 1.5], atol=EXACT)
+    np.testing.assert_allclose(np.abs(tangential), half / 2, atol=EXACT)
+    with pytest.raises(NotJammedError):
+        gf.scene("pyramid", half - 1e-6, angle=angle)
+
+
+def test_the_close_pyramid_stands_on_the_same_friction():
+    # Where the lower disks touch, they may press each other: S is a line, which begins where
+    # they do not. There f_t/f_n = tan 15° = 2 − √3 on top, a third of it on the floor.
+    S = gf.ensemble(gf.scene("pyramid", 0.4))
+    low, _ = gf.body(S).intervals
+    assert S.dimension == 1
+    between = int(np.flatnonzero((S.contacts.i == 0) & (S.contacts.j == 1))[0])
+    assert low[between, 0] == pytest.approx(0, abs=EXACT)
+    opened = gf.body(S).forces(gf.body(S).corners)
+    opened = opened[np.argmin(opened[:, between, 0])]
+    ratio = np.abs(opened[:, 1]) / np.where(opened[:, 0] > 0.1, opened[:, 0], np.inf)
+    assert ratio.max() == pytest.approx(2 - np.sqrt(3), abs=EXACT)
+    assert sorted(ratio)[1] == pytest.approx((2 - np.sqrt(3)) / 3, abs=EXACT)
+    gf.scene("pyramid", 2 - np.sqrt(3) + 1e-8)
+    with pytest.raises(NotJammedError, match="no admissible force network"):
+        gf.scene("pyramid", 2 - np.sqrt(3) - 1e-6)
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.2, 0.4])
+def test_the_walls_of_a_column_carry_what_janssen_allows(mu):
+    """What the floor bears of n disks between rough walls, by going down from disk to disk.
+
+    Pair k (below disk k) carries P along the line of centres, at the angle θ from the vertical, and
+    Q across. The torque on disk k makes the wall's friction F = Q_k − Q_{k−1}, so that its weight
+    gives cos θ P + (1 + sin θ) Q = k: one unknown Q_k a pair, and H = P sin θ − Q cos θ presses on
+    the wall. Cones: |Q| ≤ μ P, and |Q_k − Q_{k−1}| ≤ μ (H_k + H_{k−1}) at the wall. Both grow
+    with Q_{k−1} as long as μ (1 + sin θ) < cos θ: the largest Q above lets it be largest below.
+    On the floor B + G = n, with |G| ≤ μ B and |G − Q| ≤ μ (H − G) at the last wall, which some G
+    obeys where Q ≤ H.
+    """
+    n, s, c = 10, 0.5, np.sqrt(0.75)
+
+    def pressing(k):
+        return (s / c) * k, -(1 + s) / c  # H = h0 + h1 Q
+
+    q = {"least": 0.0, "largest": 0.0}
+    above = 0.0, 0.0
+    for k in range(1, n):
+        h0, h1 = pressing(k)
+        cone = mu * k / (c + mu * (1 + s)), -mu * k / (c - mu * (1 + s))
+        up, down = q["largest"], q["least"]
+        wall_up = (up + mu * (h0 + above[0] + above[1] * up)) / (1 - mu * h1)
+        wall_down = (down - mu * (h0 + above[0] + above[1] * down)) / (1 + mu * h1)
+        q = {"largest": min(cone[0], wall_up), "least": max(cone[1], wall_down)}
+        above = h0, h1
+    q["largest"] = min(q["largest"], above[0] / (1 - above[1]))
+    wall_up = (q["largest"] + mu * (above[0] + above[1] * q["largest"])) / (1 + mu)
+    wall_down = (q["least"] - mu * (above[0] + above[1] * q["least"])) / (1 - mu)
+    friction = max(-mu * n / (1 - mu), wall_down), min(mu * n / (1 + mu), wall_up)
+    S = gf.ensemble(gf.scene("column", mu))
+    floor = int(np.flatnonzero((S.contacts.j >= 10) & (S.contacts.normal[:, 1] < -0.5))[0])
+    assert ends(S, unit(S, floor, 0)) == pytest.approx(
+        (n - friction[1], n - friction[0]), abs=EXACT * n
+    )
+    assert S.dimension == 10
+
+
+def test_six_disks_in_a_box_have_two_dimensions_and_three():
+    for name, h in (("six", 2), ("solid", 3)):
+        packing = gf.scene(name)
+        S = gf.ensemble(packing)
+        assert (len(packing.r), S.dimension, len(gf.body(S).axes)) == (6, h, h)
+        assert S.admits(S.original)
+        assert gf.scene(name, 0.4).x.tolist() == packing.x.tolist()  # μ moves no disk
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "many"])
+def test_a_scene_is_kept_in_a_file(name, tmp_path):
+    packing = gf.scene(name)
+    S = gf.ensemble(packing)
+    assert S.admits(S.original)
+    gf.save_packing(packing, tmp_path / "scene.npz")
+    again = gf.load_packing(tmp_path / "scene.npz")
+    assert np.array_equal(again.forces, packing.forces) and again.info == packing.info
+    assert np.array_equal(again.load, packing.load, equal_nan=True)
+
+
+def test_a_disk_in_a_corner_is_touched_once_by_walls_that_meet():
+    disk = assembled([[0, 1]], [1.0], [[-2, 0, 0, 0], [0, 0, 2, 0]], weights([1.0]), 0.3)
+    assert len(disk.contacts.i) == 1
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: gf.scene("grove"), "choose one of groove, box"),
+        (lambda: gf.scene("box", disks=3), "no option disks"),
+        (lambda: gf.scene("groove", angle=200), "angle must lie between 10 and 180"),
+        (lambda: gf.scene("groove", -1), "friction"),
+        (lambda: assembled([[0, 0], [0, 1]], [1, 1], [], np.zeros((2, 3)), 0), "two disks overlap"),
+        (lambda: assembled([[0, 0.5]], [1], [[-1, 0, 1, 0]], [[0, 0, 0]], 0), "a wall overlap"),
+        (lambda: assembled([[0, 1]], [1], [[0, 0, 0, 0]], [[0, 0, 0]], 0), "no length"),
+        (lambda: assembled(np.empty((0, 2)), [], [], np.empty((0, 3)), 0), "no disk"),
+    ],
+)
+def test_what_cannot_be_a_scene_is_refused(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
+
+
+def test_an_unbalanced_sketch_is_there_to_be_looked_at():
+    assert not sketched("pyramid", 0.1).forces.any()
