@@ -54,7 +54,7 @@ def _frame(found, names):
         found.measured / unit,
         packing.forces / unit,
         found.added,
-        np.isnan(packing.load).any(axis=1) & ~left_open,
+        found.at_wall & ~left_open,
         left_open,
     )
 

@@ -31,7 +31,7 @@ def panel(frame):
 def compared(frame):
     """Figure of inferred against measured forces, of the contacts that were measured."""
     fig = figure("photoelastic_forces", None, "measured / ⟨fₙ⟩", "inferred / ⟨fₙ⟩", height=340)
-    seen = ~frame.added
+    seen = np.isfinite(frame.measured).all(axis=1)
     drawn, ends = [], [0.0]
     for part, (label, colour) in enumerate(COMPONENTS):
         x, y = frame.measured[seen, part], frame.inferred[seen, part]

@@ -507,8 +507,6 @@ def import_(arguments):
 
 def _import_pegs(arguments):
     """Read a photoelastic frame; report and save it, and what was measured."""
-    if arguments.contacts is None:
-        raise InputError("import pegs needs two files: positions and adjacency")
     _outputs(arguments.measured)
     found = importers.read_pegs(
         *(arguments.grains, arguments.contacts),
@@ -518,6 +516,7 @@ def _import_pegs(arguments):
         scale=arguments.scale,
         error=arguments.error,
         reverse=arguments.reverse,
+        **_flaws_and_walls(arguments),
     )
     if arguments.out is not None:
         importers.save_packing(found.packing, arguments.out)
@@ -527,6 +526,19 @@ def _import_pegs(arguments):
         columns |= dict(zip(importers.measurements.COLUMNS, values, strict=True))
         _write_csv(arguments.measured, columns)
     report(found.report, arguments.json)
+
+
+def _flaws_and_walls(arguments):
+    """What the options say of flaws and walls, as `importers.read_pegs` takes it."""
+    if arguments.strict and arguments.repair is not None:
+        raise InputError("--strict mends nothing: leave out --repair")
+    repair = True if arguments.repair is None else arguments.repair
+    forces = dict(importers.read_wall_force(text) for text in arguments.wall_force)
+    return {
+        "repair": False if arguments.strict else repair,
+        "walls": arguments.walls,
+        "wall_forces": forces,
+    }
 
 
 def scan(arguments):

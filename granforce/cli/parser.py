@@ -473,7 +473,10 @@ def _add_import(commands):
         "--measured frame.csv",
     )
     command.add_argument("format", choices=["lammps", "table", "pegs"])
-    command.add_argument("grains", help="LAMMPS particle dump, table with x, y, r, or positions")
+    command.add_argument(
+        "grains",
+        help="LAMMPS particle dump, table with x, y, r, positions, or a *_solved.mat of PeGS 2",
+    )
     command.add_argument("contacts", nargs="?", help="LAMMPS contact dump, table, or adjacency")
     command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
     command.add_argument(
@@ -498,8 +501,34 @@ def _add_import(commands):
     group.add_argument(
         "--reverse", action="store_true", help="tangential forces have the other sign"
     )
+    _add_flaws_and_walls(group)
     group.add_argument(
         "--measured", metavar="FILE.csv", help="write the measured forces, for granforce infer"
+    )
+
+
+def _add_flaws_and_walls(group):
+    group.add_argument(
+        "--repair",
+        type=float,
+        metavar="PART",
+        help="mend up to this part of the data (default 0.1); what was mended is told",
+    )
+    group.add_argument("--strict", action="store_true", help="mend nothing: the first flaw ends it")
+    group.add_argument(
+        "--walls",
+        metavar="SHAPE",
+        help="walls that count: box, annulus or circle, found from the grains at them or with "
+        "numbers (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); open: left open "
+        "(default: where a *_solved.mat has the directions of their contacts)",
+    )
+    group.add_argument(
+        "--wall-force",
+        metavar="'WALL: FX FY SIGMA'",
+        action="append",
+        default=[],
+        help="force of the grains on a wall of a box (left, right, bottom, top: by x and y), as a "
+        "load cell measured it; may be given several times",
     )
 
 

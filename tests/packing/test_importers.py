@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mutants import mutant
 
 from granforce.forces.ensemble import ensemble
 from granforce.packing.importers import load_packing, read_lammps, read_table, report, save_packing
@@ -743,45 +744,6 @@ def small_dumps():
         head.format("ENTRIES", 2) + box.format("ENTRIES atom1 atom2 distance fx fy px py", pairs),
     )
     return [dump.encode() for dump in dumps]
-
-
-PIECES = [
-    b"",
-    b"0",
-    b"-1",
-    b"9",
-    b"nan",
-    b"inf",
-    b"1e999",
-    b"1e-320",
-    b",",
-    b"\n",
-    b" ",
-    b'"',
-    b"\0",
-]
-
-
-def mutant(contents, rng):
-    """The files with one to four changes: bytes replaced, pieces put in or lines moved, cuts."""
-    changed = [bytearray(content) for content in contents]
-    for _ in range(rng.integers(1, 5)):
-        content = changed[rng.integers(len(changed))]
-        at = int(rng.integers(len(content) + 1))
-        to = min(len(content), at + int(rng.integers(0, 9)))
-        change = rng.integers(5)
-        if change == 0 and at < len(content):
-            content[at] = rng.integers(256)
-        elif change == 1:
-            content[at:to] = PIECES[rng.integers(len(PIECES))]
-        elif change == 2:
-            other = int(rng.integers(len(content) + 1))
-            content[at:at] = content[other : other + 20]
-        elif change == 3:
-            del content[at:to]
-        elif rng.random() < 0.1:
-            del content[at:]
-    return [bytes(content) for content in changed]
 
 
 def judge(read, contents):

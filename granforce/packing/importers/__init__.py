@@ -10,6 +10,7 @@ from granforce.packing.importers.network import report
 from granforce.packing.importers.npz import load_packing, save_packing
 from granforce.packing.importers.pegs import read_pegs
 from granforce.packing.importers.tables import read_table
+from granforce.packing.importers.walls import read_wall_force
 
 __all__ = [
     "load_packing",
@@ -18,6 +19,7 @@ __all__ = [
     "read_measurement",
     "read_pegs",
     "read_table",
+    "read_wall_force",
     "report",
     "save_packing",
 ]
