@@ -9,6 +9,7 @@ from granforce.packing.importers.measurements import read_measurement
 from granforce.packing.importers.network import report
 from granforce.packing.importers.npz import load_packing, save_packing
 from granforce.packing.importers.pegs import read_pegs
+from granforce.packing.importers.synthetic import synthetic_frame
 from granforce.packing.importers.tables import read_table
 from granforce.packing.importers.walls import read_wall_force
 
@@ -22,4 +23,5 @@ __all__ = [
     "read_wall_force",
     "report",
     "save_packing",
+    "synthetic_frame",
 ]

@@ -68,8 +68,11 @@ class Photoelastic(NamedTuple):
 def open_frames(positions, adjacency=None):
     """Frames to read: `frames` (their numbers) and `listing(frame)`.
 
-    From two text files, or, without adjacency, from a *_solved.mat of PeGS 2.
+    From two text files, or, without adjacency, from a *_solved.mat of PeGS 2; a frame that is one
+    already (`synthetic_frame`) is taken as it is.
     """
+    if hasattr(positions, "listing"):
+        return positions
     if adjacency is None:
         return solved.read_solved(positions)
     return read_frames(positions, adjacency)

@@ -169,7 +169,7 @@ def _listing(name, number, columns):
     if not ends:
         raise InputError(f"{name}: no particle has neighbours; is it the file after diskSolve?")
     owner = np.concatenate(owner)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         spread = single["fitError"] / single["r"] ** 2
         weight = np.nanmedian(spread) / spread if np.isfinite(spread).any() else spread
     weight = np.clip(np.nan_to_num(weight, nan=1.0, posinf=_WEIGHTS), 1 / _WEIGHTS, _WEIGHTS)
