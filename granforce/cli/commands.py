@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from granforce import measures
+from granforce.cli import frames
 from granforce.packing import importers
 from granforce.perturb.critical_force import COUNTS
 from granforce.records import InputError, check_memory, whole
@@ -235,18 +236,25 @@ INFERENCE_LINES = (
 
 def infer(arguments):
     """The likeliest network of measured forces, with error bars if wanted; report it."""
-    asked = _conditions(arguments)
+    if arguments.frames is not None:
+        return frames.infer_frames(arguments, _flaws_and_walls(arguments))
+    if arguments.files or arguments.measured is None:
+        raise InputError(
+            "give --measured FILE.csv and a packing, or files of frames with --frames all"
+        )
+    asked, states = _conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = importers.read_measurement(arguments.measured)
 
     def name(packing):
         return kinds.INFERENCE.parameters(
             packing,
             measured,
-            arguments.states,
+            states,
             arguments.sample_seed,
             mu=arguments.ensemble_mu,
             chains=arguments.chains,
             unmeasured=arguments.unmeasured,
+            again=arguments.again,
             certain=arguments.certain,
             **asked,
         )
@@ -284,7 +292,7 @@ def infer(arguments):
         lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
         lines |= {"carry_for_certain": columns["contact"][order].tolist()}
         columns |= {"least_f_n": dataset["least_normal"].values}
-    if arguments.states:
+    if states:
         error = dataset["standard_error"].values
         lines |= {"states": dataset.sizes["state"], "mean_standard_error": error.mean() / scale}
         lines |= {name: dataset[name].item() for name in INFERENCE_LINES}
@@ -512,10 +520,6 @@ def _import_pegs(arguments):
         *(arguments.grains, arguments.contacts),
         mu=arguments.mu,
         frame=arguments.frame,
-        reach=arguments.reach,
-        scale=arguments.scale,
-        error=arguments.error,
-        reverse=arguments.reverse,
         **_flaws_and_walls(arguments),
     )
     if arguments.out is not None:
@@ -535,6 +539,7 @@ def _flaws_and_walls(arguments):
     repair = True if arguments.repair is None else arguments.repair
     forces = dict(importers.read_wall_force(text) for text in arguments.wall_force)
     return {
+        **{name: getattr(arguments, name) for name in ("reach", "scale", "error", "reverse")},
         "repair": False if arguments.strict else repair,
         "walls": arguments.walls,
         "wall_forces": forces,

@@ -74,6 +74,8 @@ VARIABLES: dict[str, Variable] = {
     "setup_seconds": Variable((), "float64", "s", "wall time until the first step"),
     "sampling_seconds": Variable((), "float64", "s", "wall time of the steps"),
     # a measurement, and what S makes of it
+    "grain_id": Variable(("grain",), "float64", "1", "name in the files; below 0: a wall"),
+    "added": Variable(("contact",), "int64", "1", "1 where the contact was not listed"),
     "measured": Variable(
         ("contact", "component"), "float64", "force", f"measured forces, {_COMPONENT}"
     ),
