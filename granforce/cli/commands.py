@@ -496,12 +496,19 @@ def import_(arguments):
         if arguments.contacts is None:
             raise InputError("import lammps needs two dumps: particles and contacts")
         packing = importers.read_lammps(arguments.grains, arguments.contacts, arguments.mu)
+    elif arguments.format in ("yade", "mercury"):
+        if arguments.contacts is None:
+            raise InputError(f"import {arguments.format} needs two files: grains and contacts")
+        read = importers.read_yade if arguments.format == "yade" else importers.read_mercury
+        packing = read(arguments.grains, arguments.contacts, arguments.mu, box=arguments.box)
     else:
+        columns = None if arguments.columns is None else importers.read_columns(arguments.columns)
         packing = importers.read_table(
             arguments.grains,
             arguments.contacts,
             mu=arguments.mu,
             box=arguments.box,
+            columns=columns,
             forces=True if arguments.forces else None,
             pressure=arguments.pressure,
         )

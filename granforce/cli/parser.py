@@ -492,15 +492,21 @@ def _add_import(commands):
         "  granforce import pegs positions.txt adjacency.txt --mu 0.5 --out frame.npz "
         "--measured frame.csv",
     )
-    command.add_argument("format", choices=["lammps", "table", "pegs"])
+    command.add_argument("format", choices=["lammps", "yade", "mercury", "table", "pegs"])
     command.add_argument(
         "grains",
-        help="LAMMPS particle dump, table with x, y, r, positions, or a *_solved.mat of PeGS 2",
+        help="LAMMPS particle dump, bodies of YADE, .data of MercuryDPM, table with x, y, r, "
+        "positions, or a *_solved.mat of PeGS 2",
     )
-    command.add_argument("contacts", nargs="?", help="LAMMPS contact dump, table, or adjacency")
+    command.add_argument(
+        "contacts", nargs="?", help="LAMMPS contact dump, interactions, .fstat, table, or adjacency"
+    )
     command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
     command.add_argument(
-        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="table: box sides"
+        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="table, yade, mercury: box sides"
+    )
+    command.add_argument(
+        "--columns", metavar="x=…,y=…", help="table: what columns are called in the files"
     )
     command.add_argument("--forces", action="store_true", help="table: fn, ft must be given")
     command.add_argument("--pressure", type=float, default=1.0, help="table without forces: P0")

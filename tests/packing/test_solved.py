@@ -40,10 +40,11 @@ def test_a_perfect_frame_is_taken_as_it_is(options):
     found = read_pegs(mat(particles, **options), mu=0.3, reach=0, error=0.1 * NEWTON)
     told = found.report
     assert told["frame"] == 7 and told["contacts_listed"] == len(truth) == told["listed_twice"]
-    assert told["walls"] == "wall" and told["wall_contacts"] == told["contacts_with_a_wall"] > 10
+    assert told["walls"].startswith("wall")
+    assert told["wall_contacts"] == told["contacts_with_a_wall"] > 10
     assert told["unbalanced"] == 0 and not found.findings
-    # Nothing is open but the wall.
-    assert np.isnan(found.packing.load).any(axis=1).sum() == 1 == len(found.walls)
+    # Nothing is open but the wall, which counts again for a grain that touches it again.
+    assert np.isnan(found.packing.load).any(axis=1).sum() == len(found.walls)
     true = by_pair(found, truth)
     here = np.isfinite(true[:, 0])
     assert np.abs(found.packing.forces - true)[here].max() < 1e-6 * NEWTON

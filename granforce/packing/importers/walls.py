@@ -134,9 +134,10 @@ def wall_contacts(listing, x, r, at_wall, walls, reach):
         told = np.isfinite(beta)
         if not told.any():
             return None
-        zero = np.zeros(int(told.sum()), np.int64)
+        which = _occurrence(grain[told])
+        names = tuple(f"{_ANY} {k + 1}" if k else _ANY for k in range(which.max() + 1))
         return WallContacts(
-            grain[told], zero, normal[told], forces[told], factor[told], (_ANY,), None
+            grain[told], which, normal[told], forces[told], factor[told], names, None
         )
     outline = walls if isinstance(walls, Outline) else _fitted(walls, x, r, at_wall, listing.flag)
     gap, ways = outline.gaps(x, r)
@@ -152,6 +153,16 @@ def wall_contacts(listing, x, r, at_wall, walls, reach):
             best = mine[np.argmin(gap[g[mine], w[mine]])]
         m[best], f[best] = forces[k], factor[k]
     return WallContacts(g, w, ways[g, w], m, f, outline.names, outline)
+
+
+def _occurrence(grain):
+    """(w,) how often the grain came before: two contacts of one grain are with two bodies."""
+    order = np.argsort(grain, kind="stable")
+    new = np.concatenate([[True], np.diff(grain[order]) != 0])
+    first = np.maximum.accumulate(np.where(new, np.arange(len(grain)), 0))
+    which = np.empty(len(grain), dtype=np.int64)
+    which[order] = np.arange(len(grain)) - first
+    return which
 
 
 def _fitted(shape, x, r, at_wall, flag):
