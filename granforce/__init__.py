@@ -50,6 +50,8 @@ _HOME = {
     "read_yade": "packing.importers",
     "synthetic_frame": "packing.importers",
     "report": "packing.importers",
+    "frames_of": "study.series",
+    "infer_series": "study.series",
     "open_store": "study.store",
     "figures": "",
     "measures": "",

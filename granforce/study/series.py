@@ -30,6 +30,8 @@ from granforce.system.files import expanded
 
 # Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
 STATES, UNMEASURED = 200, 1.0
+# Parts of a side of the frame in which the stress is told.
+REGIONS = 3
 # What files are, by their names.
 _POSITIONS, _CONTACTS = re.compile("position|cent(er|re)s", re.I), re.compile("adjacency", re.I)
 _TEXT = {".txt", ".csv", ".dat"}
@@ -151,21 +153,36 @@ def _inferred(store, parameters, *, workers, progress):
         wall_forces=parameters["wall_forces"],
         **parameters["options"],
     )
-    S = ensemble(found.packing)
-    drawn = remeasured(
-        S,
-        found.measured[S.index],
-        found.sigma[S.index],
+    return infer_frame(
+        found,
         states=parameters["states"],
         seed=parameters["seed"],
         unmeasured=parameters["unmeasured"],
         workers=workers,
         progress=progress,
+        number=parameters["frame"],
+    )
+
+
+def infer_frame(found, *, states=STATES, unmeasured=UNMEASURED, number=None, **options):
+    """Dataset of a Photoelastic: its packing, forces, errors, stresses by region, its account.
+
+    Forces are those of `remeasured`, on all contacts (0 where nothing can carry); options as there.
+    """
+    S = ensemble(found.packing)
+    drawn = remeasured(
+        *(S, found.measured[S.index], found.sigma[S.index]),
+        states=states,
+        unmeasured=unmeasured,
+        **options,
     )
     whole_packing = np.zeros((3, *found.measured.shape))
     whole_packing[2] = np.nan
     for values, of in zip(whole_packing, (drawn.forces, drawn.error, drawn.deviation), strict=True):
         values[S.index] = of
+    grains = len(found.packing.r) - len(found.walls)
+    stress = regional_stress(S.contacts, found.packing.x, grains, drawn.forces)
+    off = regional_stress(S.contacts, found.packing.x, grains, drawn.draws.flat) - stress
     dataset = packing_dataset(found.packing).merge(
         labelled(
             {
@@ -179,14 +196,39 @@ def _inferred(store, parameters, *, workers, progress):
                 "suspect": drawn.suspects,
                 "chi_square": drawn.chi_square,
                 "freedom": drawn.freedom,
+                "regional_stress": stress,
+                "regional_stress_error": np.sqrt(np.mean(off**2, axis=0)),
             }
         )
     )
     findings = [one._asdict() for one in found.findings]
-    told = {"report": found.report | {"frame": parameters["frame"]}, "findings": findings}
+    report = found.report if number is None else found.report | {"frame": number}
+    told = {"report": report, "findings": findings}
     told |= {"walls": list(found.walls), "left_open": found.left_open.tolist()}
+    told |= {"at_wall": np.flatnonzero(found.at_wall).tolist()}
     dataset.attrs["account"] = json.dumps(told, default=to_builtin)
     return dataset
+
+
+def regional_stress(contacts, x, grains, forces):
+    """Stresses (…, 9, 3) xx, yy, xy in 3 × 3 parts of the frame, of forces (…, N_c, 2).
+
+    σ_ab = (1/A) Σ F_a ℓ_b over the contacts whose point lies in a part of the area A; of a contact
+    with a wall, ℓ ends at the wall. The first `grains` of the centres x are grains.
+    """
+    arm = np.where(contacts.j < grains, contacts.length, contacts.arm_i)
+    at = x[contacts.i] + contacts.arm_i[:, None] * contacts.normal
+    low, high = x[:grains].min(axis=0), x[:grains].max(axis=0)
+    side = np.maximum((high - low) / REGIONS, 1e-300)
+    cell = np.clip(((at - low) / side).astype(int), 0, REGIONS - 1) @ [REGIONS, 1]
+    tangent = np.column_stack([-contacts.normal[:, 1], contacts.normal[:, 0]])
+    force = forces[..., :1] * contacts.normal + forces[..., 1:] * tangent
+    branch = arm[:, None] * contacts.normal
+    parts = np.stack([force[..., a] * branch[:, b] for a, b in ((0, 0), (1, 1), (0, 1))], axis=-1)
+    total = np.zeros((*forces.shape[:-2], REGIONS**2, 3))
+    for k in range(REGIONS**2):
+        total[..., k, :] = parts[..., cell == k, :].sum(axis=-2)
+    return total / np.prod(side)
 
 
 FRAME = Kind("frame", 1, "frames", "frame", parameters, _inferred)

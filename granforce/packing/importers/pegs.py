@@ -167,7 +167,10 @@ def take_frame(
         raise InputError("a force on a wall needs walls: give the outline, such as --walls box")
     made = None if found is None else bodies(found, x, r, wall_forces or {})
     alone = _packing(x, r, listed, np.zeros((0, 2), int), at_wall, mu, made)
-    pairs = _candidates(x, r, listed, at_wall, reach)
+    still_open = at_wall.copy()
+    if found is not None:
+        still_open[found.grain] = False
+    pairs = _candidates(x, r, listed, still_open, reach)
     packing = _packing(x, r, listed, pairs, at_wall, mu, made)
     measured, sigma, factor, added = _measurement(listed, len(pairs), made)
     unit = float(np.nanmean(np.abs(listed.forces[:, 0])))
@@ -296,15 +299,15 @@ def _gain_by_reversing(x, listed, at_wall):
     return float(1 - off[1] / off[0]) if off[0] > 0 else 0.0
 
 
-def _candidates(x, r, listed, at_wall, reach):
-    """Pairs (k, 2) that are not listed, with a gap up to `reach`, one of them inside."""
+def _candidates(x, r, listed, left_open, reach):
+    """Pairs (k, 2) that are not listed, with a gap up to `reach`, one of them to be balanced."""
     far = 2 * r.max() + reach * r.mean()
     pairs = cKDTree(x).query_pairs(far, output_type="ndarray") if reach else np.zeros((0, 2), int)
     pairs = np.sort(pairs.astype(np.int64))
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     gap = np.hypot(*(x[pairs[:, 1]] - x[pairs[:, 0]]).T) - r[pairs].sum(axis=1)
     known = np.isin(pairs @ [len(x), 1], listed.pairs @ [len(x), 1])
-    return pairs[(gap <= reach * r.mean()) & ~known & ~at_wall[pairs].all(axis=1)]
+    return pairs[(gap <= reach * r.mean()) & ~known & ~left_open[pairs].all(axis=1)]
 
 
 def _packing(x, r, listed, pairs, at_wall, mu, walls=None):
