@@ -47,13 +47,14 @@ def frames(quick=True, *, n=None, packings=None, cases=CASES, mu=MU):
 
 def _one(packing, sigma, missed, wrong, seed):
     frame = synthetic_frame(packing, noise=sigma, missed=missed, seed=seed)
-    # Two sides, each with σ: their mean has σ/√2.
     options = {"mu": wrong * packing.mu, "reach": REACH, "error": sigma * frame.unit, "repair": 0.5}
     found = read_pegs(frame, **options)
     S, unit = ensemble(found.packing), frame.unit
     m, s = found.measured[S.index], found.sigma[S.index]
-    # The spread of two sides is part of the noise: the true σ counts, and that alone.
-    s = np.where(np.isfinite(m), sigma * unit / np.sqrt(2), np.nan)
+    # The spread of two sides is part of the noise: the true σ counts, and that alone, and contacts
+    # with walls have one side.
+    sides = np.where(S.contacts.j < len(found.ids) - len(found.walls), 2.0, 1.0)[:, None]
+    s = np.where(np.isfinite(m), sigma * unit / np.sqrt(sides), np.nan)
     drawn = remeasured(S, m, s, states=STATES, seed=seed, unmeasured=2.0)
     true = frame.truth(found)[S.index]
     inner, listed = np.isfinite(true[:, 0]), np.isfinite(m[:, 0])
