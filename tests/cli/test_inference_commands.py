@@ -74,3 +74,17 @@ def test_what_was_mended_is_told_and_may_be_forbidden(folder, capsys):
     assert main([*words.split(), "--walls", "box", "--wall-force", "right: 1 2"]) == 2
     walls = told(f"{words} --walls box", capsys)
     assert walls["walls"] == "left, right, bottom, top" and walls["wall_contacts"] > 4
+
+
+def test_error_bars_by_measuring_again(folder, capsys):
+    told(
+        "import pegs positions.txt adjacency.txt --mu 0.3 --reach 0.1 --out frame.npz "
+        "--measured frame.csv",
+        capsys,
+    )
+    words = "infer --packing frame.npz --measured frame.csv --unmeasured 1 --states 40"
+    flat, again = told(words, capsys), told(f"{words} --again", capsys)
+    assert again["states"] == 40 and not again["cached"]
+    assert again["chi_square"] == flat["chi_square"]
+    assert again["mean_standard_error"] != flat["mean_standard_error"]
+    assert told(f"{words} --again", capsys)["cached"]
