@@ -1,13 +1,21 @@
 """Photoelastic frames that a visitor brings: measured beside inferred forces, as plain arrays."""
 
+import json
 from typing import NamedTuple
 
 import numpy as np
 
-from granforce.packing import importers
+from granforce.packing.importers.listing import plain
+from granforce.packing.importers.pegs import open_frames, take_frame
+from granforce.packing.importers.repair import KINDS
+from granforce.study import series
 
-from . import uploads
+from . import exports, uploads
 from .limits import LIMITS
+
+DRAWS = 80  # for error bars on the page
+CERTAIN = 2.0  # standard errors above 0 from which on a contact is told to carry for certain
+ROLES = ("positions", "adjacency"), ("solved",)
 
 
 class Frame(NamedTuple):
@@ -15,58 +23,117 @@ class Frame(NamedTuple):
 
     source: str  # which files it came from, in words
     report: dict  # of importers.read_pegs
-    x: np.ndarray  # (N, 2) centres
+    numbers: tuple  # of all frames in the files
+    x: np.ndarray  # (N, 2) centres of the grains
     r: np.ndarray  # (N,) radii
-    ends: np.ndarray  # (N_c, 2) grains of each contact
-    measured: np.ndarray  # (N_c, 2) f_n, f_t; NaN for contacts that were added
+    ids: np.ndarray  # (N + walls,) their names
+    ends: np.ndarray  # (N_c, 2) grains of each contact; N and above: a wall
+    lines: np.ndarray  # (N_c, 2, 2) where a contact is drawn from and to
+    measured: np.ndarray  # (N_c, 2) f_n, f_t; NaN where they were not
     inferred: np.ndarray  # (N_c, 2)
-    added: np.ndarray  # (N_c,) bool
-    at_wall: np.ndarray  # (N,) bool, grains at walls, whose balance is not asked for
+    error: np.ndarray  # (N_c, 2) standard errors of the inferred forces
+    deviation: np.ndarray  # (N_c, 2) inferred less measured, in its σ
+    added: np.ndarray  # (N_c,) bool, contacts that were not listed
+    suspects: np.ndarray  # contacts beyond 3 σ, the farthest first
+    certain: np.ndarray  # contacts that were not measured and carry for certain, strongest first
+    at_wall: np.ndarray  # (N,) bool, grains at walls
     left_open: np.ndarray  # (N,) bool, other grains whose balance had to be left open
+    found: np.ndarray  # (k, 2) where something was mended
+    stress: np.ndarray  # (9, 3) xx, yy, xy by region, over the mean pressure
+    stress_error: np.ndarray  # (9, 3)
 
 
-def infer(files, *, mu, reverse=False):
-    """Work, for jobs.Task, that reads a frame and finds its likeliest network; a Frame.
+def infer(files, *, mu, reverse=False, number=None):
+    """Work, for jobs.Task, that reads a frame and finds its likeliest network with errors; a Frame.
 
-    files: {role: (name, content)}; mu, reverse: as for `importers.read_pegs`.
+    files: {role: (name, content)}; mu, reverse: as for `importers.read_pegs`; number: of the frame.
     """
 
     def work(job):
         LIMITS.check(mu=mu)
         job.begin("looking for forces that balance the grains, near the measured ones")
-        opened = (uploads.opened(*files[part]) for part in ("positions", "adjacency"))
-        found = importers.read_pegs(*opened, mu=mu, reverse=reverse, most_grains=LIMITS.n)
-        return _frame(found, " and ".join(name for name, _ in files.values()))
+        roles = next(roles for roles in ROLES if roles[0] in files)
+        frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
+        found = take_frame(frames, number, mu=mu, reverse=reverse, most_grains=LIMITS.n)
+        job.begin("measuring the likeliest network again and again, for error bars")
+        dataset = series.infer_frame(found, states=DRAWS)
+        names = " and ".join(name for name, _ in files.values())
+        return frame_of(dataset, names, tuple(map(plain, frames.frames.tolist())))
 
     return work
 
 
-def _frame(found, names):
-    packing, unit = found.packing, found.report["mean_measured_normal_force"]
-    left_open = np.zeros(len(packing.r), dtype=bool)
-    left_open[found.left_open] = True
+def frame_of(dataset, names, numbers):
+    """The Frame of a dataset of `series.infer_frame`."""
+    told = json.loads(dataset.attrs["account"])
+    report, walls = told["report"], len(told["walls"])
+    unit, count = report["mean_measured_normal_force"], dataset.sizes["grain"] - walls
+    of = {name: dataset[name].values for name in dataset.data_vars}
+    i, j = of["contact_i"], of["contact_j"]
+    away = np.where(j < count, of["length"], of["arm_i"])[:, None] * of["normal"]
+    begin = of["x"][i]
+    inner = i < count  # not a load cell
+    certain = inner & np.isnan(of["measured"][:, 0])
+    certain &= of["inferred"][:, 0] > CERTAIN * of["standard_error"][:, 0]
+    order = np.argsort(-of["inferred"][:, 0], kind="stable")
+    left_open, at_wall = np.zeros((2, count + walls), dtype=bool)
+    left_open[told["left_open"]] = True
+    at_wall[told["at_wall"]] = True
+    places = np.array([[one["x"], one["y"]] for one in told["findings"]]).reshape(-1, 2)
+    pressure = np.abs(of["regional_stress"][:, :2].mean()) or 1.0
     return Frame(
-        f"{uploads.FAMILIES['pegs'][0]}: {names}",
-        found.report,
-        packing.x,
-        packing.r,
-        np.column_stack([packing.contacts.i, packing.contacts.j]),
-        found.measured / unit,
-        packing.forces / unit,
-        found.added,
-        np.isnan(packing.load).any(axis=1) & ~left_open,
-        left_open,
+        source=f"{uploads.FAMILIES['pegs'][0]}: {names}",
+        report=report,
+        numbers=numbers,
+        x=of["x"][:count],
+        r=of["r"][:count],
+        ids=of["grain_id"],
+        ends=np.column_stack([i, j]),
+        lines=np.where(inner[:, None, None], np.stack([begin, begin + away], axis=1), np.nan),
+        measured=of["measured"] / unit,
+        inferred=of["inferred"] / unit,
+        error=of["standard_error"] / unit,
+        deviation=of["deviation"],
+        added=of["added"].astype(bool),
+        suspects=of["suspect"],
+        certain=order[certain[order]],
+        at_wall=at_wall[:count] & ~left_open[:count],
+        left_open=left_open[:count],
+        found=places[np.isfinite(places).all(axis=1)],
+        stress=of["regional_stress"] / pressure,
+        stress_error=of["regional_stress_error"] / pressure,
     )
+
+
+def table(frame):
+    """All contacts as one CSV (bytes): names, measured and inferred forces, errors, marks."""
+    suspect, certain = np.zeros((2, len(frame.ends)), dtype=int)
+    suspect[frame.suspects], certain[frame.certain] = 1, 1
+    one, two = frame.ids[frame.ends].T
+    columns = {"contact": np.arange(len(one)), "id1": one, "id2": two}
+    for name, values in (
+        ("measured", frame.measured), ("inferred", frame.inferred), ("error", frame.error),
+        ("sigmas_off", frame.deviation),
+    ):  # fmt: skip
+        columns |= {f"{name}_f_{part}": values[:, k] for k, part in enumerate("nt")}
+    columns |= {"added": frame.added.astype(int), "suspect": suspect, "certain": certain}
+    unit = frame.report["mean_measured_normal_force"]
+    return exports.csv(columns, f"# forces in their mean measured normal force, {unit:.9g}\n")
 
 
 def account(report):
     """What was found, what was done, and what that leaves open: sentences with the numbers."""
     count = report.get
+    if "names" in report:
+        yield f"Beware: {report['names']}."
     yield (
         f"Listed are {count('contacts_listed')} contacts of {count('grains')} grains. "
-        f"{count('grains_at_walls')} grains are at walls: what a wall does to them was not "
-        "measured, so their balance is not asked for."
+        f"{_walls(report)}"
     )
+    mended = [f"{report[kind]} {words}" for kind, (words, _, spoils) in KINDS.items()
+              if spoils and report[kind]]  # fmt: skip
+    if mended:
+        yield f"Mended, and marked by crosses: {'; '.join(mended)}."
     for key, words in DOUBTS:
         if report[key]:
             yield f"{report[key]} {words}"
@@ -91,11 +158,21 @@ def account(report):
     )
 
 
+def _walls(report):
+    at = f"{report['grains_at_walls']} grains are at walls"
+    if report["walls"] == "open":
+        return (
+            f"{at}: what a wall does to them was not measured, so their balance is not asked for."
+        )
+    return (
+        f"{at}: the directions of {report['wall_contacts']} contacts with the walls are known, so "
+        "that the forces there are inferred like all others."
+    )
+
+
 DOUBTS = (
     ("listed_twice_with_other_forces", "contacts are listed twice with different forces: the mean "
      "was taken, the difference counts as an error."),
-    ("negative_normal_forces", "measured normal forces are negative, where contacts can only "
-     "press."),
     ("beyond_friction", "measured tangential forces are larger than friction allows at this μ."),
 )  # fmt: skip
 REVERSED = 0.05  # part of the unbalance, from which on the sign of f_t is doubted

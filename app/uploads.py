@@ -1,6 +1,7 @@
 """Packings that a visitor brings, read in memory: no name or path of theirs reaches the disk."""
 
 import io
+import re
 from typing import NamedTuple
 
 from granforce.packing import importers
@@ -15,6 +16,7 @@ FAMILIES = {
     "lammps": ("LAMMPS dumps", ("particles", "contacts"), ()),
     "table": ("tables", ("grains",), ("joined",)),
     "pegs": ("photoelastic frame", ("positions", "adjacency"), ()),
+    "solved": ("photoelastic frame", ("solved",), ()),
 }
 WORDS = {
     "npz": "packing",
@@ -24,6 +26,7 @@ WORDS = {
     "joined": "table of contacts",
     "positions": "positions of the grains",
     "adjacency": "adjacency list with the forces",
+    "solved": "frame solved by PeGS 2",
 }
 # An archive may unpack to this many times the bytes that may be sent.
 UNPACKED = 8
@@ -43,6 +46,8 @@ def role(name, content):
     """What a file is, one of WORDS, told by its content; InputError for anything else."""
     if content[:4] == b"PK\x03\x04":
         return "npz"
+    if content[:6] == b"MATLAB" or content[:4] == b"\x89HDF":
+        return "solved"
     if content.lstrip()[:5] == b"ITEM:":
         if b"ITEM: ATOMS" in content:
             return "particles"
@@ -71,7 +76,7 @@ def _photoelastic(content):
     whole = lines if len(content) <= LOOKED_AT else lines[:-1]
     for line in filter(str.strip, whole[:ROWS]):
         try:
-            rows.append([float(field) for field in line.replace(";", ",").split(",")])
+            rows.append([float(field) for field in re.split(r"[;,\s]+", line.strip(" ;,\t"))])
         except ValueError:
             if rows:  # only the first line may have names
                 return None

@@ -1,4 +1,4 @@
-"""Files with a few bytes changed, to try what reads them."""
+"""Files with a few bytes changed, as damaged disks and careless hands leave them."""
 
 PIECES = [
     b"",

@@ -1,11 +1,17 @@
-"""The tutorial notebook: it runs, and was committed as it runs."""
+"""The notebooks: they run, and were committed as they run."""
 
 from pathlib import Path
 
 import nbformat
+import pytest
 from nbclient import NotebookClient
 
-TOUR = Path(__file__).parents[1] / "data" / "tour.ipynb"
+DATA = Path(__file__).parents[1] / "data"
+# What each shows at least: pictures and tables.
+NOTEBOOKS = {
+    "tour.ipynb": {"image/svg+xml", "text/html"},
+    "frames.ipynb": {"image/png", "text/html"},
+}
 
 
 def shown(notebook):
@@ -17,15 +23,15 @@ def shown(notebook):
     ]
 
 
-def test_the_tour_runs_and_shows_what_it_showed():
-    assert TOUR.stat().st_size < 1e6
-    committed = nbformat.read(TOUR, as_version=4)
-    here = {"metadata": {"path": str(TOUR.parent)}}
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_it_runs_and_shows_what_it_showed(name):
+    assert (DATA / name).stat().st_size < 1e6
+    committed = nbformat.read(DATA / name, as_version=4)
+    here = {"metadata": {"path": str(DATA)}}
     executed = nbformat.from_dict(committed)
     for cell in executed.cells:
         if cell.cell_type == "code":
             cell.outputs = []
     NotebookClient(executed, timeout=300, kernel_name="python3", resources=here).execute()
     assert shown(executed) == shown(committed)
-    kinds = set().union(*shown(committed))
-    assert {"image/svg+xml", "text/html"} <= kinds  # pictures and tables
+    assert NOTEBOOKS[name] <= set().union(*shown(committed))

@@ -21,9 +21,9 @@ HELP = """
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
 contacts; <b>tables</b> (CSV): grains with columns x, y, r, and, if there are any, contacts with
 columns i, j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
-y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), for which the nearest forces in
-balance are found. The files are read in memory; only a packing is kept, in the cache; a frame is
-not.
+y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code>
+of PeGS 2, for which the nearest forces in balance are found. The files are read in memory; only a
+packing is kept, in the cache; a frame is not.
 """
 REPORT = """
 <table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
@@ -82,8 +82,8 @@ class View:
     def _ask(self):
         """Show the fields that the files at hand need."""
         kind = uploads.family(self.files) if self.files else None
-        self.mu.visible = kind in ("lammps", "table", "pegs")
-        self.reverse.visible = kind == "pegs"
+        self.mu.visible = kind in ("lammps", "table", "pegs", "solved")
+        self.reverse.visible = kind in ("pegs", "solved")
         self.box.visible = self.pressure.visible = kind == "table"
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
 
@@ -111,7 +111,7 @@ class View:
         except InputError as error:
             self._refuse(str(error))
             return
-        if uploads.family(self.files) == "pegs":
+        if uploads.family(self.files) in ("pegs", "solved"):
             self._clear()
             self.task.start(photoelastic.infer(self.files, **options), self._compare)
             return
@@ -120,7 +120,7 @@ class View:
     def _options(self):
         kind = uploads.family(self.files)
         options = {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
-        if kind == "pegs":
+        if kind in ("pegs", "solved"):
             options["reverse"] = self.reverse.value
         if kind == "table":
             sides = (self.box.value_input or self.box.value).replace(",", " ").split()
@@ -143,7 +143,8 @@ class View:
 
     def _compare(self, frame):
         """Measured beside inferred forces; the frame itself stays here, as it has no pressure."""
-        self.frame[:] = measured.panel(frame)
+        shown = measured.Frames(frame, dict(self.files), self.task, **self._options())
+        self.frame[:] = shown.panel()
 
     def _clear(self):
         self.report.object = ""

@@ -7,6 +7,7 @@
 import time
 
 from granforce.bench.conditions import knowledge
+from granforce.bench.frames import frames
 from granforce.bench.inference import inference
 from granforce.bench.kernel import growth, kernel, pushes, starts
 from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
@@ -26,6 +27,7 @@ __all__ = [
     "compaction_growth",
     "contact_updates",
     "environment",
+    "frames",
     "growth",
     "inference",
     "interval_methods",
@@ -62,6 +64,7 @@ PARTS = {
     "interval_methods": (interval_methods, "Exact intervals against other tools"),
     "uniform": (uniform, "Uniform sampling of S"),
     "inference": (inference, "The likeliest network of a measurement"),
+    "frames": (frames, "Photoelastic frames of known forces: distance from the truth in ⟨f_n⟩"),
     "knowledge": (knowledge, "What is prescribed and known, beside HiGHS and PIQP"),
     "walks": (walks, "Random walks by solver"),
 }

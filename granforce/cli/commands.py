@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from granforce import measures
+from granforce.cli import frames
 from granforce.packing import importers, scenes
 from granforce.perturb.critical_force import COUNTS
 from granforce.records import InputError, check_memory, whole
@@ -247,18 +248,25 @@ INFERENCE_LINES = (
 
 def infer(arguments):
     """The likeliest network of measured forces, with error bars if wanted; report it."""
-    asked = _conditions(arguments)
+    if arguments.frames is not None:
+        return frames.infer_frames(arguments, _flaws_and_walls(arguments))
+    if arguments.files or arguments.measured is None:
+        raise InputError(
+            "give --measured FILE.csv and a packing, or files of frames with --frames all"
+        )
+    asked, states = _conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = importers.read_measurement(arguments.measured)
 
     def name(packing):
         return kinds.INFERENCE.parameters(
             packing,
             measured,
-            arguments.states,
+            states,
             arguments.sample_seed,
             mu=arguments.ensemble_mu,
             chains=arguments.chains,
             unmeasured=arguments.unmeasured,
+            again=arguments.again,
             certain=arguments.certain,
             **asked,
         )
@@ -296,7 +304,7 @@ def infer(arguments):
         lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
         lines |= {"carry_for_certain": columns["contact"][order].tolist()}
         columns |= {"least_f_n": dataset["least_normal"].values}
-    if arguments.states:
+    if states:
         error = dataset["standard_error"].values
         lines |= {"states": dataset.sizes["state"], "mean_standard_error": error.mean() / scale}
         lines |= {name: dataset[name].item() for name in INFERENCE_LINES}
@@ -500,13 +508,20 @@ def import_(arguments):
         if arguments.contacts is None:
             raise InputError("import lammps needs two dumps: particles and contacts")
         packing = importers.read_lammps(arguments.grains, arguments.contacts, arguments.mu)
+    elif arguments.format in ("yade", "mercury"):
+        if arguments.contacts is None:
+            raise InputError(f"import {arguments.format} needs two files: grains and contacts")
+        read = importers.read_yade if arguments.format == "yade" else importers.read_mercury
+        packing = read(arguments.grains, arguments.contacts, arguments.mu, box=arguments.box)
     else:
+        columns = None if arguments.columns is None else importers.read_columns(arguments.columns)
         packing = importers.read_table(
             arguments.grains,
             arguments.contacts,
             mu=arguments.mu,
             box=arguments.box,
             tilt=arguments.tilt,
+            columns=columns,
             forces=True if arguments.forces else None,
             pressure=arguments.pressure,
         )
@@ -520,17 +535,12 @@ def import_(arguments):
 
 def _import_pegs(arguments):
     """Read a photoelastic frame; report and save it, and what was measured."""
-    if arguments.contacts is None:
-        raise InputError("import pegs needs two files: positions and adjacency")
     _outputs(arguments.measured)
     found = importers.read_pegs(
         *(arguments.grains, arguments.contacts),
         mu=arguments.mu,
         frame=arguments.frame,
-        reach=arguments.reach,
-        scale=arguments.scale,
-        error=arguments.error,
-        reverse=arguments.reverse,
+        **_flaws_and_walls(arguments),
     )
     if arguments.out is not None:
         importers.save_packing(found.packing, arguments.out)
@@ -540,6 +550,20 @@ def _import_pegs(arguments):
         columns |= dict(zip(importers.measurements.COLUMNS, values, strict=True))
         _write_csv(arguments.measured, columns)
     report(found.report, arguments.json)
+
+
+def _flaws_and_walls(arguments):
+    """What the options say of flaws and walls, as `importers.read_pegs` takes it."""
+    if arguments.strict and arguments.repair is not None:
+        raise InputError("--strict mends nothing: leave out --repair")
+    repair = True if arguments.repair is None else arguments.repair
+    forces = dict(importers.read_wall_force(text) for text in arguments.wall_force)
+    return {
+        **{name: getattr(arguments, name) for name in ("reach", "scale", "error", "reverse")},
+        "repair": False if arguments.strict else repair,
+        "walls": arguments.walls,
+        "wall_forces": forces,
+    }
 
 
 def scan(arguments):

@@ -249,25 +249,37 @@ def _add_infer(commands):
         "infer",
         "infer",
         "find the admissible network that measured forces speak for, with error bars",
-        "granforce infer --packing frame.npz --measured frame.csv --unmeasured 1",
+        "granforce infer --packing frame.npz --measured frame.csv --unmeasured 1\n"
+        "  granforce infer folder --frames all --mu 0.5 --out series.zarr",
+    )
+    command.add_argument(
+        "files",
+        nargs="*",
+        help="with --frames: a folder, *_solved.mat files, or positions and adjacency",
     )
     _add_any_packing(command)
     group = command.add_argument_group("the inference")
     group.add_argument(
         "--measured",
         metavar="FILE.csv",
-        required=True,
         help="columns contact, f_n, f_t, sigma_n, sigma_t; empty or nan where not measured",
     )
     group.add_argument(
         "--unmeasured",
         type=float,
-        default=1000.0,
         help="what was not measured counts as 0 with an error of so many ⟨f_n⟩ (default 1000: any "
-        "force; a photoelastic frame, without a pressure, wants about 1)",
+        "force; with --again 2, with --frames 1: a frame without a pressure wants about 1)",
     )
     group.add_argument(
-        "--states", type=int, default=1000, help="draws for error bars (default 1000; 0: none)"
+        "--again",
+        action="store_true",
+        help="error bars for forces that came about by dynamics: the likeliest network is measured "
+        "again and again (without: all networks are alike before the measurement)",
+    )
+    group.add_argument(
+        "--states",
+        type=int,
+        help="draws for error bars (default 1000, with --frames 200; 0: none)",
     )
     group.add_argument(
         "--certain",
@@ -281,6 +293,14 @@ def _add_infer(commands):
     group.add_argument("--csv", metavar="FILE.csv", help="write the result per contact")
     _add_conditions(command)
     _add_store(command)
+    series = command.add_argument_group("many photoelastic frames")
+    series.add_argument(
+        "--frames", help="all, or numbers separated by commas: import and infer each of them"
+    )
+    series.add_argument("--out", metavar="FOLDER.zarr", help="write all frames as one dataset")
+    _add_reading(series)
+    _add_flaws_and_walls(series)
+    _add_scheduler(command)
 
 
 def _add_measure(commands):
@@ -502,12 +522,21 @@ def _add_import(commands):
         "  granforce import pegs positions.txt adjacency.txt --mu 0.5 --out frame.npz "
         "--measured frame.csv",
     )
-    command.add_argument("format", choices=["lammps", "table", "pegs"])
-    command.add_argument("grains", help="LAMMPS particle dump, table with x, y, r, or positions")
-    command.add_argument("contacts", nargs="?", help="LAMMPS contact dump, table, or adjacency")
+    command.add_argument("format", choices=["lammps", "yade", "mercury", "table", "pegs"])
+    command.add_argument(
+        "grains",
+        help="LAMMPS particle dump, bodies of YADE, .data of MercuryDPM, table with x, y, r, "
+        "positions, or a *_solved.mat of PeGS 2",
+    )
+    command.add_argument(
+        "contacts", nargs="?", help="LAMMPS contact dump, interactions, .fstat, table, or adjacency"
+    )
     command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
     command.add_argument(
-        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="table: box sides"
+        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="table, yade, mercury: box sides"
+    )
+    command.add_argument(
+        "--columns", metavar="x=…,y=…", help="table: what columns are called in the files"
     )
     command.add_argument(
         "--tilt", type=float, default=0.0, help="table: tilt of the box, LAMMPS' xy (default 0)"
@@ -517,6 +546,14 @@ def _add_import(commands):
     command.add_argument("--out", metavar="FILE.npz", help="save the packing to this file")
     group = command.add_argument_group("photoelastic frames (pegs)")
     group.add_argument("--frame", type=float, help="number of the frame (default: the last)")
+    _add_reading(group)
+    _add_flaws_and_walls(group)
+    group.add_argument(
+        "--measured", metavar="FILE.csv", help="write the measured forces, for granforce infer"
+    )
+
+
+def _add_reading(group):
     group.add_argument(
         "--reach",
         type=float,
@@ -531,8 +568,30 @@ def _add_import(commands):
     group.add_argument(
         "--reverse", action="store_true", help="tangential forces have the other sign"
     )
+
+
+def _add_flaws_and_walls(group):
     group.add_argument(
-        "--measured", metavar="FILE.csv", help="write the measured forces, for granforce infer"
+        "--repair",
+        type=float,
+        metavar="PART",
+        help="mend up to this part of the data (default 0.1); what was mended is told",
+    )
+    group.add_argument("--strict", action="store_true", help="mend nothing: the first flaw ends it")
+    group.add_argument(
+        "--walls",
+        metavar="SHAPE",
+        help="walls that count: box, annulus or circle, found from the grains at them or with "
+        "numbers (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); open: left open "
+        "(default: where a *_solved.mat has the directions of their contacts)",
+    )
+    group.add_argument(
+        "--wall-force",
+        metavar="'WALL: FX FY SIGMA'",
+        action="append",
+        default=[],
+        help="force of the grains on a wall of a box (left, right, bottom, top: by x and y), as a "
+        "load cell measured it; may be given several times",
     )
 
 

@@ -12,10 +12,11 @@ from scipy.sparse.linalg import splu
 
 from granforce.forces import knowledge
 from granforce.forces.contact_problem import forces_of, problem_of
+from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import likeliest_piqp
 from granforce.numerics import certificates, contact_program
 from granforce.numerics.contact_program import OPTIMUM, PINNED
-from granforce.numerics.lanes import ONE
+from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.records import InputError, positive
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
@@ -29,6 +30,8 @@ UNMEASURED = 1e3
 _MOST_STEPS, _BALANCE, _CLOSED, _CLOSED_BETWEEN_BOUNDS = 150, BALANCED / 4, 1e-24, 1e-11
 # Coordinates y (in ⟨f_n⟩) up to this lie on the wall of their cone.
 _ON_THE_WALL = 1e-6
+# What the last digits of balance may move a force by, in ⟨f_n⟩.
+_NEAR = 1e-6
 # Added to a diagonal of 1: more than rounding, and less than what is not.
 _SHIFTS = 1e-12, 1e-10
 
@@ -85,29 +88,53 @@ def checked(ensemble, measured, sigma):
 
 def fitted(ensemble, m, s, unmeasured=UNMEASURED):
     """The forces (N_c, 2) of `likeliest`, for m and σ that were checked."""
+    return fitted_many(ensemble, m[None], s, unmeasured)[0]
+
+
+def fitted_many(ensemble, many, s, unmeasured=UNMEASURED):
+    """The same (k, N_c, 2) of k ≤ LANES measurements (k, N_c, 2) of the same components, in lanes.
+
+    Each gives the same network as alone.
+    """
     problem, unit = problem_of(ensemble), ensemble.force_scale
+    m, width = many[0], 1 if len(many) == 1 else LANES
     # Tangential forces are kept as f_t/μ.
     w = np.where(np.isnan(m), unmeasured, s / unit) ** -2.0 * [1.0, ensemble.mu**2]
     scale = w.max(initial=0.0)
     problem = problem._replace(w=np.where(problem.w < PINNED, w.ravel() / scale, PINNED))
-    target = np.nan_to_num(m / unit) / [1.0, ensemble.mu or 1.0]
-    pulls = np.where(problem.w.reshape(w.shape) < PINNED, w / scale * target, 0.0)
-    at = contact_program.make_iterate(problem, 1)
-    work = contact_program.make_workspace(problem, 1)
-    at.c[: w.size : 2, 0] = -0.5 * (pulls[:, 0] + pulls[:, 1])
-    at.c[1 : w.size : 2, 0] = -0.5 * (pulls[:, 0] - pulls[:, 1])
-    work.going[:] = 1.0
+    at = contact_program.make_iterate(problem, width)
+    work = contact_program.make_workspace(problem, width)
+    for lane, values in enumerate(many):
+        target = np.nan_to_num(values / unit) / [1.0, ensemble.mu or 1.0]
+        pulls = np.where(problem.w.reshape(w.shape) < PINNED, w / scale * target, 0.0)
+        at.c[: w.size : 2, lane] = -0.5 * (pulls[:, 0] + pulls[:, 1])
+        at.c[1 : w.size : 2, lane] = -0.5 * (pulls[:, 0] - pulls[:, 1])
+    work.going[:] = 0.0
+    work.going[0, : len(many)] = 1.0
     closed = (_CLOSED_BETWEEN_BOUNDS if len(problem.side) else _CLOSED) * len(at.y)
+    lanes = ONE if width == 1 else MANY
     for _ in range(_MOST_STEPS):
         cancelling.check("inference")
-        contact_program.look(problem, False, at, work, ONE)
-        if work.unbalance[0, 0] <= _BALANCE and work.product[0, 0] <= closed:
+        contact_program.look(problem, False, at, work, lanes)
+        there = (work.unbalance[0] <= _BALANCE) & (work.product[0] <= closed)
+        work.going[0, there] = 0.0
+        if not work.going[0].any():
             break
-        contact_program.advance(problem, False, OPTIMUM, at, work, ONE)
-    forces = forces_of(ensemble, at.y[:-1, 0])
-    if ensemble.residual(forces) <= BALANCED:
-        return forces
-    forces = likeliest_piqp(ensemble, 1 / np.where(np.isnan(m), unmeasured * unit, s), m)
+        contact_program.advance(problem, False, OPTIMUM, at, work, lanes)
+    forces = np.stack([forces_of(ensemble, at.y[:-1, lane]) for lane in range(len(many))])
+    for lane in np.flatnonzero(~(ensemble.residual(forces) <= BALANCED)):
+        forces[lane] = _otherwise(ensemble, forces[lane], many[lane], s, unmeasured)
+    return forces
+
+
+def _otherwise(ensemble, forces, m, s, unmeasured):
+    """The likeliest network where rounding left the steps just outside S, or they ended nowhere."""
+    found = nearest(ensemble, forces) if np.isfinite(forces).all() else None
+    if found is not None and found.converged and found.residual <= BALANCED:
+        if np.abs(found.forces - forces).max() <= _NEAR * ensemble.force_scale:
+            return found.forces
+    spread = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
+    forces = likeliest_piqp(ensemble, 1 / spread, m)
     if ensemble.admits(forces):
         return forces
     if ensemble.member is not None and ensemble.dimension == 0:

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 
+from granforce.explore import remeasured
 from granforce.explore.carrying import carrying
 from granforce.explore.infer import infer
 from granforce.explore.informative import informative
@@ -282,7 +283,8 @@ def _inference_parameters(
     states=0,
     seed=0,
     *,
-    unmeasured=UNMEASURED,
+    unmeasured=None,
+    again=False,
     certain=False,
     mu=None,
     chains=4,
@@ -292,11 +294,15 @@ def _inference_parameters(
     """The parameters that name an inference: its packing, its measurement, and its draws.
 
     measured: a Measurement, which is named by a hash of its arrays; mu, keep: as of a walk; states,
-    chains, unmeasured: as for `infer`. certain: whether contacts that were not measured are tried
+    chains, unmeasured: as for `infer`. again: draws are those of `remeasured`, for networks made by
+    dynamics. certain: whether contacts that were not measured are tried
     for carrying in every network. asked: the conditions.
     """
     size = _size(packing, max(1, states), seed, chains, keep) | {"states": whole(states, "states")}
+    if unmeasured is None:
+        unmeasured = remeasured.UNMEASURED if again else UNMEASURED
     named = {"measured": _digest(*measured), "unmeasured": positive(unmeasured, "unmeasured")}
+    named |= {"again": True} if again else {}
     return {**_cones(packing, mu, **asked), **size, **named, "certain": bool(certain)}
 
 
@@ -310,7 +316,8 @@ def _inference(store, parameters, *, workers, progress, measured=None):
     begin = time.perf_counter()
     S = _ensemble(store, parameters)
     forces, sigma = (values[S.index] for values in measured.on(len(S.packing.contacts.i)))
-    found = infer(
+    again = parameters.get("again") and parameters["states"]
+    found = (remeasured.remeasured if again else infer)(
         *(S, forces, sigma),
         states=parameters["states"],
         seed=parameters["seed"],

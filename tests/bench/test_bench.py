@@ -226,3 +226,10 @@ def test_knowledge_compares_the_same_programs():
             assert max(ours["residual"], baseline["residual"]) <= 1e-9
             assert 0 <= ours["above"] < 1e-6 and baseline["off"] < 1e-4
     assert rows[0]["programs"] == 4 * len(ensemble(packed(30, 0.3)).index)
+
+
+def test_frames_are_nearer_to_the_truth_when_inferred():
+    (row,) = bench.frames(n=60, packings=2, cases=((0.2, 0.1, 1.0),))
+    assert 0 < row["likeliest_f_n"] < row["raw_f_n"] and row["likeliest_f_t"] < row["raw_f_t"]
+    assert row["stress"] < row["raw_stress"] and row["suspected"] > 0.7
+    assert 0.4 < row["cover"] < 0.95 and 0.5 < row["chi"] < 1.6

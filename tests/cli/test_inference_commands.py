@@ -58,3 +58,33 @@ def test_a_measurement_of_another_packing_is_told(folder, capsys):
     (folder / "some.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n5000,1.5,,0.1,\n")
     assert main("infer -n 20 --mu 0.3 --measured some.csv".split()) == 2
     assert "right packing" in capsys.readouterr().err
+
+
+def test_what_was_mended_is_told_and_may_be_forbidden(folder, capsys):
+    with open(folder / "adjacency.txt", "a") as file:
+        file.write("\n1,3,99999,0.0,0.01")
+    words = "import pegs positions.txt adjacency.txt --mu 0.3 --reach 0.1"
+    found = told(words, capsys)
+    assert found["contacts_of_missing_grains"] == 1 and "99999" in found["findings"][0]
+    assert main(words.split()) == 0
+    assert "99999" in capsys.readouterr().out
+    for options in ("--strict", "--repair 2", "--strict --repair 0.1", "--walls cube"):
+        assert main([*words.split(), *options.split()]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert main([*words.split(), "--walls", "box", "--wall-force", "right: 1 2"]) == 2
+    walls = told(f"{words} --walls box", capsys)
+    assert walls["walls"] == "left, right, bottom, top" and walls["wall_contacts"] > 4
+
+
+def test_error_bars_by_measuring_again(folder, capsys):
+    told(
+        "import pegs positions.txt adjacency.txt --mu 0.3 --reach 0.1 --out frame.npz "
+        "--measured frame.csv",
+        capsys,
+    )
+    words = "infer --packing frame.npz --measured frame.csv --unmeasured 1 --states 40"
+    flat, again = told(words, capsys), told(f"{words} --again", capsys)
+    assert again["states"] == 40 and not again["cached"]
+    assert again["chi_square"] == flat["chi_square"]
+    assert again["mean_standard_error"] != flat["mean_standard_error"]
+    assert told(f"{words} --again", capsys)["cached"]

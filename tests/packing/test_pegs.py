@@ -63,7 +63,7 @@ def test_without_candidates_balance_is_left_open():
 
 def test_what_is_listed_twice_is_averaged_and_differs_by_its_error():
     grains, rows, _ = frame(noise=0.2)
-    found = read(grains, rows, mu=0.3, error=0.1 * NEWTON)
+    found = read(grains, rows, mu=0.3, error=0.1 * NEWTON, repair=False)
     assert found.report["listed_twice_with_other_forces"] == len(rows) // 2
     forward, backward = rows[0], rows[1]
     i, j = sorted(((forward[1] - 3) // 10, (forward[2] - 3) // 10))

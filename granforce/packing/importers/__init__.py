@@ -1,23 +1,31 @@
-"""Packings from files: granforce's own NPZ, LAMMPS dumps, tables, and photoelastic experiments.
+"""Packings from files: our own NPZ, LAMMPS, YADE, MercuryDPM, tables, photoelastic experiments.
 
 Whatever a file holds, these functions return a validated Packing or raise InputError.
 """
 
+from granforce.packing.importers.dem import read_mercury, read_yade
 from granforce.packing.importers.known import read_known
 from granforce.packing.importers.lammps import read_lammps
 from granforce.packing.importers.measurements import read_measurement
 from granforce.packing.importers.network import report
 from granforce.packing.importers.npz import load_packing, save_packing
 from granforce.packing.importers.pegs import read_pegs
-from granforce.packing.importers.tables import read_table
+from granforce.packing.importers.synthetic import synthetic_frame
+from granforce.packing.importers.tables import read_columns, read_table
+from granforce.packing.importers.walls import read_wall_force
 
 __all__ = [
     "load_packing",
+    "read_columns",
     "read_known",
     "read_lammps",
     "read_measurement",
+    "read_mercury",
     "read_pegs",
     "read_table",
+    "read_wall_force",
+    "read_yade",
     "report",
     "save_packing",
+    "synthetic_frame",
 ]

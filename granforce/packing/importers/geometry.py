@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from granforce.packing.neighbours import find_pairs, separations
-from granforce.records import InputError, make_contacts, make_packing, positive
+from granforce.records import Cell, InputError, make_contacts, make_packing, positive
 
 # Contacts may overlap, or gape, by this part of the smaller radius before the file must be wrong.
 OVERLAP_ALLOWED = 0.2
@@ -19,6 +19,9 @@ EXTENT = 1e7
 # Pairs within one largest diameter that may be looked at for overlaps: above, grains lie on top
 # of each other (or sizes differ too much), and the list of pairs would not fit into memory.
 CLOSE_PAIRS = 20_000_000
+
+# No direction is periodic.
+OPEN = Cell(np.full(2, np.inf), 0.0)
 
 
 def touching(x, r, cell, tolerance):

@@ -149,8 +149,9 @@ def _contacts(arrays, r, info):
     arms = {}
     for key, grain in zip(_ARMS, (contacts.i, contacts.j), strict=True):
         arms[key] = float_array(arrays[key], grain.shape, key)
-        # From the rigid disk's radius to the middle of the overlap, and no farther.
-        if np.any(np.abs(arms[key] - r[grain]) > np.abs(contacts.gap) / 2 + rounding * r[grain]):
+        # From the rigid disk's radius to the middle of the overlap, and no farther; 0 for a wall.
+        far = np.abs(arms[key] - r[grain]) > np.abs(contacts.gap) / 2 + rounding * r[grain]
+        if np.any(far & (arms[key] != 0)):
             raise InputError(f"lever arms {key} do not fit the radii; remove them")
     # A file written by save_packing: its normals have been divided by their length before.
     return contacts._replace(**arms | ({"normal": normal} if exact else {}))

@@ -1,13 +1,10 @@
-"""Packings and measured forces from photoelastic experiments, in the format of PeGS.
-
-positions: a line per grain with frame, id, x, y, radius and, if wanted, a flag that is not 0 for
-grains at a wall. adjacency: a line per contact with frame, the two ids (negative: a wall),
-tangential and normal force; contacts may be listed both ways.
+"""Packings and measured forces from photoelastic experiments, in the formats of PeGS.
 
 Such data do not balance: contacts were missed, others are wrong, and radii are known to some
-tenths only. So pairs that are about as near as the listed ones join as candidates that were not
-measured; a linear program then finds the fewest grains that still cannot be balanced, and their
-balance is left open, as is that of grains at walls.
+tenths only. What is wrong by itself is mended first (`repair`). Pairs that are about as near as the
+listed ones join as candidates that were not measured; a linear program then finds the fewest grains
+that still cannot be balanced, and their balance is left open. So is that of grains at walls, unless
+the directions of their contacts with the walls are known (`walls`).
 """
 
 from typing import NamedTuple
@@ -20,11 +17,15 @@ from granforce import notebook
 from granforce.forces.ensemble import ensemble
 from granforce.forces.likeliest import likeliest
 from granforce.numerics import highs
-from granforce.packing.importers.geometry import check_disks
+from granforce.packing.importers import solved
+from granforce.packing.importers.geometry import OPEN, check_disks
+from granforce.packing.importers.listing import plain, read_frames
 from granforce.packing.importers.network import judged
-from granforce.packing.importers.text import check_grains, make_table, read_text
+from granforce.packing.importers.repair import KINDS, OVERLAP, repaired, rows_of
+from granforce.packing.importers.text import check_grains
+from granforce.packing.importers.walls import bodies, read_outline, wall_contacts
 from granforce.records import (
-    Cell,
+    Contacts,
     InputError,
     Packing,
     UndecidedError,
@@ -34,28 +35,29 @@ from granforce.records import (
     positive,
 )
 
-_GRAINS = ("frame", "id", "x", "y", "radius", "flag")
-_CONTACTS = ("frame", "id1", "id2", "tangential", "normal")
 # What changing a measured force by ⟨f_n⟩ costs, where ⟨f_n⟩ of unbalance costs 1.
 _CHANGE = 0.2
 # Unbalance in ⟨f_n⟩ up to which a grain is balanced.
 _BALANCED = 1e-6
-# Disks may overlap by this part of the smaller radius before the file must be wrong.
-_OVERLAP = 0.5
 # Contacts a grain needs at least to be judged by its balance.
 _ENOUGH = 3
+# Findings of one kind that are listed in the report.
+_LISTED = 10
 
 
 class Photoelastic(NamedTuple):
-    """A packing with measured forces; contacts are those listed, then the candidates."""
+    """A packing with measured forces; contacts: those listed, candidates, those of walls."""
 
     packing: Packing  # its own network is the likeliest one; loads are NaN where balance is open
     measured: np.ndarray  # (N_c, 2) f_n, f_t as listed, force; NaN for candidates
     sigma: np.ndarray  # (N_c, 2) their standard errors
-    added: np.ndarray  # (N_c,) mask of the candidates
+    added: np.ndarray  # (N_c,) mask of contacts that were not listed
     left_open: np.ndarray  # (k,) grains that no admissible forces balance, walls apart
-    ids: np.ndarray  # (N,) their names in the files
-    report: dict  # plain numbers: what was found and what was done
+    at_wall: np.ndarray  # (N,) mask of grains at walls, and of the walls themselves
+    ids: np.ndarray  # (N,) their names in the files; −1, −2, … for the walls
+    walls: tuple  # names of the walls, which are the last bodies of the packing
+    findings: list  # of repair.Finding: what was mended, and where
+    report: dict  # plain numbers and words: the account of what was found and what was done
 
     def _repr_html_(self):
         """The import as notebooks show it."""
@@ -63,9 +65,22 @@ class Photoelastic(NamedTuple):
         return notebook.table("Photoelastic frame", lines)
 
 
+def open_frames(positions, adjacency=None):
+    """Frames to read: `frames` (their numbers) and `listing(frame)`.
+
+    From two text files, or, without adjacency, from a *_solved.mat of PeGS 2; a frame that is one
+    already (`synthetic_frame`) is taken as it is.
+    """
+    if hasattr(positions, "listing"):
+        return positions
+    if adjacency is None:
+        return solved.read_solved(positions)
+    return read_frames(positions, adjacency)
+
+
 def read_pegs(
     positions,
-    adjacency,
+    adjacency=None,
     *,
     mu,
     frame=None,
@@ -73,180 +88,195 @@ def read_pegs(
     scale=1.0,
     error=None,
     reverse=False,
+    repair=True,
+    walls=None,
+    wall_forces=None,
     most_grains=None,
 ):
     """A Photoelastic of one frame, from files or open files of positions and contacts.
 
-    frame: its number, by default the last one that both files have. scale: factor on the radii as
-    listed. reach: largest gap between the disks of a candidate, in mean radii (0: no candidates).
-    error: standard error of a measured component, force; by default the one that makes χ² equal
-    to its degrees of freedom; half the difference of what was listed twice is added in quadrature.
-    reverse: take f_t with the other sign (programs differ). most_grains: how many are taken.
+    Without adjacency, positions is a *_solved.mat of PeGS 2. frame: its number, by default the last
+    one that both files have. scale: factor on the radii as listed. reach: largest gap between the
+    disks of a candidate, in mean radii (0: no candidates). error: standard error of a measured
+    component, force; by default the one that makes χ² equal to its degrees of freedom; half the
+    difference of what was listed twice is added in quadrature. reverse: take f_t with the other
+    sign (programs differ). repair: mend what is wrong by itself, up to a tenth of the data (or the
+    part that is given); False: the first thing wrong raises. most_grains: how many are taken.
 
-    The report tells, in mean measured normal forces, how many inner grains cannot be balanced on
-    the listed contacts alone and with the candidates, by how much in sum, and what came of it.
+    walls: "open" (the balance of grains at walls is not asked for), "box", "annulus" or "circle",
+    found from the grains at walls or with numbers (`walls.read_outline`); by default contacts with
+    walls count where the solver lists their directions. wall_forces: {"right": (f_x, f_y, σ)},
+    forces of the grains on straight walls, measured by load cells.
+
+    The report is an account: what was mended, by kind; how many inner grains cannot be balanced on
+    the listed contacts alone and with the candidates, and by how much in sum, in mean measured
+    normal forces; and what came of it.
 
     Raises InputError naming file and line.
     """
+    return take_frame(
+        *(open_frames(positions, adjacency), frame),
+        mu=mu,
+        reach=reach,
+        scale=scale,
+        error=error,
+        reverse=reverse,
+        repair=repair,
+        walls=walls,
+        wall_forces=wall_forces,
+        most_grains=most_grains,
+    )
+
+
+def take_frame(
+    frames,
+    frame=None,
+    *,
+    mu,
+    reach=0.5,
+    scale=1.0,
+    error=None,
+    reverse=False,
+    repair=True,
+    walls=None,
+    wall_forces=None,
+    most_grains=None,
+):
+    """The Photoelastic of one frame of `open_frames`; everything else as for `read_pegs`."""
     mu, scale = friction(mu), positive(scale, "scale")
     if not 0 <= reach <= 2:
         raise InputError(f"reach is in mean radii and must lie between 0 and 2, got {reach}")
-    grains, links = _table(positions, _GRAINS), _table(adjacency, _CONTACTS)
-    frame = _frame(grains, links, frame)
-    grains, links = _of_frame(grains, frame), _of_frame(links, frame)
-    check_grains(len(grains.rows), most_grains, grains.name)
-    x, r, ids, at_wall = _disks(grains, scale)
-    listed = _listed(links, grains.index("id"), at_wall)
+    if walls is not None and not hasattr(walls, "gaps"):
+        walls = read_outline(walls)
+    listing = frames.listing(frame)
+    check_grains(len(listing.ids), most_grains, listing.names[0])
+    listing = listing._replace(r=scale * listing.r)
     if reverse:
-        listed = listed._replace(forces=listed.forces * [1, -1])
+        listing = listing._replace(forces=listing.forces * [1, -1])
+    listing, account, renamed = repaired(listing, mu, repair)
+    x, r = listing.x, listing.r
+    check_disks(x, r, OPEN, lambda g: listing.place(0, g), OVERLAP)
+    at_wall = listing.flag != 0
+    rows = rows_of(listing)
+    with_wall = (rows == -1).any(axis=1)
+    at_wall[rows[with_wall].max(axis=1)] = True
+    listed = _listed(listing, rows)
     saved = _gain_by_reversing(x, listed, at_wall)
-    alone = _packing(x, r, listed, np.zeros((0, 2), int), at_wall, mu)
-    pairs = _candidates(x, r, listed, at_wall, reach)
-    packing = _packing(x, r, listed, pairs, at_wall, mu)
-    m = np.full((len(packing.contacts.i), 2), np.nan)
-    m[: len(listed.pairs)] = listed.forces
-    unit = float(np.nanmean(np.abs(m[:, 0])))
-    before, after = (_unbalance(P, m[: len(P.contacts.i)], unit) for P in (alone, packing))
+    found = wall_contacts(listing, x, r, at_wall, walls, reach)
+    if wall_forces and found is None:
+        raise InputError("a force on a wall needs walls: give the outline, such as --walls box")
+    made = None if found is None else bodies(found, x, r, wall_forces or {})
+    alone = _packing(x, r, listed, np.zeros((0, 2), int), at_wall, mu, made)
+    still_open = at_wall.copy()
+    if found is not None:
+        still_open[found.grain] = False
+    pairs = _candidates(x, r, listed, still_open, reach)
+    packing = _packing(x, r, listed, pairs, at_wall, mu, made)
+    measured, sigma, factor, added = _measurement(listed, len(pairs), made)
+    unit = float(np.nanmean(np.abs(listed.forces[:, 0])))
+    if not unit > 0:
+        raise InputError(f"{listing.names[1]}: all measured normal forces are 0")
+    of_alone = np.delete(np.arange(len(measured)), len(listed.pairs) + np.arange(len(pairs)))
+    before = _unbalance(alone, measured[of_alone], unit)
+    after = _unbalance(packing, measured, unit) if len(pairs) else before
     left_open = np.flatnonzero(after > _BALANCED)
     load = packing.load.copy()
     load[left_open] = np.nan
     packing = packing._replace(load=load)
-    best, sigma = _inferred(packing, m, listed.spread, error, unit)
+    best, sigma = _inferred(packing, measured, sigma, factor, listed.spread, error, unit)
     packing = packing._replace(forces=best.forces)
-    added = np.arange(len(m)) >= len(listed.pairs)
-    change = np.nanmean(np.abs(best.forces - m), axis=0) / unit
+    names = () if made is None else made.names
+    ids = np.concatenate([listing.ids, -1.0 - np.arange(len(names))])
+    change = np.nanmean(np.abs(best.forces - measured), axis=0) / unit
     gap = packing.contacts.gap
+    first = len(listed.pairs)
     report = {
-        "frame": frame,
+        "frame": plain(listing.frame),
+        "columns": listing.said,
+        **({"names": renamed} if renamed else {}),
         "grains": len(r),
         "grains_at_walls": int(at_wall.sum()),
-        "contacts_listed": len(listed.pairs),
+        "contacts_listed": first,
         "listed_twice": listed.twice,
         "listed_twice_with_other_forces": listed.unequal,
-        "contacts_with_a_wall": listed.with_wall,
-        "negative_normal_forces": int(np.sum(listed.forces[:, 0] < 0)),
-        "beyond_friction": int(np.sum(np.abs(m[:, 1]) > mu * m[:, 0])),
+        "contacts_with_a_wall": int(with_wall.sum()),
+        **account.counts,
+        "walls": ", ".join(names) or "open",
+        "wall_contacts": 0 if found is None else len(found.grain),
         "unbalance_saved_if_tangential_forces_were_reversed": saved,
         "mean_measured_normal_force": unit,
-        "median_gap_in_mean_radii": float(np.median(gap[~added]) / r.mean()),
+        "median_gap_in_mean_radii": float(np.median(gap[:first]) / r.mean()),
         "candidates": len(pairs),
         "unbalanced_on_listed_contacts": int(np.sum(before > _BALANCED)),
         "unbalance_on_listed_contacts": float(before.sum()),
         "unbalanced": len(left_open),
         "unbalance": float(after.sum()),
-        "left_open": [_plain(ids[k]) for k in left_open],
+        "left_open": [plain(ids[k]) for k in left_open],
         "candidates_that_carry": int(np.sum(best.forces[added, 0] > _BALANCED * unit)),
-        "error": float(np.nanmedian(sigma[:, 0]) / unit),
+        "error": float(np.nanmedian(sigma[:first, 0]) / unit),
         "chi_square": best.chi_square,
         "freedom": best.freedom,
         "mean_change_of_f_n": float(change[0]),
         "mean_change_of_f_t": float(change[1]),
+        "findings": _told(account),
     }
-    info = {"source": "pegs", "frame": frame, "largest_gap": float(np.abs(gap).max() / r.min())}
+    shorter = np.minimum(*packing.r[np.stack([packing.contacts.i, packing.contacts.j])])
+    info = {"source": "pegs", "frame": report["frame"], "walls": len(names)}
+    info["largest_gap"] = float(np.abs(gap / shorter).max())
     packing = packing._replace(info=info | judged(packing))
-    return Photoelastic(packing, m, sigma, added, left_open, ids, report)
+    open_or_wall = np.concatenate([at_wall, np.ones(len(names), dtype=bool)])
+    return Photoelastic(
+        *(packing, measured, sigma, added, left_open, open_or_wall, ids, names),
+        *(account.findings, report),
+    )
+
+
+def _told(account):
+    """What was found of each kind, in lines of words, the first ones of many."""
+    lines = []
+    for kind, (words, *_) in KINDS.items():
+        found = account.of(kind)
+        if found:
+            more = f"; and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
+            told = "; ".join(one.text for one in found[:_LISTED])
+            lines.append(f"{len(found)} {words}: {told}{more}")
+    return lines
 
 
 class _Listed(NamedTuple):
     """Contacts between two grains, each once."""
 
     pairs: np.ndarray  # (k, 2) grains, the first before the second
-    forces: np.ndarray  # (k, 2) mean of what is listed
+    forces: np.ndarray  # (k, 2) mean of what is listed; NaN where that was no measurement
     spread: np.ndarray  # (k, 2) half of the largest difference
+    factor: np.ndarray  # (k,) variance of the mean, in that of a usual line
     twice: int
     unequal: int  # listed twice, with different forces
-    with_wall: int
 
 
-def _table(source, header):
-    """A Table of comma-separated numbers, its first line left out where that has names."""
-    name, text = read_text(source)
-    rows, lines = [], []
-    for number, line in enumerate(text.splitlines(), start=1):
-        fields = [field.strip() for field in line.replace(";", ",").split(",")]
-        if not any(fields) or (not rows and not _is_number(fields[0])):
-            continue
-        if len(fields) < 5:
-            raise InputError(
-                f"{name}, line {number}: {len(fields)} fields where {', '.join(header)} are "
-                "wanted; is it a file of PeGS?"
-            )
-        rows.append(([*fields, "0"])[: len(header)])
-        lines.append(number)
-    if not rows:
-        raise InputError(f"{name}: no line with numbers; is it a file of PeGS?")
-    return make_table(name, header, rows, lines)
-
-
-def _is_number(text):
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _frame(grains, links, frame):
-    """The number of the frame to take."""
-    both = np.intersect1d(grains.numbers("frame"), links.numbers("frame"))
-    if not len(both):
-        raise InputError(f"{grains.name} and {links.name} have no frame in common")
-    if frame is None:
-        return _plain(both[-1])
-    if frame not in both:
-        raise InputError(
-            f"frame {frame} is not in both files; they have {_plain(both[0])} … {_plain(both[-1])}"
-        )
-    return _plain(float(frame))
-
-
-def _plain(number):
-    return int(number) if float(number).is_integer() else float(number)
-
-
-def _of_frame(table, frame):
-    here = np.flatnonzero(table.numbers("frame") == frame)
-    rows, lines = ([values[k] for k in here] for values in (table.rows, table.lines))
-    return table._replace(rows=rows, lines=lines)
-
-
-def _disks(table, scale):
-    """Positions, radii, names, and which grains are at a wall."""
-    x = np.column_stack([table.numbers("x"), table.numbers("y")])
-    r = scale * table.numbers("radius")
-    check_disks(x, r, Cell(np.full(2, np.inf), 0.0), table.place, _OVERLAP)
-    return x, r, table.numbers("id"), table.numbers("flag") != 0
-
-
-def _listed(table, index, at_wall):
-    """The _Listed of a table; grains that touch a wall, by a negative id, are noted in at_wall."""
-    ends = np.column_stack([table.numbers("id1"), table.numbers("id2")])
-    walls = ends < 0
-    rows = np.flatnonzero(~walls.any(axis=1))
-    for row in np.flatnonzero(walls.any(axis=1)):
-        for end in ends[row][~walls[row]]:
-            if end in index:
-                at_wall[index[end]] = True
-    inner = table._replace(rows=[table.rows[k] for k in rows], lines=[table.lines[k] for k in rows])
-    if not len(rows):
-        raise InputError(f"{table.name}: no contact between two grains")
-    i, j = inner.lookup("id1", index), inner.lookup("id2", index)
-    for c in np.flatnonzero(i == j)[:1]:
-        raise InputError(f"{inner.place(c)}: the grain touches itself; remove the line")
+def _listed(listing, rows):
+    """The _Listed of a listing that was repaired; rows (k, 2) of its ends."""
+    inner = np.all(rows >= 0, axis=1)
     # f_t is that of n and t turned together: it keeps its sign when i and j change places.
-    values = np.column_stack([inner.numbers("normal"), inner.numbers("tangential")])
-    pairs, which = np.unique(np.sort(np.column_stack([i, j])), axis=0, return_inverse=True)
-    times = np.bincount(which.ravel())
-    low, high, total = np.full((3, len(pairs), 2), 0.0)
+    pairs, which = np.unique(np.sort(rows[inner]), axis=0, return_inverse=True)
+    which, values = which.ravel(), listing.forces[inner]
+    good = np.isfinite(values[:, 0])
+    weight = np.where(good, listing.weight[inner], 0.0)
+    total = np.bincount(which, weight, len(pairs))
+    low, high, mean = np.full((3, len(pairs), 2), 0.0)
     low[:], high[:] = np.inf, -np.inf
-    for reduce, into in ((np.minimum, low), (np.maximum, high), (np.add, total)):
-        reduce.at(into, which.ravel(), values)
-    spread, twice = 0.5 * (high - low), times > 1
-    return _Listed(
-        *(pairs, total / times[:, None], spread),
-        *(int(twice.sum()), int(np.sum(spread.any(axis=1)))),
-        int(walls.any(axis=1).sum()),
-    )
+    np.minimum.at(low, which[good], values[good])
+    np.maximum.at(high, which[good], values[good])
+    np.add.at(mean, which[good], weight[good, None] * values[good])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean /= total[:, None]
+        factor = (
+            1 if listing.both_ways else np.bincount(which[good], minlength=len(pairs))
+        ) / total
+        spread = np.where(np.isfinite(mean), 0.5 * (high - low), np.nan)
+    times = np.bincount(which, minlength=len(pairs))
+    unequal = int(np.sum(np.nan_to_num(spread).any(axis=1)))
+    return _Listed(pairs, mean, spread, factor, int(np.sum(times > 1)), unequal)
 
 
 def _gain_by_reversing(x, listed, at_wall):
@@ -260,7 +290,8 @@ def _gain_by_reversing(x, listed, at_wall):
     inner = ~at_wall & (np.bincount(listed.pairs.ravel(), minlength=len(x)) >= _ENOUGH)
     off = []
     for sign in (1, -1):
-        force = listed.forces[:, :1] * normal + sign * listed.forces[:, 1:] * across
+        force = np.nan_to_num(listed.forces)
+        force = force[:, :1] * normal + sign * force[:, 1:] * across
         total = np.zeros_like(x)
         np.add.at(total, listed.pairs[:, 1], force)
         np.add.at(total, listed.pairs[:, 0], -force)
@@ -268,19 +299,19 @@ def _gain_by_reversing(x, listed, at_wall):
     return float(1 - off[1] / off[0]) if off[0] > 0 else 0.0
 
 
-def _candidates(x, r, listed, at_wall, reach):
-    """Pairs (k, 2) that are not listed, with a gap up to `reach`, one of them inside."""
+def _candidates(x, r, listed, left_open, reach):
+    """Pairs (k, 2) that are not listed, with a gap up to `reach`, one of them to be balanced."""
     far = 2 * r.max() + reach * r.mean()
     pairs = cKDTree(x).query_pairs(far, output_type="ndarray") if reach else np.zeros((0, 2), int)
     pairs = np.sort(pairs.astype(np.int64))
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     gap = np.hypot(*(x[pairs[:, 1]] - x[pairs[:, 0]]).T) - r[pairs].sum(axis=1)
     known = np.isin(pairs @ [len(x), 1], listed.pairs @ [len(x), 1])
-    return pairs[(gap <= reach * r.mean()) & ~known & ~at_wall[pairs].all(axis=1)]
+    return pairs[(gap <= reach * r.mean()) & ~known & ~left_open[pairs].all(axis=1)]
 
 
-def _packing(x, r, listed, pairs, at_wall, mu):
-    """The packing of listed and candidate contacts; forces as listed, 0 for candidates.
+def _packing(x, r, listed, pairs, at_wall, mu, walls=None):
+    """The packing of listed and candidate contacts, and those with walls; forces as listed, else 0.
 
     Contact points lie midway between the disks, whose radii are not known well.
     """
@@ -289,10 +320,33 @@ def _packing(x, r, listed, pairs, at_wall, mu):
     length = np.hypot(*branch.T)
     contacts = make_contacts(i, j, branch / length[:, None], length, r)
     arms = {"arm_i": r[i] + contacts.gap / 2, "arm_j": r[j] + contacts.gap / 2}
-    forces = np.concatenate([listed.forces, np.zeros((len(pairs), 2))])
+    contacts = contacts._replace(**arms)
+    forces = [np.nan_to_num(listed.forces), np.zeros((len(pairs), 2))]
     load = np.where(at_wall[:, None], np.nan, np.zeros((len(r), 3)))
-    box = np.full(2, np.inf)
-    return make_packing(x, r, box, contacts._replace(**arms), forces, mu, load=load)
+    if walls is not None:
+        load[walls.contacts.i[walls.contacts.i < len(r)]] = 0.0
+        x, r, load = (
+            np.concatenate(both) for both in ((x, walls.x), (r, walls.r), (load, walls.load))
+        )
+        contacts = Contacts(*map(np.concatenate, zip(contacts, walls.contacts, strict=True)))
+        forces.append(np.nan_to_num(walls.measured))
+    return make_packing(
+        *(x, r, np.full(2, np.inf), contacts, np.concatenate(forces), mu), load=load
+    )
+
+
+def _measurement(listed, candidates, walls):
+    """Measured forces (N_c, 2), errors that are known, factors of the variance, what was added."""
+    nothing = np.full((candidates, 2), np.nan)
+    measured, factor = [listed.forces, nothing], [listed.factor, np.ones(candidates)]
+    sigma = [np.full_like(listed.forces, np.nan), nothing]
+    added = [np.zeros(len(listed.pairs), dtype=bool), np.ones(candidates, dtype=bool)]
+    if walls is not None:
+        measured.append(walls.measured)
+        factor.append(walls.factor)
+        sigma.append(walls.sigma)
+        added.append(np.isnan(walls.measured[:, 0]))
+    return tuple(map(np.concatenate, (measured, sigma, factor, added)))
 
 
 def _unbalance(packing, m, unit):
@@ -302,6 +356,8 @@ def _unbalance(packing, m, unit):
     leave few grains unbalanced.
     """
     S = ensemble(packing, prune=False)
+    if not len(S.grains):
+        return np.zeros(len(packing.r))
     A, T = S.cone_form
     m = S.to_vector(m) / unit
     seen = np.flatnonzero(np.isfinite(m))
@@ -322,13 +378,16 @@ def _unbalance(packing, m, unit):
     return np.where(unbalance > _BALANCED, unbalance, 0.0)
 
 
-def _inferred(packing, m, spread, error, unit):
-    """The Likeliest network, and σ (N_c, 2)."""
+def _inferred(packing, m, sigma, factor, spread, error, unit):
+    """The Likeliest network, and σ (N_c, 2): that of load cells as given, else of the factors."""
     S = ensemble(packing, prune=False)
-    sigma = np.full(m.shape, np.nan)
+    relative = np.sqrt(factor)[:, None] * np.ones(2)
+    own = np.isnan(sigma)
     if error is None:
         # With one σ for all, the network does not depend on it, and χ² σ² is what is left over.
-        best = likeliest(S, m, unit)
+        best = likeliest(S, np.where(own, m, np.nan), unit * relative)
         error = unit * np.sqrt(max(best.chi_square, _BALANCED) / max(best.freedom, 1))
-    sigma[: len(spread)] = np.hypot(positive(error, "error"), spread)
+    sigma = np.where(own, positive(error, "error") * relative, sigma)
+    sigma[: len(spread)] = np.hypot(sigma[: len(spread)], spread)
+    sigma[np.isnan(m)] = np.nan
     return likeliest(S, m, sigma), sigma

@@ -8,6 +8,10 @@ from granforce.packing.importers.text import check_grains, read_csv
 from granforce.records import InputError, friction, make_cell, make_packing, positive
 from granforce.tolerances import TOUCHING
 
+# Columns of grains, then of contacts.
+NAMES = ("id", "x", "y", "r", "fx", "fy", "torque")
+NAMES += ("i", "j", "nx", "ny", "length", "fn", "ft")
+
 
 def read_table(
     grains,
@@ -16,6 +20,7 @@ def read_table(
     mu,
     box=None,
     tilt=0.0,
+    columns=None,
     forces=None,
     pressure=1.0,
     tolerance=TOUCHING,
@@ -27,16 +32,17 @@ def read_table(
     contacts: columns i, j (ids, or row numbers from 0 without an id column); optionally nx, ny,
     length (else the nearest images are joined) and fn, ft. Without it, grains closer than
     tolerance (in largest radii) touch. box: (L_x, L_y), inf for an open direction; None: open.
-    tilt: of the cell, whose upper side begins at (tilt, L_y). forces: whether to take fn, ft, by
-    default if they are there; the pressure is then what they carry (in an open set: the loads).
-    Otherwise the network nearest to equal normal forces at the given pressure (or the given loads)
-    is found; pressure is not used with fn, ft. most_grains: how many are taken.
+    tilt: of the cell, whose upper side begins at (tilt, L_y). columns: {name here: name in the
+    files} of columns that are called otherwise. forces: whether to take fn, ft, by default if they
+    are there; the pressure is then what they carry (in an open set: the loads). Otherwise the
+    network nearest to equal normal forces at the given pressure (or the given loads) is found;
+    pressure is not used with fn, ft. most_grains: how many are taken.
 
     Raises InputError naming file and line, NotJammedError where no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     pressure = positive(pressure, "pressure")
-    table = read_csv(grains)
+    table = renamed(read_csv(grains), columns)
     check_grains(len(table.rows), most_grains, table.name)
     x, r = _disks(table, cell)
     load = _loads(table, cell)
@@ -45,7 +51,7 @@ def read_table(
             raise InputError("forces need a table of contacts with columns i, j, fn, ft")
         joined, given = touching(x, r, cell, tolerance), None
     else:
-        joined, given = _joined(read_csv(contacts), table, x, r, cell, forces, mu)
+        joined, given = _joined(renamed(read_csv(contacts), columns), table, x, r, cell, forces, mu)
     closed = bool(np.all(np.isfinite(cell.box)))
     zero = np.zeros((len(joined.i), 2))
     packing = make_packing(
@@ -63,6 +69,27 @@ def read_table(
     if given is None:
         return find(packing, forces="found")
     return adopt(packing, forces="given")
+
+
+def renamed(table, columns):
+    """The table with columns under the names that are used here; those that it lacks are none."""
+    for name, theirs in (columns or {}).items():
+        if name not in NAMES:
+            raise InputError(f"no column is called {name[:40]!r} here: {', '.join(NAMES)}")
+        if theirs.lower() in table.header and theirs.lower() != name:
+            # A column of that name that is not meant stands aside.
+            header = [f"other {one}" if one == name else one for one in table.header]
+            header[table.header.index(theirs.lower())] = name
+            table = table._replace(header=tuple(header))
+    return table
+
+
+def read_columns(text):
+    """{name here: name in the file} of 'x=…,y=…'; InputError for anything else."""
+    pairs = [part.split("=", 1) for part in text.split(",")]
+    if not all(len(pair) == 2 and pair[1].strip() for pair in pairs):
+        raise InputError(f"--columns {text[:40]!r}: give them as x=…,y=…,r=…")
+    return {name.strip(): theirs.strip() for name, theirs in pairs}
 
 
 def _disks(table, cell):

@@ -141,14 +141,15 @@ def read_text(source):
 
 
 def read_csv(source):
-    """A Table from comma-, semicolon- or tab-separated text with a header line.
+    """A Table from text with a header line, separated by commas, semicolons, tabs or blanks.
 
     Column names are taken in lower case; blank lines are skipped. Raises InputError.
     """
     name, text = read_text(source)
     lines = text.splitlines()
     head = next(line for line in lines if line.strip())
-    delimiter = next((mark for mark in ",;\t" if mark in head), ",")
+    delimiter = next((mark for mark in ",;\t" if mark in head), " " if " " in head.strip() else ",")
+    lines = [line.strip() for line in lines] if delimiter == " " else lines
     reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
     rows, numbers = [], []
     try:

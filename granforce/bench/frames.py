@@ -1,0 +1,105 @@
+"""Photoelastic frames of known forces: how far measured and inferred forces are from the truth."""
+
+import numpy as np
+
+from granforce.bench.report import note
+from granforce.explore.remeasured import remeasured
+from granforce.forces.ensemble import ensemble
+from granforce.packing.compaction import pack
+from granforce.packing.importers.pegs import read_pegs
+from granforce.packing.importers.synthetic import synthetic_frame
+
+# σ in ⟨f_n⟩, part of contacts missed, and the friction taken over the true one.
+CASES = (
+    *((sigma, 0.0, 1.0) for sigma in (0.05, 0.1, 0.2, 0.5)),
+    *((0.1, missed, 1.0) for missed in (0.1, 0.2, 0.5)),
+    *((0.2, 0.1, wrong) for wrong in (0.5, 0.8, 1.5, 3.0)),
+)
+MU, REACH, STATES = 0.3, 0.05, 100
+# Parts of a side of the frame in which the stress is told.
+_REGIONS = 3
+# Contacts whose measured f_n is made wrong by so many ⟨f_n⟩, to see whether they are suspected.
+_SPOILT, _BY = 5, 3.0
+
+
+def frames(quick=True, *, n=None, packings=None, cases=CASES, mu=MU):
+    """Rows: mean distance from the truth in ⟨f_n⟩ (f_n and f_t of listed contacts), and coverage.
+
+    raw: as measured; likeliest: of `remeasured`, and of all contacts; mean: of its draws; stress:
+    of the pressure in each of nine regions, relative. cover: part of all forces within one standard
+    error of the likeliest network. carry: part of the candidates said to carry (by two standard
+    errors) that do. chi: χ² over its degrees of freedom at the true σ; suspected: part of contacts
+    made wrong by 3 ⟨f_n⟩ that are told, and told: how many of those told were made wrong.
+    """
+    n, packings = n or (100 if quick else 400), packings or (2 if quick else 6)
+    rows = []
+    for sigma, missed, wrong in cases:
+        seeds = range(1, packings + 1)
+        found = [_one(pack(n, mu, seed), sigma, missed, wrong, seed) for seed in seeds]
+        note(f"frames: σ = {sigma:g}, missed {missed:g}, μ × {wrong:g}")
+        row = {"n": n, "sigma": sigma, "missed": missed, "mu_over_true": wrong}
+        for name in found[0]:
+            values = np.array([one[name] for one in found], dtype=float)
+            row[name] = float(np.nanmean(values)) if np.isfinite(values).any() else None
+        rows.append(row)
+    return rows
+
+
+def _one(packing, sigma, missed, wrong, seed):
+    frame = synthetic_frame(packing, noise=sigma, missed=missed, seed=seed)
+    options = {"mu": wrong * packing.mu, "reach": REACH, "error": sigma * frame.unit, "repair": 0.5}
+    found = read_pegs(frame, **options)
+    S, unit = ensemble(found.packing), frame.unit
+    m, s = found.measured[S.index], found.sigma[S.index]
+    # The spread of two sides is part of the noise: the true σ counts, and that alone, and contacts
+    # with walls have one side.
+    sides = np.where(S.contacts.j < len(found.ids) - len(found.walls), 2.0, 1.0)[:, None]
+    s = np.where(np.isfinite(m), sigma * unit / np.sqrt(sides), np.nan)
+    drawn = remeasured(S, m, s, states=STATES, seed=seed, unmeasured=2.0)
+    true = frame.truth(found)[S.index]
+    inner, listed = np.isfinite(true[:, 0]), np.isfinite(m[:, 0])
+    here = inner & listed
+    mean = drawn.draws.flat.mean(axis=0)
+    row = {}
+    for k, part in enumerate(("f_n", "f_t")):
+        for name, forces in (("raw", m), ("likeliest", drawn.forces), ("mean", mean)):
+            row[f"{name}_{part}"] = np.abs(forces - true)[here, k].mean() / unit
+    row["likeliest_all"] = np.abs(drawn.forces - true)[inner].mean() / unit
+    row["raw_stress"], row["stress"] = (
+        _stress_error(S, np.where(inner[:, None], np.nan_to_num(forces), 0), true)
+        for forces in (m, drawn.forces)
+    )
+    off = np.abs(true - drawn.forces)[inner] / np.maximum(drawn.error[inner], 1e-9 * unit)
+    row["cover"] = np.mean(off < 1)
+    said = inner & ~listed & (drawn.forces[:, 0] > 2 * drawn.error[:, 0])
+    row["said_to_carry"] = int(said.sum())
+    row["carry"] = np.mean(true[said, 0] > 0) if said.any() else np.nan
+    row["chi"] = drawn.chi_square / max(drawn.freedom, 1)
+    return row | _spoilt(S, m, s, here, unit, seed)
+
+
+def _stress_error(S, forces, true):
+    """Mean |Δp| over the mean p of the regions, p ∝ Σ f_n ℓ of the contacts in a region."""
+    c = S.contacts
+    x = S.packing.x[c.i] + 0.5 * c.length[:, None] * c.normal
+    low, high = S.packing.x.min(axis=0), S.packing.x.max(axis=0) * (1 + 1e-9)
+    cell = np.clip((_REGIONS * (x - low) / (high - low)).astype(int), 0, _REGIONS - 1)
+    cell = cell @ [_REGIONS, 1]
+    of, exact = (
+        np.bincount(cell, np.nan_to_num(f[:, 0]) * c.length, _REGIONS**2) for f in (forces, true)
+    )
+    return np.abs(of - exact).mean() / exact.mean()
+
+
+def _spoilt(S, m, s, here, unit, seed):
+    """How well contacts that are made wrong are told."""
+    rng = np.random.default_rng(seed)
+    chosen = rng.choice(np.flatnonzero(here), _SPOILT, replace=False)
+    m = m.copy()
+    m[chosen, 0] += _BY * unit
+    told = remeasured(S, m, s, states=2, chains=1, unmeasured=2.0).suspects
+    right = np.isin(told, S.index[chosen])
+    return {
+        "suspected": right.sum() / _SPOILT,
+        "told": right.mean() if len(told) else np.nan,
+    }

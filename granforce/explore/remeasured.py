@@ -1,0 +1,116 @@
+"""Error bars of inferred forces by measuring again: for networks that dynamics made.
+
+`infer` weighs all of S alike before a measurement speaks. Networks that come about by dynamics are
+not of that kind: some of their contacts slide or carry nothing, so that they lie on walls of S,
+where hardly any of its volume is, and half as many of their forces as should be lie within one
+standard error. So nothing is said about them here. The likeliest network is measured again, with
+new errors,
+
+    m' = f + σ ε,   ε normal,
+
+and the likeliest network of m' is one draw (the parametric bootstrap: Efron, Tibshirani, An
+Introduction to the Bootstrap, 1993). It lies on walls as often as networks nearest to something do.
+What was not measured counts as 0 with an error of `unmeasured` ⟨f_n⟩, in either measurement.
+"""
+
+import time
+
+import numpy as np
+
+from granforce.explore.infer import SUSPECT, Draws, Inference
+from granforce.explore.mixing import Mixing
+from granforce.forces.likeliest import checked, fitted_many, likeliest
+from granforce.numerics.lanes import LANES
+from granforce.records import positive, whole
+from granforce.system import cancelling
+from granforce.tolerances import ADMISSIBLE, BALANCED
+
+# Forces that were not measured are known to so many ⟨f_n⟩ beforehand.
+UNMEASURED = 2.0
+
+
+class Remeasured(Inference):
+    """An Inference whose draws tell how far the likeliest network is from the truth.
+
+    Of networks made by dynamics 68 % of the forces lie within one standard error of it
+    (data/README.md has how nearly).
+    """
+
+    __slots__ = ()
+
+    @property
+    def mean(self):
+        """(N_c, 2) the likeliest network itself, about which the errors are told, force."""
+        return self.forces
+
+    @property
+    def error(self):
+        """(N_c, 2) standard error of every force: root mean square of draws less that."""
+        return np.sqrt(np.mean((self.draws.flat - self.forces) ** 2, axis=0))
+
+
+@cancelling.cancellable
+def remeasured(
+    ensemble,
+    measured,
+    sigma,
+    *,
+    states=200,
+    seed=0,
+    unmeasured=UNMEASURED,
+    chains=4,
+    workers=1,
+    progress=None,
+    cancel=None,
+):
+    """The network with the least Σ ((f − m)/σ)², and what would be found if measured again.
+
+    A Remeasured, with the same arguments as `infer`; its draws are independent of each other (their
+    mixing is not diagnosed: NaN) and need no set-up: one contact program each, eight at a time.
+    workers: threads, which change nothing in the result.
+
+    Raises InputError for shapes that do not fit and σ ≤ 0, NotJammedError where S is empty.
+    """
+    begin = time.perf_counter()
+    states, chains = whole(states, "the number of draws", 1), whole(chains, "chains", 1)
+    workers = whole(workers, "workers", 1)
+    scale = positive(unmeasured, "unmeasured") * ensemble.force_scale
+    m, s = checked(ensemble, measured, sigma)
+    best = likeliest(ensemble, m, s, unmeasured)
+    far = np.nan_to_num(np.abs(best.deviation)).max(axis=1, initial=0.0)
+    beyond = np.flatnonzero(far > SUSPECT)
+    ready = time.perf_counter()
+    width = np.where(np.isnan(m), scale, s)
+    found = _again(ensemble, best.forces, width, states, chains, seed, workers, progress)
+    drawn = time.perf_counter()
+    residual, violation = ensemble.residual(found), ensemble.violation(found)
+    # Independent draws: there is nothing to mix, and nothing is said of it.
+    worth = Mixing(*np.full((3, *s.shape), np.nan))
+    inside = bool(residual.max() <= BALANCED and violation.max() <= ADMISSIBLE)
+    counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
+    draws = Draws(*(found, residual, violation, worth, inside, counts), 0.0, drawn - ready)
+    return Remeasured(
+        *best,
+        ensemble.index[beyond[np.argsort(-far[beyond], kind="stable")]],
+        ensemble.residual(best.forces),
+        ensemble.violation(best.forces),
+        draws,
+        time.perf_counter() - begin,
+    )
+
+
+def _again(ensemble, forces, s, states, chains, seed, workers, progress):
+    """Networks (chains, k, N_c, 2) of the network measured again, at least `states` in all."""
+    each = -(-states // chains)
+    streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(chains))
+    errors = np.stack([rng.standard_normal((each, *s.shape)) for rng in streams])
+    again = (forces + s * errors).reshape(-1, *s.shape)
+    batches = [again[k : k + LANES] for k in range(0, len(again), LANES)]
+    done, found = 0, []
+    with cancelling.threads(workers) as pool:
+        for networks in pool.map(lambda batch: fitted_many(ensemble, batch, s), batches):
+            found.append(networks)
+            done += len(networks)
+            if progress is not None:
+                progress(done, len(again))
+    return np.concatenate(found).reshape(chains, each, *s.shape)

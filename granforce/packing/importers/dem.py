@@ -1,0 +1,209 @@
+"""Packings of simulations by YADE and MercuryDPM, from the text files that they write.
+
+YADE: bodies by `export.textExt` (format x_y_z_r, or x_y_z_r_attrs with a column id in its comment;
+without, ids count the lines from 0), and a line for each interaction with id1, id2 and the vectors
+phys.normalForce and phys.shearForce, which its documentation (NormShearPhys) gives in global
+coordinates, as sustained by particle #2 from particle #1.
+
+MercuryDPM: $name.data and $name.fstat as its documentation ("Output files", docs.mercurydpm.org)
+has them: for each time step a line N, time and the domain, then the particles (x, y, z, velocity,
+radius, angles, angular velocity, info; in two dimensions x, y, velocity, radius, angle, angular
+velocity, info); and comments, then a line for each contact with time, i, j (below 0: a wall), the
+contact point, overlap, tangential spring, |f_n|, |f_t|, the unit vectors n and t. n and t are those
+of the force on i where n points from j to i, and of the force on j otherwise.
+
+Both are three-dimensional; a layer of disks (spheres) is taken, in the plane in which its centres
+lie. What walls and gravity do to grains becomes their load.
+"""
+
+import numpy as np
+
+from granforce.packing.importers.geometry import check_disks, listed
+from granforce.packing.importers.network import adopt
+from granforce.packing.importers.text import check_grains, make_table, read_text
+from granforce.records import InputError, friction, make_cell, make_packing
+
+# Centres lie in a plane where they leave it by less than this part of a radius.
+_FLAT = 1e-3
+_INTERACTION = ("id1", "id2", "fnx", "fny", "fnz", "fsx", "fsy", "fsz")
+_FSTAT = ("time", "i", "j", "x", "y", "z", "delta", "deltat", "fn", "ft")
+_FSTAT += ("nx", "ny", "nz", "tx", "ty", "tz")
+# Columns of a line of particles by their number, and whether the line before has the domain in 3-D.
+_DATA = {
+    (14, 8): ("x", "y", "z", "vx", "vy", "vz", "r", "q1", "q2", "q3", "wx", "wy", "wz", "info"),
+    (8, 8): ("x", "y", "z", "vx", "vy", "vz", "r", "info"),
+    (8, 6): ("x", "y", "vx", "vy", "r", "angle", "w", "info"),
+}
+
+
+def read_yade(bodies, interactions, mu, *, box=None, most_grains=None):
+    """A Packing from YADE's bodies and interactions (paths or open files).
+
+    box: (L_x, L_y) of the plane, inf for an open direction; None: open. Raises InputError naming
+    file and line.
+    """
+    grains, links = _yade_bodies(bodies), _lines_of(interactions, _INTERACTION)
+    plane = _plane(grains, 3)
+    ids = (
+        grains.index("id")
+        if "id" in grains.header
+        else {row: row for row in range(len(grains.rows))}
+    )
+    i, j = links.lookup("id1", ids), links.lookup("id2", ids)
+    force = np.column_stack([links.numbers(f"fn{k}") + links.numbers(f"fs{k}") for k in plane])
+    return _packing(grains, plane, links, i, j, force, friction(mu), box, most_grains, "yade")
+
+
+def read_mercury(data, fstat, mu, *, step=None, box=None, most_grains=None):
+    """A Packing from MercuryDPM's .data and .fstat (paths or open files).
+
+    step: number of the time step in the files, from 0; by default the last. box: as for
+    `read_yade`. Raises InputError naming file and line.
+    """
+    grains, time = _mercury_particles(data, step)
+    links = _mercury_contacts(fstat, time)
+    plane = _plane(grains, 3 if "z" in grains.header else 2)
+    first, second = links.numbers("i"), links.numbers("j")
+    inner = np.flatnonzero((first >= 0) & (second >= 0))
+    if not len(inner):
+        raise InputError(f"{links.name}: no contact between two particles at time {time:g}")
+    links = links._replace(
+        rows=[links.rows[k] for k in inner], lines=[links.lines[k] for k in inner]
+    )
+    ids = {row: row for row in range(len(grains.rows))}
+    i, j = links.lookup("i", ids), links.lookup("j", ids)
+    x = np.column_stack([grains.numbers(axis) for axis in plane])
+    normal, tangent = (
+        np.column_stack([links.numbers(f"{kind}{axis}") for axis in plane]) for kind in "nt"
+    )
+    force = links.numbers("fn")[:, None] * normal + links.numbers("ft")[:, None] * tangent
+    # That of the grain that n points to.
+    to_first = np.sum(normal * _cell(box).nearest(x[j] - x[i]), axis=1) < 0
+    force[to_first] *= -1
+    once, keep = set(), []
+    for k, pair in enumerate(zip(i.tolist(), j.tolist(), strict=True)):
+        if tuple(sorted(pair)) not in once:
+            once.add(tuple(sorted(pair)))
+            keep.append(k)
+    links = links._replace(rows=[links.rows[k] for k in keep], lines=[links.lines[k] for k in keep])
+    return _packing(
+        *(grains, plane, links, i[keep], j[keep], force[keep]),
+        *(friction(mu), box, most_grains, "mercury"),
+    )
+
+
+def _packing(grains, plane, links, i, j, force, mu, box, most_grains, source):
+    """The packing of disks and of the forces (N_c, 2) on j."""
+    check_grains(len(grains.rows), most_grains, grains.name)
+    cell = _cell(box)
+    x = cell.wrapped(np.column_stack([grains.numbers(axis) for axis in plane]))
+    r = grains.numbers("r")
+    check_disks(x, r, cell, grains.place)
+    carrying = np.flatnonzero(force.any(axis=1))
+    if not len(carrying):
+        raise InputError(f"{links.name}: no contact carries force; is the packing compressed?")
+    joined = listed(x, r, cell, i[carrying], j[carrying], lambda c: links.place(carrying[c]))
+    across = np.column_stack([-joined.normal[:, 1], joined.normal[:, 0]])
+    forces = np.column_stack(
+        [np.sum(force[carrying] * way, axis=1) for way in (joined.normal, across)]
+    )
+    info = {"source": source, "contacts_skipped": len(force) - len(carrying)}
+    return adopt(make_packing(x, r, cell.box, joined, forces, mu, info=info), forces="given")
+
+
+def _cell(box):
+    return make_cell((np.inf, np.inf) if box is None else box, 0.0)
+
+
+def _plane(table, dimensions):
+    """The two axes of the plane in which centres lie."""
+    if dimensions == 2:
+        return "xy"
+    spread = {axis: np.ptp(table.numbers(axis)) for axis in "xyz"}
+    thin = min("zyx", key=spread.get)
+    if spread[thin] > _FLAT * table.numbers("r").mean():
+        raise InputError(
+            f"{table.name}: centres do not lie in a plane (x, y, z reach over "
+            f"{', '.join(f'{spread[axis]:.3g}' for axis in 'xyz')}); only a layer is read"
+        )
+    return "".join(axis for axis in "xyz" if axis != thin)
+
+
+def _split(source):
+    """Name, [(line number, fields)], and the comments before the first line of numbers."""
+    name, text = read_text(source)
+    rows, comments = [], []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.lstrip().startswith("#"):
+            comments.append(line.lstrip("# \t").lower())
+        elif line.strip():
+            rows.append((number, line.replace(",", " ").split()))
+    if not rows:
+        raise InputError(f"{name}: no line with numbers")
+    return name, rows, comments
+
+
+def _lines_of(source, header):
+    """A Table of lines with these columns, a first line with names left out."""
+    name, rows, _ = _split(source)
+    if not rows[0][1][0].lstrip("+-").replace(".", "").isdigit():
+        rows = rows[1:]
+    return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
+
+
+def _yade_bodies(source):
+    name, rows, comments = _split(source)
+    header = ["x", "y", "z", "r"]
+    width = len(rows[0][1])
+    if width > 4:
+        words = comments[-1].split() if comments else []
+        words = words if len(words) == width - 4 else words[4:]
+        if len(words) != width - 4:
+            words = [f"column {k}" for k in range(5, width + 1)]
+        header += words
+    return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
+
+
+def _mercury_particles(source, step):
+    """A Table of the particles of one step, and its time."""
+    name, rows, _ = _split(source)
+    at, steps = 0, []
+    while at < len(rows):
+        number, fields = rows[at]
+        if len(fields) not in (6, 8):
+            raise InputError(
+                f"{name}, line {number}: N, time and the domain are wanted, and "
+                f"{len(fields)} fields are there; is it a .data of MercuryDPM?"
+            )
+        head = make_table(name, ("n", "time"), [fields[:2]], [number])
+        count = head.numbers("n")[0]
+        if not (count.is_integer() and 0 < count <= len(rows) - at - 1):
+            raise InputError(
+                f"{name}, line {number}: {fields[0][:20]} particles are announced, and "
+                f"{len(rows) - at - 1} lines follow; is the file cut off?"
+            )
+        steps.append((head.numbers("time")[0], len(fields), rows[at + 1 : at + 1 + int(count)]))
+        at += 1 + int(count)
+    if step is not None and not 0 <= step < len(steps):
+        raise InputError(f"{name}: no step {step}; there are {len(steps)}, from 0")
+    time, domain, lines = steps[-1 if step is None else step]
+    header = _DATA.get((len(lines[0][1]), domain))
+    if header is None:
+        raise InputError(
+            f"{name}, line {lines[0][0]}: {len(lines[0][1])} fields of a particle; 8 or 14 are read"
+        )
+    return make_table(name, header, [f for _, f in lines], [k for k, _ in lines]), time
+
+
+def _mercury_contacts(source, time):
+    """A Table of the contacts at a time, as nearly as files with few digits have it."""
+    name, rows, _ = _split(source)
+    table = make_table(name, _FSTAT, [fields for _, fields in rows], [k for k, _ in rows])
+    times = table.numbers("time")
+    nearest = times[np.argmin(np.abs(times - time))]
+    if abs(nearest - time) > 1e-4 * max(abs(time), abs(nearest)):
+        raise InputError(
+            f"{name}: no contacts at time {time:g}; they are of {times.min():g} … {times.max():g}"
+        )
+    here = np.flatnonzero(times == nearest)
+    return table._replace(rows=[table.rows[k] for k in here], lines=[table.lines[k] for k in here])

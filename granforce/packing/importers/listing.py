@@ -1,0 +1,256 @@
+"""What the files of one photoelastic frame list, before anything is judged or mended.
+
+Text files of positions and contacts come with or without a column for the frame, a flag for grains
+at walls, and a header, separated by commas, semicolons, tabs or blanks. Which columns there are is
+told from the header or, without one, from their number and from what is in them:
+
+    frame, id, x, y, radius, flag     id, x, y, radius, flag     x, y, radius, flag
+    frame, id, x, y, radius           id, x, y, radius           x, y, radius
+    frame, id1, id2, f_t, f_n         id1, id2, f_t, f_n         (the contacts; ids < 0: a wall)
+
+The formats of PeGS are those of its README (github.com/photoelasticity), modules particleTrack and
+adjacencyMatrix. Angles and signs are in the axes of the files: **t** is **n** turned from x to y.
+"""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.packing.importers.text import LARGEST, read_text
+from granforce.records import InputError
+
+_GRAINS = ("frame", "id", "x", "y", "radius", "flag")
+_CONTACTS = ("frame", "id1", "id2", "tangential", "normal")
+# Other words for them, in lower case without blanks and what is in brackets.
+_WORDS = {
+    "frame": ("frame", "frameid", "frame_id", "image", "step", "t"),
+    "id": ("id", "particle", "particleid", "particle_id", "grain", "track", "label"),
+    "x": ("x", "xpos", "x_px", "cx"),
+    "y": ("y", "ypos", "y_px", "cy"),
+    "radius": ("radius", "r", "r_px", "rad"),
+    "flag": ("flag", "edge", "wall", "boundary"),
+    "id1": ("id1", "i", "particle1", "grain1"),
+    "id2": ("id2", "j", "particle2", "grain2"),
+    "tangential": ("tangential", "ft", "f_t", "tangentialforce", "tangential_force"),
+    "normal": ("normal", "fn", "f_n", "normalforce", "normal_force"),
+}
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
+
+
+class Listing(NamedTuple):
+    """Grains and contacts of one frame as listed; NaN where a field was no finite number."""
+
+    ids: np.ndarray  # (N,) names of the grains
+    x: np.ndarray  # (N, 2) centres
+    r: np.ndarray  # (N,) radii
+    flag: np.ndarray  # (N,) not 0 for grains at a wall
+    ends: np.ndarray  # (k, 2) names of the two grains of each line; below 0: a wall
+    forces: np.ndarray  # (k, 2) f_n, f_t
+    beta: np.ndarray  # (k,) angle from the first grain to the contact, rad; NaN: not listed
+    weight: np.ndarray  # (k,) 1/σ² of the line's forces relative to a usual line
+    names: tuple  # of the two files
+    lines: tuple  # (N,), (k,): where they stand in them
+    both_ways: bool  # two lines of one contact are two independent measurements
+    frame: float
+    said: str  # which columns were recognised
+
+    def place(self, kind, row):
+        """'file, line n' of a grain (kind 0) or a contact (1)."""
+        return f"{self.names[kind]}, line {int(self.lines[kind][row])}"
+
+    def with_grains(self, rows):
+        """The listing with some of its grains, in this order."""
+        kept = {name: getattr(self, name)[rows] for name in ("ids", "x", "r", "flag")}
+        return self._replace(**kept, lines=(self.lines[0][rows], self.lines[1]))
+
+    def with_contacts(self, rows):
+        """The listing with some of its contacts, in this order."""
+        kept = {name: getattr(self, name)[rows] for name in ("ends", "forces", "beta", "weight")}
+        return self._replace(**kept, lines=(self.lines[0], self.lines[1][rows]))
+
+
+class Columns(NamedTuple):
+    """A text file as numbers under the names that were recognised."""
+
+    name: str  # of the file
+    values: dict  # {column: (rows,)}
+    lines: np.ndarray  # (rows,) line numbers
+    said: str
+
+    @property
+    def frames(self):
+        """Numbers of the frames, ascending; empty where there is no such column."""
+        found = self.values.get("frame", np.zeros(0))
+        return np.unique(found[np.isfinite(found)])
+
+    def of(self, frame):
+        """The rows of one frame, or all where frames are not told apart."""
+        if "frame" not in self.values:
+            return self
+        here = self.values["frame"] == frame
+        values = {name: column[here] for name, column in self.values.items()}
+        return self._replace(values=values, lines=self.lines[here])
+
+
+class TextFrames(NamedTuple):
+    """The two files of one frame or of many."""
+
+    grains: Columns
+    contacts: Columns
+
+    @property
+    def frames(self):
+        """Numbers of the frames that both files have, ascending, at least one."""
+        one, two = self.grains.frames, self.contacts.frames
+        if len(one) and len(two):
+            both = np.intersect1d(one, two)
+            if not len(both):
+                raise InputError(
+                    f"{self.grains.name} and {self.contacts.name} have no frame in common"
+                )
+            return both
+        if len(one) > 1 or len(two) > 1:
+            lone, many = (self.grains, self.contacts) if len(two) > 1 else reversed(self)
+            raise InputError(
+                f"{many.name} has {len(many.frames)} frames and {lone.name} no column for the "
+                "frame; give files of one frame, or add the column"
+            )
+        return one if len(one) else two if len(two) else np.ones(1)
+
+    def listing(self, frame=None):
+        """The Listing of a frame, by default the last."""
+        there = self.frames
+        if frame is None:
+            frame = there[-1]
+        if frame not in there:
+            raise InputError(
+                f"frame {plain(float(frame))} is not in both files; "
+                f"they have {plain(there[0])} … {plain(there[-1])}"
+            )
+        grains, contacts = (one.of(frame) for one in self)
+        g, c = grains.values, contacts.values
+        count, links = len(grains.lines), len(contacts.lines)
+        return Listing(
+            ids=g["id"] if "id" in g else np.arange(1.0, count + 1),
+            x=np.column_stack([g["x"], g["y"]]),
+            r=g["radius"],
+            flag=np.nan_to_num(g["flag"]) if "flag" in g else np.zeros(count),
+            ends=np.column_stack([c["id1"], c["id2"]]),
+            forces=np.column_stack([c["normal"], c["tangential"]]),
+            beta=np.full(links, np.nan),
+            weight=np.ones(links),
+            names=(grains.name, contacts.name),
+            lines=(grains.lines, contacts.lines),
+            both_ways=False,
+            frame=float(frame),
+            said=f"{grains.said}; {contacts.said}",
+        )
+
+
+def read_frames(positions, adjacency):
+    """The TextFrames in two files, paths or open files; InputError for what is no such file."""
+    return TextFrames(_columns(positions, _GRAINS), _columns(adjacency, _CONTACTS))
+
+
+def plain(number):
+    """A number as people write it: whole where it is whole."""
+    return int(number) if float(number).is_integer() else float(number)
+
+
+def _columns(source, wanted):
+    """The Columns of a text file of grains or contacts."""
+    name, text = read_text(source)
+    lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    if "\0" in text:
+        raise InputError(f"{name}: not a text file; give plain text")
+    separator = next((mark for mark in ",;\t" if mark in lines[-1][1]), None)
+    rows = [(k, [field.strip() for field in line.split(separator)]) for k, line in lines]
+    header = None
+    while rows and not any(np.isfinite(_number(field)) for field in rows[0][1]):
+        header = rows.pop(0)[1]
+    if not rows:
+        raise InputError(f"{name}: no line with numbers; is it a file of PeGS?")
+    width = max(set(counts := [len(fields) for _, fields in rows]), key=counts.count)
+    numbers = np.full((len(rows), width), np.nan)
+    for row, (_, fields) in zip(numbers, rows, strict=True):
+        # A line of another length is no line of this table: nothing in it is taken.
+        if len(fields) == width:
+            row[:] = [_number(field) for field in fields]
+    named = _named(header, wanted, width) or _by_content(name, numbers, wanted)
+    values = {column: numbers[:, k] for k, column in enumerate(named) if column}
+    told = f"{name}: {', '.join(filter(None, named))}, separated by {_SEPARATORS[separator]}"
+    return Columns(name, values, np.array([k for k, _ in rows]), told)
+
+
+def _number(text):
+    """The finite number that is written, or NaN."""
+    try:
+        value = float(text)
+    except ValueError:
+        return np.nan
+    return value if abs(value) <= LARGEST else np.nan
+
+
+def _named(header, wanted, width):
+    """Names of the columns by a header line, "" for others; None where it does not tell."""
+    if header is None or len(header) != width:
+        return None
+    words = [re.sub(r"[\[(].*|[\s\"'#]", "", word.lower()) for word in header]
+    named = [next((name for name in wanted if word in _WORDS[name]), "") for word in words]
+    needed = {"x", "y", "radius"} if "x" in wanted else set(wanted) - {"frame"}
+    told = [name for name in named if name]
+    return named if needed <= set(told) and len(told) == len(set(told)) else None
+
+
+def _by_content(name, numbers, wanted):
+    """Names of the columns by their number and what is in them."""
+    width = numbers.shape[1]
+    found = _as_contacts(numbers) if "id1" in wanted else _as_grains(numbers)
+    if found is None:
+        raise InputError(
+            f"{name}: {width} fields in a line, which are not "
+            f"{', '.join(wanted)} (the first and the last may be missing); is it a file of PeGS? "
+            "Give a header line that names the columns"
+        )
+    return found
+
+
+def _as_contacts(numbers):
+    columns = {4: _CONTACTS[1:], 5: _CONTACTS}.get(numbers.shape[1])
+    if columns is None:
+        return None
+    whole = [_whole(numbers[:, columns.index(name)]) for name in ("id1", "id2")]
+    return columns if all(whole) else None
+
+
+def _as_grains(numbers):
+    width = numbers.shape[1]
+    if width < 3:
+        return None
+    first, last = numbers[:, 0], numbers[:, min(width, 6) - 1]
+    flagged, counted = _flags(last), _whole(first)
+    alone = len(np.unique(first[np.isfinite(first)])) > 0.9 * np.isfinite(first).sum()
+    if width >= 6:
+        return (*_GRAINS, *[""] * (width - 6)) if counted else None
+    if width == 5:
+        # A number for the frame comes again and again, that of a grain once a frame.
+        if not counted:
+            return None
+        return _GRAINS[1:] if flagged and alone else _GRAINS[:5]
+    if width == 4:
+        if counted and alone and not flagged:
+            return _GRAINS[1:5]
+        return _GRAINS[2:] if flagged else None
+    return _GRAINS[2:5]
+
+
+def _whole(column):
+    """Whether nearly all are whole numbers: what is not may be a damaged line."""
+    seen = column[np.isfinite(column)]
+    return len(seen) > 0 and np.mean(seen == np.round(seen)) > 0.9
+
+
+def _flags(column):
+    seen = column[np.isfinite(column)]
+    return len(seen) > 0 and np.mean(np.isin(seen, (-1, 0, 1))) > 0.9

@@ -1,0 +1,364 @@
+"""What is wrong with a photoelastic frame, mended where it can be, and an account of it.
+
+Each step takes a Listing, notes what it finds, and gives the Listing without it. Lines that cannot
+be are left out; forces that cannot be are taken as not measured. Beyond a tenth of the grains or of
+the contacts nothing is mended any more: then the files do not belong together, or a unit is wrong.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
+from granforce.packing.importers.listing import plain
+from granforce.records import InputError
+
+# Kind of finding → what it is called, whether it is of grains (0) or contacts (1), and how much of
+# the data it spoils: 1 what is left out or not measured any more, 0 what is only told.
+KINDS = {
+    "unreadable_grains": ("grains with a field that is no finite number, or no radius", 0, 1),
+    "doubled_grains": ("grains listed twice", 0, 1),
+    "false_detections": ("grains inside others, which fit fewer contacts and sizes", 0, 1),
+    "unreadable_contacts": ("contacts with a field that is no finite number", 1, 1),
+    "contacts_with_themselves": ("contacts of a grain with itself", 1, 1),
+    "contacts_of_missing_grains": ("contacts that name a grain that is not there", 1, 1),
+    "contacts_too_long": ("contacts of grains too far apart to touch", 1, 1),
+    "negative_normal_forces": ("contacts that pull, taken as not measured", 1, 1),
+    "beyond_friction": ("measured forces beyond friction at this μ, kept", 1, 0),
+}
+# Disks may overlap by this part of the smaller radius before one of them must be false.
+OVERLAP = 0.5
+# Largest gap of two grains that may touch, in mean radii: centres and radii are known to some
+# tenths of a radius only.
+FAR = 1.0
+# Part of the data up to which it is mended, if not told otherwise.
+MOST = 0.1
+# Two detections are of one grain where centres are nearer than this part of the smaller radius and
+# radii differ by less than that part.
+_SAME = 0.5, 0.3
+# Gaps fit up to this many mean radii, and radii are of one size within this part.
+_FIT, _SIZE = 0.5, 0.05
+
+
+class Finding(NamedTuple):
+    """One thing that was wrong."""
+
+    kind: str  # one of KINDS
+    text: str  # in words, with file and line
+    x: float  # where it is, NaN if that is not known
+    y: float
+
+
+class Account(NamedTuple):
+    """What was found in a frame, in the order in which it was looked for."""
+
+    findings: list
+    strict: bool  # the first thing to mend is an error
+    most: float  # part of grains and of contacts that may be mended
+
+    def note(self, kind, texts, places):
+        """Findings of one kind: texts, and where (k, 2). InputError where nothing may be mended."""
+        if self.strict and texts and KINDS[kind][2] and kind != "negative_normal_forces":
+            raise InputError(f"{texts[0]}; correct or remove the line, or read it with repair")
+        for text, (x, y) in zip(texts, places, strict=True):
+            self.findings.append(Finding(kind, text, float(x), float(y)))
+
+    def of(self, kind):
+        """The findings of one kind."""
+        return [one for one in self.findings if one.kind == kind]
+
+    @property
+    def counts(self):
+        """{kind: how many}, of all kinds."""
+        return {kind: len(self.of(kind)) for kind in KINDS}
+
+    def check(self, grains, contacts):
+        """InputError where more was mended than may be, of so many grains and contacts."""
+        for which, (count, what) in enumerate(((grains, "grains"), (contacts, "contacts"))):
+            spoilt = [one for one in self.findings if KINDS[one.kind][1:] == (which, 1)]
+            if len(spoilt) > self.most * count and not self.strict:
+                kinds = ", ".join(
+                    f"{len(self.of(kind))} {words}"
+                    for kind, (words, *_) in KINDS.items()
+                    if KINDS[kind][1:] == (which, 1) and self.of(kind)
+                )
+                raise InputError(
+                    f"{len(spoilt)} of {count} {what} would have to be mended, more than "
+                    f"{self.most:.0%}: {kinds}; the first: {spoilt[0].text}; check units, columns "
+                    "and that both files are of one frame"
+                )
+
+
+def repaired(listing, mu, repair=True):
+    """The Listing, mended, each contact between two grains that are there or with a wall.
+
+    repair: True, False (the first error is raised), or the part of the data that may be mended.
+    Returns it with the Account and with what was done about names, in words ("" for nothing).
+    """
+    most = MOST if repair is True else float(repair)
+    if not 0 <= most <= 1:
+        raise InputError(f"repair is a part of the data, from 0 to 1, got {repair}")
+    account = Account([], repair is False, most)
+    whole = len(listing.ids), len(listing.ends)
+    listing, said = _named(listing, account)
+    for step in (
+        _without_unreadable_grains,
+        _without_doubled_names,
+        _without_false_detections,
+        _without_unreadable_contacts,
+        _without_missing_grains,
+        _without_long_contacts,
+        _without_tension,
+    ):
+        listing = step(listing, account)
+        account.check(*whole)
+    _note_friction(listing, account, mu)
+    if not np.any(np.all(listing.ends >= 0, axis=1)):
+        raise InputError(f"{listing.names[1]}: no contact between two grains")
+    return listing, account, said
+
+
+def rows_of(listing):
+    """Rows (k, 2) of the grains that contacts name; −1 for a wall, −2 for one that is not there."""
+    order = np.argsort(listing.ids, kind="stable")
+    place = np.searchsorted(listing.ids, listing.ends, sorter=order)
+    rows = order[np.minimum(place, len(order) - 1)]
+    rows = np.where(listing.ids[rows] == listing.ends, rows, -2)
+    return np.where(listing.ends < 0, -1, rows)
+
+
+def gaps_of(listing, rows):
+    """Gaps (k,) of the disks that contacts join; NaN where one is a wall or not there."""
+    there = np.all(rows >= 0, axis=1)
+    i, j = np.where(there[:, None], rows, 0).T
+    gap = np.hypot(*(listing.x[j] - listing.x[i]).T) - listing.r[i] - listing.r[j]
+    return np.where(there, gap, np.nan)
+
+
+def _fitting(listing):
+    """Part of the contacts between grains that join grains that are there and near."""
+    inner = np.all(listing.ends >= 0, axis=1)
+    if not inner.any():
+        return 1.0
+    gap = gaps_of(listing, rows_of(listing))[inner]
+    return float(np.mean(gap <= FAR * _mean_radius(listing)))
+
+
+def _mean_radius(listing):
+    good = listing.r[np.isfinite(listing.r) & (listing.r > 0)]
+    return good.mean() if len(good) else np.nan
+
+
+def _named(listing, account):
+    """The listing with names under which contacts join neighbours, and what was done for it.
+
+    Where the ids of one file were given anew (by tracking, say), contacts may still count the
+    grains of the frame in some order: that order is found by whether neighbours are joined.
+    """
+    needed = 1 - account.most
+    share = _fitting(listing)
+    readable = np.mean(np.isfinite(listing.r) & (listing.r > 0)) if len(listing.r) else 0.0
+    if account.strict or share >= needed or readable < needed:
+        return listing, ""
+    count = len(listing.ids)
+    orders = {
+        "as they are listed": np.arange(count),
+        "by id": np.argsort(listing.ids, kind="stable"),
+        "by x": np.argsort(listing.x[:, 0], kind="stable"),
+        "by y": np.argsort(listing.x[:, 1], kind="stable"),
+    }
+    for words, order in orders.items():
+        for first in (1, 0):
+            ids = np.empty(count)
+            ids[order] = np.arange(first, first + count)
+            other = listing._replace(ids=ids)
+            if _fitting(other) >= needed:
+                return other, (
+                    f"the ids of {listing.names[1]} are not those of {listing.names[0]}: they "
+                    f"count its grains {words}, from {first}; taken so, {_fitting(other):.0%} "
+                    f"of the contacts join neighbours (by their names {share:.0%})"
+                )
+    raise InputError(_strangers(listing, share))
+
+
+def _strangers(listing, share):
+    """Why names and places do not belong together, and what to do."""
+    rows = rows_of(listing)
+    gap, radius = gaps_of(listing, rows), _mean_radius(listing)
+    absent = np.flatnonzero((rows == -2).any(axis=1))
+    words = f"only {share:.0%} of the contacts in {listing.names[1]} join neighbours"
+    if len(absent):
+        row = absent[0]
+        named = listing.ends[row][rows[row] == -2][0]
+        words += f"; {len(absent)} name grains that are not there ({plain(named)}, the first)"
+    if np.isfinite(gap).any():
+        words += f"; the median gap is {np.nanmedian(gap) / radius:.3g} mean radii"
+        i, j = rows[np.isfinite(gap)].T
+        ratio = (gap[np.isfinite(gap)] / (listing.r[i] + listing.r[j])) + 1
+        low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
+        if middle > 1.3 and high - low < 0.2 * middle:
+            words += (
+                f", but distances are {middle:.3g} times the radii: try a scale of {middle:.3g}"
+            )
+    return (
+        f"{words}; no order of the grains in {listing.names[0]} fits either; check that both files "
+        "are of one frame and one tracking, and the unit of the radii"
+    )
+
+
+def _without_unreadable_grains(listing, account):
+    fields = np.column_stack([listing.ids, listing.x, listing.r])
+    bad = ~np.isfinite(fields).all(axis=1) | ~(listing.r > 0)
+    texts = [
+        f"{listing.place(0, k)}: "
+        + (
+            f"radius {listing.r[k]:g} is not positive"
+            if np.isfinite(fields[k]).all()
+            else "id, x, y or radius is not a finite number"
+        )
+        for k in np.flatnonzero(bad)
+    ]
+    account.note("unreadable_grains", texts, listing.x[bad])
+    return listing.with_grains(np.flatnonzero(~bad))
+
+
+def _without_doubled_names(listing, account):
+    """Of lines of one name, the first."""
+    _, first, which = np.unique(listing.ids, return_index=True, return_inverse=True)
+    again = np.flatnonzero(first[which] != np.arange(len(which)))
+    texts = [
+        f"{listing.place(0, k)}: id {plain(listing.ids[k])} was given in line "
+        f"{int(listing.lines[0][first[which[k]]])} already"
+        for k in again
+    ]
+    account.note("doubled_grains", texts, listing.x[again])
+    return listing.with_grains(np.sort(first))
+
+
+def _without_false_detections(listing, account):
+    """Of two disks in one place, the one that fits more contacts and sizes."""
+    x, r, ids = listing.x, listing.r, listing.ids
+    if not len(r):
+        return listing
+    check_disks(x, r, OPEN, lambda g: listing.place(0, g), np.inf)
+    i, j, gap = overlapping(x, r, OPEN)
+    deep = np.flatnonzero(-gap > OVERLAP * np.minimum(r[i], r[j]))
+    fit = _fits(listing) if len(deep) else None
+    gone, ends = {}, listing.ends.copy()
+    for c in deep[np.argsort(gap[deep], kind="stable")]:
+        a, b = int(i[c]), int(j[c])
+        if a in gone or b in gone:
+            continue
+        false, true = (a, b) if (fit[a], r[a]) < (fit[b], r[b]) else (b, a)
+        small, large = sorted((r[a], r[b]))
+        near = np.hypot(*(x[a] - x[b])) < _SAME[0] * small
+        kind = "doubled_grains" if near and large - small < _SAME[1] * large else "false_detections"
+        gone[false] = kind, true, -gap[c]
+        if kind == "doubled_grains":
+            ends[ends == ids[false]] = ids[true]
+    for kind in ("doubled_grains", "false_detections"):
+        those = [g for g in sorted(gone) if gone[g][0] == kind]
+        texts = [
+            f"{listing.place(0, g)}: grains {plain(ids[g])} and {plain(ids[gone[g][1]])} "
+            f"overlap by {gone[g][2]:.3g}, more than {OVERLAP:.0%} of a radius"
+            for g in those
+        ]
+        account.note(kind, texts, x[those])
+    kept = np.setdiff1d(np.arange(len(r)), list(gone))
+    return listing._replace(ends=ends).with_grains(kept)
+
+
+def _fits(listing):
+    """(N,) how well each grain fits: contacts with a usual gap count 1, others down to −1, and an
+    unusual radius takes off up to 2."""
+    rows = rows_of(listing)
+    gap = gaps_of(listing, rows)
+    here = np.isfinite(gap)
+    off = np.abs(gap[here] - np.median(gap[here]) if here.any() else gap[here])
+    value = np.clip(1 - off / (_FIT * listing.r.mean()), -1, 1)
+    fit = np.zeros(len(listing.r))
+    for side in rows[here].T:
+        np.add.at(fit, side, value)
+    order = np.sort(listing.r)
+    alike = np.searchsorted(order, listing.r * (1 + _SIZE)) - np.searchsorted(
+        order, listing.r * (1 - _SIZE)
+    )
+    return fit + 2 * alike / alike.max()
+
+
+def _without_unreadable_contacts(listing, account):
+    """Lines without two names go; forces that are no numbers are not measured."""
+    named = np.isfinite(listing.ends).all(axis=1)
+    told = np.isfinite(listing.forces).all(axis=1)
+    bad = np.flatnonzero(~(named & told))
+    texts = [f"{listing.place(1, k)}: a name or a force is not a finite number" for k in bad]
+    account.note("unreadable_contacts", texts, _places(listing, bad))
+    forces = np.where(told[:, None], listing.forces, np.nan)
+    return listing._replace(forces=forces).with_contacts(np.flatnonzero(named))
+
+
+def _without_missing_grains(listing, account):
+    own = np.flatnonzero(listing.ends[:, 0] == listing.ends[:, 1])
+    texts = [f"{listing.place(1, k)}: the grain touches itself" for k in own]
+    account.note("contacts_with_themselves", texts, _places(listing, own))
+    listing = listing.with_contacts(np.setdiff1d(np.arange(len(listing.ends)), own))
+    rows = rows_of(listing)
+    bad = np.flatnonzero((rows == -2).any(axis=1) | (rows < 0).all(axis=1))
+    texts = []
+    for k in bad:
+        named = listing.ends[k][rows[k] < 0][0]
+        texts.append(
+            f"{listing.place(1, k)}: grain {plain(named)} is not among the grains"
+            if named >= 0
+            else f"{listing.place(1, k)}: the contact joins no grain"
+        )
+    account.note("contacts_of_missing_grains", texts, _places(listing, bad))
+    return listing.with_contacts(np.setdiff1d(np.arange(len(rows)), bad))
+
+
+def _without_long_contacts(listing, account):
+    rows = rows_of(listing)
+    gap = gaps_of(listing, rows)
+    with np.errstate(invalid="ignore"):
+        bad = np.flatnonzero(gap > FAR * listing.r.mean())
+    texts = [
+        f"{listing.place(1, k)}: grains {plain(listing.ends[k, 0])} and "
+        f"{plain(listing.ends[k, 1])} are {gap[k] / listing.r.mean():.3g} mean radii apart"
+        for k in bad
+    ]
+    account.note("contacts_too_long", texts, _places(listing, bad))
+    return listing.with_contacts(np.setdiff1d(np.arange(len(rows)), bad))
+
+
+def _without_tension(listing, account):
+    """Contacts of grains without glue only press: a negative normal force is a bad fit."""
+    bad = np.flatnonzero(listing.forces[:, 0] < 0)
+    texts = [f"{listing.place(1, k)}: f_n = {listing.forces[k, 0]:.3g} pulls" for k in bad]
+    account.note("negative_normal_forces", texts, _places(listing, bad))
+    if account.strict:
+        return listing
+    forces = listing.forces.copy()
+    forces[bad] = np.nan
+    return listing._replace(forces=forces)
+
+
+def _note_friction(listing, account, mu):
+    normal, tangential = listing.forces.T
+    with np.errstate(invalid="ignore"):
+        bad = np.flatnonzero((np.abs(tangential) > mu * normal) & (normal >= 0))
+    texts = [
+        f"{listing.place(1, k)}: |f_t| = {abs(tangential[k]):.3g}, more than μ f_n = "
+        f"{mu * normal[k]:.3g}"
+        for k in bad
+    ]
+    account.note("beyond_friction", texts, _places(listing, bad))
+
+
+def _places(listing, contacts):
+    """(k, 2) where contacts are: between their grains, or at the one that is there."""
+    rows = rows_of(listing)[contacts]
+    there = rows >= 0
+    x = np.where(there[..., None], listing.x[np.where(there, rows, 0)], np.nan)
+    with np.errstate(invalid="ignore"):
+        count = there.sum(axis=1)[:, None]
+        return np.where(count, np.nansum(x, axis=1) / np.maximum(count, 1), np.nan)

@@ -1,0 +1,201 @@
+"""Frames as PeGS 2 leaves them: *_solved.mat, a MATLAB struct array `particle`.
+
+Fields as its module adjacencyMatrix documents them (PeGS 2, Lee et al., arXiv:2507.01933,
+github.com/photoelasticity): id; x, y, r in pixels, rm in metres; edge (not 0 at a wall); and, of
+each contact, neighbours (ids; −1: a wall), forces F, alphas α (0: normal, ±π/2: tangential), betas
+β (the azimuth of the contact, in the axes of the image); fitError, the sum of the squared
+differences of fitted and seen brightness. So
+
+    f_n = F cos α,   f_t = F sin α,   n = (cos β, sin β),
+
+and each contact between two grains is measured twice, from either side. The variance of a fit's
+forces goes with that of its brightness, which is fitError over the pixels of the disk: σ² ∝
+fitError/r².
+"""
+
+import io
+import os
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.packing.importers.listing import Listing
+from granforce.packing.importers.matfile import read_struct
+from granforce.packing.importers.text import LARGEST
+from granforce.records import InputError
+
+_NEEDED = ("id", "x", "y", "r", "neighbours", "forces", "alphas")
+_FIELDS = (*_NEEDED, "betas", "fitError", "edge")
+# A fit counts at most so many times as much, or as little, as the usual one.
+_WEIGHTS = 100.0
+_LARGEST_FILE = 10**9
+
+
+class SolvedFrame(NamedTuple):
+    """One frame, ready to be taken."""
+
+    frames: np.ndarray  # (1,) its number
+    only: Listing
+
+    def listing(self, frame=None):
+        """Its Listing; InputError for another frame."""
+        if frame is not None and frame != self.frames[0]:
+            raise InputError(
+                f"{self.only.names[0]} is frame {self.frames[0]:g}, and frame {frame:g} is wanted"
+            )
+        return self.only
+
+
+def read_solved(source):
+    """The SolvedFrame in a *_solved.mat (a path or an open binary file); its number by its name.
+
+    Raises InputError for what is no such file.
+    """
+    name, content = _content(source)
+    try:
+        if content[:8] == b"\x89HDF\r\n\x1a\n" or content[:15] == b"MATLAB 7.3 MAT-":
+            particles = _version_73(name, content)
+        else:
+            particles = read_struct(content, "particle", _FIELDS, _LARGEST_FILE)
+        columns = _columns(particles)
+    except InputError:
+        raise
+    except Exception:
+        # A damaged file fails anywhere: in zlib, in the tags, in shapes that do not fit.
+        raise InputError(f"{name}: no MATLAB file with a struct array, or damaged") from None
+    if columns is None:
+        raise InputError(
+            f"{name}: no struct array `particle` with {', '.join(_NEEDED)}; is it a *_solved.mat "
+            "of PeGS 2 (after diskSolve)?"
+        )
+    digits = re.findall(r"\d+", re.sub(r"\.mat$", "", name))
+    number = float(digits[-1]) if digits and len(digits[-1]) < 16 else 1.0
+    return SolvedFrame(np.array([number]), _listing(name, number, columns))
+
+
+def _content(source):
+    if hasattr(source, "read"):
+        name, content = str(getattr(source, "name", "the given file")), source.read()
+    else:
+        name = os.fspath(source)
+        try:
+            if os.path.getsize(name) > _LARGEST_FILE:
+                raise InputError(f"{name}: more than {_LARGEST_FILE / 1e6:g} MB")
+            with open(name, "rb") as file:
+                content = file.read()
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{name}: cannot be read ({reason}); check the path") from None
+    name = os.path.basename(name) or name
+    if isinstance(content, str) or not content:
+        raise InputError(f"{name}: not a MATLAB file")
+    return name, content
+
+
+def _version_73(name, content):
+    """The particles of a file of version 7.3, which is HDF5: each field a column of references."""
+    try:
+        import h5py
+    except ImportError:
+        raise InputError(
+            f"{name}: a MATLAB file of version 7.3; install h5py to read it, or save it in MATLAB "
+            "by save(…, '-v7')"
+        ) from None
+    with h5py.File(io.BytesIO(content), "r") as file:
+        if "particle" not in file or not hasattr(file["particle"], "keys"):
+            return []
+        group = file["particle"]
+        columns = {}
+        for field in set(_FIELDS) & set(group):
+            values = group[field]
+            if values.dtype == object:
+                columns[field] = [_value(file[one]) for one in np.ravel(values[()])]
+            else:  # a single particle is kept without references
+                columns[field] = [_value(values)]
+        counts = {len(column) for column in columns.values()}
+        if len(counts) != 1:
+            return []
+        return [{field: columns[field][k] for field in columns} for k in range(*counts)]
+
+
+def _value(dataset):
+    """A dataset as MATLAB holds it: empty arrays are kept as their shape."""
+    if dataset.attrs.get("MATLAB_empty", 0):
+        return np.zeros(0)
+    value = dataset[()]
+    return value["real"] if value.dtype.names else value
+
+
+def _columns(particles):
+    """{field: per particle, a flat float array}, or None where a needed field is missing."""
+    if not particles:
+        return None
+    there = [field for field in _FIELDS if all(field in one for one in particles)]
+    if not set(_NEEDED) <= set(there):
+        return None
+    return {field: [_numbers(one[field]) for one in particles] for field in there}
+
+
+def _numbers(value):
+    """A flat array; what is no finite number is NaN."""
+    flat = np.real(np.ravel(np.asarray(value)))
+    if flat.dtype.kind not in "iufb":
+        return np.full(flat.shape, np.nan)
+    flat = flat.astype(np.float64)
+    return np.where(np.abs(flat) <= LARGEST, flat, np.nan)
+
+
+def _listing(name, number, columns):
+    """The Listing: a line for each contact of each particle."""
+    single = {field: _first(columns, field) for field in ("id", "x", "y", "r", "edge", "fitError")}
+    count = len(columns["id"])
+    ends, forces, beta, owner = [], [], [], []
+    angles = columns.get("betas", [np.zeros(0)] * count)
+    for k in range(count):
+        neighbours = columns["neighbours"][k]
+        size = len(neighbours)
+        if not size:
+            continue
+        force, alpha, azimuth = (
+            # Fields of other lengths belong to no contact.
+            values if len(values) == size else np.full(size, np.nan)
+            for values in (columns["forces"][k], columns["alphas"][k], angles[k])
+        )
+        ends.append(np.column_stack([np.full(size, single["id"][k]), neighbours]))
+        forces.append(np.column_stack([force * np.cos(alpha), force * np.sin(alpha)]))
+        beta.append(azimuth)
+        owner.append(np.full(size, k))
+    if not ends:
+        raise InputError(f"{name}: no particle has neighbours; is it the file after diskSolve?")
+    owner = np.concatenate(owner)
+    with np.errstate(all="ignore"):
+        spread = single["fitError"] / single["r"] ** 2
+        weight = np.nanmedian(spread) / spread if np.isfinite(spread).any() else spread
+    weight = np.clip(np.nan_to_num(weight, nan=1.0, posinf=_WEIGHTS), 1 / _WEIGHTS, _WEIGHTS)
+    told = "id, x, y, r, neighbours, forces, alphas"
+    told += "".join(f", {field}" for field in ("betas", "fitError", "edge") if field in columns)
+    return Listing(
+        ids=single["id"],
+        x=np.column_stack([single["x"], single["y"]]),
+        r=single["r"],
+        flag=np.nan_to_num(single["edge"]),
+        ends=np.concatenate(ends),
+        forces=np.concatenate(forces),
+        beta=np.concatenate(beta),
+        weight=weight[owner],
+        names=(name, name),
+        lines=(np.arange(1, count + 1), owner + 1),
+        both_ways=True,
+        frame=number,
+        said=f"{name}: struct array particle with {told}",
+    )
+
+
+def _first(columns, field):
+    """The one number of each particle, NaN where there is none."""
+    return (
+        np.array([one[0] if len(one) else np.nan for one in columns[field]])
+        if (field in columns)
+        else np.full(len(columns["id"]), np.nan)
+    )

@@ -1,0 +1,142 @@
+"""Photoelastic frames made from packings whose forces are known, with the errors of real ones."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from granforce.forces.ensemble import ensemble
+from granforce.packing.importers.listing import Listing
+from granforce.records import InputError, positive, random_seed, whole
+from granforce.system.files import written
+
+
+class SyntheticFrame(NamedTuple):
+    """A frame as files would hold it, and the truth; `gf.read_pegs` takes it in place of files."""
+
+    only: Listing
+    pairs: np.ndarray  # (k, 2) names of the grains that touch inside the frame
+    forces: np.ndarray  # (k, 2) their true f_n, f_t
+    unit: float  # mean true normal force
+
+    @property
+    def frames(self):
+        """Its number."""
+        return np.array([self.only.frame])
+
+    def listing(self, frame=None):
+        """Its Listing; InputError for another frame."""
+        if frame is not None and frame != self.only.frame:
+            raise InputError(f"the frame is {self.only.frame:g}, and frame {frame:g} is wanted")
+        return self.only
+
+    def truth(self, found):
+        """True forces (N_c, 2) of a Photoelastic's contacts: 0 of pairs that do not touch, NaN of
+        contacts with walls."""
+        c, ids = found.packing.contacts, found.ids
+        known = {tuple(sorted(pair)): k for k, pair in enumerate(self.pairs.tolist())}
+        true = np.zeros((len(c.i), 2))
+        for row, (i, j) in enumerate(zip(ids[c.i].tolist(), ids[c.j].tolist(), strict=True)):
+            k = known.get((i, j) if i < j else (j, i))
+            true[row] = np.nan if j < 0 else 0.0 if k is None else self.forces[k]
+        return true
+
+    def write(self, positions, adjacency):
+        """Write it as PeGS does: frame, id, x, y, radius, flag; frame, id1, id2, f_t, f_n."""
+        one, number = self.only, self.only.frame
+        grains = np.column_stack([one.ids, one.x, one.r, one.flag])
+        links = np.column_stack([one.ends, one.forces[:, ::-1]])
+        for path, rows in ((positions, grains), (adjacency, links)):
+            with written(path) as file:
+                whole = np.column_stack([np.full(len(rows), number), rows])
+                np.savetxt(file, whole, fmt="%.9g", delimiter=",")
+
+
+def synthetic_frame(
+    packing,
+    *,
+    noise=0.1,
+    missed=0.0,
+    false=0.0,
+    blur=0.0,
+    walls=True,
+    pixels=50.0,
+    newton=0.01,
+    number=1,
+    seed=0,
+):
+    """A SyntheticFrame of a packing and its own forces, cut out where its box ends.
+
+    noise: standard error of a component, in ⟨f_n⟩, different from either side of a contact. missed:
+    part of the contacts that are not listed, weak ones first: a contact of force f is missed with
+    a chance ∝ 1/(f + ⟨f_n⟩/2). false: contacts listed that are none, as a part of the true ones, of
+    the nearest other pairs, with forces of about 0.2 ⟨f_n⟩. blur: error of centres and radii, in
+    radii. walls: contacts through the sides of the box are listed as contacts with walls, with
+    their direction and force; False: grains there are flagged only. pixels: of the unit of length;
+    newton: mean normal force. number: of the frame.
+
+    Raises InputError for sizes below 0.
+    """
+    for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):
+        if not 0 <= value < np.inf or (name == "missed" and value >= 1):
+            raise InputError(f"{name} must be finite and at least 0 (missed: below 1), got {value}")
+    rng = np.random.default_rng(random_seed(seed))
+    S = ensemble(packing)
+    c, unit = S.contacts, positive(newton, "newton")
+    branch = packing.x[c.j] - packing.x[c.i]
+    inside = np.abs(branch - c.length[:, None] * c.normal).max(axis=1) < 1e-6 * packing.r.max()
+    forces = unit * S.original / S.original[:, 0].mean()
+    count = len(packing.r)
+    flag = np.zeros(count)
+    flag[c.i[~inside]] = flag[c.j[~inside]] = 1.0
+    chance = inside / (forces[:, 0] + unit / 2)
+    order = rng.exponential(size=len(chance)) / np.maximum(chance, 1e-300)
+    gone = np.zeros(len(chance), dtype=bool)
+    gone[np.argsort(order)[: round(missed * inside.sum())]] = True
+    inner = np.flatnonzero(inside & ~gone)
+    ends, values = np.column_stack([c.i, c.j])[inner], forces[inner]
+    wrong = _near_pairs(packing, c, round(false * inside.sum()))
+    guess = np.abs(rng.normal(0, 0.2 * unit, (len(wrong), 2))) * [1.0, packing.mu]
+    ends, values = np.concatenate([ends, wrong]), np.concatenate([values, guess])
+    ends, values = np.concatenate([ends, ends[:, ::-1]]), np.tile(values, (2, 1))
+    beta = np.full(len(ends), np.nan)
+    if walls:
+        out = np.flatnonzero(~inside)
+        angle = np.arctan2(*c.normal[out].T[::-1])
+        sides = np.concatenate([c.i[out], c.j[out]])
+        ends = np.concatenate([ends, np.column_stack([sides, np.full(len(sides), -2)])])
+        values = np.concatenate([values, forces[out], forces[out]])
+        beta = np.concatenate([beta, angle, angle + np.pi])
+    values = values + noise * unit * rng.standard_normal(values.shape)
+    mean = packing.r.mean()
+    x = packing.x + blur * mean * rng.standard_normal(packing.x.shape)
+    r = packing.r * (1 + blur * rng.standard_normal(count)).clip(0.5, 1.5)
+    size = positive(pixels, "pixels")
+    listing = Listing(
+        ids=np.arange(1.0, count + 1),
+        x=size * x,
+        r=size * r,
+        flag=flag,
+        ends=ends + 1.0,
+        forces=values,
+        beta=beta,
+        weight=np.ones(len(ends)),
+        names=("synthetic positions", "synthetic contacts"),
+        lines=(np.arange(1, count + 1), np.arange(1, len(ends) + 1)),
+        both_ways=True,
+        frame=float(whole(number, "number")),
+        said="synthetic frame",
+    )
+    true = np.column_stack([c.i, c.j])[inside] + 1.0
+    return SyntheticFrame(listing, true, forces[inside], unit)
+
+
+def _near_pairs(packing, contacts, count):
+    """The `count` nearest pairs inside the box that are no contacts."""
+    pairs = cKDTree(packing.x).query_pairs(2.5 * packing.r.max(), output_type="ndarray")
+    pairs = np.sort(pairs.astype(np.int64))
+    touching = np.sort(np.column_stack([contacts.i, contacts.j]))
+    pairs = pairs[~np.isin(pairs @ [len(packing.r), 1], touching @ [len(packing.r), 1])]
+    gap = np.hypot(*(packing.x[pairs[:, 1]] - packing.x[pairs[:, 0]]).T)
+    gap -= packing.r[pairs].sum(axis=1)
+    return pairs[np.argsort(gap, kind="stable")[:count]]

@@ -1,0 +1,256 @@
+"""Walls of a photoelastic frame: bodies that grains press on, in known directions.
+
+A wall is one more body of the packing. Its contacts have lever arm 0 on its side, so that its
+torque does not count; what holds it is not known, and its balance is left open. Where a load cell
+tells the force on a straight wall, the wall is balanced, and held by one more contact in the same
+direction: the sum of the forces on the wall lies in the same cone as each of them, and is what was
+measured.
+
+Directions come from the angles that a solver lists, or from the nearest side of an outline: a box,
+or an annulus (a circle where no grain is flagged −1, for the inner wall).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import optimize
+
+from granforce.packing.importers.repair import rows_of
+from granforce.records import InputError, make_contacts, positive
+
+SIDES = ("left", "right", "bottom", "top")  # least and largest x, least and largest y
+_NORMALS = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
+_SHAPES = {"box": 4, "annulus": 4, "circle": 3}
+# Name of the one wall whose contacts have angles and no outline.
+_ANY = "wall"
+# Grains at a side lie within so many mean radii of the outermost.
+_AT_SIDE = 1.0
+
+
+class Outline(NamedTuple):
+    """Walls about a frame."""
+
+    shape: str  # box: x0, x1, y0, y1; annulus: centre x, y, inner and outer radius; circle: x, y, R
+    numbers: tuple
+
+    @property
+    def names(self):
+        """What its walls are called."""
+        return {"box": SIDES, "annulus": ("inner", "outer"), "circle": ("outer",)}[self.shape]
+
+    def gaps(self, x, r):
+        """Gaps (N, walls) of disks, and the unit vectors (N, walls, 2) from them to the walls."""
+        if self.shape == "box":
+            low, high = np.array(self.numbers[::2]), np.array(self.numbers[1::2])
+            away = np.stack([x - low, high - x], axis=-1).reshape(len(x), 4)
+            return away - r[:, None], np.broadcast_to(_NORMALS, (len(x), 4, 2))
+        from_centre = x - self.numbers[:2]
+        distance = np.hypot(*from_centre.T)
+        out = from_centre / np.maximum(distance, 1e-300)[:, None]
+        gaps, ways = [self.numbers[-1] - distance - r], [out]
+        if self.shape == "annulus":
+            gaps.insert(0, distance - r - self.numbers[2])
+            ways.insert(0, -out)
+        return np.stack(gaps, axis=1), np.stack(ways, axis=1)
+
+    def place(self, wall, reach):
+        """Where the body of a wall is drawn: `reach` outside of its middle."""
+        if self.shape == "box":
+            x0, x1, y0, y1 = self.numbers
+            half = np.array([x1 - x0, y1 - y0]) / 2 + reach
+            return np.array([x0 + x1, y0 + y1]) / 2 + half * _NORMALS[wall]
+        if self.names[wall] == "inner":
+            return np.array(self.numbers[:2])
+        return np.add(self.numbers[:2], [0.0, self.numbers[-1] + reach])
+
+
+class WallContacts(NamedTuple):
+    """Contacts of grains with walls."""
+
+    grain: np.ndarray  # (w,) int64
+    wall: np.ndarray  # (w,) int64, number of the wall
+    normal: np.ndarray  # (w, 2) from the grain to the wall
+    forces: np.ndarray  # (w, 2) f_n, f_t as measured; NaN where they were not
+    factor: np.ndarray  # (w,) of the variance
+    names: tuple  # of the walls
+    outline: Outline | None
+
+
+def read_outline(text):
+    """'open', 'box', 'annulus' or 'circle' (found from the grains), or an Outline with its numbers.
+
+    Such as box:0,100,0,80 or annulus:500,500,200,450. Raises InputError.
+    """
+    shape, _, numbers = str(text).strip().partition(":")
+    if shape == "open" and not numbers:
+        return "open"
+    if shape not in _SHAPES:
+        raise InputError(f"walls are open, {', '.join(_SHAPES)}, got {str(text)[:40]!r}")
+    if not numbers:
+        return shape
+    try:
+        values = tuple(float(part) for part in numbers.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != _SHAPES[shape] or not np.all(np.isfinite(values)):
+        raise InputError(f"walls {shape} need {_SHAPES[shape]} numbers, got {numbers[:40]!r}")
+    if shape == "box" and not (values[0] < values[1] and values[2] < values[3]):
+        raise InputError("walls box: x0,x1,y0,y1 must ascend")
+    if shape == "annulus" and not 0 < values[2] < values[3]:
+        raise InputError("walls annulus: x,y,inner,outer: the inner radius must be the smaller")
+    if shape == "circle" and not values[2] > 0:
+        raise InputError("walls circle: x,y,R: the radius must be above 0")
+    return Outline(shape, values)
+
+
+def read_wall_force(text):
+    """(name, (f_x, f_y, σ)) of 'right: fx fy sigma', the force that grains exert on a wall."""
+    name, _, numbers = str(text).partition(":")
+    try:
+        values = tuple(float(part) for part in numbers.replace(",", " ").split())
+    except ValueError:
+        values = ()
+    if len(values) != 3 or not np.all(np.isfinite(values)):
+        raise InputError(f"--wall-force {str(text)[:40]!r}: give it as 'right: fx fy sigma'")
+    positive(values[2], "the error of a wall's force")
+    return name.strip(), values
+
+
+def wall_contacts(listing, x, r, at_wall, walls, reach):
+    """The WallContacts of a frame, or None where its walls stay open.
+
+    at_wall (N,): grains at walls. walls: as `read_outline` gives it, or None for angles where they
+    are listed. reach: gap in mean radii up to which a grain at a wall touches a side.
+    """
+    rows = rows_of(listing)
+    lines = np.flatnonzero((rows == -1).any(axis=1) & (rows >= 0).any(axis=1))
+    grain = np.maximum(rows[lines, 0], rows[lines, 1])
+    beta = np.where(rows[lines, 0] >= 0, listing.beta[lines], listing.beta[lines] + np.pi)
+    forces, factor = listing.forces[lines], 1 / listing.weight[lines]
+    normal = np.column_stack([np.cos(beta), np.sin(beta)])
+    if walls == "open":
+        return None
+    if walls is None:
+        told = np.isfinite(beta)
+        if not told.any():
+            return None
+        which = _occurrence(grain[told])
+        names = tuple(f"{_ANY} {k + 1}" if k else _ANY for k in range(which.max() + 1))
+        return WallContacts(
+            grain[told], which, normal[told], forces[told], factor[told], names, None
+        )
+    outline = walls if isinstance(walls, Outline) else _fitted(walls, x, r, at_wall, listing.flag)
+    gap, ways = outline.gaps(x, r)
+    touching = at_wall[:, None] & (gap <= reach * r.mean())
+    touching[np.flatnonzero(at_wall), gap[at_wall].argmin(axis=1)] = True
+    g, w = np.nonzero(touching)
+    m, f = np.full((len(g), 2), np.nan), np.ones(len(g))
+    for k, of in enumerate(grain):
+        mine = np.flatnonzero(g == of)
+        if np.isfinite(beta[k]):  # the side that the angle points to
+            best = mine[np.argmax(ways[g[mine], w[mine]] @ normal[k])]
+        else:
+            best = mine[np.argmin(gap[g[mine], w[mine]])]
+        m[best], f[best] = forces[k], factor[k]
+    return WallContacts(g, w, ways[g, w], m, f, outline.names, outline)
+
+
+def _occurrence(grain):
+    """(w,) how often the grain came before: two contacts of one grain are with two bodies."""
+    order = np.argsort(grain, kind="stable")
+    new = np.concatenate([[True], np.diff(grain[order]) != 0])
+    first = np.maximum.accumulate(np.where(new, np.arange(len(grain)), 0))
+    which = np.empty(len(grain), dtype=np.int64)
+    which[order] = np.arange(len(grain)) - first
+    return which
+
+
+def _fitted(shape, x, r, at_wall, flag):
+    """The Outline of a shape that the grains at walls touch."""
+    if at_wall.sum() < 4:
+        raise InputError(
+            f"walls {shape}: fewer than four grains are at walls (by a flag, or an id below 0); "
+            "give the outline with its numbers"
+        )
+    x, r, flag = x[at_wall], r[at_wall], flag[at_wall]
+    if shape == "box":
+        numbers = []
+        for axis in (0, 1):
+            low, high = x[:, axis] - r, x[:, axis] + r
+            numbers.append(np.median(low[low < low.min() + _AT_SIDE * r.mean()]))
+            numbers.append(np.median(high[high > high.max() - _AT_SIDE * r.mean()]))
+        return Outline("box", tuple(map(float, numbers)))
+    inner = flag < 0
+    if shape == "annulus" and inner.sum() < 3:
+        raise InputError("walls annulus: too few grains are flagged −1 for the inner wall")
+    if shape == "circle":
+        inner[:] = False
+
+    def misses(p):
+        distance = np.hypot(*(x - p[:2]).T)
+        return np.where(inner, distance - r - p[2], p[3] - distance - r)
+
+    centre = x[~inner].mean(axis=0)
+    away = np.hypot(*(x - centre).T)
+    start = [*centre, away[inner].mean() if inner.any() else 0.0, away[~inner].mean()]
+    found = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
+    cut = found if shape == "annulus" else found[[0, 1, 3]]
+    return read_outline(f"{shape}:" + ",".join(repr(float(value)) for value in cut))
+
+
+class Bodies(NamedTuple):
+    """Walls as bodies after the N grains, their contacts, and what load cells measured."""
+
+    x: np.ndarray  # (b, 2)
+    r: np.ndarray  # (b,)
+    load: np.ndarray  # (b, 3) 0 where a load cell holds the wall, else NaN
+    contacts: object  # Contacts with walls, then those that load cells hold
+    measured: np.ndarray  # (w + cells, 2)
+    sigma: np.ndarray  # (w + cells, 2) NaN, and the errors of load cells
+    factor: np.ndarray  # (w + cells,)
+    names: tuple  # (b,)
+
+
+def bodies(found, x, r, forces):
+    """The Bodies of WallContacts; forces: {name: (f_x, f_y, σ)} of load cells.
+
+    Raises InputError for a force on a wall that is not there, or not straight.
+    """
+    straight = found.outline is not None and found.outline.shape == "box"
+    for name in forces:
+        if name not in found.names or not straight:
+            raise InputError(
+                f"no straight wall is called {name[:40]!r}; walls: {', '.join(found.names)} "
+                "(a force on a wall needs --walls box)"
+            )
+    count, radius, cells = len(found.names), r.mean(), list(forces)
+    if found.outline is None:
+        places = [x.mean(axis=0)] * count
+    else:
+        places = [found.outline.place(k, 2 * radius) for k in range(count)]
+    walls = np.array([found.names.index(name) for name in cells], dtype=np.int64)
+    ground = places + [np.add(places[k], 3 * radius * _NORMALS[k]) for k in walls]
+    total = np.array(ground)
+    load = np.full((len(total), 3), np.nan)
+    load[walls] = 0.0
+    i = np.concatenate([found.grain, len(x) + walls])
+    j = np.concatenate([len(x) + found.wall, len(x) + count + np.arange(len(cells))])
+    normal = np.concatenate([found.normal, _NORMALS[walls]])
+    radii = np.concatenate([r, np.full(len(total), radius)])
+    contacts = make_contacts(i, j, normal, radii[i] + radii[j], radii)
+    arm = np.where(i < len(x), radii[i], 0.0)
+    contacts = contacts._replace(arm_i=arm, arm_j=np.zeros(len(j)))
+    values = np.array([forces[name] for name in cells]).reshape(-1, 3)
+    across = np.column_stack([-_NORMALS[walls, 1], _NORMALS[walls, 0]])
+    held = np.column_stack(
+        [np.sum(values[:, :2] * way, axis=1) for way in (_NORMALS[walls], across)]
+    )
+    sigma = np.full((len(i), 2), np.nan)
+    sigma[len(found.grain) :] = values[:, 2:]
+    return Bodies(
+        *(total, radii[len(x) :], load, contacts),
+        np.concatenate([found.forces, held]),
+        sigma,
+        np.concatenate([found.factor, np.ones(len(cells))]),
+        (*found.names, *(f"cell of the {name} wall" for name in cells)),
+    )

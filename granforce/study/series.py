@@ -1,0 +1,346 @@
+"""Many frames of one experiment: each imported and inferred by itself, all in one dataset.
+
+A frame is a cell of a study: it is computed in any process, in any order, kept as it ends, and
+found again. Its name holds a digest of its files, so that a file that changed is read anew.
+"""
+
+import hashlib
+import itertools
+import json
+import re
+import secrets
+import shutil
+import warnings
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce.explore.remeasured import remeasured
+from granforce.forces.ensemble import ensemble
+from granforce.packing.importers.pegs import open_frames, take_frame
+from granforce.packing.importers.repair import KINDS
+from granforce.records import InputError, friction, positive, random_seed, whole
+from granforce.study.cells import Cell, Kind, load
+from granforce.study.scan import run
+from granforce.study.schema import labelled, packing_dataset, to_builtin
+from granforce.study.store import open_store
+from granforce.system.files import expanded
+
+# Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
+STATES, UNMEASURED = 200, 1.0
+# Parts of a side of the frame in which the stress is told.
+REGIONS = 3
+# What files are, by their names.
+_POSITIONS, _CONTACTS = re.compile("position|cent(er|re)s", re.I), re.compile("adjacency", re.I)
+_TEXT = {".txt", ".csv", ".dat"}
+# Numbers of a frame's account that are kept by frame.
+_COUNTS = (*KINDS, "grains", "contacts_listed", "candidates", "candidates_that_carry", "unbalanced")
+
+
+class Frame(NamedTuple):
+    """One frame: its files, and its number in them."""
+
+    positions: str
+    adjacency: str | None  # None: a *_solved.mat
+    number: float
+
+
+def frames_of(*paths):
+    """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
+
+    In order of their numbers. Raises InputError where there are none, or two of one number.
+    """
+    files = []
+    for path in map(expanded, paths):
+        if path.is_dir():
+            files += sorted(one for one in path.rglob("*") if one.is_file())
+        else:
+            files.append(path)
+    solved = [one for one in files if one.suffix.lower() == ".mat" and "solved" in one.name.lower()]
+    if not solved and len(paths) == 1 and files and files[0].suffix.lower() == ".mat":
+        solved = files
+    if solved:
+        pairs = [(one, None) for one in solved]
+    elif len(files) == 2 and not any(map(_is_folder, paths)):
+        pairs = [tuple(files)]
+    else:
+        pairs = _paired([one for one in files if one.suffix.lower() in _TEXT])
+    if not pairs:
+        raise InputError(
+            f"{', '.join(map(str, paths))}: no frames; wanted are *_solved.mat, or text files with "
+            "'positions' (or 'centers') and 'adjacency' in their names"
+        )
+    found = [
+        Frame(str(one), None if two is None else str(two), float(number))
+        for one, two in pairs
+        for number in _numbers(one, two, len(pairs))
+    ]
+    found.sort(key=lambda frame: frame.number)
+    for one, two in itertools.pairwise(found):
+        if one.number == two.number:
+            raise InputError(f"{one.positions} and {two.positions} are both frame {one.number:g}")
+    return found
+
+
+def _is_folder(path):
+    return expanded(path).is_dir()
+
+
+def _numbers(one, two, count):
+    """Numbers of the frames in one pair of files; by the name where each file has one frame."""
+    inside = open_frames(one, two).frames
+    by_name = _digits(one) if count > 1 and two is not None else []
+    return [float(by_name[-1])] if by_name and len(inside) == 1 else inside
+
+
+def _digits(path):
+    return [part for part in re.findall(r"\d+", path.stem) if len(part) < 16]
+
+
+def _paired(files):
+    """Pairs (positions, contacts) that have the same number, or none, in their names."""
+    positions = [one for one in files if _POSITIONS.search(one.name)]
+    contacts = [one for one in files if _CONTACTS.search(one.name)]
+    # One file of all frames goes before those of each.
+    for choose in (lambda path: not _digits(path), _digits):
+        some = [[one for one in those if choose(one)] for those in (positions, contacts)]
+        if len(some[0]) == len(some[1]) == 1:
+            return [(some[0][0], some[1][0])]
+        by_number = [{_digits(one)[-1]: one for one in those if _digits(one)} for those in some]
+        both = sorted(set(by_number[0]) & set(by_number[1]), key=int)
+        if both:
+            return [(by_number[0][key], by_number[1][key]) for key in both]
+    return []
+
+
+def parameters(frame, *, mu, states=STATES, seed=0, unmeasured=UNMEASURED, **options):
+    """The parameters that name the inference of a Frame; options as for `read_pegs`."""
+    forces = options.pop("wall_forces", None) or {}
+    return {
+        "positions": frame.positions,
+        "adjacency": frame.adjacency,
+        "content": _digest(frame.positions, frame.adjacency),
+        "frame": frame.number,
+        "mu": friction(mu),
+        "states": whole(states, "states", 2),
+        "seed": random_seed(seed),
+        "unmeasured": positive(unmeasured, "unmeasured"),
+        "wall_forces": {name: list(map(float, values)) for name, values in forces.items()},
+        "options": options,
+    }
+
+
+def _digest(*paths):
+    total = hashlib.blake2b(digest_size=16)
+    for path in filter(None, paths):
+        try:
+            total.update(Path(path).read_bytes())
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    return total.hexdigest()
+
+
+def _inferred(store, parameters, *, workers, progress):
+    """Dataset of one frame: its packing, measured and inferred forces with errors, its account."""
+    frames = open_frames(parameters["positions"], parameters["adjacency"])
+    number = parameters["frame"] if len(frames.frames) > 1 else None
+    found = take_frame(
+        frames,
+        number,
+        mu=parameters["mu"],
+        wall_forces=parameters["wall_forces"],
+        **parameters["options"],
+    )
+    return infer_frame(
+        found,
+        states=parameters["states"],
+        seed=parameters["seed"],
+        unmeasured=parameters["unmeasured"],
+        workers=workers,
+        progress=progress,
+        number=parameters["frame"],
+    )
+
+
+def infer_frame(found, *, states=STATES, unmeasured=UNMEASURED, number=None, **options):
+    """Dataset of a Photoelastic: its packing, forces, errors, stresses by region, its account.
+
+    Forces are those of `remeasured`, on all contacts (0 where nothing can carry); options as there.
+    """
+    S = ensemble(found.packing)
+    drawn = remeasured(
+        *(S, found.measured[S.index], found.sigma[S.index]),
+        states=states,
+        unmeasured=unmeasured,
+        **options,
+    )
+    whole_packing = np.zeros((3, *found.measured.shape))
+    whole_packing[2] = np.nan
+    for values, of in zip(whole_packing, (drawn.forces, drawn.error, drawn.deviation), strict=True):
+        values[S.index] = of
+    grains = len(found.packing.r) - len(found.walls)
+    stress = regional_stress(S.contacts, found.packing.x, grains, drawn.forces)
+    off = regional_stress(S.contacts, found.packing.x, grains, drawn.draws.flat) - stress
+    dataset = packing_dataset(found.packing).merge(
+        labelled(
+            {
+                "grain_id": found.ids,
+                "added": found.added,
+                "measured": found.measured,
+                "sigma": found.sigma,
+                "inferred": whole_packing[0],
+                "standard_error": whole_packing[1],
+                "deviation": whole_packing[2],
+                "suspect": drawn.suspects,
+                "chi_square": drawn.chi_square,
+                "freedom": drawn.freedom,
+                "regional_stress": stress,
+                "regional_stress_error": np.sqrt(np.mean(off**2, axis=0)),
+            }
+        )
+    )
+    findings = [one._asdict() for one in found.findings]
+    report = found.report if number is None else found.report | {"frame": number}
+    told = {"report": report, "findings": findings}
+    told |= {"walls": list(found.walls), "left_open": found.left_open.tolist()}
+    told |= {"at_wall": np.flatnonzero(found.at_wall).tolist()}
+    dataset.attrs["account"] = json.dumps(told, default=to_builtin)
+    return dataset
+
+
+def regional_stress(contacts, x, grains, forces):
+    """Stresses (…, 9, 3) xx, yy, xy in 3 × 3 parts of the frame, of forces (…, N_c, 2).
+
+    σ_ab = (1/A) Σ F_a ℓ_b over the contacts whose point lies in a part of the area A; of a contact
+    with a wall, ℓ ends at the wall. The first `grains` of the centres x are grains.
+    """
+    arm = np.where(contacts.j < grains, contacts.length, contacts.arm_i)
+    at = x[contacts.i] + contacts.arm_i[:, None] * contacts.normal
+    low, high = x[:grains].min(axis=0), x[:grains].max(axis=0)
+    side = np.maximum((high - low) / REGIONS, 1e-300)
+    cell = np.clip(((at - low) / side).astype(int), 0, REGIONS - 1) @ [REGIONS, 1]
+    tangent = np.column_stack([-contacts.normal[:, 1], contacts.normal[:, 0]])
+    force = forces[..., :1] * contacts.normal + forces[..., 1:] * tangent
+    branch = arm[:, None] * contacts.normal
+    parts = np.stack([force[..., a] * branch[:, b] for a, b in ((0, 0), (1, 1), (0, 1))], axis=-1)
+    total = np.zeros((*forces.shape[:-2], REGIONS**2, 3))
+    for k in range(REGIONS**2):
+        total[..., k, :] = parts[..., cell == k, :].sum(axis=-2)
+    return total / np.prod(side)
+
+
+FRAME = Kind("frame", 1, "frames", "frame", parameters, _inferred)
+
+
+def infer_series(path, frames, *, workers=2, scheduler=None, progress=None, **options):
+    """All frames inferred into the store at path, found there where they are: (dataset, failed).
+
+    options: as for `parameters`. The dataset is that of `combined`; failed: (frame, message) of
+    frames that were refused, which the dataset does not have.
+    """
+    cells = [Cell(FRAME, parameters(frame, **options)) for frame in frames]
+    failed = run(path, cells, workers=workers, scheduler=scheduler, progress=progress)
+    lost = {id(cell): message for cell, message in failed}
+    store = open_store(path)
+    done = [
+        (frame.number, load(store, *cell))
+        for frame, cell in zip(frames, cells, strict=True)
+        if id(cell) not in lost
+    ]
+    told = [
+        (frame, lost[id(cell)])
+        for frame, cell in zip(frames, cells, strict=True)
+        if id(cell) in lost
+    ]
+    return (combined(done) if done else None), told
+
+
+def combined(done):
+    """One dataset (frame, contact, component) of [(number, dataset of a frame), …].
+
+    A contact is a pair of names, over all frames; NaN where a frame does not have it. change: its
+    inferred force less that in the frame before, and change_error, by both errors.
+    """
+    named = [_names(one) for _, one in done]
+    pairs = sorted({pair for names in named for pair in names if pair is not None})
+    row = {pair: k for k, pair in enumerate(pairs)}
+    shape = (len(done), len(pairs), 2)
+    arrays = {
+        name: np.full(shape, np.nan) for name in ("measured", "sigma", "inferred", "standard_error")
+    }
+    added = np.zeros(shape[:2], dtype=bool)
+    for k, ((_, one), names) in enumerate(zip(done, named, strict=True)):
+        here = [c for c, pair in enumerate(names) if pair is not None]
+        into = [row[names[c]] for c in here]
+        for name, values in arrays.items():
+            values[k, into] = one[name].values[here]
+        added[k, into] = one["added"].values[here]
+    change, change_error = np.full((2, *shape), np.nan)
+    change[1:] = np.diff(arrays["inferred"], axis=0)
+    change_error[1:] = np.hypot(arrays["standard_error"][1:], arrays["standard_error"][:-1])
+    accounts = [json.loads(one.attrs["account"])["report"] for _, one in done]
+    forces, single = ("frame", "contact", "component"), ("frame",)
+    variables = {name: (forces, values, {"units": "force"}) for name, values in arrays.items()}
+    variables |= {
+        "added": (forces[:2], added, {"long_name": "contact was not listed"}),
+        "change": (forces, change, {"units": "force", "long_name": "since the frame before"}),
+        "change_error": (forces, change_error, {"units": "force"}),
+        "chi_square": (single, [float(one["chi_square"]) for _, one in done]),
+        "freedom": (single, [int(one["freedom"]) for _, one in done]),
+        "unit": (single, [one["mean_measured_normal_force"] for one in accounts]),
+        "account": (("frame", "kind"), [[one[kind] for kind in _COUNTS] for one in accounts]),
+    }
+    ends = np.array(pairs, dtype=float).reshape(-1, 2)
+    return xr.Dataset(
+        variables,
+        {
+            "frame": [number for number, _ in done],
+            "component": ["f_n", "f_t"],
+            "kind": list(_COUNTS),
+            "id1": ("contact", ends[:, 0], {"long_name": "name of the first grain"}),
+            "id2": ("contact", ends[:, 1], {"long_name": "of the second; below 0: a wall"}),
+        },
+    )
+
+
+def _names(one):
+    """Names of a frame's contacts: pairs of ids, None for a second contact of one pair."""
+    ids = one["grain_id"].values
+    i, j = ids[one["contact_i"].values], ids[one["contact_j"].values]
+    seen, names = set(), []
+    for a, b in zip(i.tolist(), j.tolist(), strict=True):
+        # Grains before walls, whose names are below 0.
+        pair = (a, b) if b < 0 or (a >= 0 and a <= b) else (b, a)
+        names.append(None if pair in seen else pair)
+        seen.add(pair)
+    return names
+
+
+def check_folder(path):
+    """The path, if a Zarr folder can be put there; InputError otherwise."""
+    path = expanded(path)
+    if path.exists() and not (path / "zarr.json").is_file():
+        raise InputError(f"{path}: is there already and no Zarr folder; choose another")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+    return path
+
+
+def save_series(dataset, path):
+    """Write a dataset as a Zarr folder, whole or not at all; one that is there is replaced."""
+    path = check_folder(path)
+    aside = path.with_name(f".granforce-{secrets.token_hex(8)}.part")
+    try:
+        with warnings.catch_warnings():
+            # Of names as text, which Zarr has not laid down for good; xarray reads them.
+            warnings.simplefilter("ignore")
+            dataset.to_zarr(aside, mode="w", consolidated=False)
+        if path.exists():
+            shutil.rmtree(path)
+        aside.rename(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)

@@ -1,0 +1,199 @@
+"""Packings of YADE and MercuryDPM, in files written here as their documentation has them."""
+
+import io
+import json
+import warnings
+
+import numpy as np
+import pytest
+from mutants import mutant
+from packings import packed
+
+from granforce.cli.parser import main
+from granforce.forces.ensemble import ensemble
+from granforce.packing.importers import read_columns, read_mercury, read_table, read_yade
+from granforce.records import InputError
+
+N, MU = 30, 0.3
+
+
+def vectors():
+    """Disks, pairs, and the forces on the second of each pair, along n and t."""
+    packing = packed(N, MU)
+    S = ensemble(packing)
+    c = S.contacts
+    tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])
+    return packing, c, S.original, S.original[:, :1] * c.normal, S.original[:, 1:] * tangent
+
+
+def yade(plane="xy", ids=False, header=False):
+    packing, c, _, normal, shear = vectors()
+    names = 7 * np.arange(N)[::-1] + 2 if ids else np.arange(N)
+
+    def spread(values):
+        out = np.zeros((len(values), 3))
+        out[:, ["xyz".index(axis) for axis in plane]] = values
+        return out
+
+    lines = ["#format x_y_z_r" + ("_attrs" if ids else ""), "# id" if ids else "# by hand"]
+    columns = [spread(packing.x), packing.r[:, None], *([names[:, None]] if ids else [])]
+    lines += ["\t".join(f"{v:.15g}" for v in row) for row in np.column_stack(columns)]
+    links = np.column_stack([names[c.i], names[c.j], spread(normal), spread(shear)])
+    words = ["id1 id2 fnx fny fnz fsx fsy fsz"] if header else []
+    words += [" ".join(f"{v:.15g}" for v in row) for row in links]
+    return ["\n".join(text).encode() for text in (lines, words)]
+
+
+def mercury(flat=False, steps=2, both=True, turned=False):
+    packing, c, forces, _, _ = vectors()
+    z, n = np.zeros((N, 1)), N
+    width = packing.box[0]
+    data, fstat = [], []
+    for step in range(steps):
+        time, x = 0.5 * step, packing.x + 0.01 * (steps - 1 - step)
+        if flat:
+            data.append(f"{n} {time:g} 0 0 {width:.9g} {width:.9g}")
+            rows = np.column_stack([x, z, z, packing.r, z, z, z])
+        else:
+            data.append(f"{n} {time:g} 0 0 0 {width:.9g} {width:.9g} 0")
+            rows = np.column_stack([x, z, z, z, z, packing.r, *[z] * 7])
+        data += [" ".join(f"{v:.15g}" for v in row) for row in rows]
+        fstat += [f"# {time:g} 1 2", "# info", "# info"]
+        for k in range(len(c.i)):
+            f_n, f_t = forces[k]
+            t = np.sign(f_t or 1.0) * np.array([-c.normal[k, 1], c.normal[k, 0]])
+            ends = [(c.i[k], c.j[k], -1.0), (c.j[k], c.i[k], 1.0)][: 2 if both else 1]
+            for i, j, sign in ends:
+                # The force on i, as n points to it; or, turned, that on j.
+                sign = -sign if turned else sign
+                row = [time, i, j, 0, 0, 0, 0, 0, f_n, abs(f_t), *sign * c.normal[k], 0]
+                fstat.append(" ".join(f"{v:.15g}" for v in [*row, *sign * t, 0]))
+        fstat.append(f"{time:g} 0 -1 0 0 0 0 0 1 0 1 0 0 0 1 0")
+    return ["\n".join(text).encode() for text in (data, fstat)]
+
+
+def given(*contents):
+    return [io.BytesIO(content) for content in contents]
+
+
+def as_it_was(packing):
+    true, _, forces, *_ = vectors()
+    assert packing.pressure == pytest.approx(1.0, rel=1e-6)
+    assert packing.info["residual"] < 1e-6 and packing.info["violation"] < 1e-6
+    assert len(packing.contacts.i) == len(forces)
+    one, two = (values[np.lexsort(values.T)] for values in (packing.forces, forces))
+    assert np.allclose(one, two, atol=1e-9) and np.allclose(packing.r.sum(), true.r.sum())
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"plane": "xz"}, {"ids": True}, {"header": True, "plane": "yz"}]
+)
+def test_yade(options):
+    as_it_was(read_yade(*given(*yade(**options)), MU, box=packed(N, MU).box))
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"flat": True}, {"both": False}, {"turned": True}, {"steps": 1}]
+)
+def test_mercury(options):
+    as_it_was(read_mercury(*given(*mercury(**options)), MU, box=packed(N, MU).box))
+
+
+def test_walls_and_open_boxes_become_loads():
+    """Contacts inside an open box only: what is left over is the load."""
+    bodies, links = yade()
+    packing = packed(N, MU)
+    c = ensemble(packing).contacts
+    branch = packing.x[c.j] - packing.x[c.i]
+    inside = np.abs(branch - c.length[:, None] * c.normal).max(axis=1) < 1e-6
+    kept = b"\n".join(np.array(links.split(b"\n"))[inside])
+    found = read_yade(*given(bodies, kept), MU)
+    assert found.load.any() and found.info["residual"] < 1e-9
+
+
+def test_a_step_is_chosen():
+    data, fstat = mercury(steps=3)
+    for step in (0, 2):
+        found = read_mercury(*given(data, fstat), MU, step=step, box=packed(N, MU).box)
+        assert found.x[0, 0] == pytest.approx(packed(N, MU).x[0, 0] + 0.01 * (2 - step))
+    with pytest.raises(InputError, match="no step 3"):
+        read_mercury(*given(data, fstat), MU, step=3)
+
+
+@pytest.mark.parametrize(
+    "read, files, words",
+    [
+        (read_yade, (b"1 2 3 1\n4 5 9 1", b"0 1 1 0 0 0 0 0"), "plane"),
+        (read_yade, (b"0 0 0 1\n2 0 0 1", b"0 5 1 0 0 0 0 0"), "id2 names grain '5'"),
+        (read_yade, (b"0 0 0 1\n2 0 0 1", b"0 1 1 0 0"), "fields"),
+        (read_mercury, (b"0 0 0 1\n", b"0 1 1"), "is it a .data"),
+        (read_mercury, (b"9 0 0 0 1 1\n0 0 0 0 1 0 0 0\n", b"0 1 1"), "cut off"),
+    ],
+)
+def test_what_is_wrong_is_told(read, files, words):
+    with pytest.raises(InputError, match=words):
+        read(*given(*files), MU)
+
+
+def test_by_the_command_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    width = str(packed(N, MU).box[0])
+    for name, made in (("yade", yade()), ("mercury", mercury())):
+        for k, content in enumerate(made):
+            (tmp_path / f"{name}{k}").write_bytes(content)
+        words = ["import", name, f"{name}0", f"{name}1", "--mu", "0.3", "--box", width, width]
+        assert main([*words, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["contacts"] == len(vectors()[2])
+        assert main(words[:3] + words[4:]) == 2
+
+
+def test_tables_with_columns_of_any_name():
+    grains = b"Pos X;y pos;Radius;r;z\n0;0;1;9;1\n2;0;1;9;1\n"
+    contacts = b"a;b;N;T\n0;1;1;0\n"
+    named = "x=pos x,y=y pos,r=radius,i=a,j=b,fn=n,ft=T"
+    found = read_table(*given(grains, contacts), mu=0.3, columns=read_columns(named))
+    assert found.r.tolist() == [1, 1] and found.forces.tolist() == [[1, 0]]
+    blank = b"x y r\n0 0 1\n2 0 1\n"
+    assert len(read_table(*given(blank, contacts), mu=0.3, columns=read_columns(named)).r) == 2
+    for text in ("x", "x=", "speed=a"):
+        with pytest.raises(InputError):
+            read_table(*given(grains, contacts), mu=0.3, columns=read_columns(text))
+
+
+FILES = {
+    "yade": (lambda: yade(header=True), read_yade),
+    "mercury": (lambda: mercury(steps=1), read_mercury),
+    "mercury, flat": (lambda: mercury(flat=True, both=False), read_mercury),
+}
+
+
+def mutants(kind, count, seed):
+    """How many of so many mutants were refused."""
+    make, read = FILES[kind]
+    contents, rng, box = make(), np.random.default_rng(seed), packed(N, MU).box
+    refused = 0
+    for _ in range(count):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                packing = read(*given(*mutant(contents, rng)), MU, box=box)
+        except InputError as error:
+            assert str(error) and "\n" not in str(error)
+            refused += 1
+            continue
+        c = packing.contacts
+        assert all(np.isfinite(array).all() for array in (packing.x, packing.forces, *c))
+        assert np.all(packing.r > 0) and np.all(c.i != c.j)
+    return refused
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_mutants_are_refused_or_whole(kind):
+    assert mutants(kind, 100, 1) > 10
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("seed", range(10, 20))
+def test_ten_thousand_mutants_are_refused_or_whole(kind, seed):
+    assert mutants(kind, 1000, seed) > 100

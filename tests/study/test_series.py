@@ -1,0 +1,125 @@
+"""Series of frames: found in folders, inferred over processes, resumed, in one dataset."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from frames import write
+from packings import packed
+
+from granforce.cli.parser import main
+from granforce.packing.importers import synthetic_frame
+from granforce.records import InputError
+from granforce.study import series
+from granforce.study.store import open_store
+
+
+def folder_of(tmp_path, numbers=(1, 2, 3), **options):
+    """Frames of one packing, measured anew each time, a pair of files each."""
+    for number in numbers:
+        frame = synthetic_frame(
+            packed(40, 0.3), noise=0.1, number=number, seed=number, walls=False, **options
+        )
+        frame.write(
+            tmp_path / f"Step-{number:04d}_centers.txt",
+            tmp_path / f"Step-{number:04d}_Adjacency.txt",
+        )
+    return tmp_path
+
+
+OPTIONS = {"mu": 0.3, "states": 16, "reach": 0.1}
+
+
+def test_frames_are_inferred_and_found_again(tmp_path):
+    frames = series.frames_of(folder_of(tmp_path))
+    assert [frame.number for frame in frames] == [1, 2, 3]
+    dataset, failed = series.infer_series(tmp_path / "store", frames, workers=2, **OPTIONS)
+    assert not failed and dataset.sizes["frame"] == 3
+    assert np.isfinite(dataset["inferred"]).any("contact").all()
+    assert np.isnan(dataset["change"][0]).all() and np.isfinite(dataset["change"][1]).any()
+    listed = np.isfinite(dataset["measured"]).all("component")
+    assert np.all((dataset["standard_error"] > 0).where(listed, True))
+    # The same packing: what changes is error, and the errors say so.
+    z = (dataset["change"] / dataset["change_error"]).values[1:][listed.values[1:]]
+    assert np.mean(np.abs(z[np.isfinite(z)]) < 2) > 0.8
+    seen = []
+    again, _ = series.infer_series(
+        tmp_path / "store", frames, workers=1, progress=lambda *p: seen.append(p), **OPTIONS
+    )
+    assert xr.testing.assert_identical(dataset, again) is None and not seen
+
+
+def test_a_frame_that_is_refused_costs_only_itself(tmp_path):
+    folder = folder_of(tmp_path)
+    (tmp_path / "Step-0002_Adjacency.txt").write_text("2,900,901,0,1\n2,903,904,0,1\n")
+    dataset, failed = series.infer_series(
+        tmp_path / "store", series.frames_of(folder), workers=1, **OPTIONS
+    )
+    assert dataset["frame"].values.tolist() == [1, 3]
+    ((frame, message),) = failed
+    assert frame.number == 2 and "join neighbours" in message
+    # Mended, it is read anew; the others are found.
+    synthetic_frame(packed(40, 0.3), noise=0.1, number=2, seed=2, walls=False).write(
+        tmp_path / "Step-0002_centers.txt", tmp_path / "Step-0002_Adjacency.txt"
+    )
+    seen = []
+    dataset, failed = series.infer_series(
+        tmp_path / "store",
+        series.frames_of(folder),
+        workers=1,
+        progress=lambda *p: seen.append(p),
+        **OPTIONS,
+    )
+    assert not failed and seen[-1] == (1, 1)
+
+
+def test_all_frames_of_one_pair_of_files(tmp_path):
+    one, two = (
+        synthetic_frame(packed(40, 0.3), noise=0.1, number=n, seed=n, walls=False) for n in (4, 9)
+    )
+    for k, frame in enumerate((one, two)):
+        frame.write(tmp_path / f"p{k}", tmp_path / f"a{k}")
+    for name in ("p", "a"):
+        text = (tmp_path / f"{name}0").read_text() + (tmp_path / f"{name}1").read_text()
+        (tmp_path / f"{name}.txt").write_text(text)
+    frames = series.frames_of(tmp_path / "p.txt", tmp_path / "a.txt")
+    assert [frame.number for frame in frames] == [4, 9]
+
+
+def test_folders_without_frames_are_told(tmp_path):
+    with pytest.raises(InputError, match="no frames"):
+        series.frames_of(tmp_path)
+    (tmp_path / "notes.txt").write_text("nothing")
+    with pytest.raises(InputError, match="no frames"):
+        series.frames_of(tmp_path)
+
+
+def test_by_the_command_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "lab").mkdir()
+    folder_of(tmp_path / "lab", (1, 2))
+    words = "infer lab --frames all --mu 0.3 --reach 0.1 --states 16 --out series.zarr --json"
+    assert main(words.split()) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["frame"] for row in rows] == [1, 2] and rows[0]["grains"] == 40
+    written = xr.open_zarr(tmp_path / "series.zarr", consolidated=False)
+    assert written.sizes["frame"] == 2 and "inferred" in written
+    assert main([*words.split()[:-1], "--frames", "2"]) == 0
+    assert xr.open_zarr(tmp_path / "series.zarr", consolidated=False).sizes["frame"] == 1
+    capsys.readouterr()
+    for wrong in ("--frames 7", "--frames x", "--out lab", "--measured x.csv"):
+        assert main([*words.split(), *wrong.split()]) == 2, wrong
+        assert capsys.readouterr().err.count("\n") == 1
+    assert main(["infer", "--mu", "0.3"]) == 2
+    assert len(list(open_store(tmp_path / "cache").find("frame"))) == 2
+
+
+def test_names_of_files_of_positions_and_adjacency(tmp_path):
+    import frames as made
+
+    grains, rows, _ = made.frame(20)
+    write(tmp_path, grains, rows)
+    (frame,) = series.frames_of(tmp_path)
+    assert frame.positions.endswith("positions.txt") and frame.number == 1
