@@ -15,7 +15,7 @@ from granforce.numerics import (
     linear_programs,
 )
 from granforce.system import cancelling
-from granforce.tolerances import BALANCED
+from granforce.tolerances import BALANCED, ROUNDING
 
 # Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
 # slows no step, only bounds them.
@@ -182,7 +182,9 @@ def _new_system(ensemble):
         # Multipliers of rows that follow from others may be large: what the own unbalance of a
         # network, up to BALANCED, contradicts there would pass for a bound.
         given = A @ _coordinates(ensemble, ensemble.member)
-        b = given if np.abs(given - b).max(initial=0.0) <= 2 * BALANCED else b
+        off = np.abs(given - b)
+        if off.max(initial=0.0) <= 2 * BALANCED:
+            b = np.where(off > 10 * ROUNDING, given, b)
     problem = independent_problem_of(ensemble)
     return certified_values.make_system(problem, A.tocsr(), b, loads.tocsc(), bounding)
 

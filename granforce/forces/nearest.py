@@ -81,8 +81,9 @@ def _batch(ensemble, starts, tolerance, max_iterations):
     if ensemble.member is not None and max_iterations >= MOST_STEPS:
         # S is not empty, and the steps were not cut short: at μ ≳ 10³ they may lead nowhere.
         for k in np.flatnonzero(~np.array(converged)):
-            forces[k] = likeliest_piqp(ensemble, np.ones_like(forces[k]), starts[k])
-            converged[k] = ensemble.admits(forces[k])
+            if np.isfinite(starts[k]).all():
+                forces[k] = likeliest_piqp(ensemble, np.ones_like(forces[k]), starts[k])
+                converged[k] = ensemble.admits(forces[k])
     residual = ensemble.residual(forces[: len(starts)])
     seconds = (time.perf_counter() - begin) / len(starts)
     return [

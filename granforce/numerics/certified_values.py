@@ -193,7 +193,8 @@ def _certify(system, outcomes, tasks):
             gain[k] = max(0.0, system.gains[task.loaded])
     slack = cost - system.A.T @ multiplier
     short = np.maximum(np.max(-slack / system.weight[:, None], axis=0), 0.0)
-    bound = system.b @ multiplier - system.total * short
+    # One by one: a product of matrices would round by the company that a program came in.
+    bound = np.array([system.b @ one for one in multiplier.T.copy()]) - system.total * short
     # w·y may grow with the load: −F ≥ bound − short · gain · F.
     bound = np.where(short * gain < 1, bound / (1 - short * gain), -np.inf)
     admitted = (np.abs(unbalance).max(axis=0) <= BALANCED) & (y.min(axis=0) >= 0)
