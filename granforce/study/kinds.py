@@ -586,16 +586,16 @@ def _perturbed_contact(store, parameters, *, workers, progress):
 PACKING = Kind("packing", 1, "compaction", "step", _packing_parameters, _packing)
 WALK = Kind("walk", 1, "random walk", "state", _walk_parameters, _walk, holds_states=True)
 UNIFORM = Kind(
-    "uniform", 2, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True
+    "uniform", 3, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True
 )
 INFERENCE = Kind(
-    *("inference", 1, "inference", "draw", _inference_parameters, _inference), holds_states=True
+    *("inference", 2, "inference", "draw", _inference_parameters, _inference), holds_states=True
 )
 INTERVALS = Kind("intervals", 1, "exact bounds", "bound", _exact_parameters, _intervals)
 LIMIT_LOADS = Kind("limit_loads", 1, "limit loads", "contact", _exact_parameters, _limit_loads)
 OUTLINE = Kind("outline", 1, "outline of S", "program", _outline_parameters, _outline)
 INFORMATIVE = Kind(
-    *("informative", 1, "which measurement next", "contact"), _informative_parameters, _informative
+    *("informative", 2, "which measurement next", "contact"), _informative_parameters, _informative
 )
 STRESS = Kind("stress", 1, "outline of stresses", "program", _stress_parameters, _stress)
 PERTURBATION = Kind(
