@@ -34,6 +34,7 @@ _HOME = {
     "outline": "explore.outline",
     "infer": "explore.infer",
     "informative": "explore.informative",
+    "volume": "explore.volume",
     "carrying": "explore.carrying",
     "pull": "explore.pull",
     "reach": "explore.pull",

@@ -16,7 +16,7 @@ from granforce.system import cancelling
 
 # Walls are padded to a multiple of this, so that the search for the next one runs in lanes.
 LANES = 64
-# Memory for rows of K, all threads together: those of 11,500 walls (2600 disks at μ = 0.1) fit.
+# Memory for rows of K, all threads together: those of 11,500 walls (3500 disks at μ = 0.1) fit.
 MEMORY = 1 << 30
 # Slacks stay above this: a point that rounding put on a wall turns there at once.
 _LEAST = 1e-300

@@ -129,7 +129,7 @@ def step(made, ends, *, count, reach, rows=None, method="billiard"):
     left = count * PATHS_PER_STATE
     while left:
         paths = min(left, BATCH - ends[0].paths % BATCH)
-        drawn = [_directions(made, end.rng, paths) for end in ends]
+        drawn = [directions(made, end.rng, paths) for end in ends]
         drawn = [(speeds, lengths * (0.5 + parts)) for speeds, parts in drawn]
         ends, outs, done = flown(made, rows, ends, on, drawn)
         found.append(outs)
@@ -160,12 +160,14 @@ def moves(made, slacks, counts):
     return Moves(made.on_hull(slacks), *(int(number) for number in counts))
 
 
-def _directions(made, rng, count):
-    """Speeds (count, walls) of uniform directions, and as many numbers uniform in [0, 1]."""
+def directions(made, rng, count, unit=True):
+    """Speeds (count, walls) of covariance K, or uniform directions of it, and numbers in [0, 1]."""
     g, parts = np.empty((count, made.count)), np.empty(count)
     for path in range(count):
         g[path], parts[path] = rng.standard_normal(made.count), rng.random()
     speeds = made.moved(g)
+    if not unit:
+        return speeds, parts
     return speeds / np.sqrt((speeds * speeds).sum(axis=1, keepdims=True)), parts
 
 
@@ -177,7 +179,7 @@ def _hit_and_run(made, ends, count):
         for state in range(count):
             for first in range(0, moves, BATCH):
                 cancelling.check("uniform sample")
-                drawn = _directions(made, end.rng, min(BATCH, moves - first))
+                drawn = directions(made, end.rng, min(BATCH, moves - first))
                 billiard.chords(*drawn, s, rate)
             s = made.on_hull(s[None])[0]
             out[state] = s

@@ -20,11 +20,11 @@ from bodies import (
     z_scores,
 )
 from packings import REFERENCE, lattice, packed, reference, two_disks
-from scipy import sparse
+from scipy import linalg, sparse
 
 from granforce import bench, measures
 from granforce.cli.parser import main
-from granforce.explore import uniform
+from granforce.explore import billiard, uniform
 from granforce.explore.mixing import mixing
 from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
@@ -357,3 +357,25 @@ def test_the_benchmark_compares_walks_by_cost_and_by_moments():
     assert other["ratio"] == pytest.approx(other["seconds_per_state"] / cost)
     assert other["z_mean"] < 2 and other["z_square"] < 2
     assert elsewhere and all("hopsy" in row["method"] for row in elsewhere)
+
+
+def test_rows_made_on_demand_change_no_bit(S, sample, monkeypatch):
+    """Room for as few rows as there can be: each is made again and again."""
+    drawn = sample_uniform(S, 40, seed=2)
+    monkeypatch.setattr(billiard, "MEMORY", 1)
+    for workers in (1, 3):
+        again = sample_uniform(S, 40, seed=2, workers=workers)
+        assert again.rows is None and np.array_equal(again.states, drawn.states)
+        assert again.counts == drawn.counts
+
+
+def test_slacks_move_as_the_null_space_lets_them(S):
+    """K against a dense projection, and h against its trace."""
+    for body in (S, ensemble(packed(40, 0.3), prune=False), ensemble(lattice(4, 4, 0.5))):
+        made = walls(body)
+        count = len(made.moving)
+        A = body.scaled_form[0].toarray()[:, made.moving] * made.centre[made.moving]
+        null = linalg.null_space(A, rcond=1e-9)
+        K = made.rows(np.arange(count))[:, :count]
+        assert np.abs(K - null @ null.T).max() < 1e-8
+        assert made.dimension == null.shape[1] == round(np.trace(K))
