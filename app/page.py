@@ -29,6 +29,7 @@ from .views.progress import Progress
 from .views.stream import Stream
 from .views.summary import tiles
 from .views.tour import Tour
+from .views.volume import Volume
 
 # Where it lies over the page, the sidebar begins unseen: player.js shows it once it is closed.
 UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
@@ -128,10 +129,12 @@ def page():
         for k in range(0, len(widgets), 3):
             sidebar.extend(widgets[k : k + 3])
             yield
-        summary = tiles(state)
-        right.append(summary)
+        summary, volume = tiles(state), Volume(state).panel()
+        right.extend([summary, volume])
         tabs = Tabs(state)
-        _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
+        _pale_when_old(
+            [*tabs.pages.items(), ("summary", summary), ("volume", volume), ("plane", middle)]
+        )
         packing.player.on_digit = tabs.choose
         state.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
         yield
@@ -197,7 +200,8 @@ def _open_library():
 def in_title(state, query):
     """What stands in the title bar, where it covers nothing: what is computed, and the tour."""
     knowledge = state.knowledge
-    tasks = state.computation, state.loading, state.besides.task, knowledge.task, knowledge.ranking
+    tasks = state.computation, state.loading, state.measuring, state.besides.task
+    tasks += knowledge.task, knowledge.ranking
     return [Progress(*tasks, titled=True), Tour(state, query)]
 
 
