@@ -19,6 +19,8 @@ from granforce.figures.variations import (
     samplers,
     sizes,
     stresses,
+    tails,
+    volumes,
 )
 
 __all__ = [
@@ -39,4 +41,6 @@ __all__ = [
     "save",
     "sizes",
     "stresses",
+    "tails",
+    "volumes",
 ]

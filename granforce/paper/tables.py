@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,9 @@ SHOWN_PARTS = ("sweeps_1e-3", "walk")
 
 # Parts whose contacts are kept one by one.
 SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "walk", "exact", "uniform")
+# Upper edges of the bins, in ⟨f_n⟩, in which normal forces of uniform states are counted.
+TAILED = ("tails", "tails_stress")
+FORCES = np.arange(1, 161) * 0.125
 SAMPLES = ("row", "contact", "normal", "least", "extent")
 
 _SCALARS = (
@@ -30,6 +34,7 @@ _SCALARS = (
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
     *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "mean_sweeps", "seconds"),
     *("critical_force", "decay_exponent", "decay_low", "decay_high", "friction"),
+    *("log_volume", "log_volume_error", "log_volume_per_grain", "extent"),
 )
 
 
@@ -42,6 +47,7 @@ class Table(NamedTuple):
     shown: list  # (row, normal forces (S, N_c) in ⟨f_n⟩) of some walks
     packings: dict  # {row: Packing} of those walks
     skipped: dict  # counts: cells of the plan that the store lacked
+    tails: dict = MappingProxyType({})  # {row: counts of f_n of its states, in bins up to FORCES}
 
     def part(self, *names, n=None):
         """Rows of some parts; n: only of this number of disks."""
@@ -82,7 +88,7 @@ def reduce(path, plan, wanted=None):
     wanted: the tasks whose lack is counted and told, by default all of the plan.
     """
     store = open_store(path, readonly=True)
-    rows, samples, shown, packings, centres = [], [], [], {}, {}
+    rows, samples, shown, packings, centres, tails = [], [], [], {}, {}, {}
     every = plans.tasks(plan)
     for task, dataset in plans.finished(path, plan):
         k = len(rows)
@@ -92,6 +98,8 @@ def reduce(path, plan, wanted=None):
             rows[k] |= _shears(packing, dataset)
         if task.part in SAMPLED and _has_states(dataset):
             samples.append(_samples(k, dataset))
+        if task.part in TAILED:
+            tails[k] = _counted(dataset)
         if task.part == "uniform":
             centres[task.mu, task.seed] = dataset["states"].values.mean(axis=0), rows[k]
         first = task.part in SHOWN_PARTS and task.seed == 1 and _has_states(dataset)
@@ -109,7 +117,7 @@ def reduce(path, plan, wanted=None):
     known = {_name(row) for row in rows}
     missing = sum((t.part, t.n, t.mu, t.seed) not in known for t in wanted)
     skipped = {"missing_cells": missing}
-    return Table(plan._asdict(), rows, joined, shown, packings, skipped)
+    return Table(plan._asdict(), rows, joined, shown, packings, skipped, tails)
 
 
 def _compare_distances(store, wanted, centres):
@@ -194,6 +202,12 @@ def _samples(k, dataset):
     }
 
 
+def _counted(dataset):
+    """Counts of f_n of the states in the bins that end at FORCES."""
+    normal = dataset["states"].values[..., 0] / dataset["force_scale"].item()
+    return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
+
+
 def _shown(dataset):
     states = dataset["states"].values[:, :, 0] / dataset["force_scale"].item()
     pick = np.linspace(0, len(states) - 1, min(SHOWN_STATES, len(states))).astype(int)
@@ -223,6 +237,7 @@ def merged(new, old):
         shown=new.shown + [(place[k], normal) for k, normal in old.shown if k in place],
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
         skipped={"missing_cells": new.skipped["missing_cells"] - len(kept)},
+        tails=dict(new.tails) | {place[k]: t for k, t in old.tails.items() if k in place},
     )
 
 
@@ -268,6 +283,9 @@ def _dataset(table):
     if table.shown:
         arrays["shown_row"] = np.concatenate([np.full(s.shape[1], k) for k, s in table.shown])
         arrays["shown_normal"] = np.concatenate([s for _, s in table.shown], axis=1)
+    if table.tails:
+        arrays["tail_row"], arrays["tail_force"] = list(table.tails), FORCES
+        arrays["tail_count"] = np.stack(list(table.tails.values()))
     return labelled(arrays, {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)})
 
 
@@ -295,5 +313,10 @@ def _table(store, entry, dataset):
             shown.append((k, dataset["shown_normal"].values[:, chosen]))
             named = kinds.PACKING.parameters(rows[k]["n"], rows[k]["mu"], rows[k]["seed"])
             packings[k] = kinds.get_packing(store, named)[0]
+    tails = {}
+    if "tail_row" in dataset:
+        counts = dataset["tail_count"].values
+        tails = dict(zip(dataset["tail_row"].values.tolist(), counts, strict=True))
     plan = {name: value for name, value in entry.params.items() if name != "rows"}
-    return Table(plan, rows, samples, shown, packings, json.loads(dataset.attrs["skipped"]))
+    skipped = json.loads(dataset.attrs["skipped"])
+    return Table(plan, rows, samples, shown, packings, skipped, tails)
