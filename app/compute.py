@@ -86,6 +86,31 @@ def exact(library, shown):
     return work
 
 
+# Standard error of ln V on the page: its width is then known to a part in a thousand.
+VOLUME_ERROR = 0.1
+
+
+def _volume_parameters(cell):
+    selection = cell.selection
+    return kinds.VOLUME.parameters(selection.packing, VOLUME_ERROR, mu=selection.mu)
+
+
+def known_volume(library, cell):
+    """Work that looks for the volume of S of a cell's packing: (cell, dataset or None)."""
+    return lambda job: (cell, library.stored(kinds.VOLUME, _volume_parameters(cell)))
+
+
+def volume(library, cell):
+    """Work that measures the volume of S of a cell's packing; results in (cell, dataset)."""
+    params = _volume_parameters(cell)
+
+    def work(job):
+        return cell, found_or_made(library, job, "volume of S", kinds.VOLUME, params)
+
+    work.wants = ((kinds.VOLUME.name, params),)
+    return work
+
+
 def _make_packing(job, library, packing):
     library.lend_packing(packing)
     if "imported" in packing:

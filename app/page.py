@@ -30,6 +30,7 @@ from .views.small import FIRST_STEPS, Small
 from .views.stream import Stream
 from .views.summary import tiles
 from .views.tour import STEPS, Tour
+from .views.volume import Volume
 
 # Where it lies over the page, the sidebar begins unseen: player.js shows it once it is closed.
 UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
@@ -159,10 +160,12 @@ def _large(document, query):
         for k in range(0, len(widgets), 3):
             sidebar.extend(widgets[k : k + 3])
             yield
-        summary = tiles(state)
-        right.append(summary)
+        summary, volume = tiles(state), Volume(state).panel()
+        right.extend([summary, volume])
         tabs = Tabs(state)
-        _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
+        _pale_when_old(
+            [*tabs.pages.items(), ("summary", summary), ("volume", volume), ("plane", middle)]
+        )
         packing.player.on_digit = tabs.choose
         state.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
         yield
@@ -228,7 +231,8 @@ def _open_library():
 def in_title(state, query):
     """What stands in the title bar, where it covers nothing: what is computed, and the tour."""
     knowledge = state.knowledge
-    tasks = state.computation, state.loading, state.besides.task, knowledge.task, knowledge.ranking
+    tasks = state.computation, state.loading, state.measuring, state.besides.task
+    tasks += knowledge.task, knowledge.ranking
     return [Progress(*tasks, titled=True), Tour(state, query)]
 
 

@@ -98,6 +98,7 @@ class AppState(param.Parameterized):
         self.tasks, self._ahead, self._closed = [], [], False
         self.computation, self.reader = self.task(), self.task(reading)
         self.loading = self.task()
+        self.looking, self.measuring = self.task(reading), self.task()  # for the volume of S
         self.knowledge = Knowledge(self)
         self.besides = Beside(self)
         self.param.watch(self._need_loads, ["colour", "thickness", "replay"])

@@ -39,6 +39,7 @@ _HOME = {
     "infer": "explore.infer",
     "informative": "explore.informative",
     "remeasured": "explore.remeasured",
+    "volume": "explore.volume",
     "carrying": "explore.carrying",
     "pull": "explore.pull",
     "reach": "explore.pull",

@@ -125,6 +125,18 @@ TERMS = {
         "interval is several times as long as forces scatter in it: so 0.15 η3 is told, which can "
         "be compared with η1 and η2.",
     ),
+    "width": Term(
+        "width of S",
+        "V^(1/h)/√(2πe)",
+        "How wide S is along each of its h free dimensions, in ⟨fₙ⟩, from its volume V: that of "
+        "the normal distribution which leaves as much open.",
+    ),
+    "volume": Term(
+        "volume of S",
+        "ln V",
+        "How many force networks there are: the logarithm of the h-dimensional volume that they "
+        "fill, with fₙ and fₜ of every contact in ⟨fₙ⟩. It is the entropy of the forces.",
+    ),
     "mobilisation": Term(
         "mobilisation",
         "fₜ/(μ fₙ)",

@@ -10,6 +10,8 @@ import numpy as np
 from arviz_stats.base import array_stats
 from scipy import linalg, sparse, spatial, stats
 
+from granforce.explore.billiard import LANES
+
 
 class Body(NamedTuple):
     A: sparse.csc_matrix  # (rows, n)
@@ -68,6 +70,52 @@ def cross_polytope(d, skew=False):
     fourth = 12 * d * (d + 1) / ((d + 1) * (d + 2) * (d + 3) * (d + 4))
     moments = (np.full(n, v) for v in (1.0, variance, fourth / variance**2))
     return _skewed(A, A @ np.ones(n), d, *moments, [], skew)
+
+
+class BodyWalls:
+    """A body as samplers take it, in place of the `Walls` of an ensemble: K as it is written."""
+
+    def __init__(self, body, W=None, d=None):
+        """W (k, n), d (k,): weighted with exp(−½ |W y − d|²)."""
+        self.dimension = body.dimension
+        self.moving = np.arange(len(body.mean))
+        self.count = len(self.moving) + -len(self.moving) % LANES
+        null = linalg.null_space(body.A.toarray(), rcond=1e-9)
+        self.centre = body.mean if W is None else _centre(body.mean, null, W.toarray(), d)
+        relative = np.zeros((self.count, self.dimension))
+        relative[: len(null)] = null / self.centre[:, None]
+        W = np.zeros((0, len(null))) if W is None else W.toarray()
+        slopes = np.vstack([relative, W @ null])
+        # B and W on an orthonormal basis of what balance leaves, rounded as both together are.
+        rounded = relative @ np.linalg.inv(np.linalg.qr(slopes, mode="r"))
+        measured = (W @ null) @ np.linalg.inv(np.linalg.qr(slopes, mode="r"))
+        self.K, self.pushed = rounded @ rounded.T, rounded @ measured.T
+        self.pull = np.zeros(0) if d is None else d - W @ self.centre
+        self.root = np.ones(len(W))
+        basis = np.linalg.qr(relative)[0]
+        self.hull = basis @ basis.T
+
+    def rows(self, walls):
+        return self.K[walls]
+
+    def moved(self, g, pulls=None):
+        return g @ self.K + (0.0 if pulls is None else pulls @ self.pushed.T)
+
+    def on_hull(self, slacks):
+        return 1.0 + (slacks - 1.0) @ self.hull
+
+    def points(self, slacks):
+        return self.centre * np.maximum(slacks[..., : len(self.centre)], 0.0)
+
+
+def _centre(y, null, W, d):
+    """The y with the largest Σ log y − ½ |W y − d|² among y + null · z, by damped Newton steps."""
+    for _ in range(500):
+        scaled, pulled = null / y[:, None], W @ null
+        slope = scaled.sum(axis=0) + pulled.T @ (d - W @ y)
+        relative = scaled @ np.linalg.solve(scaled.T @ scaled + pulled.T @ pulled, slope)
+        y = y * (1 + relative / (1 + np.linalg.norm(relative)))
+    return y
 
 
 def known_by_triangulation(A, b, inside):

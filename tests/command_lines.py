@@ -90,6 +90,17 @@ COMMANDS = {
             **KNOWN,
         },
     ),
+    "volume": (
+        ["-n", "8", "--mu", "0.3", "--accuracy", "0.5"],
+        ANY_PACKING
+        | {
+            "--accuracy": POSITIVE,
+            "--volume-seed": SEEDS,
+            "--ensemble-mu": FRICTION,
+            **CONDITIONS,
+            **KNOWN,
+        },
+    ),
     "infer": (
         ["-n", "8", "--mu", "0.3", "--measured", "measured.csv", "--states", "8"],
         ANY_PACKING

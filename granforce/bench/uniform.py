@@ -5,15 +5,17 @@ hopsy (pip install hopsy) is optional: it brings GLPK, and is used for nothing e
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy import linalg
 
 from granforce.bench.report import note
-from granforce.explore.chart import chart
+from granforce.explore.billiard import all_rows
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.uniform import METHODS, forces_of, step, varying, warm_up
-from granforce.forces.contact_problem import inner_network
+from granforce.explore.walls import walls
 from granforce.forces.ensemble import ensemble
 from granforce.packing.compaction import pack
 
@@ -27,10 +29,12 @@ HOPSY_STATES = 600
 def uniform(quick=True, *, n=None, frictions=None, seed=1, rounded=None):
     """Rows: seconds of processor time per effective state (bulk, minimum over components).
 
-    Four chains one after another, warm-up included; set-up (affine hull, centre, rounding) apart.
+    Four chains in one thread, warm-up included; set-up (centre, factor, rows of K) apart.
     ratio: that cost over the billiard's. z_mean and z_square: root mean square, over components, of
     the differences of means and of second moments from the billiard's in standard errors: near 1
-    where both sample the same measure. two_cores: wall time of one thread over that of two.
+    where both sample the same measure. null_space_ratio: a dense null space of the balance (QR with
+    pivoting), which sampling did without, over the whole set-up. two_cores: wall time
+    of one thread over that of two.
     """
     n = n or (100 if quick else 400)
     frictions = frictions or ((0.1, 1.0) if quick else (0.5, 0.3, 0.1, 0.01))
@@ -38,14 +42,17 @@ def uniform(quick=True, *, n=None, frictions=None, seed=1, rounded=None):
     rows = []
     for mu in frictions:
         S = ensemble(pack(n, mu, seed))
+        walls(S)  # the first time it is compiled
         begin = time.process_time()
-        made = chart(*S.scaled_form[:2], inner_network(S))
+        made = walls(S)
+        kept = all_rows(made)
         setup = time.process_time() - begin
-        runs = [_ours(S, made, method, seed) for method in METHODS]
-        runs += _hopsy(S, made, rounded)
+        runs = [_ours(S, made, kept, method, seed) for method in METHODS]
+        runs += _hopsy(S, made, kept, rounded)
         for run in runs:
             rows.append(_row({"n": n, "mu": mu, "h": made.dimension}, S, runs[0], run, setup))
-        rows[-len(runs)]["two_cores"] = _two_cores(made, seed)
+        rows[-len(runs)]["two_cores"] = _two_cores(made, kept, seed)
+        rows[-len(runs)]["null_space_ratio"] = _null_space(S, made) / setup
     return rows
 
 
@@ -54,7 +61,7 @@ class _Run(NamedTuple):
     states: np.ndarray | None  # (chains, k, N_c, 2), None where it could not be run
     mixing: Mixing | None
     seconds: float  # processor time of the steps
-    setup: float  # processor time of what had to be done before, the chart left out
+    setup: float  # processor time of what had to be done before, the walls left out
     note: str = ""
 
 
@@ -70,41 +77,54 @@ def _row(start, S, first, run, setup):
     return row
 
 
-def _ours(S, made, method, seed):
+def _ours(S, made, kept, method, seed):
     note(f"uniform: h = {made.dimension}, {method}")
     for count in (1, STATES // 4):  # the first time it is compiled
         begin = time.process_time()
-        ends, reach, _ = warm_up(made, 4, seed + METHODS.index(method), method=method)
-        options = {"count": count, "reach": reach, "method": method}
-        done = [step(made, end, **options)[1].slacks for end in ends]
+        own = seed + METHODS.index(method)
+        ends, reach, _ = warm_up(made, 4, own, method=method, stores=[kept])
+        _, done = step(made, ends, count=count, reach=reach, rows=kept, method=method)
         seconds = time.process_time() - begin
-    states = forces_of(S, made, np.array(done))
+    states = forces_of(S, made, np.array([one.slacks for one in done]))
     return _Run(method, states, mixing(states, varying(S, made)), seconds, 0.0)
 
 
-def _two_cores(made, seed):
+def _null_space(S, made):
+    """Seconds of processor time of the QR that gives the same K by a dense null space."""
+    weighted = S.scaled_form[0].tocsc()[:, made.moving].toarray() * made.centre[made.moving]
+    begin = time.process_time()
+    linalg.qr(weighted.T, pivoting=True)
+    return time.process_time() - begin
+
+
+def _two_cores(made, kept, seed):
     wall = []
-    ends, reach, _ = warm_up(made, 2, seed)
+    ends, reach, _ = warm_up(made, 2, seed, stores=[kept])
     for workers in (1, 2):
         begin = time.perf_counter()
         with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(lambda end: step(made, end, count=STATES, reach=reach), ends))
+            on = partial(step, made, count=STATES, reach=reach, rows=kept)
+            list(pool.map(on, [[end] for end in ends]))
         wall.append(time.perf_counter() - begin)
     return wall[0] / wall[1]
 
 
-def _hopsy(S, made, rounded):
-    """Coordinate hit-and-run by hopsy, its best walk, on our rounding and, up to `rounded`, its."""
+def _hopsy(S, made, kept, rounded):
+    """Coordinate hit-and-run by hopsy, its best walk, on our rounding and, up to `rounded`, its.
+
+    It wants coordinates: those of an orthonormal basis of what K projects on.
+    """
     try:
         import hopsy
     except ImportError:
         return [_Run("hopsy", None, None, 0.0, 0.0, "not installed")]
-    h, walls = made.dimension, -made.G[: len(made.moving)]
+    h, count = made.dimension, len(made.moving)
+    sides = -np.linalg.eigh(kept.values[:count, :count])[1][:, count - h :]
     begin = time.process_time()
-    problems = {"hopsy, our rounding": (hopsy.Problem(walls, np.ones(len(walls))), 0.0)}
+    problems = {"hopsy, our rounding": (hopsy.Problem(sides, np.ones(count)), 0.0)}
     if h <= rounded:
         note(f"uniform: h = {h}, hopsy rounds")
-        problem = hopsy.round(hopsy.Problem(walls, np.ones(len(walls))))
+        problem = hopsy.round(hopsy.Problem(sides, np.ones(count)))
         problems["hopsy, its rounding"] = (problem, time.process_time() - begin)
     runs = []
     for name, (problem, setup) in problems.items():
@@ -117,8 +137,8 @@ def _hopsy(S, made, rounded):
         begin = time.process_time()
         _, places = hopsy.sample(chains, streams, HOPSY_STATES // 4, thinning=thinning)
         seconds = time.process_time() - begin
-        slacks = np.ones((*places.shape[:2], len(made.G)))
-        slacks[..., : len(walls)] -= places @ walls.T
+        slacks = np.ones((*places.shape[:2], made.count))
+        slacks[..., :count] -= places @ sides.T
         states = forces_of(S, made, slacks)[:, places.shape[1] // 10 :]  # warm-up
         runs.append(_Run(name, states, mixing(states, varying(S, made)), seconds, setup))
     return runs

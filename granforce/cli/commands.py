@@ -240,6 +240,36 @@ def uniform(arguments):
     return 1 if arguments.effective is not None and not reached else 0
 
 
+def volume(arguments):
+    """The volume of S, measured or found; report it. Returns 1 if it is not as sure as wanted."""
+    asked = _conditions(arguments)
+
+    def name(packing):
+        accuracy, seed = arguments.accuracy, arguments.volume_seed
+        return kinds.VOLUME.parameters(packing, accuracy, seed, mu=arguments.ensemble_mu, **asked)
+
+    store, parameters = _prepared(arguments, name)
+    dataset, cached = _get(store, kinds.VOLUME, parameters, arguments)
+    down, up = dataset["log_volume_ladders"].values
+    reached = bool(dataset["reached"].item())
+    lines = {
+        "entry": study.entry_name(store, kinds.VOLUME, parameters),
+        "dimension": dataset["dimension"].item(),
+        "ln_volume": dataset["log_volume"].item(),
+        "standard_error": dataset["log_volume_error"].item(),
+        "ln_volume_on_the_way_down": float(down),
+        "ln_volume_on_the_way_up": float(up),
+        "ln_volume_per_grain": dataset["log_volume_per_grain"].item(),
+        "extent_over_mean_normal_force": dataset["extent"].item(),
+        "reached": reached,
+        **json.loads(dataset.attrs["counts"]),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    report(lines, arguments.json)
+    return 0 if reached else 1
+
+
 INFERENCE_LINES = (
     *("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held"),
     *("setup_seconds", "sampling_seconds"),

@@ -69,6 +69,7 @@ def _parser():
     _add_pack(commands)
     _add_walk(commands)
     _add_uniform(commands)
+    _add_volume(commands)
     _add_infer(commands)
     _add_measure(commands)
     _add_scan(commands)
@@ -238,6 +239,29 @@ def _add_uniform(commands):
     group.add_argument(
         "--effective", type=float, help="draw on until worth so many independent states"
     )
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    _add_conditions(command)
+    _add_store(command)
+
+
+def _add_volume(commands):
+    command = _command(
+        commands,
+        "volume",
+        "volume",
+        "measure the volume of all force networks of a packing, with its standard error",
+        "granforce volume -n 400 --mu 0.1 --seed 1 --accuracy 0.1",
+    )
+    _add_any_packing(command)
+    group = command.add_argument_group("the volume")
+    group.add_argument(
+        "--accuracy",
+        type=float,
+        default=0.05,
+        help="standard error of ln V that is wanted (default 0.05)",
+    )
+    group.add_argument("--volume-seed", type=int, default=0, help="seed of the draws (default 0)")
+    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
     _add_conditions(command)
     _add_store(command)

@@ -1,188 +1,246 @@
-"""Walks in a polytope {u : 1 + G u ≥ 0} that is nearly round: uniform, or normal cut by its walls.
+"""Paths in S between its walls: straight ones, for uniform states, and harmonic ones, for normal.
 
-All carry the slacks s = 1 + G u along, so that a move costs as many operations as there are walls.
-With orthonormal columns in G, the matrix K = G Gᵀ holds what a turn at one wall does to the speed
-at which every other wall is approached.
+A path is told by the slacks s of all walls and the speeds w at which they change. At a wall that is
+met, its own speed is turned: w ← w − 2 w_k/K_kk · (row k of K). So a turn costs one pass over the
+walls, and a row of K, which is kept (`Rows`) or asked for: a path then stops where it is, and goes
+on, bit for bit as if the row had been there, once it is.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
+from granforce.numerics import lanes
 from granforce.numerics.lanes import compiled, within
+from granforce.system import cancelling
 
-# Rows are padded to a multiple of this, so that the search for the next wall runs in vector lanes.
+# Walls are padded to a multiple of this, so that the search for the next one runs in lanes.
 LANES = 64
+# Memory for rows of K, all threads together: those of 11,500 walls (3500 disks at μ = 0.1) fit.
+MEMORY = 1 << 30
 # Slacks stay above this: a point that rounding put on a wall turns there at once.
 _LEAST = 1e-300
+# What Flight.count counts.
+_PATH, _HITS, _TURNS, _REFUSED, _FLYING = range(5)
+
+
+class Rows(NamedTuple):
+    """Rows of K that are kept."""
+
+    values: np.ndarray  # (places, walls)
+    place: np.ndarray  # (walls,) where each row is, −1 where it is not
+    owner: np.ndarray  # (places,) wall of each place, −1 where it is free
+    used: np.ndarray  # (places,) bool, since the hand came by last
+    hand: np.ndarray  # (1,) the next place that may be given away
+
+
+class Flight(NamedTuple):
+    """Where one chain is."""
+
+    s: np.ndarray  # (walls,) slacks
+    w: np.ndarray  # (walls,) their speeds
+    start: np.ndarray  # (walls,) slacks where the path began
+    rate: np.ndarray  # (walls,) one over the time to each wall
+    left: np.ndarray  # (1,) time that is left of the path
+    count: np.ndarray  # (5,) path, its hits; turns and paths not taken in all; whether in flight
+
+
+def all_rows(walls):
+    """The Rows of all walls where they fit into MEMORY, None where not."""
+    count = walls.count
+    if 8 * count**2 > MEMORY:
+        return None
+    rows = _room(count, count)
+    for first in range(0, len(walls.moving), lanes.LANES):
+        cancelling.check("uniform sample")
+        make_rows(walls, rows, range(first, min(first + lanes.LANES, len(walls.moving))))
+    return rows
+
+
+def some_rows(walls, part):
+    """Rows with room in a part of MEMORY, none of them there yet."""
+    return _room(walls.count, max(2 * lanes.LANES, int(part * MEMORY / (8 * walls.count))))
+
+
+def _room(count, places):
+    places = min(max(1, places), max(1, count))
+    return Rows(
+        np.zeros((places, count)),
+        np.full(count, -1),
+        np.full(places, -1),
+        np.zeros(places, dtype=bool),
+        np.zeros(1, dtype=np.int64),
+    )
+
+
+def make_rows(walls, rows, wanted):
+    """Put the rows of so many walls where others were not used for long."""
+    new = walls.rows(np.asarray(wanted))
+    for wall, row in zip(wanted, new, strict=True):
+        while rows.used[rows.hand[0]]:
+            rows.used[rows.hand[0]] = False
+            rows.hand[0] = (rows.hand[0] + 1) % len(rows.owner)
+        here = rows.hand[0]
+        if rows.owner[here] >= 0:
+            rows.place[rows.owner[here]] = -1
+        rows.values[here], rows.place[wall], rows.owner[here] = row, here, wall
+        rows.used[here] = True
+        rows.hand[0] = (here + 1) % len(rows.owner)
+
+
+def make_flight(slacks):
+    """A Flight that begins at slacks (walls,)."""
+    room = (np.empty_like(slacks) for _ in range(3))
+    return Flight(slacks.copy(), *room, np.zeros(1), np.zeros(5, dtype=np.int64))
+
+
+def counted(flight):
+    """Turns and paths not taken."""
+    return flight.count[_TURNS], flight.count[_REFUSED]
+
+
+def follow(walls, rows, flights, on):
+    """Carry flights to the end of their paths; on(number, flight) → the wall that it waits at.
+
+    Where rows are missing, those of the walls that are next for each flight are made side by side.
+    """
+    waiting = dict(enumerate(flights))
+    while waiting:
+        met = {number: on(number, flight) for number, flight in waiting.items()}
+        cancelling.check("uniform sample")
+        waiting = {number: waiting[number] for number, wall in met.items() if wall >= 0}
+        each = lanes.LANES // max(1, len(waiting))
+        wanted = [met[number] for number in waiting]
+        for flight in waiting.values():
+            soon = np.where(rows.place < 0, flight.rate, -1.0)
+            ahead = np.argpartition(-soon, each)[:each] if each else []
+            wanted += [int(wall) for wall in ahead if soon[wall] > 0]
+        wanted = list(dict.fromkeys(wanted))[: max(lanes.LANES, len(waiting))]
+        if wanted:
+            make_rows(walls, rows, wanted)
 
 
 @compiled
-def billiard(G, columns, K, turn, u, rng, length, limit, paths, out, stop):
+def straight(rows, speeds, lengths, flight, limit, out, stop):
     """Billiard walk (Polyak, Gryazina, EJOR 238, 497 (2014)): straight paths, mirrored at walls.
 
-    Each path starts in a random direction and has a length uniform in (½, 3/2) · length, whatever
-    the place: the flow of the billiard keeps volume and can be run backwards, so the uniform
-    measure is stationary (their Theorem 1; any such law of lengths will do). A path with more than
-    `limit` turns is not taken, which is as likely as for its reverse.
-
-    G (rows, h) and its transpose columns (h, rows); K = G Gᵀ; turn = 2/diag K (rows,); u (h,) the
-    place, changed in place; rng a numpy Generator; out (states, rows) gets the slacks after every
-    `paths` paths. Returns the numbers of turns and of paths not taken. Ends early, with states that
-    mean nothing, once stop[0] is raised.
+    Path after path has the speeds (paths, walls), of a random direction, and a length (paths,)
+    whose law does not depend on the place: the flow of the billiard keeps volume and can be run
+    backwards, so the uniform measure is stationary (their Theorem 1). A path with more than `limit`
+    turns is not taken, which is as likely as for its reverse. out (paths, walls) gets the slacks
+    after each. Returns −1, or the wall whose row is missing. Ends early, with states that mean
+    nothing, once stop[0] is raised.
     """
-    rows, h = G.shape
-    s, w, rate = np.empty(rows), np.empty(rows), np.empty(rows)
-    v, start = np.empty(h), np.empty(h)
+    s, w, rate, left, count = flight.s, flight.w, flight.rate, flight.left, flight.count
     top = np.empty(LANES)
-    turns, refused = 0, 0
-    for state in range(len(out)):
-        if stop[0]:
-            break
-        for _ in range(paths):
-            if stop[0]:
+    while count[_PATH] < len(lengths):
+        path = count[_PATH]
+        if not count[_FLYING]:
+            _begin(flight, speeds[path], lengths[path])
+        _advance(s, w, rate, rows.values[0], 0.0, 0.0)
+        while True:
+            wall, fastest = _next_wall(rate, top)
+            if fastest * left[0] <= 1.0:
+                _axpy(s, left[0], w)
                 break
-            start[:] = u
-            _direction(v, rng)
-            left = length * (0.5 + rng.random())
-            _refresh(columns, u, v, s, w)
-            _advance(s, w, rate, K[0], 0.0, 0.0)
-            hits = 0
-            while True:
-                wall, fastest = _next_wall(rate, top)
-                if fastest * left <= 1.0:
-                    _axpy(u, left, v)
-                    break
-                if hits == limit or stop[0]:
-                    u[:] = start
-                    refused += 1
-                    break
-                time = 1.0 / fastest
-                left -= time
-                kick = w[wall] * turn[wall]
-                _axpy(u, time, v)
-                _axpy(v, -kick, G[wall])
-                _advance(s, w, rate, K[wall], time, kick)
-                hits += 1
-            turns += hits
-        _refresh(columns, u, v, s, w)
-        out[state] = s
-    return turns, refused
+            if count[_HITS] == limit or stop[0]:
+                _refuse(flight)
+                break
+            place = rows.place[wall]
+            if place < 0:
+                return wall
+            rows.used[place] = True
+            row, time = rows.values[place], 1.0 / fastest
+            left[0] -= time
+            _advance(s, w, rate, row, time, 2.0 * w[wall] / row[wall])
+            count[_HITS] += 1
+        _end(flight, out[path])
+    return -1
 
 
 @compiled
-def harmonic(G, columns, K, turn, shift, follow, u, rng, time, limit, paths, out, stop):
-    """Draws from the density exp(−½ Σ (1 − θ) u² + shift · u) between walls, 0 ≤ θ ≤ 1.
+def harmonic(rows, speeds, middles, times, flight, limit, out, stop):
+    """Paths middle + (s − middle) cos t + w sin t, mirrored at walls that are met.
 
-    Two steps in turn (Gibbs). A companion w of u is drawn from the normal distribution of variance
-    1/θ around it; the density of u given w is a normal one of variance 1 around
-    c = shift + θ w, cut by the walls. On that a path c + (u − c) cos t + v sin t, mirrored at
-    walls, is followed for a `time` (≤ π/2): its energy is conserved and walls are met at times in
-    closed form (Pakman, Paninski, arXiv:1208.4118). Where θ = 0 no companion is needed; where
-    θ = 1 the density is flat.
-
-    follow (h,): θ; shift (h,); other arguments as in `billiard`.
+    They leave the normal distribution of covariance K around the slacks `middle`, cut by the walls,
+    as it is: energy is conserved and walls are met at times in closed form (Pakman, Paninski,
+    arXiv:1208.4118). middles (paths, walls), or (1, walls) for all; times (paths,) up to π/2; other
+    arguments and what is returned as for `straight`.
     """
-    rows, h = G.shape
-    s, w, middle, rate = np.empty(rows), np.empty(rows), np.empty(rows), np.empty(rows)
-    v, start, centre, away = np.empty(h), np.empty(h), np.empty(h), np.empty(h)
+    s, w, rate, left, count = flight.s, flight.w, flight.rate, flight.left, flight.count
     top = np.empty(LANES)
-    turns, refused = 0, 0
-    for state in range(len(out)):
-        if stop[0]:
-            break
-        for _ in range(paths):
-            if stop[0]:
+    while count[_PATH] < len(times):
+        path = count[_PATH]
+        middle = middles[min(path, len(middles) - 1)]
+        if not count[_FLYING]:
+            _begin(flight, speeds[path], times[path])
+        while True:
+            _meetings(s, w, middle, rate)
+            wall, soonest = _next_wall(rate, top)
+            if soonest * np.tan(0.5 * left[0]) <= 1.0:
+                _swing(s, w, middle, np.cos(left[0]), np.sin(left[0]))
                 break
-            start[:] = u
-            for i in range(h):
-                companion = np.sqrt(follow[i]) * rng.standard_normal()
-                centre[i] = shift[i] + follow[i] * u[i] + companion
-                v[i] = rng.standard_normal()
-            _refresh(columns, centre, v, middle, w)
-            _refresh(columns, u, v, s, w)
-            left, hits = time, 0
-            while True:
-                _meetings(s, w, middle, rate)
-                wall, soonest = _next_wall(rate, top)
-                last = soonest * np.tan(0.5 * left) <= 1.0
-                if hits == limit or stop[0]:
-                    u[:] = start
-                    refused += 1
-                    break
-                step = left if last else 2.0 * np.arctan(1.0 / soonest)
-                left -= step
-                cos, sin = np.cos(step), np.sin(step)
-                for i in range(h):
-                    away[i] = u[i] - centre[i]
-                    u[i] = centre[i] + cos * away[i] + sin * v[i]
-                    v[i] = cos * v[i] - sin * away[i]
-                if last:
-                    break
-                _swing(s, w, middle, cos, sin)
-                kick = w[wall] * turn[wall]
-                _axpy(v, -kick, G[wall])
-                _axpy(w, -kick, K[wall])
-                hits += 1
-            turns += hits
-        _refresh(columns, u, v, s, w)
-        out[state] = s
-    return turns, refused
+            if count[_HITS] == limit or stop[0]:
+                _refuse(flight)
+                break
+            place = rows.place[wall]
+            if place < 0:
+                return wall
+            rows.used[place] = True
+            row, time = rows.values[place], 2.0 * np.arctan(1.0 / soonest)
+            left[0] -= time
+            _swing(s, w, middle, np.cos(time), np.sin(time))
+            _axpy(w, -2.0 * w[wall] / row[wall], row)
+            count[_HITS] += 1
+        _end(flight, out[path])
+    return -1
 
 
 @compiled
-def hit_and_run(columns, u, rng, moves, out, stop):
-    """Coordinate hit-and-run (Turchin, 1971): a uniform point of the chord along a random axis.
+def chords(speeds, parts, s, rate):
+    """Hit-and-run (Smith, Oper. Res. 32, 1296 (1984)): a uniform point of each chord in turn.
 
-    Arguments as in `billiard`; out (states, rows) gets the slacks after every `moves` moves.
+    speeds (moves, walls) of random directions, parts (moves,) uniform in [0, 1]; s (walls,) is
+    changed in place.
     """
-    h, rows = columns.shape
-    s, w, rate = np.empty(rows), np.empty(rows), np.empty(rows)
-    v = np.zeros(h)
     top = np.empty(LANES)
-    for state in range(len(out)):
-        _refresh(columns, u, v, s, w)
-        for _ in range(moves):
-            if stop[0]:
-                break
-            axis = int(h * rng.random())
-            w[:] = columns[axis]
-            _advance(s, w, rate, w, 0.0, 0.0)
-            ahead = 1.0 / _next_wall(rate, top)[1]
-            for k in range(rows):
-                rate[k] = -rate[k]
-            behind = 1.0 / _next_wall(rate, top)[1]
-            move = (ahead + behind) * rng.random() - behind
-            u[axis] += move
-            _axpy(s, move, w)
-        _refresh(columns, u, v, s, w)
-        out[state] = s
+    for move in range(len(parts)):
+        w = speeds[move]
+        _advance(s, w, rate, w, 0.0, 0.0)
+        ahead = 1.0 / _next_wall(rate, top)[1]
+        for k in range(len(rate)):
+            rate[k] = -rate[k]
+        behind = 1.0 / _next_wall(rate, top)[1]
+        _axpy(s, (ahead + behind) * parts[move] - behind, w)
 
 
 @within
-def _direction(v, rng):
-    square = 0.0
-    for i in range(len(v)):
-        v[i] = rng.standard_normal()
-        square += v[i] * v[i]
-    for i in range(len(v)):
-        v[i] /= np.sqrt(square)
+def _begin(flight, speeds, left):
+    flight.start[:] = flight.s
+    flight.w[:] = speeds
+    flight.left[0] = left
+    flight.count[_HITS] = 0
+    flight.count[_FLYING] = 1
+
+
+@within
+def _refuse(flight):
+    flight.s[:] = flight.start
+    flight.count[_REFUSED] += 1
+
+
+@within
+def _end(flight, out):
+    out[:] = flight.s
+    flight.count[_TURNS] += flight.count[_HITS]
+    flight.count[_PATH] += 1
+    flight.count[_FLYING] = 0
 
 
 @within
 def _axpy(x, factor, y):
     for i in range(len(x)):
         x[i] += factor * y[i]
-
-
-@within
-def _refresh(columns, u, v, s, w):
-    """s = 1 + G u and w = G v from scratch, so that rounding does not grow from path to path."""
-    s[:] = 1.0
-    w[:] = 0.0
-    for i in range(len(u)):
-        column, place, speed = columns[i], u[i], v[i]
-        for k in range(len(s)):
-            s[k] += place * column[k]
-            w[k] += speed * column[k]
 
 
 @within

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import HalfspaceIntersection
 
 from granforce import notebook
-from granforce.explore.chart import inner_point
+from granforce.explore.walls import inner_point
 from granforce.forces.ensemble import ensemble
 from granforce.numerics import certificates
 from granforce.records import InputError

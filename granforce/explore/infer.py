@@ -14,13 +14,11 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg, sparse
 
 from granforce import notebook
 from granforce.explore import billiard, uniform
-from granforce.explore.chart import chart
 from granforce.explore.mixing import Mixing, mixing
-from granforce.forces.contact_problem import inner_network
+from granforce.explore.walls import walls
 from granforce.forces.likeliest import UNMEASURED, checked, likeliest
 from granforce.records import whole
 from granforce.system import cancelling
@@ -32,6 +30,8 @@ SUSPECT = 3.0
 _TIME = np.pi / 2
 # Paths between states that are kept: 1000 states are then worth 300 to 900 independent ones.
 _PATHS = 4
+# Paths whose speeds are drawn side by side.
+_AT_ONCE = 8
 # States dropped at the start of each chain, and states between two calls of progress.
 _DROPPED, _ROUND = 20, 20
 
@@ -45,7 +45,7 @@ class Draws(NamedTuple):
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component
     reached: bool  # all in S, and R̂ ≤ MIXED
     counts: dict  # turns, refused paths, dropped states, held coordinates
-    setup_seconds: float  # wall time of the chart
+    setup_seconds: float  # wall time of the walls and of the rows of K that are kept
     sampling_seconds: float  # wall time of the draws, those dropped included
 
     effective = uniform.UniformSample.effective
@@ -126,8 +126,9 @@ def infer(
     beyond = np.flatnonzero(far > SUSPECT)
     draws = None
     if states:
-        fit = _fit(ensemble, m, s, unmeasured)
-        draws = _draws(ensemble, *fit, states, chains, seed, workers, progress)
+        draws = _draws(
+            ensemble, *_fit(ensemble, m, s, unmeasured), states, chains, seed, workers, progress
+        )
     return Inference(
         *best,
         ensemble.index[beyond[np.argsort(-far[beyond], kind="stable")]],
@@ -139,33 +140,31 @@ def infer(
 
 
 def _fit(ensemble, m, s, unmeasured):
-    """W sparse (k, n) and d (k,): χ² = |W y − d|² in the coordinates of `Ensemble.scaled_form`."""
-    m, s = (ensemble.to_vector(values) / ensemble.force_scale for values in (m, s))
-    weight = 1 / np.where(np.isnan(m), unmeasured, s)
-    W = sparse.diags(weight) @ ensemble.scaled_form[2]
-    return sparse.csc_matrix(W), weight * np.nan_to_num(m)
+    """W and m (N_c, 2) in ⟨f_n⟩: χ² = Σ W (f − m)²."""
+    unit = ensemble.force_scale
+    sigma = np.where(np.isnan(m), unmeasured, s / unit)
+    return sigma**-2.0, np.nan_to_num(m / unit)
 
 
-def _draws(ensemble, W, d, states, chains, seed, workers, progress):
+def _draws(ensemble, weight, m, states, chains, seed, workers, progress):
     begin = time.perf_counter()
-    A, b, _ = ensemble.scaled_form
-    made = chart(A, b, inner_network(ensemble), (W, d))
-    turned, shift, follow = rounded(made, W, d)
-    ends = [uniform.init(turned, one) for one in np.random.SeedSequence(seed).spawn(chains)]
+    made = walls(ensemble, weight, m)
+    rows = uniform.stores(made, billiard.all_rows(made), chains, workers)
+    ends = [uniform.init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
     ready = time.perf_counter()
     parts, counts, have, target = [], {"turns": 0, "refused": 0}, -_DROPPED, -(-states // chains)
-    with cancelling.threads(workers) as pool:
-        while have < target:
-            count = min(_ROUND, target - have) if have >= 0 else -have
-            done = pool.map(lambda end, count=count: step(turned, shift, follow, end, count), ends)
-            ends, moves = zip(*done, strict=True)
-            for name in counts:
-                counts[name] += sum(getattr(one, name) for one in moves)
-            if have >= 0:
-                parts.append(uniform.forces_of(ensemble, made, np.stack([m.slacks for m in moves])))
-                if progress is not None:
-                    progress((have + count) * chains, target * chains)
-            have += count
+    while have < target:
+        count = min(_ROUND, target - have) if have >= 0 else -have
+        ends, moves = uniform.shared(
+            rows, ends, lambda kept, group, count=count: step(made, group, count, kept)
+        )
+        for name in counts:
+            counts[name] += sum(getattr(one, name) for one in moves)
+        if have >= 0:
+            parts.append(uniform.forces_of(ensemble, made, np.stack([m.slacks for m in moves])))
+            if progress is not None:
+                progress((have + count) * chains, target * chains)
+        have += count
     found = np.concatenate(parts, axis=1)
     drawn = time.perf_counter()
     residual, violation = ensemble.residual(found), ensemble.violation(found)
@@ -179,33 +178,47 @@ def _draws(ensemble, W, d, states, chains, seed, workers, progress):
     )
 
 
-def rounded(made, W, d):
-    """The chart in coordinates in which the cut normal distribution is round, shift and θ (h,).
+def step(made, ends, count, rows=None):
+    """The next `count` states of some chains, as `uniform.step` gives them.
 
-    ½ |W y − d|² is ½ Λ u·u − g·u in the chart, centred where its barrier has the curvature 1: in
-    the axes of Λ, stretched by √(Λ + 1), both together have the curvature 1, 1 − θ of it by the
-    measurement and θ by the companion that stands for the walls (see `billiard.harmonic`).
+    Two steps take turns (Gibbs). To every wall's 1 + B (f − f°) a normal error of variance 1 is
+    added, its companion; given those, f has a normal distribution of precision Bᵀ B + W around a
+    point that one solve gives, cut by the walls: a harmonic path for a quarter of an oscillation
+    draws from it. Without a measurement that leaves uniform states.
     """
-    slopes = W[:, made.moving] @ (made.centre[made.moving, None] * made.G[: len(made.moving)])
-    tilt = slopes.T @ (d - W @ made.centre)
-    triangle = np.linalg.qr(slopes, mode="r")  # the same |slopes u|, with at most h rows
-    _, size, axes = cancelling.apart(linalg.svd, triangle)
-    narrow = 1 / np.hypot(1.0, np.pad(size, (0, made.dimension - len(size))))
-    G = made.G @ axes.T * narrow
-    K = cancelling.apart(np.matmul, G, G.T)
-    diagonal = np.diagonal(K)
-    turn = np.divide(2.0, diagonal, out=np.zeros(len(G)), where=diagonal > 0)
-    turned = made._replace(G=G, columns=np.ascontiguousarray(G.T), K=K, turn=turn)
-    return turned, narrow * (axes @ tilt), narrow**2
+    ends = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends]
+    if not made.dimension:
+        return ends, [uniform.Moves(np.ones((count, made.count)), 0, 0)] * len(ends)
+    rows = billiard.some_rows(made, 1.0) if rows is None else rows
+    limit, times = uniform.MOST_TURNS * (made.dimension + 1), np.array([_TIME])
+
+    def on(drawn, flight, out):
+        return billiard.harmonic(rows, *drawn, times, flight, limit, out, cancelling.flag())
+
+    pulls = np.broadcast_to(made.pull, (len(ends), made.pull.size))
+    found, counts = [], 0
+    for path in range(count * _PATHS):
+        if path % _AT_ONCE == 0:
+            drawn = [_drawn(made, end.rng, min(_AT_ONCE, count * _PATHS - path)) for end in ends]
+        shifts = [
+            one[1][path % _AT_ONCE] + end.slacks for one, end in zip(drawn, ends, strict=True)
+        ]
+        middles = 1.0 + made.moved(np.stack(shifts) - 1.0, pulls)
+        paths = [
+            (one[0][path % _AT_ONCE][None], m[None]) for one, m in zip(drawn, middles, strict=True)
+        ]
+        ends, outs, done = uniform.flown(made, rows, ends, on, paths)
+        found.append(outs)
+        counts = counts + done
+    slacks = np.concatenate(found, axis=1)[:, _PATHS - 1 :: _PATHS]
+    return ends, [uniform.moves(made, *one) for one in zip(slacks, counts, strict=True)]
 
 
-def step(turned, shift, follow, state, count):
-    """The next `count` states of a chain, as `uniform.step` gives them."""
-    place, rng = state.place.copy(), copy.deepcopy(state.rng)
-    slacks, turns, refused = np.ones((count, len(turned.G))), 0, 0
-    if turned.dimension:
-        walls = turned.G, turned.columns, turned.K, turned.turn, shift, follow
-        path = _TIME, uniform.MOST_TURNS * (turned.dimension + 1), _PATHS
-        turns, refused = billiard.harmonic(*walls, place, rng, *path, slacks, cancelling.flag())
-    cancelling.check("inference")
-    return uniform.ChainState(place, rng), uniform.Moves(slacks, turns, refused)
+def _drawn(made, rng, count):
+    """Speeds (count, walls) of covariance K, and errors (count, walls) of companions."""
+    push, error = (np.empty((count, made.count)) for _ in range(2))
+    pull = np.empty((count, made.root.size))
+    for path in range(count):
+        push[path], error[path] = rng.standard_normal((2, made.count))
+        pull[path] = made.root * rng.standard_normal(made.root.size)
+    return made.moved(push, pull), error

@@ -12,9 +12,10 @@ import numpy as np
 from scipy.sparse.linalg import norm
 
 from granforce.explore import billiard
-from granforce.explore.chart import Chart, chart
+from granforce.explore.billiard import Rows
 from granforce.explore.mixing import Mixing, mixing
-from granforce.forces.contact_problem import inner_network
+from granforce.explore.walls import PROBES, Walls, walls
+from granforce.numerics import lanes
 from granforce.records import Cancelled, InputError
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
@@ -24,6 +25,8 @@ from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
 PATH = 2.0
 # Paths between states that are kept: 1000 states are then worth 400 to 700 independent ones.
 PATHS_PER_STATE = 2
+# Paths whose directions are drawn side by side; after each such batch rounding is taken off.
+BATCH = lanes.LANES
 # Moves of hit-and-run per state and dimension; its chains mix more slowly by about this factor.
 MOVES_PER_DIMENSION = 20
 # States dropped at the start of each chain; from the first part comes the length of the paths of
@@ -45,14 +48,15 @@ METHODS = ("billiard", "hit_and_run")
 class ChainState(NamedTuple):
     """Where a chain stands: its place and its own random stream."""
 
-    place: np.ndarray  # (h,) u in the chart
+    slacks: np.ndarray  # (walls,) s
     rng: np.random.Generator
+    paths: int = 0  # taken so far
 
 
 class Moves(NamedTuple):
     """What one step did."""
 
-    slacks: np.ndarray  # (count, rows) the states, for Chart.points
+    slacks: np.ndarray  # (count, walls) the states, for Walls.points
     turns: int  # reflections at walls
     refused: int  # paths that were not taken, for their number of turns
 
@@ -66,12 +70,13 @@ class UniformSample(NamedTuple):
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
     reached: bool  # complete, all in S, R̂ ≤ MIXED, worth as many independent states as wanted
     counts: dict  # turns, refused paths, dropped states, held coordinates, skipped (h = 0)
-    setup_seconds: float  # wall time of the chart
+    setup_seconds: float  # wall time of the walls and of the rows of K that are kept
     sampling_seconds: float  # wall time of the steps, those dropped included
     diagnosis_seconds: float  # wall time of the diagnostics
     method: str
-    chart: Chart  # the coordinates used
-    reach: float  # root mean square distance |u| from the centre, as found in the warm-up
+    walls: Walls  # the coordinates used
+    rows: Rows | None  # those of K where all are kept
+    reach: float  # root mean square distance |s − 1| from the centre, as found in the warm-up
     ends: tuple  # ChainState of each chain, from which it can be continued
 
     @property
@@ -90,36 +95,97 @@ class UniformSample(NamedTuple):
         return np.repeat(np.arange(self.states.shape[0]), self.states.shape[1])
 
 
-def init(chart, seed):
+def init(made, seed):
     """A chain on a random ray from the centre, nine tenths of the way to the wall.
 
     Chains so start far from each other, which R̂ relies on. seed: as for numpy.random.default_rng.
     """
     rng = np.random.default_rng(seed)
-    direction = rng.standard_normal(chart.dimension)
-    approach = -(chart.G @ direction).min(initial=0.0)
-    return ChainState(0.9 * direction / approach if approach > 0 else direction, rng)
+    direction = made.moved(rng.standard_normal((1, made.count)))[0]
+    approach = -direction.min(initial=0.0)
+    return ChainState(1 + (0.9 / approach if approach > 0 else 1.0) * direction, rng)
 
 
-def step(chart, state, *, count, reach, method="billiard"):
-    """The next `count` states of a chain: (state, Moves). The given state is left as it was.
+def step(made, ends, *, count, reach, rows=None, method="billiard"):
+    """The next `count` states of some chains: (ChainState of each, Moves of each).
 
-    reach: how far states are from the centre (root mean square of |u|), which sets the length of
-    the billiard's paths; any fixed number leaves the measure uniform.
+    The given ones are left as they were. rows: where rows of K are kept, made here by default.
+    reach: how far states are from the centre (root mean square of |s − 1|), which sets the length
+    of the billiard's paths; any fixed number leaves the measure uniform.
     """
-    place, rng = state.place.copy(), copy.deepcopy(state.rng)
-    slacks = np.ones((count, len(chart.G)))
-    turns = refused = 0
-    h = chart.dimension
-    if h and method == "billiard":
-        walls = chart.G, chart.columns, chart.K, chart.turn
-        path = PATH * reach, MOST_TURNS * (h + 1), PATHS_PER_STATE
-        turns, refused = billiard.billiard(*walls, place, rng, *path, slacks, cancelling.flag())
-    elif h:
-        moves = MOVES_PER_DIMENSION * h
-        billiard.hit_and_run(chart.columns, place, rng, moves, slacks, cancelling.flag())
+    ends = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends]
+    if not made.dimension:
+        nothing = Moves(np.ones((count, made.count)), 0, 0)
+        return ends, [nothing] * len(ends)
+    if method == "hit_and_run":
+        return _hit_and_run(made, ends, count)
+    rows = billiard.some_rows(made, 1.0) if rows is None else rows
+    limit, lengths = MOST_TURNS * (made.dimension + 1), PATH * reach
+
+    def on(drawn, flight, out):
+        return billiard.straight(rows, *drawn, flight, limit, out, cancelling.flag())
+
+    found, counts = [], 0
+    left = count * PATHS_PER_STATE
+    while left:
+        paths = min(left, BATCH - ends[0].paths % BATCH)
+        drawn = [directions(made, end.rng, paths) for end in ends]
+        drawn = [(speeds, lengths * (0.5 + parts)) for speeds, parts in drawn]
+        ends, outs, done = flown(made, rows, ends, on, drawn)
+        found.append(outs)
+        counts = counts + done
+        left -= paths
+    slacks = np.concatenate(found, axis=1)[:, PATHS_PER_STATE - 1 :: PATHS_PER_STATE]
+    return ends, [moves(made, *one) for one in zip(slacks, counts, strict=True)]
+
+
+def flown(made, rows, ends, on, drawn):
+    """Chains on by a batch of paths: (ends, slacks (chains, paths, walls), turns and refused).
+
+    on(drawn, flight, out): as `billiard.straight`, for what was drawn for the paths of a chain.
+    """
+    flights = [billiard.make_flight(end.slacks) for end in ends]
+    outs = np.ones((len(ends), len(drawn[0][0]), made.count))
+    billiard.follow(made, rows, flights, lambda k, flight: on(drawn[k], flight, outs[k]))
     cancelling.check("uniform sample")
-    return ChainState(place, rng), Moves(slacks, turns, refused)
+    slacks, paths = np.stack([flight.s for flight in flights]), ends[0].paths + outs.shape[1]
+    if paths % BATCH == 0:
+        slacks = made.on_hull(slacks)
+    ends = [ChainState(s, end.rng, paths) for s, end in zip(slacks, ends, strict=True)]
+    return ends, outs, np.array([billiard.counted(flight) for flight in flights])
+
+
+def moves(made, slacks, counts):
+    """The Moves of a chain, rounding taken off."""
+    return Moves(made.on_hull(slacks), *(int(number) for number in counts))
+
+
+def directions(made, rng, count, unit=True):
+    """Speeds (count, walls) of covariance K, or uniform directions of it, and numbers in [0, 1]."""
+    g, parts = np.empty((count, made.count)), np.empty(count)
+    for path in range(count):
+        g[path], parts[path] = rng.standard_normal(made.count), rng.random()
+    speeds = made.moved(g)
+    if not unit:
+        return speeds, parts
+    return speeds / np.sqrt((speeds * speeds).sum(axis=1, keepdims=True)), parts
+
+
+def _hit_and_run(made, ends, count):
+    moves, rate, done, found = MOVES_PER_DIMENSION * made.dimension, np.empty(made.count), [], []
+    for end in ends:
+        out = np.empty((count, made.count))
+        s = end.slacks.copy()
+        for state in range(count):
+            for first in range(0, moves, BATCH):
+                cancelling.check("uniform sample")
+                drawn = directions(made, end.rng, min(BATCH, moves - first))
+                billiard.chords(*drawn, s, rate)
+            s = made.on_hull(s[None])[0]
+            out[state] = s
+        done.append(end._replace(slacks=s))
+        found.append(Moves(out, 0, 0))
+    return done, found
 
 
 @cancelling.cancellable
@@ -160,7 +226,7 @@ def sample_uniform(
     most = MOST_STATES * max(states, effective or 0)
     while True:
         sample, complete = _extend(ensemble, sample, states, workers, progress)
-        h, done = sample.chart.dimension, len(sample.flat)
+        h, done = sample.walls.dimension, len(sample.flat)
         enough = not h or not effective or sample.effective >= effective
         if enough or not complete or done >= most:
             mixed = not h or sample.mixing.worst_r_hat <= MIXED
@@ -169,26 +235,52 @@ def sample_uniform(
         states = min(most, int(done * min(2.0, max(1.1, growth))) + 1)
 
 
-def warm_up(chart, chains, seed, *, method="billiard", workers=1):
+def warm_up(made, chains, seed, *, method="billiard", stores=None):
     """Chains ready to draw from: (ChainState of each, reach, Moves made and dropped)."""
-    ends = tuple(init(chart, one) for one in np.random.SeedSequence(seed).spawn(chains))
-    reach, dropped = float(np.sqrt(chart.dimension)), []
-    for count in WARM_UP if chart.dimension else ():
-        ends, moves = _together(chart, ends, count, reach, method, workers)
+    ends = [init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
+    reach, dropped = float(np.sqrt(made.dimension)), []
+    stores = stores or [billiard.some_rows(made, 1.0)]
+    for count in WARM_UP if made.dimension else ():
+        ends, moves = together(made, stores, ends, count, reach, method)
         dropped += moves
-        # Columns of G are orthonormal: |u| = |s − 1|.
         square = np.mean([np.sum((one.slacks - 1) ** 2, axis=1) for one in moves])
         reach = float(np.sqrt(square))
     return ends, reach, dropped
 
 
+def stores(made, kept, chains, workers):
+    """Rows of K for each thread: all of them together, or a part of the memory each."""
+    groups = min(workers, chains)
+    if kept is not None:
+        return [kept] * groups
+    return [billiard.some_rows(made, 1 / groups) for _ in range(groups)]
+
+
+def together(made, stores, ends, count, reach, method="billiard"):
+    """All chains on by `count` states, over as many threads as stores: ends, and Moves of each."""
+    options = {"count": count, "reach": reach, "method": method}
+    return shared(stores, ends, lambda rows, group: step(made, group, rows=rows, **options))
+
+
+def shared(stores, ends, work):
+    """work(rows, some of the chains) → (ends, moves), over threads, put together again."""
+    groups = [[int(k) for k in part] for part in np.array_split(np.arange(len(ends)), len(stores))]
+    if len(stores) == 1:
+        return work(stores[0], ends)
+    with cancelling.threads(len(stores)) as pool:
+        parts = [[ends[k] for k in group] for group in groups]
+        done = list(pool.map(work, stores, parts))
+    return [end for part in done for end in part[0]], [one for part in done for one in part[1]]
+
+
 def _start(ensemble, chains, seed, method, workers):
     """A sample without states yet, its chains warmed up."""
     begin = time.perf_counter()
-    A, b, _ = ensemble.scaled_form
-    made = chart(A, b, inner_network(ensemble))
+    made = walls(ensemble)
+    kept = billiard.all_rows(made) if method == "billiard" else None
     ready = time.perf_counter()
-    ends, reach, dropped = warm_up(made, chains, seed, method=method, workers=workers)
+    rows = stores(made, kept, chains, workers)
+    ends, reach, dropped = warm_up(made, chains, seed, method=method, stores=rows)
     counts = {"turns": 0, "refused": 0, "dropped": sum(len(one.slacks) for one in dropped)}
     counts |= {"held": len(made.centre) - len(made.moving), "skipped": 0}
     nothing = np.zeros((chains, 0))
@@ -203,19 +295,11 @@ def _start(ensemble, chains, seed, method, workers):
         sampling_seconds=time.perf_counter() - ready,
         diagnosis_seconds=0.0,
         method=method,
-        chart=made,
+        walls=made,
+        rows=kept,
         reach=reach,
         ends=ends,
     )
-
-
-def _together(chart, ends, count, reach, method, workers):
-    """All chains on by `count` states, over threads: their ends, and the Moves of each."""
-    options = {"count": count, "reach": reach, "method": method}
-    with cancelling.threads(workers) as pool:
-        done = pool.map(lambda end: step(chart, end, **options), ends)
-        ends, moves = zip(*done, strict=True)
-    return ends, moves
 
 
 def _counted(counts, moves):
@@ -225,15 +309,16 @@ def _counted(counts, moves):
 
 def _extend(ensemble, sample, states, workers, progress):
     """The sample with at least `states` states, diagnosed, and whether it was not cancelled."""
-    made, ends, counts = sample.chart, sample.ends, sample.counts
+    made, ends, counts = sample.walls, sample.ends, sample.counts
     chains, have = sample.residual.shape
     target = -(-states // chains)
     begin = time.perf_counter()
+    rows = stores(made, sample.rows, chains, workers)
     parts = [(sample.states, sample.residual, sample.violation)]
     while have < target and not cancelling.cancelled():
         count = min(_ROUND, target - have)
         try:
-            ends, moves = _together(made, ends, count, sample.reach, sample.method, workers)
+            ends, moves = together(made, rows, ends, count, sample.reach, sample.method)
         except Cancelled:
             break
         new = forces_of(ensemble, made, np.stack([one.slacks for one in moves]))
@@ -271,17 +356,22 @@ def _inside(sample):
     return balanced and sample.violation.max(initial=0.0) <= ADMISSIBLE
 
 
-def forces_of(ensemble, chart, slacks):
-    """Forces (…, N_c, 2) of slacks (…, rows)."""
-    y = chart.points(slacks)
+def forces_of(ensemble, made, slacks):
+    """Forces (…, N_c, 2) of slacks (…, walls)."""
+    y = made.points(slacks)
     T = ensemble.scaled_form[2]
     x = (T @ y.reshape(-1, y.shape[-1]).T).T * ensemble.force_scale
     return ensemble.pin(ensemble.to_forces(x.reshape(*y.shape[:-1], -1)))
 
 
-def varying(ensemble, chart):
-    """Mask (N_c, 2) of components that are not the same in all of S."""
+def varying(ensemble, made):
+    """Mask (N_c, 2) of components that are not the same in all of S: some random change has them.
+
+    The numbers drawn are always the same.
+    """
     T = ensemble.scaled_form[2].tocsc()
-    slopes = T[:, chart.moving] @ (chart.centre[chart.moving, None] * chart.G[: len(chart.moving)])
-    size = norm(T, axis=1)
-    return ensemble.to_forces(np.linalg.norm(slopes, axis=1) > FLAT * size) > 0
+    g = np.random.default_rng(0).standard_normal((PROBES, made.count))
+    relative = made.moved(g)[:, : len(made.moving)]
+    change = T[:, made.moving] @ (made.centre[made.moving] * relative).T
+    size = norm(T, axis=1) * np.sqrt(PROBES)
+    return ensemble.to_forces(np.linalg.norm(change, axis=1) > FLAT * size) > 0

@@ -25,6 +25,8 @@ from granforce.figures.variations import (
     samplers,
     sizes,
     stresses,
+    tails,
+    volumes,
 )
 
 __all__ = [
@@ -47,4 +49,6 @@ __all__ = [
     "save",
     "sizes",
     "stresses",
+    "tails",
+    "volumes",
 ]

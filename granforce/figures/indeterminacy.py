@@ -5,21 +5,25 @@ import numpy as np
 from granforce import statistics
 from granforce.figures import style
 
-_MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
+_MEASURES = (
+    *(("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15)),
+    ("extent", "width of S", 1.0),
+)
 
 
 def indeterminacy(rows, *, beside=None, backend="bokeh"):
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
 
-    rows: dicts with mu, eta1, eta2, eta3 and coordination (z). beside: {name: rows} of other
+    rows: dicts with mu, eta1, eta2, eta3, extent (the width of S per free dimension, in ⟨f_n⟩), of
+    which what is there is drawn, and coordination (z). beside: {name: rows} of other
     sources of the same measures, such as exact η3; what a row lacks is not drawn.
     """
     style.ready(backend)
     curves = []
     for k, (name, label, factor) in enumerate(_MEASURES):
-        curves.append(
-            (statistics.means(rows, name, factor=factor), label, style.COLOURS[k], "solid", k)
-        )
+        points = statistics.means(rows, name, factor=factor)
+        if points:
+            curves.append((points, label, style.COLOURS[k], "solid", k))
     for source, dash in zip(beside or {}, ("dashed", "dotted"), strict=False):
         for k, (name, label, factor) in enumerate(_MEASURES):
             points = statistics.means(beside[source], name, factor=factor)

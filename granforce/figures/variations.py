@@ -158,6 +158,58 @@ def stresses(rows, uniform, *, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
+def volumes(rows, larger=(), *, backend="bokeh"):
+    """Width of S per free dimension and ln V per grain against μ, and ln V per grain against N.
+
+    rows: dicts with mu, n, extent and log_volume_per_grain; larger: those of other numbers n.
+    """
+    style.ready(backend)
+    by_mu = (("extent", "width / ⟨f_n⟩", True), ("log_volume_per_grain", "ln V / grain", False))
+    frames = []
+    for name, label, logy in by_mu:
+        series = [(statistics.means(rows, name), label, style.COLOURS[0], "solid", 0)]
+        drawn = style.curves(series, backend, logx=True, logy=logy)
+        axes = {"x": "μ", "y": label, "logx": True, "logy": logy}
+        frames.append(style.frame(drawn, backend, title=label, **axes))
+    frictions = sorted({row["mu"] for row in larger})
+    series = [
+        (
+            statistics.means(
+                [row for row in (*rows, *larger) if row["mu"] == mu], "log_volume_per_grain", "n"
+            ),
+            *(f"μ = {mu:g}", style.COLOURS[k], "solid", k),
+        )
+        for k, mu in enumerate(frictions)
+    ]
+    if series:
+        drawn = style.curves(series, backend, logx=True)
+        axes = {"x": "N", "y": "ln V / grain", "logx": True, "legend": "right"}
+        frames.append(style.frame(drawn, backend, title="against the number of disks", **axes))
+    return style.page(frames, backend, columns=2)
+
+
+def tails(groups, *, fits=None, backend="bokeh"):
+    """P(f_n/⟨f_n⟩) of uniform states, semi-logarithmic, one frame for each word.
+
+    groups: {word: {μ: [(f, P), …]}}; fits: {word: {μ: (b, from, to)}} of tails exp(−(λ f)^b),
+    fitted in that range of f.
+    """
+    style.ready(backend)
+    frames = []
+    for last, (word, curves) in enumerate(groups.items(), 1 - len(groups)):
+        drawn = []
+        for k, (mu, points) in enumerate(sorted(curves.items())):
+            fit = (fits or {}).get(word, {}).get(mu)
+            told = "" if fit is None or last else f", b = {fit[0]:.2f}"
+            colour, marker = style.COLOURS[k], style.MARKERS[k]
+            drawn.append(style.line(points, f"μ = {mu:g}{told}", colour, backend))
+            drawn.append(style.dots(points, f"μ = {mu:g}{told}", colour, backend, marker))
+        legend = None if last else "right"
+        axes = {"x": "f_n / ⟨f_n⟩", "y": "P(f_n)", "logy": True, "legend": legend}
+        frames.append(style.frame(drawn, backend, title=word, **axes))
+    return style.page(frames, backend, columns=2)
+
+
 def _frames(sources, backend, names, legend, logy=(), columns=2):
     """One frame for each name against μ > 0, with all sources: (word, rows, dash).
 

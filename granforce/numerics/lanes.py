@@ -108,9 +108,12 @@ def _place(context, builder, signature, args):
 
 @intrinsic
 def load(typing, array, index, lanes):
-    """Number `index` of a contiguous array."""
+    """Number `index` of a contiguous array; one of a single axis is the same in all lanes."""
 
     def emit(context, builder, signature, args):
+        if array.ndim == 1 and lanes.count > 1:
+            first = context.make_array(array)(context, builder, args[0]).data
+            return _in_all(builder, builder.load(builder.gep(first, [args[1]])), lanes.count)
         return builder.load(_place(context, builder, signature, args), align=8)
 
     return _number(lanes)(array, types.int64, lanes), emit
@@ -133,15 +136,18 @@ def same(typing, lanes, value):
     kind = _number(lanes)
 
     def emit(context, builder, signature, args):
-        if kind is types.float64:
-            return args[1]
-        index = ir.IntType(32)
-        vector = ir.Constant(ir.VectorType(_DOUBLE, kind.width), ir.Undefined)
-        vector = builder.insert_element(vector, args[1], index(0))
-        first = ir.Constant(ir.VectorType(index, kind.width), [0] * kind.width)
-        return builder.shuffle_vector(vector, vector, first)
+        return args[1] if kind is types.float64 else _in_all(builder, args[1], kind.width)
 
     return kind(lanes, types.float64), emit
+
+
+def _in_all(builder, value, width):
+    """A vector of so many times one double."""
+    index = ir.IntType(32)
+    vector = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
+    vector = builder.insert_element(vector, value, index(0))
+    first = ir.Constant(ir.VectorType(index, width), [0] * width)
+    return builder.shuffle_vector(vector, vector, first)
 
 
 def _named(builder, name, args):

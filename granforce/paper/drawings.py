@@ -4,6 +4,7 @@ import numpy as np
 
 from granforce import figures
 from granforce.paper.claims.groups import SAMPLERS, drawn
+from granforce.paper.tables import FORCES
 from granforce.system.files import make_folder
 
 SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
@@ -43,7 +44,8 @@ CAPTIONS = {
     f"friction coefficient μ; {_POINTS}.",
     "effort": "Accepted part of the attempts, and sweeps per accepted state, of walks by "
     f"Gauss–Seidel sweeps alone that end at several residuals; {_POINTS}.",
-    "figure1_exact": "As Figure 1 by nearest networks; dashed, 0.15 η3 of the exact intervals.",
+    "figure1_exact": "As Figure 1 by nearest networks; dashed, 0.15 η3 of the exact intervals; "
+    "dotted, the width V^(1/h)/√(2πe) of S per free dimension, from its volume V.",
     "figure1_uniform": "As Figure 1 by nearest networks; dashed, those of uniform states.",
     "figure4_mean": "Distribution of the extent ΔF_n of normal forces, in units of its mean, that "
     f"the random walk ({{walk}}) has seen, {_TAILS}.",
@@ -63,6 +65,12 @@ CAPTIONS = {
     "network in S (exact), and that of the original network, which was made under pressure alone; "
     "and this and that of uniform states in parts of the largest in the same packing; "
     f"{_POINTS}.",
+    "volumes": "Width V^(1/h)/√(2πe) of S per free dimension, in ⟨f_n⟩, and ln V per grain of the "
+    "backbone against the friction coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V "
+    f"per grain against the number N of disks; {_POINTS}.",
+    "tails": "Distribution of the normal forces of uniform states of S, in ⟨f_n⟩, where the "
+    "pressure and where the whole stress is prescribed, semi-logarithmic. Tails exp(−(λ f)^b) are "
+    "fitted from 2 ⟨f_n⟩ to the last bin with ten forces or more: {tails}.",
     "distances": "Distance of the original network and of the walk's states from the centre of S, "
     "in units of that of uniform states; bars are standard errors over packings.",
 }
@@ -83,7 +91,8 @@ def paper_sampler(table):
 def captions(table):
     """{file name: caption} of the figures of a table."""
     walk = _RELAXED[paper_sampler(table)]
-    return {name: caption.format(walk=walk) for name, caption in CAPTIONS.items()}
+    told = _told(table) or "–"
+    return {name: caption.format(walk=walk, tails=told) for name, caption in CAPTIONS.items()}
 
 
 def draw(table, folder, *, formats=FORMATS, progress=None):
@@ -145,7 +154,8 @@ def _beyond(table):
     if efforts:
         made["effort"] = _later(figures.effort, efforts)
     if walk and exact:
-        made["figure1_exact"] = _later(figures.indeterminacy, walk, beside={"exact": exact})
+        sources = {"exact": exact, "volume": table.part("volume")}
+        made["figure1_exact"] = _later(figures.indeterminacy, walk, beside=sources)
         both = {"exact": exact} | ({"uniform": uniform} if uniform else {})
         made["figure6_exact"] = _later(figures.correlations, walk, beside=both)
     if walk and uniform:
@@ -173,7 +183,73 @@ def _beyond(table):
     if table.part("stress"):
         stress = table.part("stress"), table.part("stress_uniform")
         made["stresses"] = _later(figures.stresses, *stress)
+    if table.part("volume"):
+        made["volumes"] = _later(figures.volumes, table.part("volume"), table.part("volume_size"))
+    if table.tails:
+        made["tails"] = _later(figures.tails, _forces_drawn(table), fits=_fitted(table))
     return made
+
+
+# What uniform states of large packings are drawn for, in words.
+_PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress prescribed"}
+# Tails are fitted from here on, in ⟨f_n⟩, to the last bin with so many forces.
+_FITTED_FROM, _ENOUGH = 2.0, 10
+
+
+def _tail_counts(table):
+    """{word: {μ: counts of f_n in bins up to FORCES, over all packings}}."""
+    found = {}
+    for k, counts in table.tails.items():
+        row = table.rows[k]
+        known = found.setdefault(_PRESCRIBED[row["part"]], {})
+        known[row["mu"]] = known.get(row["mu"], 0.0) + counts
+    return found
+
+
+def _forces_drawn(table):
+    """{word: {μ: [(f, P), …]}} where there are forces."""
+    width = FORCES[0]
+    return {
+        word: {
+            mu: [
+                (f - width / 2, c / (counts.sum() * width))
+                for f, c in zip(FORCES, counts, strict=True)
+                if c
+            ]
+            for mu, counts in known.items()
+        }
+        for word, known in _tail_counts(table).items()
+    }
+
+
+def _fitted(table):
+    """{word: {μ: (b, from, to)}} of tails P(f_n > f) ~ exp(−(λ f)^b)."""
+    found = {}
+    for word, known in _tail_counts(table).items():
+        for mu, counts in known.items():
+            beyond = counts[::-1].cumsum()[::-1]
+            chosen = (FORCES - FORCES[0] >= _FITTED_FROM) & (counts >= _ENOUGH)
+            if chosen.sum() > 3:
+                from_, part = FORCES[chosen] - FORCES[0], beyond[chosen] / counts.sum()
+                found.setdefault(word, {})[mu] = _stretch(from_, part)
+    return found
+
+
+def _stretch(f, part):
+    """b of exp(−(λ f)^b) for the part of forces beyond f, and the range of f."""
+    # ln P = −(λ f)^b + ln P₀: the power is that of the best line through (f^b, ln P).
+    powers = np.linspace(0.3, 4.0, 371)
+    left = [np.polyfit(f**b, np.log(part), 1, full=True)[1].sum() for b in powers]
+    return float(powers[int(np.argmin(left))]), float(f[0]), float(f[-1])
+
+
+def _told(table):
+    """The fits in words."""
+    return "; ".join(
+        f"{word}, μ = {mu:g}: b = {b:.2f} from {low:g} to {high:g} ⟨f_n⟩"
+        for word, known in _fitted(table).items()
+        for mu, (b, low, high) in sorted(known.items())
+    )
 
 
 def _chance(rows):

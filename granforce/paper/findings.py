@@ -180,9 +180,42 @@ def shear(table):
         yield from _by_range(parts, f"{told} {word}, over the largest of the packing")
 
 
+def volume(table):
+    """How many networks there are: the width of S and the entropy of forces per grain."""
+    rows = table.part("volume")
+    for name, told in (
+        ("extent", "width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩"),
+        ("log_volume_per_grain", "ln V per grain, forces in ⟨f_n⟩"),
+    ):
+        groups = _values(rows, name)
+        if len(groups) > 2:
+            # Logarithms are of either sign: the largest of the grid.
+            top = peak(list(groups)) if name == "extent" else _largest(list(groups))
+            yield _finding(f"μ where {told} is largest", top, groups)
+        yield from _by_range(groups, told)
+    known = {(row["mu"], row["seed"]): row for row in table.part("walk")}
+    for name in ("eta1", "eta2"):
+        ratios = {}
+        for row in rows:
+            walk = known.get((row["mu"], row["seed"]))
+            if walk and walk.get(name) and row.get("extent"):
+                ratios.setdefault(row["mu"], []).append(row["extent"] / walk[name])
+        yield from _by_range(ratios, f"width of S over {name[:-1].replace('eta', 'η')}{name[-1]}")
+    for mu in sorted({row["mu"] for row in table.part("volume_size")}):
+        sized = [row for row in table.part("volume", "volume_size") if row["mu"] == mu]
+        largest = max(row["n"] for row in sized)
+        groups = [
+            [r["log_volume_per_grain"] for r in sized if (r["n"] == largest) == last]
+            for last in (True, False)
+        ]
+        if all(groups):
+            told = f"ln V per grain of {largest} disks less that of fewer, μ = {mu:g}"
+            yield _finding(told, lambda many, few: np.mean(many) - np.mean(few), groups)
+
+
 FAMILIES = (
     *(sampled_part, measure, solver, exact_shape, distribution, opened, size, preparation),
-    *(strength, shear),
+    *(strength, shear, volume),
 )
 
 
@@ -199,6 +232,11 @@ def _ratios(table, name, above, below):
         if value and row["dimension"] > 0 and name in row and row.get("reached_part", 1) > 0:
             ratios.setdefault(row["mu"], []).append(row[name] / value)
     return ratios
+
+
+def _largest(frictions):
+    """Statistic: μ of the grid where the means over packings are largest."""
+    return lambda *values: frictions[int(np.argmax([np.mean(v) for v in values]))]
 
 
 def _by_range(groups, statement):

@@ -99,7 +99,7 @@ def plan_of(arguments):
     if arguments.packings is not None and arguments.many_packings is None:
         plan = plan._replace(many_packings=0)
     if arguments.n is not None:
-        plan = plan._replace(frozen_large=4 * plan.n)
+        plan = plan._replace(frozen_large=4 * plan.n, tails_n=4 * plan.n)
     if arguments.mu is not None:
         plan = _at(plan, _numbers("mu", arguments.mu, friction))
     if arguments.sizes is not None:
@@ -115,7 +115,10 @@ def _at(plan, frictions):
     """The plan at other friction coefficients; what is added at some is added at those of them."""
     some = {
         name: tuple(mu for mu in getattr(plan, name) if mu in frictions)
-        for name in ("large_frictions", "frozen_large_frictions", "prepared_frictions")
+        for name in (
+            *("large_frictions", "frozen_large_frictions", "prepared_frictions"),
+            "tails_frictions",
+        )
     }
     return plan._replace(frictions=frictions, fine_frictions=(), **some)
 

@@ -8,7 +8,10 @@ steps) and "perturb" (loads raised by 0.4 of the way), "frozen" and "frozen_larg
 of the inner part with all forces outside held), "prepared_…" (walks in packings made with another
 time step or accuracy), "opened" and "opened_exact" (packings made without friction, cones opened
 to μ), "size", "size_sweeps" and "size_exact" (other numbers of disks), "stress" (outlines of the
-stresses that the contacts can carry) and "stress_uniform" (uniform states, for their stresses).
+stresses that the contacts can carry), "stress_uniform" (uniform states, for their stresses),
+"volume" (ln V of S), "volume_size" (that of other numbers of disks), "tails" and "tails_stress"
+(uniform states of large packings, with the pressure and with the whole stress prescribed, for the
+distribution of f_n).
 """
 
 from typing import NamedTuple
@@ -79,6 +82,12 @@ class Plan(NamedTuple):
     stress_packings: int = 10
     stress_uniform_packings: int = 3
     stress_states: int = 300
+    volume_packings: int = 10
+    volume_accuracy: float = 0.1  # of ln V, which differs by far more from packing to packing
+    tails_n: int = 1600
+    tails_frictions: tuple = (0.01, 0.1, 1)
+    tails_packings: int = 2
+    tails_states: int = 200
 
 
 QUICK = Plan(
@@ -108,6 +117,12 @@ QUICK = Plan(
     largest_exact=80,
     stress_packings=3,
     stress_states=50,
+    volume_packings=2,
+    volume_accuracy=0.3,
+    tails_n=80,
+    tails_frictions=(0.1, 1),
+    tails_packings=1,
+    tails_states=40,
 )
 
 
@@ -296,6 +311,33 @@ def _stresses(plan, seed):
     return found
 
 
+def _volumes(plan, seed):
+    if seed > min(plan.volume_packings, plan.packings):
+        return []
+    found = [_volume("volume", plan.n, seed, mu, plan) for mu in plan.frictions if mu > 0]
+    for n in plan.sizes:
+        # Large packings average over more contacts: fewer of them are needed.
+        if seed <= max(1, min(plan.volume_packings, plan.volume_packings * plan.n // n)):
+            found += [_volume("volume_size", n, seed, mu, plan) for mu in plan.size_frictions]
+    return found
+
+
+def _volume(part, n, seed, mu, plan):
+    packing = kinds.PACKING.parameters(n, mu, seed)
+    named = kinds.VOLUME.parameters(packing, plan.volume_accuracy)
+    return Task(part, Cell(kinds.VOLUME, named), n, mu, seed)
+
+
+def _tails(plan, seed):
+    found = []
+    for mu in plan.tails_frictions if seed <= min(plan.tails_packings, plan.packings) else ():
+        packing = kinds.PACKING.parameters(plan.tails_n, mu, seed)
+        for part, asked in (("tails", {}), ("tails_stress", {"prescribed": "stress"})):
+            named = kinds.UNIFORM.parameters(packing, plan.tails_states, **asked)
+            found.append(Task(part, Cell(kinds.UNIFORM, named), plan.tails_n, mu, seed))
+    return found
+
+
 # The parts by families, which are computed by name; those of the paper first.
 _PARTS = {
     "sweeps": _sweeps,
@@ -308,6 +350,8 @@ _PARTS = {
     "opened": _opened,
     "size": _sizes,
     "stress": _stresses,
+    "volume": _volumes,
+    "tails": _tails,
 }
 
 PARTS = tuple(_PARTS)

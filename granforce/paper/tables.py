@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -12,15 +13,18 @@ from granforce.explore.stress_outline import plane_of
 from granforce.figures import ratio_counts
 from granforce.forces.ensemble import stress_of
 from granforce.paper import plan as plans
-from granforce.records import InputError
+from granforce.records import InputError, friction
 from granforce.study import cells, kinds
-from granforce.study.schema import labelled
+from granforce.study.schema import dataset_packing, labelled
 from granforce.study.store import open_store
 
 VERSION = 1
 
 # Parts whose contacts are kept one by one.
 SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "walk", "exact", "uniform")
+# Upper edges of the bins, in ⟨f_n⟩, in which normal forces of uniform states are counted.
+TAILED = ("tails", "tails_stress")
+FORCES = np.arange(1, 161) * 0.125
 SAMPLES = ("row", "contact", "normal", "least", "extent")
 
 _SCALARS = (
@@ -28,6 +32,7 @@ _SCALARS = (
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
     *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "mean_sweeps", "seconds"),
     *("critical_force", "decay_exponent", "decay_low", "decay_high", "friction"),
+    *("log_volume", "log_volume_error", "log_volume_per_grain", "extent"),
 )
 
 
@@ -40,6 +45,7 @@ class Table(NamedTuple):
     shown: list  # (row, counts of states (N_c, bins of `figures.ratio_counts`)) of some walks
     packings: dict  # {row: Packing} of those walks
     skipped: dict  # counts: cells of the plan that the store lacked
+    tails: dict = MappingProxyType({})  # {row: counts of f_n of its states, in bins up to FORCES}
 
     def part(self, *names, n=None):
         """Rows of some parts; n: only of this number of disks."""
@@ -80,7 +86,7 @@ def reduce(path, plan, wanted=None):
     wanted: the tasks whose lack is counted and told, by default all of the plan.
     """
     store = open_store(path, readonly=True)
-    rows, samples, shown, packings, centres = [], [], [], {}, {}
+    rows, samples, shown, packings, centres, tails = [], [], [], {}, {}, {}
     every = plans.tasks(plan)
     for task, dataset in plans.finished(path, plan):
         k = len(rows)
@@ -90,6 +96,8 @@ def reduce(path, plan, wanted=None):
             rows[k] |= _shears(packing, dataset)
         if task.part in SAMPLED and _has_states(dataset):
             samples.append(_samples(k, dataset))
+        if task.part in TAILED:
+            tails[k] = _counted(dataset)
         if task.part == "uniform":
             centres[task.mu, task.seed] = dataset["states"].values.mean(axis=0), rows[k]
         first = task.part in plans.SHOWN_PARTS and task.seed == 1 and _has_states(dataset)
@@ -108,7 +116,7 @@ def reduce(path, plan, wanted=None):
     known = {_name(row) for row in rows}
     missing = sum((t.part, t.n, t.mu, t.seed) not in known for t in wanted)
     skipped = {"missing_cells": missing}
-    return Table(plan._asdict(), rows, joined, shown, packings, skipped)
+    return Table(plan._asdict(), rows, joined, shown, packings, skipped, tails)
 
 
 def _compare_distances(store, wanted, centres):
@@ -197,6 +205,12 @@ def _samples(k, dataset):
     }
 
 
+def _counted(dataset):
+    """Counts of f_n of the states in the bins that end at FORCES."""
+    normal = dataset["states"].values[..., 0] / dataset["force_scale"].item()
+    return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
+
+
 def merged(new, old):
     """The Table `new` with the rows of its plan that it lacks and `old` has, after its own.
 
@@ -220,6 +234,7 @@ def merged(new, old):
         shown=new.shown + [(place[k], counts) for k, counts in old.shown if k in place],
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
         skipped={"missing_cells": new.skipped["missing_cells"] - len(kept)},
+        tails=dict(new.tails) | {place[k]: t for k, t in old.tails.items() if k in place},
     )
 
 
@@ -265,6 +280,9 @@ def _dataset(table):
     if table.shown:
         arrays["shown_row"] = np.concatenate([np.full(len(s), k) for k, s in table.shown])
         arrays["shown_count"] = np.concatenate([s for _, s in table.shown])
+    if table.tails:
+        arrays["tail_row"], arrays["tail_force"] = list(table.tails), FORCES
+        arrays["tail_count"] = np.stack(list(table.tails.values()))
     return labelled(arrays, {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)})
 
 
@@ -294,7 +312,17 @@ def _table(store, entry, dataset):
             else:  # as tables had it once: some states
                 original = samples["normal"][samples["row"] == k]
                 shown.append((k, ratio_counts(original, dataset["shown_normal"].values[:, chosen])))
-            named = kinds.PACKING.parameters(rows[k]["n"], rows[k]["mu"], rows[k]["seed"])
-            packings[k] = kinds.get_packing(store, named)[0]
+            packings[k] = _packing(store, rows[k])
+    tails = {}
+    if "tail_row" in dataset:
+        counts = dataset["tail_count"].values
+        tails = dict(zip(dataset["tail_row"].values.tolist(), counts, strict=True))
     plan = {name: value for name, value in entry.params.items() if name != "rows"}
-    return Table(plan, rows, samples, shown, packings, json.loads(dataset.attrs["skipped"]))
+    skipped = json.loads(dataset.attrs["skipped"])
+    return Table(plan, rows, samples, shown, packings, skipped, tails)
+
+
+def _packing(store, row):
+    """The Packing of a row, of whatever version of the algorithm the table's store has."""
+    named = {"n": row["n"], "mu": friction(row["mu"]), "seed": row["seed"]}
+    return dataset_packing(store[store.find("packing", **named)[0].name])

@@ -1,4 +1,4 @@
-"""Exact bounds, limit loads and outlines, of S and of its stresses, as datasets."""
+"""Exact bounds, limit loads, outlines and volumes, of S and of its stresses, as datasets."""
 
 import json
 
@@ -85,6 +85,26 @@ def stress_dataset(S, found, *, seconds=0.0):
             "friction_bound": found.friction_bound,
             "dimension": S.dimension,
             "seconds": seconds,
+        },
+        {"counts": json.dumps(found.counts)},
+    )
+
+
+def volume_dataset(S, found):
+    """A Volume as a dataset."""
+    return labelled(
+        {
+            "log_volume": found.log_volume,
+            "log_volume_error": found.error,
+            "log_volume_ladders": found.ladders,
+            "log_volume_per_grain": found.per_grain,
+            "extent": found.extent,
+            "reached": found.reached,
+            "dimension": found.dimension,
+            "coordination": S.coordination,
+            "force_scale": S.force_scale,
+            **S.skipped,
+            "seconds": found.seconds,
         },
         {"counts": json.dumps(found.counts)},
     )

@@ -18,6 +18,7 @@ from granforce.explore.outline import outline
 from granforce.explore.random_walk import walk
 from granforce.explore.stress_outline import stress_outline
 from granforce.explore.uniform import sample_uniform
+from granforce.explore.volume import volume
 from granforce.forces.ensemble import ensemble
 from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.likeliest import UNMEASURED
@@ -33,6 +34,7 @@ from granforce.study.bounds import (
     limit_loads_dataset,
     outline_dataset,
     stress_dataset,
+    volume_dataset,
 )
 from granforce.study.cells import Kind, get, load, save
 from granforce.study.conditions import conditions
@@ -275,6 +277,24 @@ def _uniform(store, parameters, *, workers, progress):
     cancelling.check("uniform sample")
     seconds = time.perf_counter() - begin
     return uniform_dataset(S, drawn, keep=parameters["keep"], seconds=seconds)
+
+
+def _volume_parameters(packing, accuracy=0.05, seed=0, *, mu=None, **asked):
+    """The parameters that name a volume of S.
+
+    accuracy, seed: as for `volume`. mu: friction coefficient of the ensemble, by default the
+    packing's. asked: the conditions.
+    """
+    named = {"accuracy": positive(accuracy, "accuracy"), "seed": random_seed(seed)}
+    return {**_cones(packing, mu, **asked), **named}
+
+
+def _volume(store, parameters, *, workers, progress):
+    """Dataset of the volume of S; one whose error is larger than wanted says so in `reached`."""
+    S = _ensemble(store, parameters)
+    options = {name: parameters[name] for name in ("accuracy", "seed")}
+    found = volume(S, **options, workers=workers, progress=progress)
+    return volume_dataset(S, found)
 
 
 def _inference_parameters(
@@ -609,16 +629,17 @@ def _perturbed_contact(store, parameters, *, workers, progress):
 PACKING = Kind("packing", 2, "compaction", "step", _packing_parameters, _packing)
 WALK = Kind("walk", 1, "random walk", "state", _walk_parameters, _walk, holds_states=True)
 UNIFORM = Kind(
-    "uniform", 2, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True
+    "uniform", 3, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True
 )
 INFERENCE = Kind(
-    *("inference", 1, "inference", "draw", _inference_parameters, _inference), holds_states=True
+    *("inference", 2, "inference", "draw", _inference_parameters, _inference), holds_states=True
 )
+VOLUME = Kind("volume", 1, "volume of S", "path", _volume_parameters, _volume)
 INTERVALS = Kind("intervals", 1, "exact bounds", "bound", _exact_parameters, _intervals)
 LIMIT_LOADS = Kind("limit_loads", 1, "limit loads", "contact", _exact_parameters, _limit_loads)
 OUTLINE = Kind("outline", 1, "outline of S", "program", _outline_parameters, _outline)
 INFORMATIVE = Kind(
-    *("informative", 1, "which measurement next", "contact"), _informative_parameters, _informative
+    *("informative", 2, "which measurement next", "contact"), _informative_parameters, _informative
 )
 STRESS = Kind("stress", 1, "outline of stresses", "program", _stress_parameters, _stress)
 PERTURBATION = Kind(
@@ -633,6 +654,6 @@ KINDS = {
     kind.name: kind
     for kind in (
         *(PACKING, WALK, UNIFORM, INFERENCE, INTERVALS, LIMIT_LOADS, OUTLINE, STRESS),
-        *(PERTURBATION, PERTURBED_CONTACT, INFORMATIVE),
+        *(PERTURBATION, PERTURBED_CONTACT, INFORMATIVE, VOLUME),
     )
 }

@@ -181,6 +181,14 @@ VARIABLES: dict[str, Variable] = {
     "fit_inner": Variable(("fit",), "float64", "length", "smallest r of other fits"),
     "fit_outer": Variable(("fit",), "float64", "length", "largest r of other fits"),
     "fit_exponent": Variable(("fit",), "float64", "1", "α of other fits"),
+    # how many networks there are: forces of every contact in ⟨f_n⟩
+    "log_volume": Variable((), "float64", "1", "ln V, the h-dimensional volume of S"),
+    "log_volume_error": Variable((), "float64", "1", "standard error of ln V"),
+    "log_volume_ladders": Variable(("ladder",), "float64", "1", "ln V on the ways down and up"),
+    "log_volume_per_grain": Variable((), "float64", "1", "ln V per grain of the backbone"),
+    "extent": Variable(
+        (), "float64", "mean normal force", "extent V^(1/h)/√(2πe) of S per free dimension"
+    ),
     # the outline of S in a plane of force space
     "axes": Variable(
         ("plane_axis", "contact", "component"), "float64", "1", f"axes of the plane, {_COMPONENT}"
@@ -233,6 +241,7 @@ _ROW_SCALARS = (
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
     *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "mean_sweeps", "seconds"),
     *("critical_force", "decay_exponent", "decay_low", "decay_high", "friction"),
+    *("log_volume", "log_volume_error", "log_volume_per_grain", "extent"),
 )
 _FORCE = "mean normal force"
 
@@ -278,6 +287,11 @@ VARIABLES |= {
     "row_largest_shear": Variable(("row",), "float64", "1", "the largest of them"),
     "row_clusters": Variable(("row",), "float64", "1", "clusters of undetermined contacts"),
     "row_largest_cluster": Variable(("row",), "float64", "1", "contacts of the largest cluster"),
+    "tail_row": Variable(("tail",), "int64", "1", "row that the forces belong to"),
+    "tail_force": Variable(("tail_bin",), "float64", _FORCE, "upper edges of bins of f_n"),
+    "tail_count": Variable(
+        ("tail", "tail_bin"), "float64", "1", "forces f_n of uniform states in each bin"
+    ),
     "sample_row": Variable(("sample",), "int64", "1", "row that the contact belongs to"),
     "sample_contact": Variable(("sample",), "int64", "1", "position of the contact in the packing"),
     "sample_normal": Variable(("sample",), "float64", _FORCE, "original f_n"),

@@ -206,6 +206,16 @@ def test_the_outline_of_stresses(run, tmp_path):
     assert json.loads(run(*words)[1])["cached"] is True
 
 
+def test_the_volume_and_its_error(run):
+    words = ["volume", *SMALL[:4], "--accuracy", 0.2, "--json"]
+    report = json.loads(run(*words)[1])
+    assert report["reached"] and 0 < report["standard_error"] <= 0.2
+    both = report["ln_volume_on_the_way_down"], report["ln_volume_on_the_way_up"]
+    assert report["ln_volume"] == pytest.approx(np.mean(both))
+    assert json.loads(run(*words, "--workers", 1)[1])["cached"] is True
+    assert run("volume", *SMALL[:4], "--accuracy", 0)[0] == 2
+
+
 def test_a_frozen_frame_determines_more(run):
     words = ["intervals", "-n", "60", "--mu", "0.3", "--json"]
     free = json.loads(run(*words)[1])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bodies import (
+    BodyWalls,
     box,
     cross_polytope,
     distance_to_marginals,
@@ -19,15 +20,15 @@ from bodies import (
     z_scores,
 )
 from packings import REFERENCE, lattice, packed, reference, two_disks
-from scipy import sparse
+from scipy import linalg, sparse
 
 from granforce import bench, measures
 from granforce.cli.parser import main
-from granforce.explore import uniform
-from granforce.explore.chart import chart, inner_point
+from granforce.explore import billiard, uniform
 from granforce.explore.mixing import mixing
 from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
+from granforce.explore.walls import inner_point, walls
 from granforce.forces.ensemble import ensemble
 from granforce.packing.importers import read_lammps
 from granforce.records import Cancelled, InputError, NotJammedError
@@ -52,10 +53,9 @@ BODIES = {
 
 def drawn(body, states, chains=4, seed=0, method="billiard"):
     """Draws (chains, states, n) of y, by the same steps as sample_uniform."""
-    made = chart(body.A, body.b)
+    made = BodyWalls(body)
     ends, reach, _ = uniform.warm_up(made, chains, seed, method=method)
-    options = {"count": states, "reach": reach, "method": method}
-    done = [uniform.step(made, end, **options)[1] for end in ends]
+    _, done = uniform.step(made, ends, count=states, reach=reach, method=method)
     return made, made.points(np.array([one.slacks for one in done]))
 
 
@@ -115,14 +115,14 @@ def test_every_state_is_in_s(S, sample):
     assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
     assert np.array_equal(sample.residual, S.residual(sample.states))
     assert np.array_equal(sample.violation, S.violation(sample.states))
-    assert sample.chart.dimension == S.dimension
+    assert sample.walls.dimension == S.dimension
 
 
 @pytest.mark.slow
 def test_more_than_a_thousand_dimensions():
     S = ensemble(packed(2000, 0.1))
     sample = sample_uniform(S, 400)
-    assert sample.chart.dimension == S.dimension > 1000
+    assert sample.walls.dimension == S.dimension > 1000
     assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
     assert sample.counts["refused"] == 0 and sample.mixing.worst_r_hat < 1.1
 
@@ -137,7 +137,7 @@ def test_chains_mix(sample):
 def test_moments_are_those_of_a_triangulated_s():
     S = ensemble(packed(40, 1.0, 2))
     A, b, T = S.scaled_form
-    made = chart(A, b)
+    made = walls(S)
     assert 2 <= made.dimension <= 6
     mean, covariance = known_by_triangulation(A, b, made.centre)
     sample = sample_uniform(S, 4000)
@@ -254,7 +254,7 @@ def test_frozen_boundaries_and_packings_from_elsewhere():
     assert not inner.has_pressure_row and inner.dimension > 0 and soft.dimension > 100
     for S in (inner, soft):
         sample = sample_uniform(S, 100)
-        assert sample.chart.dimension == S.dimension
+        assert sample.walls.dimension == S.dimension
         assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
 
 
@@ -262,7 +262,7 @@ def test_frozen_boundaries_and_packings_from_elsewhere():
 def test_dependent_rows_are_no_obstacle(packing):
     S = ensemble(packing)
     sample = sample_uniform(S, 100)
-    assert sample.chart.dimension == S.dimension > 0
+    assert sample.walls.dimension == S.dimension > 0
     assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
 
 
@@ -273,7 +273,7 @@ def test_contacts_that_carry_nothing_are_held(S):
     assert len(idle)
     sample = sample_uniform(full, 200)
     assert sample.counts["held"] >= 2 * len(idle)
-    assert sample.chart.dimension == S.dimension
+    assert sample.walls.dimension == S.dimension
     assert np.abs(sample.flat[:, idle]).max() < 1e-7 * full.force_scale
     assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
 
@@ -284,14 +284,13 @@ def test_flat_bodies_are_sampled_in_their_hull():
     b = np.array([1.0, 0.0])
     y, held = inner_point(A, b)
     assert held.tolist() == [False, False, True, True, True] and y[:2].min() > 1e-3
-    assert chart(A, b).dimension == 1
 
 
 def test_wide_and_narrow_cones():
     for mu in (1e-3, 1e2):
         S = ensemble(packed(40, 0.3), mu=mu) if mu > 0.3 else ensemble(packed(40, mu))
         sample = sample_uniform(S, 100)
-        assert sample.chart.dimension == S.dimension
+        assert sample.walls.dimension == S.dimension
         assert sample.residual.max() < 1e-10 and sample.violation.max() < 1e-12
 
 
@@ -301,11 +300,11 @@ def test_what_cannot_be_sampled_is_told(S):
             sample_uniform(S, **sizes)
     with pytest.raises(InputError, match="method"):
         sample_uniform(S, method="walk")
-    A = sparse.csc_matrix([[1.0, 1.0]])
     with pytest.raises(NotJammedError):
-        chart(A, np.array([-1.0]))
+        inner_point(sparse.csc_matrix([[1.0, 1.0]]), np.array([-1.0]))
+    loose = ensemble(S.packing._replace(pressure=np.nan), prune=False)
     with pytest.raises(InputError, match="not bounded"):
-        chart(sparse.csc_matrix([[1.0, -1.0]]), np.array([0.0]))
+        sample_uniform(loose, 8)
 
 
 def test_a_cell_of_uniform_states_is_kept_with_its_measures(tmp_path):
@@ -358,3 +357,25 @@ def test_the_benchmark_compares_walks_by_cost_and_by_moments():
     assert other["ratio"] == pytest.approx(other["seconds_per_state"] / cost)
     assert other["z_mean"] < 2 and other["z_square"] < 2
     assert elsewhere and all("hopsy" in row["method"] for row in elsewhere)
+
+
+def test_rows_made_on_demand_change_no_bit(S, sample, monkeypatch):
+    """Room for as few rows as there can be: each is made again and again."""
+    drawn = sample_uniform(S, 40, seed=2)
+    monkeypatch.setattr(billiard, "MEMORY", 1)
+    for workers in (1, 3):
+        again = sample_uniform(S, 40, seed=2, workers=workers)
+        assert again.rows is None and np.array_equal(again.states, drawn.states)
+        assert again.counts == drawn.counts
+
+
+def test_slacks_move_as_the_null_space_lets_them(S):
+    """K against a dense projection, and h against its trace."""
+    for body in (S, ensemble(packed(40, 0.3), prune=False), ensemble(lattice(4, 4, 0.5))):
+        made = walls(body)
+        count = len(made.moving)
+        A = body.scaled_form[0].toarray()[:, made.moving] * made.centre[made.moving]
+        null = linalg.null_space(A, rcond=1e-9)
+        K = made.rows(np.arange(count))[:, :count]
+        assert np.abs(K - null @ null.T).max() < 1e-8
+        assert made.dimension == null.shape[1] == round(np.trace(K))

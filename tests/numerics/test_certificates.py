@@ -6,7 +6,7 @@ import pytest
 from packings import lattice, packed
 
 import granforce as gf
-from granforce.explore.chart import chart
+from granforce.explore.walls import inner_point
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import InputError, NotJammedError, UndecidedError
@@ -79,15 +79,15 @@ def saying(monkeypatch, verdicts, spoil=lambda y: y):
 def test_where_one_solver_gives_up_another_goes_on(S, monkeypatch, verdict):
     saying(monkeypatch, [verdict, verdict])
     A, b, _ = S.scaled_form
-    centre = chart(A, b).centre
-    assert np.abs(A @ centre - b).max() <= 1e-10 and centre.min() > 0
+    inside, held = inner_point(A, b)
+    assert np.abs(A @ inside - b).max() <= 1e-8 and inside.min() > 0 and not held.any()
 
 
 @pytest.mark.parametrize("verdict", [STATUS.kUnknown, STATUS.kInfeasible, STATUS.kUnbounded])
 def test_where_all_give_up_nothing_is_claimed(S, monkeypatch, verdict):
     saying(monkeypatch, [verdict] * 10**4, np.zeros_like)
     with pytest.raises(UndecidedError, match="undecided") as caught:
-        chart(*S.scaled_form[:2])
+        inner_point(*S.scaled_form[:2])
     assert not isinstance(caught.value, NotJammedError)
     # A proof stands whatever the solver that proposed it says of itself.
     with pytest.raises(NotJammedError, match="largest unbalanced load"):

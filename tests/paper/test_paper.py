@@ -46,6 +46,12 @@ TINY = plans.Plan(
     stress_packings=1,
     stress_uniform_packings=1,
     stress_states=5,
+    volume_packings=2,
+    volume_accuracy=0.5,
+    tails_n=20,
+    tails_frictions=(0.1, 0.3),
+    tails_packings=1,
+    tails_states=8,
 )
 WORDS = [
     *("study", "-n", "20", "--mu", "0,0.1,0.3", "--packings", "2", "--states", "6"),
@@ -239,6 +245,7 @@ def test_every_figure_of_the_table_is_made(done):
     made = drawings.all_figures(table)
     assert {"figure1", "figure3", "figure4", "figure5", "figure6"} <= made.keys()
     assert {"figure1_uniform", "opened", "frozen", "sizes", "distances"} <= made.keys()
+    assert {"volumes", "tails"} <= made.keys()
     assert {"samplers", "effort", "places"} <= made.keys()
     assert made.keys() <= drawings.captions(table).keys()
     assert "Gauss–Seidel" in drawings.captions(table)["figure1"]

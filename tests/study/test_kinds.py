@@ -20,14 +20,15 @@ MEASURED = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
 NAMES = {
     "packing": ((20, 0.3, 1), {}, "packing-29cd0ea4d0e838ff1bab"),
     "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-443d5ea63d65bb921e92"),
-    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-7a4d0016edb401c5d5f3"),
-    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-a9ec67274b91a749486b"),
+    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-702e781259968ff77076"),
+    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-fe6a10d377a20e3258b2"),
     "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-1aff28fa6d545ecb76c5"),
     "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-092955e97f3a3586be08"),
     "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-4740e5f166f6f194600f"),
     "stress": ((MADE,), {"angles": 16}, "stress-0891373dfc55dcaa1ea5"),
     "perturbation": ((MADE,), {"random": 4}, "perturbation-413a671867c7bb00de18"),
-    "informative": ((MADE,), {"k": 5}, "informative-666e615263ff6bc34ce1"),
+    "informative": ((MADE,), {"k": 5}, "informative-bd48c4f776db160b6af4"),
+    "volume": ((MADE, 0.1), {}, "volume-477ef570b54ce16375c9"),
     "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-951ec8ca931bc7aec025"),
 }
 

@@ -16,8 +16,8 @@ from packings import packed
 from scipy import sparse
 
 import granforce as gf
-from granforce.explore import billiard
-from granforce.explore.chart import chart
+from granforce.explore import billiard, uniform
+from granforce.explore.walls import walls
 from granforce.numerics import elimination
 from granforce.numerics import highs as programs
 from granforce.perturb import flow as exact_step
@@ -50,29 +50,23 @@ def endless_walk(S):
 
 
 def endless_paths(S):
-    made = chart(*S.scaled_form[:2])
-    walls = made.G, made.columns, made.K, made.turn
-    place, out = np.zeros(made.dimension), np.ones((1, len(made.G)))
-    path = 1.0, 10**9, 10**12
-    billiard.billiard(*walls, place, np.random.default_rng(0), *path, out, cancelling.flag())
-    cancelling.check()
+    made = walls(S)
+    ends = [uniform.init(made, 0)]
+    uniform.step(made, ends, count=10**7, reach=1.0, rows=billiard.all_rows(made))
 
 
 def one_endless_path(S):
-    made = chart(*S.scaled_form[:2])
-    walls = made.G, made.columns, made.K, made.turn
-    place, out = np.zeros(made.dimension), np.ones((1, len(made.G)))
-    path = 1e12, 10**12, 1
-    billiard.billiard(*walls, place, np.random.default_rng(0), *path, out, cancelling.flag())
+    made = walls(S)
+    flight, out = billiard.make_flight(uniform.init(made, 0).slacks), np.ones((1, made.count))
+    speeds = made.moved(np.random.default_rng(0).standard_normal((1, made.count)))
+    path = speeds, np.array([1e12]), flight, 10**12
+    billiard.straight(billiard.all_rows(made), *path, out, cancelling.flag())
     cancelling.check()
 
 
 def endless_hits(S):
-    made = chart(*S.scaled_form[:2])
-    place, out = np.zeros(made.dimension), np.ones((1, len(made.G)))
-    rng = np.random.default_rng(0)
-    billiard.hit_and_run(made.columns, place, rng, 10**12, out, cancelling.flag())
-    cancelling.check()
+    made = walls(S)
+    uniform.step(made, [uniform.init(made, 0)], count=10**6, reach=1.0, method="hit_and_run")
 
 
 def endless_motion(S):

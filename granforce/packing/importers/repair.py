@@ -38,6 +38,8 @@ MOST = 0.1
 _SAME = 0.5, 0.3
 # Gaps fit up to this many mean radii, and radii are of one size within this part.
 _FIT, _SIZE = 0.5, 0.05
+# A force at the edge of its cone lies beyond it by no more than this part.
+_ROUNDING = 1e-9
 
 
 class Finding(NamedTuple):
@@ -345,7 +347,8 @@ def _without_tension(listing, account):
 def _note_friction(listing, account, mu):
     normal, tangential = listing.forces.T
     with np.errstate(invalid="ignore"):
-        bad = np.flatnonzero((np.abs(tangential) > mu * normal) & (normal >= 0))
+        beyond = np.abs(tangential) > mu * normal * (1 + _ROUNDING)
+        bad = np.flatnonzero(beyond & (normal >= 0))
     texts = [
         f"{listing.place(1, k)}: |f_t| = {abs(tangential[k]):.3g}, more than μ f_n = "
         f"{mu * normal[k]:.3g}"

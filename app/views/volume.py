@@ -1,0 +1,71 @@
+"""A card beside η: how wide S is along each free dimension, by its volume."""
+
+import panel as pn
+import panel_material_ui as pmui
+
+from .. import compute
+from .summary import STYLE, TILE
+
+# Words, name in the dataset, form, and key of the glossary.
+TILES = (
+    ("width of S", "extent", ".4f", "width"),
+    ("volume ln V", "log_volume", ".1f", "volume"),
+    ("error of ln V", "log_volume_error", ".2f", "volume"),
+)
+
+
+class Volume:
+    """The volume of all networks of the packing on screen, once it is known; else an offer."""
+
+    def __init__(self, state):
+        self.state, self.found = state, None
+        self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
+        self.measure = pmui.Button(
+            label="Measure the volume of S", variant="outlined", size="small", margin=(4, 10)
+        )
+        self.measure.on_click(lambda event: self._measure())
+        state.param.watch(self._look, "replay")
+        state.measuring.param.watch(self._offer, "running")
+        self._look()
+
+    def panel(self):
+        """The tiles, or the button in their place."""
+        return pn.Column(self.tiles, self.measure, sizing_mode="stretch_width")
+
+    def _look(self, *events):
+        """Whether a store has it already."""
+        state, self.found = self.state, None
+        state.measuring.cancel()
+        self._show()
+        if state.replay is not None and state.cell is not None:
+            state.looking.start(compute.known_volume(state.library, state.cell), self._take)
+
+    def _measure(self):
+        cell = self.state.cell
+        if cell is not None:
+            self.state.measuring.start(compute.volume(self.state.library, cell), self._take)
+
+    def _take(self, result):
+        cell, found = result
+        if cell == self.state.cell:
+            self.found = found
+            self._show()
+
+    def _show(self):
+        self.tiles.object = "" if self.found is None else text(self.found)
+        self._offer()
+
+    def _offer(self, *events):
+        replay = self.state.replay
+        free = replay is not None and replay.summary["dimension"] > 0
+        wanted = free and self.found is None and not self.state.measuring.running
+        self.measure.visible = bool(wanted)
+
+
+def text(dataset):
+    """The tiles of a volume, as HTML."""
+    tiles = "".join(
+        TILE.format(name=name, value=format(dataset[key].item(), form), term=term)
+        for name, key, form, term in TILES
+    )
+    return f'<div class="tiles">{tiles}</div>'

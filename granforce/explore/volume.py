@@ -1,0 +1,260 @@
+"""The volume of S: how many networks there are, by a ladder of normal distributions cut by walls.
+
+With q = |s − 1|² of the slacks (see `walls`) and Z(β) = ∫_S exp(−½ β q), the volume is Z(0). At a
+large β hardly a wall is met: Z = (2π/β)^(h/2) P, where P is the part of independent normal states
+that lie in S. From there steps lead down to β = 0, each so short that the logarithm of what is
+averaged has a standard deviation of STEP:
+
+    Z(β′)/Z(β) = ⟨exp(½ (β − β′) q)⟩_β = 1/⟨exp(−½ (β − β′) q)⟩_β′
+
+The geometric mean of both takes off the bias of either to first order. Draws follow harmonic paths
+between the walls (`billiard.harmonic`). Two ladders are climbed by chains of their own, one down
+from the narrowest distribution and one up from uniform states: were chains too short to forget
+where they came from, both would differ.
+"""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce import notebook
+from granforce.explore import billiard, uniform
+from granforce.explore.walls import walls
+from granforce.records import positive, random_seed, whole
+from granforce.system import cancelling
+
+# Standard deviation of ½ (β − β′) q, by which steps of the ladder are chosen.
+STEP = 0.7
+# Part of independent normal states that lie in S at the top of the ladder; how many are drawn to
+# choose it, and to estimate it.
+_INSIDE, _TRIED, _COUNTED = 0.8, 256, 4096
+# Paths on each rung to find the next one, and of them those left out before q is averaged.
+_PILOT, _FORGOTTEN = 48, 16
+# Paths on each rung at first, and batches of them whose scatter tells the error.
+_FIRST, _BATCHES = 256, 16
+# Rounds of more paths, each at most so many times as many, until the error is the wanted one.
+_MOST_ROUNDS, _GROWTH = 30, 4.0
+# A turn costs about so many passes over the walls less than a path does besides.
+_PATH_COST = 20.0
+_COUNTS = "turns", "refused"
+# Two ladders further apart than this many of their standard errors do not agree.
+AGREE = 4.0
+
+
+class Volume(NamedTuple):
+    """The volume of S in its affine hull, forces f_n and f_t of every contact in ⟨f_n⟩."""
+
+    log_volume: float  # ln V
+    error: float  # its standard error
+    dimension: int  # h
+    per_grain: float  # ln V over the number of grains of the backbone
+    ladders: np.ndarray  # (2,) ln V by the way down and by the way up
+    reached: bool  # the error is the wanted one, and both ladders agree
+    counts: dict  # rungs, paths, turns, refused paths
+    seconds: float  # wall time
+
+    @property
+    def extent(self):
+        """V^(1/h)/√(2πe): width per dimension of the normal distribution of the same entropy."""
+        if not self.dimension:
+            return 0.0
+        return float(np.exp(self.log_volume / self.dimension) / np.sqrt(2 * np.pi * np.e))
+
+    def _repr_html_(self):
+        """The volume as notebooks show it."""
+        lines = {
+            "dimension h": self.dimension,
+            "ln V": self.log_volume,
+            "standard error": self.error,
+            "extent / ⟨fₙ⟩": self.extent,
+            "ln V per grain": self.per_grain,
+        }
+        return notebook.table("Volume of S", lines)
+
+
+@cancelling.cancellable
+def volume(ensemble, *, accuracy=0.05, seed=0, workers=1, progress=None, cancel=None):
+    """ln V of S with a standard error of `accuracy`; a Volume.
+
+    V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
+    of ⟨f_n⟩; a single point has ln V = 0. workers: threads, which change nothing in the result.
+    progress(done, total) counts paths, of as many as seem to be needed.
+
+    Raises InputError for an accuracy that is not above 0 and forces without bounds, NotJammedError
+    where S is empty.
+    """
+    begin = time.perf_counter()
+    accuracy, seed = positive(accuracy, "accuracy"), random_seed(seed)
+    workers = whole(workers, "workers", 1)
+    made = walls(ensemble)
+    grains = max(1, len(ensemble.grains))
+    if not made.dimension:
+        counts = dict.fromkeys(("rungs", "paths", *_COUNTS), 0)
+        return Volume(0.0, 0.0, 0, 0.0, np.zeros(2), True, counts, time.perf_counter() - begin)
+    top, log_top, top_variance = _top(made, np.random.default_rng([seed, 0]))
+    stores = uniform.stores(made, billiard.all_rows(made), workers, workers)
+    rungs = _climbed(made, stores[0], top, seed)
+    rungs = _extended(made, stores, rungs, np.full((2, len(rungs[0])), _FIRST), progress)
+    for _ in range(_MOST_ROUNDS):
+        ladders, variance = _summed(rungs)
+        error = np.sqrt(variance.sum() + top_variance)
+        if error <= accuracy:
+            break
+        wanted = max(accuracy**2 - top_variance, 0.1 * accuracy**2)
+        rungs = _extended(made, stores, rungs, _more(rungs, variance, wanted), progress)
+    ladders += made.units + log_top
+    found, own = float(ladders.mean()), 2 * np.sqrt(variance.sum())
+    agree = abs(ladders[1] - ladders[0]) <= AGREE * own
+    counts = {"rungs": len(rungs[0]), "paths": int(sum(len(r.q) for way in rungs for r in way))}
+    counts |= {name: sum(getattr(r, name) for way in rungs for r in way) for name in _COUNTS}
+    return Volume(
+        *(found, float(error), made.dimension, found / grains, ladders),
+        *(bool(error <= accuracy and agree), counts, time.perf_counter() - begin),
+    )
+
+
+def _top(made, rng):
+    """The largest β, ln Z there, and the variance of that."""
+
+    def reach(count):
+        # Normal states of β = 1: how far outside of S each is, as the β at which it lies on a wall.
+        w = made.moved(rng.standard_normal((count, made.count)))
+        return np.maximum(-w.min(axis=1), 0.0) ** 2
+
+    beta = float(np.quantile(reach(_TRIED), _INSIDE))
+    inside = 0
+    for _ in range(_COUNTED // _TRIED):
+        cancelling.check("volume")
+        inside += int(np.sum(reach(_TRIED) < beta))
+    part = inside / _COUNTED
+    log = 0.5 * made.dimension * np.log(2 * np.pi / beta) + np.log(part)
+    return beta, log, (1 - part) / (part * _COUNTED)
+
+
+class _Rung(NamedTuple):
+    """One chain at one β."""
+
+    beta: float
+    reach: float  # √⟨q⟩ nearby: sets the length of paths
+    end: uniform.ChainState
+    q: np.ndarray  # (paths,) |s − 1|²
+    turns: int
+    refused: int
+
+
+def _climbed(made, rows, top, seed):
+    """Rungs of both ladders, each from the narrowest to β = 0, with the first paths of each."""
+    down, beta, slacks, reach = [], top, np.ones(made.count), np.sqrt(made.dimension / top)
+    while not down or down[-1].beta > 0:
+        down.append(_settled(made, rows, beta, reach, slacks, [seed, 1, len(down)]))
+        q = down[-1].q
+        slacks, reach = down[-1].end.slacks, float(np.sqrt(q.mean()))
+        spread = max(float(q.std()), 1e-300)
+        # Wider distributions have wider q: the last step is a short one, and none is too long.
+        beta = 0.0 if beta * spread < STEP else max(0.5 * beta, beta - 2 * STEP / spread)
+    up = []
+    for number in range(len(down) - 1, -1, -1):
+        beta, reach = down[number].beta, down[number].reach
+        up.append(_settled(made, rows, beta, reach, slacks, [seed, 2, number]))
+        slacks = up[-1].end.slacks
+    rungs = down, up[::-1]
+    # More of the same: what the ladder was built by has no part in the result.
+    return [[rung._replace(q=rung.q[:0], turns=0, refused=0) for rung in way] for way in rungs]
+
+
+def _settled(made, rows, beta, reach, slacks, seed):
+    """A rung whose chain has left where it came from, with the paths after that."""
+    end = uniform.ChainState(slacks, np.random.default_rng(seed))
+    fresh = _Rung(beta, reach, end, np.zeros(0), 0, 0)
+    begun = _flown(made, rows, fresh, _PILOT)
+    return begun._replace(q=begun.q[_FORGOTTEN:])
+
+
+def _flown(made, rows, rung, count):
+    """The rung with so many more paths, in whole batches."""
+    beta, end, found = rung.beta, rung.end, [rung.q]
+    counts = np.zeros(2, dtype=np.int64)
+    limit, middle = uniform.MOST_TURNS * (made.dimension + 1), np.ones((1, made.count))
+
+    def on(drawn, flight, out):
+        stop = cancelling.flag()
+        if beta > 0:
+            speeds, times = drawn
+            return billiard.harmonic(rows, speeds, middle, times, flight, limit, out, stop)
+        return billiard.straight(rows, *drawn, flight, limit, out, stop)
+
+    for _ in range(0, count, uniform.BATCH):
+        speeds, parts = uniform.directions(made, end.rng, uniform.BATCH, unit=not beta)
+        lengths = uniform.PATH * rung.reach * (0.5 + parts)
+        if beta > 0:
+            # As long as those of uniform states, or a quarter of an oscillation.
+            speeds /= np.sqrt(beta)
+            lengths = np.minimum(lengths * np.sqrt(beta / made.dimension), 0.5 * np.pi)
+        (end,), outs, done = uniform.flown(made, rows, [end], on, [(speeds, lengths)])
+        found.append(((outs[0] - 1.0) ** 2).sum(axis=1))
+        counts += done[0]
+    turns, refused = rung.turns + int(counts[0]), rung.refused + int(counts[1])
+    return _Rung(beta, rung.reach, end, np.concatenate(found), turns, refused)
+
+
+def _summed(rungs):
+    """ln Z(0)/Z(top) by each ladder (2,), and what each rung adds to the variance of their mean."""
+    betas = np.array([rung.beta for rung in rungs[0]])
+    step = 0.5 * -np.diff(betas)
+    sums, variance = np.zeros(2), np.zeros((2, len(betas)))
+    for way, ladder in enumerate(rungs):
+        for number, rung in enumerate(ladder):
+            influence = np.zeros(len(rung.q))
+            for k, sign in ((number, 1.0), (number - 1, -1.0)):
+                if 0 <= k < len(step):
+                    log, weight = _log_mean(sign * step[k] * rung.q)
+                    sums[way] += 0.5 * sign * log
+                    influence += 0.5 * sign * weight
+            parts = np.array([part.mean() for part in np.array_split(influence, _BATCHES)])
+            variance[way, number] = 0.25 * parts.var(ddof=1) / _BATCHES
+    return sums, variance
+
+
+def _log_mean(values):
+    """ln ⟨exp⟩ of values, and exp(value)/⟨exp⟩ of each."""
+    most = values.max()
+    weight = np.exp(values - most)
+    mean = weight.mean()
+    return most + np.log(mean), weight / mean
+
+
+def _more(rungs, variance, wanted):
+    """How many more paths (2, rungs) each rung gets, for a variance as wanted at the least cost."""
+    have = np.array([[len(rung.q) for rung in way] for way in rungs])
+    turns = np.array([[rung.turns for rung in way] for way in rungs])
+    cost = (turns / have + _PATH_COST).mean(axis=0)
+    # Neighbours are alike: their mean is less noisy.
+    each = np.convolve(
+        np.pad((variance * have).mean(axis=0), 2, mode="edge"), np.ones(5) / 5, "valid"
+    )
+    aim = np.sqrt(each / cost) * 2 * np.sum(np.sqrt(each * cost)) / (0.95 * wanted)
+    more = np.clip(aim - have, 0.05 * have, (_GROWTH - 1) * have)
+    return np.ceil(more).astype(int)
+
+
+def _extended(made, stores, rungs, more, progress):
+    """The rungs with so many more paths each, over threads."""
+    count = len(rungs[0])
+    # Neighbours in different threads: the widest take the longest.
+    order = [
+        (way, k)
+        for first in range(len(stores))
+        for k in range(first, count, len(stores))
+        for way in (0, 1)
+    ]
+    tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
+
+    def work(rows, group):
+        return [_flown(made, rows, *task) for task in group], []
+
+    done, _ = uniform.shared(stores, tasks, work)
+    found = [list(way) for way in rungs]
+    for (way, k), rung in zip(order, done, strict=True):
+        found[way][k] = rung
+    return found

@@ -1,0 +1,292 @@
+"""S by its walls: the slack of each, relative to that at a centre, is all that sampling moves.
+
+At the centre f° of S every slack is s = 1. Around the analytic centre (the largest Π y of the cone
+coordinates y ≥ 0 and of what is left of known bounds), S contains the ball |s − 1| ≤ 1 and lies in
+one of a radius equal to the number of walls (Nesterov, Nemirovskii, Interior-point polynomial
+algorithms, 1994): it is nearly round. Slacks move together as the matrix K of `wall_matrix` says.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from granforce.explore.billiard import LANES
+from granforce.forces import knowledge
+from granforce.forces.contact_problem import independent_problem_of, inner_network
+from granforce.forces.ensemble import Ensemble
+from granforce.numerics import certificates, contact_program, wall_matrix
+from granforce.numerics import highs as programs
+from granforce.numerics.contact_program import PINNED, Problem
+from granforce.numerics.wall_matrix import WallMatrix
+from granforce.records import InputError
+from granforce.system import cancelling
+from granforce.tolerances import FLAT
+
+# What every coordinate is asked to reach, if it can, in the point the centring starts from.
+_AWAY = 0.01
+# Rows of the balance whose pivot, relative to the diagonal, is below this follow from others once
+# some coordinates are held.
+_DEPENDENT = 1e-13
+_MOST_NEWTON_STEPS = 200
+# Newton's decrement at the centre: it only has to make S round. Steps are then balanced so often.
+_NEAR_CENTRE, _POLISH = 1e-3, 3
+# Random forces that tell what varies in S.
+PROBES = 8
+
+
+class Walls(NamedTuple):
+    """y = centre; y[moving] *= s. Walls beyond those of `moving` are padding: there s = 1."""
+
+    centre: np.ndarray  # (n,) y°, coordinates of `Ensemble.scaled_form`
+    moving: np.ndarray  # (w,) positions in y of what is not held in all of S
+    matrix: WallMatrix  # K of all `count` walls
+    dimension: int  # h of the affine hull of S
+    pull: np.ndarray  # (2 N_c,) W (m − f°), what a measurement pulls with; 0 without one
+    root: np.ndarray  # (2 N_c,) √W
+    barrier: np.ndarray  # (N_c, 3) conductances of the barrier alone
+    units: float  # ln of the volume of S in ⟨f_n⟩ over that in s
+
+    @property
+    def count(self):
+        """Number of walls, padding included."""
+        return len(self.matrix.contact)
+
+    def rows(self, walls):
+        """Rows (k, count) of K."""
+        return wall_matrix.rows(self.matrix, walls)
+
+    def moved(self, g, pulls=None):
+        """K g + B Q p, (k, count), of g (k, count) and forces p (k, 2 N_c)."""
+        return wall_matrix.moved(self.matrix, g, pulls)
+
+    def on_hull(self, slacks):
+        """The slacks (k, count), or next to them, that balance lets be."""
+        # With the barrier's own conductances f − f° is read off the slacks, contact by contact.
+        return 1.0 + wall_matrix.moved(self.matrix, slacks - 1.0, None, _POLISH, self.barrier)
+
+    def points(self, slacks):
+        """y (…, n) ≥ 0 of slacks (…, count)."""
+        y = np.broadcast_to(self.centre, (*slacks.shape[:-1], len(self.centre))).copy()
+        y[..., self.moving] *= np.maximum(slacks[..., : len(self.moving)], 0.0)
+        return y
+
+
+def walls(ensemble, weight=None, measured=None):
+    """The Walls of an ensemble.
+
+    weight, measured (N_c, 2): W and m in ⟨f_n⟩ for the centre of exp(−½ Σ W (f − m)²) cut by the
+    walls, which has the largest Σ log y − ½ Σ W (f − m)², in place of the analytic one; K then has
+    W in its stiffness.
+
+    Raises NotJammedError where S is empty, InputError where the centre lies at infinity,
+    UndecidedError where no solver could tell.
+    """
+    A, b, _ = ensemble.scaled_form
+    y = inner_network(ensemble)
+    if y is None:
+        y, held = inner_point(A, b)
+    else:
+        held = y == 0
+    frame = _frame(ensemble, y, held, weight, measured)
+    return _walls(frame, _centred(frame, y))
+
+
+def inner_point(A, b):
+    """A point y (n,) inside the polytope relative to its affine hull, and the mask of what is held.
+
+    Held are coordinates that stay below FLAT in all of the polytope. Each program raises the sum
+    of what was not seen above it yet, each coordinate counted up to a small value only.
+    """
+    n = A.shape[1]
+    held = np.ones(n, dtype=bool)
+    found = []
+    while held.any():
+        y = _raised(A, b, np.flatnonzero(held))
+        found.append(y)
+        newly = held & (y > FLAT)
+        if not newly.any():
+            break
+        held &= ~newly
+    return np.mean(found, axis=0), held
+
+
+def _raised(A, b, low):
+    """The y with the largest Σ min(y, _AWAY) over the coordinates `low`."""
+    n = A.shape[1]
+    upper = np.concatenate([np.full(n, np.inf), np.full(len(low), _AWAY)])
+    cost = np.concatenate([np.zeros(n), np.full(len(low), -1.0)])
+    both = sparse.hstack([A, A.tocsc()[:, low]])
+    model = programs.bounded(both, (b, b), (np.zeros(len(upper)), upper), cost, solver="ipm")
+    model.setOptionValue("run_crossover", "off")  # inner points are wanted, not vertices
+    solution = programs.optimal(model)
+    if solution is None:
+        raise certificates.why_unsolved(A, b)
+    solution = np.maximum(solution, 0.0)
+    y = solution[:n]
+    y[low] += solution[n:]
+    return y
+
+
+class _Frame(NamedTuple):
+    """What does not change while the centre is looked for."""
+
+    ensemble: Ensemble
+    problem: Problem  # its balance, independent rows
+    contact: np.ndarray  # (n,) contact of each coordinate y
+    normal: np.ndarray  # (n, 2) what unit f_n, f_t/μ add to it
+    held: np.ndarray  # (n,) bool
+    stiff: np.ndarray  # (N_c, 2) W, of f_n and f_t/μ; PINNED for what is known
+    target: np.ndarray  # (N_c, 2) m, f_t/μ
+
+    @property
+    def cones(self):
+        """Coordinates of the cones; those of known bounds come after."""
+        return self.ensemble.per_contact * len(self.stiff)
+
+    def forces(self, y):
+        """f_n, f_t/μ (N_c, 2) of y (n,)."""
+        pairs = y[: self.cones].reshape(len(self.stiff), -1)
+        if self.ensemble.mu == 0:
+            return np.pad(pairs, ((0, 0), (0, 1)))
+        return 0.5 * np.stack([pairs.sum(axis=1), pairs[:, 0] - pairs[:, 1]], axis=1)
+
+    def pull(self, y):
+        """W (m − f) (2 N_c,)."""
+        free = np.where(self.stiff < PINNED, self.stiff, 0.0)
+        return (free * (self.target - self.forces(y))).ravel()
+
+
+def _frame(ensemble, y, held, weight, measured):
+    contacts, mu, known = len(ensemble.index), ensemble.mu, ensemble.known
+    unit = knowledge.units(mu)
+    contact = np.repeat(np.arange(contacts), ensemble.per_contact)
+    normal = np.tile([[1.0, 1.0], [1.0, -1.0]] if mu > 0 else [[1.0, 0.0]], (contacts, 1))
+    stiff, target = np.zeros((contacts, 2)), np.zeros((contacts, 2))
+    if weight is not None:
+        stiff, target = weight * unit**2, measured / unit
+    if mu == 0:
+        stiff[:, 1] = PINNED
+    if known is not None:
+        contact = np.append(contact, known.contact)
+        normal = np.vstack([normal, -known.sign[:, None] * np.eye(2)[known.component]])
+        stiff = np.where(known.pinned, PINNED, stiff)
+    problem = independent_problem_of(ensemble)
+    frame = _Frame(ensemble, problem, contact, normal, held, stiff, target)
+    if held.any():
+        C, _, _ = _conductances(frame, _barrier(frame, y), stiff)
+        _, out = wall_matrix.factored(problem.network, C, problem.diagonal, _DEPENDENT)
+        without = contact_program.without_rows(problem, problem.diagonal, out)
+        frame = frame._replace(problem=without)
+    return frame
+
+
+def _conductances(frame, curvature, stiff):
+    """`wall_matrix.conductances` of a stiffness (n,) along the coordinates and W (N_c, 2)."""
+    cones = frame.cones
+    # Half of it still counts as pinned.
+    d = np.where(frame.held, 4 * PINNED, curvature)
+    k = stiff.copy()
+    np.add.at(k, (frame.contact[cones:], (frame.normal[cones:, 1] != 0).astype(int)), d[cones:])
+    if frame.ensemble.mu > 0:
+        return wall_matrix.conductances(d[:cones].reshape(-1, 2), k)
+    return wall_matrix.conductances(np.repeat(d[:cones, None] / 2, 2, axis=1), k)
+
+
+def _barrier(frame, y):
+    """The curvature of −Σ log y."""
+    return np.where(frame.held, 1.0, y) ** -2.0
+
+
+def _matrix(frame, y, stiff):
+    """(K at y, its walls' positions in y)."""
+    C, _, free = _conductances(frame, _barrier(frame, y), stiff)
+    moving = np.flatnonzero(~frame.held & (free[frame.contact] > 0))
+    padding = -len(moving) % LANES
+    contact = np.append(frame.contact[moving], np.zeros(padding, dtype=np.int64))
+    normal = np.vstack([frame.normal[moving] / y[moving, None], np.zeros((padding, 2))])
+    problem = frame.problem
+    factors, _ = wall_matrix.factored(problem.network, C, problem.diagonal, 0.0)
+    return WallMatrix(problem.network, contact, normal, C, factors), moving
+
+
+def _rest(frame, y):
+    """Unbalance b − A f of y, by rows of the problem and global rows."""
+    S, problem = frame.ensemble, frame.problem
+    forces = frame.forces(y) * knowledge.units(S.mu)
+    rest = np.zeros(len(problem.b) + len(problem.b_border))
+    rest[problem.place] = S.b / S.force_scale - S.A @ S.to_vector(forces)
+    rest[: len(problem.b)] *= problem.diagonal == 0
+    return rest[: len(problem.b)], rest[len(problem.b) :]
+
+
+def _centred(frame, y):
+    """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps."""
+    weight = np.where(frame.stiff < PINNED, frame.stiff, 0.0)
+    for _ in range(_MOST_NEWTON_STEPS):
+        cancelling.check("uniform sample")
+        matrix, moving = _matrix(frame, y, frame.stiff)
+        if not len(moving):
+            return y
+        w = len(moving)
+        y = _shifted(y, moving, wall_matrix.balancing(matrix, *_rest(frame, y))[:w])
+        pull = frame.pull(y)
+        relative = wall_matrix.moved(matrix, np.ones((1, matrix.contact.size)), pull)[0, :w]
+        change = frame.forces(_shifted(y, moving, relative)) - frame.forces(y)
+        # The decrement squared: the growth of the sum along the step, to first order.
+        gain = float(relative.sum() + pull @ change.ravel())
+        if gain < _NEAR_CENTRE**2:
+            for _ in range(_POLISH):
+                y = _shifted(y, moving, wall_matrix.balancing(matrix, *_rest(frame, y))[:w])
+            return y
+        slope, curve = float(pull @ change.ravel()), float(np.sum(weight * change**2))
+        step = min(1.0, 0.95 / max(-relative.min(), 1e-300))
+        while _rise(step, relative, slope, curve) < 0.1 * step * gain:
+            step /= 2
+        y = _shifted(y, moving, step * relative)
+    raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
+
+
+def _rise(step, relative, slope, curve):
+    """Growth of Σ log y − ½ Σ W (f − m)² along a step."""
+    return np.log1p(step * relative).sum() + step * (slope - 0.5 * step * curve)
+
+
+def _shifted(y, moving, relative):
+    y = y.copy()
+    y[moving] *= 1 + relative
+    return y
+
+
+def _walls(frame, y):
+    """The Walls around y."""
+    known = np.where(frame.stiff < PINNED, 0.0, PINNED)
+    weight = np.where(frame.stiff < PINNED, frame.stiff, 0.0)
+    barrier, moving = _matrix(frame, y, known)
+    h, shape = _shape(frame, _barrier(frame, y), known)
+    # f_t is in units of μ: its own length is μ times that.
+    plain = np.maximum(known, knowledge.units(frame.ensemble.mu) ** 2)
+    return Walls(
+        centre=y,
+        moving=moving,
+        matrix=_matrix(frame, y, frame.stiff)[0] if weight.any() else barrier,
+        dimension=h,
+        pull=frame.pull(y),
+        root=np.sqrt(weight).ravel(),
+        barrier=barrier.C,
+        units=_shape(frame, np.zeros_like(y), plain)[1] - shape,
+    )
+
+
+def _shape(frame, curvature, stiff):
+    """Dimension h of what balance leaves free, and ½ ln det of the stiffness M there.
+
+    For N a basis of the null space of A, det NᵀMN is det M det A M⁻¹Aᵀ but for a factor that only
+    A has part in.
+    """
+    network, diagonal = frame.problem.network, frame.problem.diagonal
+    C, logs, free = _conductances(frame, curvature, stiff)
+    factors, out = wall_matrix.factored(network, C, diagonal, 0.0)
+    rows = int(np.sum((diagonal == 0) & ~out)) + wall_matrix.global_rows(network, factors)
+    log_rows = wall_matrix.log_determinant(network, factors)
+    return int(free.sum()) - rows, 0.5 * float(logs.sum() + log_rows)

@@ -1,0 +1,206 @@
+"""What a push at one wall of a polytope does to the speed at which all others are approached.
+
+In {f : A f = b, f_c in a polygon of its own for every contact c} the slack of a wall, relative to
+that at a centre f°, is s = 1 + B (f − f°), B having one wall of one contact in every row. With a
+stiffness M = Bᵀ B + W of each contact (the barrier's at the centre, and what else pulls) and its
+inverse, the conductance C, forces that keep the balance move by
+
+    Q = C − C Aᵀ (A C Aᵀ)⁻¹ A C,
+
+and slacks by the matrix K = B Q Bᵀ. Where W = 0 it is the projection I − D Ãᵀ (Ã D² Ãᵀ)⁻¹ Ã D on
+what slacks can do together, in slacks y = D s with Ã y = b̃: no basis of it is needed, only the
+sparse factor of A C Aᵀ (`contact_matrix`). One factor serves eight right-hand sides in lanes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.numerics import contact_matrix
+from granforce.numerics.contact_matrix import Factors, Network, clear, pull, push
+from granforce.numerics.contact_program import PINNED
+from granforce.numerics.lanes import (
+    LANES,
+    MANY,
+    ONE,
+    compiled,
+    fma,
+    load,
+    room,
+    same,
+    store,
+    within,
+)
+from granforce.system import cancelling
+
+
+class WallMatrix(NamedTuple):
+    """K in factors; walls are padded with such that meet no force."""
+
+    network: Network  # A, for forces (f_n, f_t/μ)
+    contact: np.ndarray  # (walls,) contact of each wall
+    normal: np.ndarray  # (walls, 2) B: what unit f_n, f_t/μ add to its slack
+    C: np.ndarray  # (N_c, 3) nn, nt, tt of each conductance
+    factors: Factors  # of A C Aᵀ, one number for all lanes
+
+
+class Scratch(NamedTuple):
+    """Room for W right-hand sides."""
+
+    f: np.ndarray  # (2 N_c, W) forces
+    x: np.ndarray  # (rows, W)
+    y: np.ndarray  # (m, W)
+    g: np.ndarray  # (walls, W)
+    out: np.ndarray  # (walls, W)
+
+
+def conductances(d, k):
+    """(C (N_c, 3), ln det M (N_c,) on what is free, free (N_c,)) of contacts.
+
+    M = Tᵀ-form of `contact_program`: d (N_c, 2) along y₁, y₂ = f_n ± f_t/μ and k (N_c, 2) along
+    f_n, f_t/μ, each PINNED where nothing may move along it; free: dimensions that are left.
+    """
+    (d0, d1), (k_n, k_t) = d.T, k.T
+    det = 0.25 * (k_n + k_t) * (d0 + d1) + d0 * d1 + 0.25 * k_n * k_t
+    C = np.stack([d0 + d1 + k_t, d1 - d0, d0 + d1 + k_n], axis=1) * (0.25 / det)[:, None]
+    held = np.sum(d >= PINNED, axis=1) + np.sum(k >= PINNED, axis=1)
+    free = np.maximum(0, 2 - held)
+    C[free == 0] = 0.0
+    one = np.where(free == 1, C[:, 0] + C[:, 2], 1.0)
+    return C, np.where(free == 2, np.log(4 * det), -np.log(one)), free
+
+
+def factored(network, C, diagonal, least):
+    """(Factors of A C Aᵀ + diag(diagonal), mask (rows,) of rows without a pivot above `least`).
+
+    least: relative to the diagonal of A C Aᵀ.
+    """
+    factors = contact_matrix.make_factors(network, 1)
+    _begin(network, C, diagonal, factors, ONE)
+    bound = least * factors.lower[contact_matrix.diagonals(network), 0].ravel()
+    bound = np.maximum(bound, contact_matrix.NO_PIVOT)
+    contact_matrix.factor(network, bound, factors, cancelling.flag(), ONE)
+    cancelling.check()
+    out = contact_matrix.left_out(network, factors)
+    return Factors(*(part.ravel() for part in factors)), out
+
+
+def global_rows(network, factors):
+    """Number of global rows that do not follow from others."""
+    return int(np.sum(factors.corner[:: network.border.shape[1] // 2 + 1] > 0))
+
+
+def log_determinant(network, factors):
+    """ln det A C Aᵀ by its factors, rows without a pivot left out."""
+    m = network.border.shape[1] // 2
+    own = factors.lower[contact_matrix.diagonals(network)].ravel()
+    corner = factors.corner[:: m + 1] if m else np.zeros(0)
+    pivots = np.concatenate([own[own > 1e-30], corner[corner > 0]])
+    return -2 * np.log(pivots).sum()
+
+
+def moved(matrix, g, pulls=None, times=1, C=None):
+    """B Q (Bᵀ g + p), (k, walls), of g (k, walls) and p (2 N_c,) or (k, 2 N_c).
+
+    times: how often balance is restored: once, what is left of the unbalance is that of rounding
+    and of the weights together. C (N_c, 3): where forces come from, if not the matrix's own.
+    """
+    found = np.empty_like(g)
+    for first in range(0, len(g), LANES):
+        part = slice(first, first + LANES)
+        count = len(g[part])
+        lanes = ONE if count == 1 else MANY
+        at = make_scratch(matrix, len(lanes))
+        at.g[:, :count] = g[part].T
+        if pulls is not None:
+            at.f[:, :count] = pulls[:, None] if pulls.ndim == 1 else pulls[part].T
+        _move(matrix, matrix.C if C is None else C, times, at, lanes)
+        found[part] = at.out[:, :count].T
+    return found
+
+
+def rows(matrix, walls):
+    """Rows (k, walls) of K for walls (k,)."""
+    g = np.zeros((len(walls), len(matrix.contact)))
+    g[np.arange(len(walls)), walls] = 1.0
+    return moved(matrix, g)
+
+
+def balancing(matrix, rest, rest_border):
+    """The change of slacks (walls,) by the forces of least weight that take up an unbalance."""
+    at = make_scratch(matrix, 1)
+    at.x[:, 0], at.y[:, 0] = rest, rest_border
+    _balance(matrix, at, ONE)
+    return at.out[:, 0].copy()
+
+
+def make_scratch(matrix, width):
+    """Scratch of `width` right-hand sides, all zero."""
+    grains, m = len(matrix.network.layout.position), matrix.network.border.shape[1] // 2
+    walls = len(matrix.contact)
+    sizes = 2 * len(matrix.C), 3 * grains, m, walls, walls
+    return Scratch(*(room(size, width) for size in sizes))
+
+
+@compiled
+def _begin(network, C, diagonal, factors, lanes):
+    contact_matrix.begin(network, diagonal, factors, lanes)
+    for c in range(len(C)):
+        nn, nt, tt = same(lanes, C[c, 0]), same(lanes, C[c, 1]), same(lanes, C[c, 2])
+        contact_matrix.add(network, c, nn, nt, tt, factors, lanes)
+
+
+@compiled
+def _move(matrix, C, times, at, lanes):
+    """out ← B Q (f + Bᵀ g)."""
+    f = at.f
+    for k in range(len(matrix.contact)):
+        c, g = 2 * matrix.contact[k], load(at.g, k, lanes)
+        store(f, c, lanes, fma(same(lanes, matrix.normal[k, 0]), g, load(f, c, lanes)))
+        store(f, c + 1, lanes, fma(same(lanes, matrix.normal[k, 1]), g, load(f, c + 1, lanes)))
+    for c in range(len(C)):
+        normal, tangential = _through(C, c, load(f, 2 * c, lanes), load(f, 2 * c + 1, lanes), lanes)
+        store(f, 2 * c, lanes, normal)
+        store(f, 2 * c + 1, lanes, tangential)
+    for _ in range(times):
+        clear(at.x, lanes)
+        clear(at.y, lanes)
+        for c in range(len(C)):
+            normal, tangential = -load(f, 2 * c, lanes), -load(f, 2 * c + 1, lanes)
+            push(matrix.network, c, normal, tangential, at.x, at.y, lanes)
+        _answer(matrix, at, lanes)
+    _slacks(matrix, at, lanes)
+
+
+@compiled
+def _balance(matrix, at, lanes):
+    _answer(matrix, at, lanes)
+    _slacks(matrix, at, lanes)
+
+
+@within
+def _answer(matrix, at, lanes):
+    """f ← f + C Aᵀ (A C Aᵀ)⁻¹ (x, y)."""
+    contact_matrix.solve(matrix.network, matrix.factors, at.x, at.y, lanes)
+    for c in range(len(matrix.C)):
+        normal, tangential = pull(matrix.network, c, at.x, at.y, lanes)
+        normal, tangential = _through(matrix.C, c, normal, tangential, lanes)
+        store(at.f, 2 * c, lanes, load(at.f, 2 * c, lanes) + normal)
+        store(at.f, 2 * c + 1, lanes, load(at.f, 2 * c + 1, lanes) + tangential)
+
+
+@within
+def _slacks(matrix, at, lanes):
+    """out ← B f."""
+    for k in range(len(matrix.contact)):
+        c = 2 * matrix.contact[k]
+        value = same(lanes, matrix.normal[k, 0]) * load(at.f, c, lanes)
+        b_t = same(lanes, matrix.normal[k, 1])
+        store(at.out, k, lanes, fma(b_t, load(at.f, c + 1, lanes), value))
+
+
+@within
+def _through(C, c, normal, tangential, lanes):
+    """C times the forces of a contact."""
+    nn, nt, tt = same(lanes, C[c, 0]), same(lanes, C[c, 1]), same(lanes, C[c, 2])
+    return fma(nn, normal, nt * tangential), fma(nt, normal, tt * tangential)

@@ -1,0 +1,36 @@
+"""The card with the volume of S: offered, measured in the background, found again."""
+
+import pytest
+
+
+@pytest.fixture
+def view(state, wait_for):
+    from app.views.volume import Volume
+
+    state.choose(mu=1)
+    wait_for(state)
+    made = Volume(state)
+    wait_for(state)
+    return made
+
+
+def test_the_volume_is_measured_once_and_found_again(state, view, wait_for):
+    from app.views.volume import Volume
+
+    assert view.measure.visible and not view.tiles.object
+    view.measure.clicks += 1
+    assert state.measuring.running and not view.measure.visible
+    wait_for(state)
+    assert not view.measure.visible and "ln V" in view.tiles.object
+    assert 0 < view.found["log_volume_error"].item() <= 0.1
+    again = Volume(state)
+    wait_for(state)
+    assert again.tiles.object == view.tiles.object
+
+
+def test_it_is_that_of_the_packing_on_screen(state, view, wait_for):
+    view.measure.clicks += 1
+    state.choose(mu=0)
+    wait_for(state)
+    # One network only: nothing to measure.
+    assert not view.measure.visible and view.found is None and not view.tiles.object
