@@ -34,7 +34,7 @@ PACKING = {
     "--radii": RADII,
     "--pressure": POSITIVE,
     "--dt": POSITIVE,
-    "--accuracy": POSITIVE,
+    "--step-accuracy": POSITIVE,
     "--box-mass": POSITIVE,
     "--sweeps": [*WHOLE, LONG],
 }

@@ -65,7 +65,7 @@ def _packing_parameters(arguments, mu, seed):
         dt=arguments.dt,
         box_mass=arguments.box_mass,
         sweeps=arguments.sweeps,
-        accuracy=arguments.accuracy,
+        accuracy=arguments.step_accuracy,
     )
 
 

@@ -126,7 +126,7 @@ def _add_packing(command, several=False):
     group.add_argument("--box-mass", type=float, default=100.0, help="box inertia (default 100)")
     group.add_argument("--sweeps", type=int, default=600, help="most sweeps per step (default 600)")
     group.add_argument(
-        "--accuracy",
+        "--step-accuracy",
         type=float,
         default=0.01,
         help="breach of the contact laws that ends a step, relative to the fastest grain "
