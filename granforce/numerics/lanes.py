@@ -106,12 +106,21 @@ def _place(context, builder, signature, args):
     return builder.bitcast(builder.gep(array.data, [first]), kind.as_pointer())
 
 
+# Axes of arrays whose numbers are the same in all lanes.
+_SHARED = 4
+
+
+def shared(values):
+    """Values (n, 1) as numbers that `load` gives to all lanes alike."""
+    return values.reshape(-1, *(1,) * (_SHARED - 1))
+
+
 @intrinsic
 def load(typing, array, index, lanes):
-    """Number `index` of a contiguous array; one of a single axis is the same in all lanes."""
+    """Number `index` of a contiguous array, of one that is `shared` the same in all lanes."""
 
     def emit(context, builder, signature, args):
-        if array.ndim == 1 and lanes.count > 1:
+        if array.ndim == _SHARED and lanes.count > 1:
             first = context.make_array(array)(context, builder, args[0]).data
             return _in_all(builder, builder.load(builder.gep(first, [args[1]])), lanes.count)
         return builder.load(_place(context, builder, signature, args), align=8)

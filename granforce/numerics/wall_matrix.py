@@ -28,6 +28,7 @@ from granforce.numerics.lanes import (
     load,
     room,
     same,
+    shared,
     store,
     within,
 )
@@ -82,7 +83,7 @@ def factored(network, C, diagonal, least):
     contact_matrix.factor(network, bound, factors, cancelling.flag(), ONE)
     cancelling.check()
     out = contact_matrix.left_out(network, factors)
-    return Factors(*(part.ravel() for part in factors)), out
+    return Factors(*(shared(part) for part in factors)), out
 
 
 def global_rows(network, factors):
@@ -94,7 +95,7 @@ def log_determinant(network, factors):
     """ln det A C Aᵀ by its factors, rows without a pivot left out."""
     m = network.border.shape[1] // 2
     own = factors.lower[contact_matrix.diagonals(network)].ravel()
-    corner = factors.corner[:: m + 1] if m else np.zeros(0)
+    corner = factors.corner[:: m + 1].ravel() if m else np.zeros(0)
     pivots = np.concatenate([own[own > 1e-30], corner[corner > 0]])
     return -2 * np.log(pivots).sum()
 
