@@ -13,7 +13,12 @@ from scipy import sparse
 
 from granforce.explore.billiard import LANES
 from granforce.forces import knowledge
-from granforce.forces.contact_problem import independent_problem_of, inner_network
+from granforce.forces.contact_problem import (
+    MOST_DENSE,
+    in_balance,
+    independent_problem_of,
+    inner_network,
+)
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics import highs as programs
@@ -21,7 +26,7 @@ from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import WallMatrix
 from granforce.records import InputError
 from granforce.system import cancelling
-from granforce.tolerances import FLAT
+from granforce.tolerances import BALANCED, FLAT
 
 # What every coordinate is asked to reach, if it can, in the point the centring starts from.
 _AWAY = 0.01
@@ -238,13 +243,21 @@ def _centred(frame, y):
         if gain < _NEAR_CENTRE**2:
             for _ in range(_POLISH):
                 y = _shifted(y, moving, wall_matrix.balancing(matrix, *_rest(frame, y))[:w])
-            return y
+            return _polished(frame, y)
         slope, curve = float(pull @ change.ravel()), float(np.sum(weight * change**2))
         step = min(1.0, 0.95 / max(-relative.min(), 1e-300))
         while _rise(step, relative, slope, curve) < 0.1 * step * gain:
             step /= 2
         y = _shifted(y, moving, step * relative)
     raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
+
+
+def _polished(frame, y):
+    """y, its balance restored by dense matrices where rows had been left out."""
+    A, b, _ = frame.ensemble.scaled_form
+    if np.abs(A @ y - b).max(initial=0.0) <= BALANCED / 10 or A.shape[0] > MOST_DENSE:
+        return y
+    return in_balance(A, b, y)
 
 
 def _rise(step, relative, slope, curve):

@@ -14,7 +14,7 @@ from granforce.records import Cancelled, InputError
 
 @pytest.fixture(scope="module")
 def S():
-    return ensemble(packed(40, 0.3))
+    return ensemble(packed(40, 0.3, 2))
 
 
 def extent(body):

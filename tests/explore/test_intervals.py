@@ -58,7 +58,7 @@ def square_lattice(side, mu):
 
 def test_what_frozen_surroundings_leave_open_is_certified():
     # Rounding of the frozen forces once kept these programs from ending in balance at all.
-    packing = packed(400, 1.0, 1)
+    packing = packed(400, 1.0, 3)
     S = ensemble(packing, frozen=slices.outside(packing, (0.2, 0.8, 0.2, 0.8)))
     found = intervals(S)
     assert found.converged
@@ -70,7 +70,7 @@ def test_what_frozen_surroundings_leave_open_is_certified():
 
 
 def test_bounds_where_some_contacts_can_do_nothing_but_slide():
-    packing = packed(50, 0.01, 1)
+    packing = packed(50, 0.01, 3)
     S = ensemble(packing, frozen=slices.outside(packing, (0.2, 0.8, 0.2, 0.8)))
     system = make_system(S)
     assert not system.middle.reached
