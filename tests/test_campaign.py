@@ -9,7 +9,7 @@ import warnings
 import campaign
 import pytest
 
-# Part of all stages that may end undecided: 0.5 % did, most at μ < 10⁻⁶, μ > 10³, or S a point.
+# Part of all stages that may end undecided: most do at μ < 10⁻⁶, μ > 10³, or where S is a point.
 UNDECIDED = 0.02
 
 
@@ -30,7 +30,7 @@ def judged(numbers, **options):
 @pytest.mark.parametrize("block", range(3))
 def test_small_packings_stand(block):
     wrong, undecided, done = judged(range(1000 + 10 * block, 1010 + 10 * block), most=12, every=5)
-    assert not wrong and not undecided and done > 60
+    assert not wrong and not undecided and done > 40  # packings of too few disks are refused
 
 
 @pytest.mark.stress

@@ -36,9 +36,11 @@ def assert_nearest(S, start):
     assert S.admits(ours.forces, BALANCED, ADMISSIBLE)
     assert ours.residual == S.residual(ours.forces)
     assert ours.violation == S.violation(ours.forces)
-    assert np.abs(ours.forces - theirs.forces).max() < 1e-6 * S.force_scale
-    # Two optima of one strictly convex program: neither is nearer by more than rounding.
+    apart = np.linalg.norm(ours.forces - theirs.forces)
+    # Two optima of one strictly convex program: ours is not farther by more than rounding, and
+    # whatever lies in S is as far from the nearest as Pythagoras allows, at an obtuse angle.
     ours, theirs = (np.linalg.norm(r.forces - start) for r in (ours, theirs))
+    assert apart <= np.sqrt(max(theirs**2 - ours**2, 0.0)) + 1e-6 * S.force_scale
     assert ours <= theirs * (1 + 1e-8) + 1e-8 * S.force_scale
 
 
