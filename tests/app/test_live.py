@@ -63,8 +63,9 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     browser.run(lambda: state.growing is not None)
     pictures = browser.parts("picture")
     fractions = [picture["fraction"] for picture in pictures]
-    # The gas has φ = 0.5; a page that is behind leaves pictures out.
-    assert len(pictures) > 30 and 0.5 - 1e-6 < fractions[0] < 0.55
+    # The gas has φ = 0.5. At least 33 pictures are kept, one for each shrinking by STRAIN; a page
+    # that found them all at once would still be sent 21.
+    assert len(pictures) > 18 and 0.5 - 1e-6 < fractions[0] < 0.55
     assert fractions[-1] > 0.75 and pictures[0]["box"][0] > 1.15 * pictures[-1]["box"][0]
     assert len(pictures[0]["x"]) == 2 * DISKS and pictures[-1]["mu"] == 0.23
     assert state.seen is state.growing and state.replay is old
