@@ -36,7 +36,7 @@ class StepProblem(NamedTuple):
     length: np.ndarray
     arm_i: np.ndarray
     arm_j: np.ndarray
-    closing: np.ndarray  # max(gap, 0)/Δt: approach velocity that just closes the contact
+    closing: np.ndarray  # gap/Δt: approach velocity that just closes it; < 0 pushes overlap out
     stiff_n: np.ndarray  # Δf_n per normal velocity to be stopped
     stiff_t: np.ndarray  # Δf_t per tangential velocity to be stopped
     inverse_mass: np.ndarray  # Δt/m
