@@ -256,8 +256,8 @@ def _rail(rail, scale):
 
 
 def spelled(pulls):
-    """Pulls as a link holds them."""
-    return "~".join(":".join([str(name), *(f"{x:.6g}" for x in at)]) for name, *at in pulls)
+    """Pulls as a link holds them, to all digits: an end of an interval must not round beyond it."""
+    return "~".join(":".join([str(name), *map(str, at)]) for name, *at in pulls)
 
 
 def read(text):

@@ -154,3 +154,9 @@ def test_a_pulled_point_travels_with_the_link(page, state, library, wait_for):
     np.testing.assert_allclose(
         Page(other, wait_for).told[-1]["held"]["normal"], held["normal"], atol=1e-4
     )
+
+
+def test_a_link_keeps_a_pull_to_the_end_of_an_interval():
+    """Rounded to the next digit, it would be asked for beyond the end, and refused."""
+    pulls = [(17, 2.545365301781461)]
+    assert grabs.read(grabs.spelled(pulls)) == pulls
