@@ -1,7 +1,6 @@
 """What visitors stumbled over, one test each: the page answers, and says what is so."""
 
 import signal
-import time
 
 import numpy as np
 import pytest
@@ -129,9 +128,7 @@ def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, s
         page.locator("button.step").click()
         searched(page, "frame=1")
         server.send_signal(signal.SIGKILL)
-        begin = time.monotonic()
         page.get_by_role("alert").get_by_text("Connection lost").wait_for()
-        assert time.monotonic() - begin < 20
         painting = scene(page, "scene.painted")
         page.locator("button.play").click()  # what is in the page still plays
         page.wait_for_function(
