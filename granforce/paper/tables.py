@@ -46,6 +46,7 @@ class Table(NamedTuple):
     packings: dict  # {row: Packing} of those walks
     skipped: dict  # counts: cells of the plan that the store lacked
     tails: dict = MappingProxyType({})  # {row: counts of f_n of its states, in bins up to FORCES}
+    packing_version: int = kinds.PACKING.version  # of the algorithm that made its packings
 
     def part(self, *names, n=None):
         """Rows of some parts; n: only of this number of disks."""
@@ -215,8 +216,13 @@ def merged(new, old):
     """The Table `new` with the rows of its plan that it lacks and `old` has, after its own.
 
     Numbers of a row that hang on other cells (distances from the uniform centre) stay the old ones
-    where those cells are gone.
+    where those cells are gone. Raises InputError where the packings are of different versions.
     """
+    if new.packing_version != old.packing_version:
+        raise InputError(
+            f"the older table is of packings of version {old.packing_version}, which cannot stand "
+            f"beside those of version {new.packing_version}: leave --table out"
+        )
     known, older = {_name(row) for row in new.rows}, {_name(row): row for row in old.rows}
     planned = {(t.part, t.n, t.mu, t.seed) for t in plans.tasks(plans.Plan(**new.plan))}
     kept = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
@@ -283,7 +289,8 @@ def _dataset(table):
     if table.tails:
         arrays["tail_row"], arrays["tail_force"] = list(table.tails), FORCES
         arrays["tail_count"] = np.stack(list(table.tails.values()))
-    return labelled(arrays, {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)})
+    told = {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)}
+    return labelled(arrays, told | {"packing_version": table.packing_version})
 
 
 def _number(value):
@@ -319,7 +326,8 @@ def _table(store, entry, dataset):
         tails = dict(zip(dataset["tail_row"].values.tolist(), counts, strict=True))
     plan = {name: value for name, value in entry.params.items() if name != "rows"}
     skipped = json.loads(dataset.attrs["skipped"])
-    return Table(plan, rows, samples, shown, packings, skipped, tails)
+    version = int(dataset.attrs.get("packing_version", 1))  # tables of version 1 did not tell
+    return Table(plan, rows, samples, shown, packings, skipped, tails, version)
 
 
 def _packing(store, row):

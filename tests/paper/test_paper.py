@@ -242,6 +242,8 @@ def test_rows_that_a_store_lacks_come_from_the_older_table(done):
         assert joined.rows[k]["part"] in plans.SHOWN_PARTS
         assert k in joined.packings
         assert len(counts) == joined.rows[k]["contacts"]
+    with pytest.raises(InputError, match="packings of version 1"):
+        tables.merged(fewer, old._replace(packing_version=1))
 
 
 def test_every_figure_of_the_table_is_made(done):
