@@ -280,7 +280,9 @@ def test_a_scene_is_built_by_hand_and_its_link_carries_it(look, tmp_path):
 
     page.mouse.click(*at(2.1, 2.8))  # near two disks: it snaps onto both
     until(page, "small.body.h === 3 && small.body.count === 6")
-    page.wait_for_function("() => location.search.includes('built=')")
+    # The link follows once hands rest; before, it has the two disks that were there.
+    disks = "new URLSearchParams(location.search).get('built')?.split('|')[0].split(';').length"
+    page.wait_for_function(f"() => {disks} === 3")
     with page.expect_download() as file:
         desk(page).get_by_role("button", name="Save NPZ").click()
     file.value.save_as(tmp_path / "own.npz")
