@@ -242,7 +242,7 @@ def _damage(store, name):
 def _cell(store, name):
     """The Cell of a store's entry; None where it holds no states of the current algorithms."""
     entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
-    if entry is None or entry.version != SOURCES[entry.kind].version:
+    if entry is None or not study.is_current(SOURCES[entry.kind], entry):
         return None
     selection = selected(entry.kind, entry.params)
     return Cell(selection, series(selection, entry.params), entry.params, store, name)

@@ -62,7 +62,15 @@ def entry_name(store, kind, parameters):
 def entries(store, kind, **parameters):
     """Entries of a kind with these parameters, of its current version, as Store.find."""
     found = store.find(kind.name, **parameters)
-    return [entry for entry in found if entry.version == kind.version]
+    return [entry for entry in found if is_current(kind, entry)]
+
+
+def is_current(kind, entry):
+    """Whether an entry is of the current version of its kind, and of its packing's."""
+    packing = entry.params.get("packing")
+    # Packings of version 1 did not name the accuracy of their steps.
+    older = isinstance(packing, dict) and "n" in packing and "accuracy" not in packing
+    return entry.version == kind.version and not older
 
 
 ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")

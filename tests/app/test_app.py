@@ -15,7 +15,9 @@ from small_store import DISKS, KEPT, STATES, cell_parameters
 import granforce as gf
 from granforce import measures
 from granforce.records import Cancelled, InputError
+from granforce.study import cells as study
 from granforce.study import kinds
+from granforce.study.store import open_store
 
 
 def cell_at(library, mu):
@@ -977,3 +979,19 @@ def test_scripts_of_one_component_name_nothing_twice():
 
     declared = re.findall(r"^(?:const|let|class|(?:async )?function) (\w+)", Player._esm, re.M)
     assert len(declared) > 50 and sorted(set(declared)) == sorted(declared)
+
+
+def test_states_of_older_packings_in_a_cache_are_not_offered(tmp_path):
+    """Packings of version 1 named no accuracy of steps; a page once failed over them."""
+    from app.data import Library
+
+    shipped = Library(cache=tmp_path / "none")
+    cell = next(cell for cell in shipped.cells() if cell.kind == "walk")
+    older = dict(cell.params["packing"])
+    del older["accuracy"]
+    cache = open_store(tmp_path / "cache")
+    named, dtypes = cell.params | {"packing": older}, {"states": "float32"}
+    study.save(cache, kinds.WALK, named, shipped.dataset(cell), dtypes=dtypes)
+    library = Library(cache=tmp_path / "cache")
+    assert len(cache.entries()) == 1
+    assert [one.params for one in library.cells()] == [one.params for one in shipped.cells()]

@@ -66,6 +66,21 @@ def test_packings_of_version_1_still_open_and_are_not_taken_for_the_new_ones():
         assert entry not in study.entries(store, PACKING)
 
 
+def test_states_of_older_packings_are_not_listed(tmp_path):
+    """Version 1 named no accuracy: what a cache has of its packings stays, and is not listed."""
+    shipped, entries = kept("start.zarr")
+    walk = next(entry for entry in entries if entry.kind == "walk")
+    older = dict(walk.params["packing"])
+    del older["accuracy"]
+    store = open_store(tmp_path / "cache.zarr")
+    for packing in (walk.params["packing"], older):
+        dataset = study.load(shipped, KINDS["walk"], walk.params)
+        named = walk.params | {"packing": packing}
+        study.save(store, KINDS["walk"], named, dataset, dtypes={"states": "float32"})
+    assert len(store.entries()) == 2
+    assert [entry.params for entry in study.entries(store, KINDS["walk"])] == [walk.params]
+
+
 def test_the_reduced_study_is_found():
     assert tables.load(DATA / "study.zarr").rows
 
