@@ -10,7 +10,6 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from granforce.forces import knowledge
 from granforce.forces.contact_problem import forces_of, problem_of
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import likeliest_piqp
@@ -148,16 +147,7 @@ def _adapted(ensemble, m, forces):
     With the cone coordinates that are 0 there held, the rank of what is measured on the null space
     of the balance.
     """
-    normal, tangential = (forces / ensemble.force_scale).T
-    y = np.repeat(normal, ensemble.per_contact)
-    if ensemble.mu > 0:
-        y[::2] += tangential / ensemble.mu
-        y[1::2] -= tangential / ensemble.mu
-    if ensemble.known is not None:
-        known, scaled = ensemble.known, forces / ensemble.force_scale
-        slack = known.limit - known.sign * scaled[known.contact, known.component]
-        y = np.append(y, slack / knowledge.units(ensemble.mu)[known.component])
-    free = np.flatnonzero(y > _ON_THE_WALL)
+    free = np.flatnonzero(ensemble.coordinates(forces) > _ON_THE_WALL)
     A, _, T = ensemble.scaled_form
     A, T = sparse.csc_matrix(A)[:, free], sparse.csr_matrix(T)[:, free]
     T = T[np.flatnonzero(np.isfinite(ensemble.to_vector(m)))]
