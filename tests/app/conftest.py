@@ -58,14 +58,14 @@ def _returning(browser, **options):
 
 
 @pytest.fixture
-def visit(chromium, address):
-    """visit(query, width, height, …): a page with its tabs; at the end no error was told.
+def opening(chromium, address):
+    """opening(query, width, height, …): a page on its way; at the end no error was told.
 
     first: whether it is of somebody who was never here; further options are of its context.
     """
     errors, contexts = [], []
 
-    def visit(query="", width=1280, height=900, first=False, **options):
+    def opening(query, width, height, first=False, **options):
         begin = chromium.fresh_context if first else chromium.new_context
         context = begin(viewport={"width": width, "height": height}, **options)
         contexts.append(context)
@@ -73,15 +73,26 @@ def visit(chromium, address):
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda told: told.type == "error" and errors.append(told.text))
-        page.goto(address + (query or MANY))
+        page.goto(address + query)
+        return page
+
+    yield opening
+    for context in contexts:
+        context.close()
+    assert not [error for error in errors if "favicon" not in error]
+
+
+@pytest.fixture
+def visit(opening):
+    """visit(query, width, height, …): a page with its tabs, by `opening`."""
+
+    def visit(query="", width=1280, height=900, **options):
+        page = opening(query or MANY, width, height, **options)
         painted(page, PATIENCE)
         page.get_by_role("tab").first.wait_for()
         return page
 
-    yield visit
-    for context in contexts:
-        context.close()
-    assert not [error for error in errors if "favicon" not in error]
+    return visit
 
 
 @pytest.fixture

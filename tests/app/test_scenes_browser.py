@@ -17,26 +17,15 @@ pytestmark = pytest.mark.browser
 
 
 @pytest.fixture
-def look(chromium, address):
-    """look(query, width, height, …): the page of a scene, drawn; at the end no error was told."""
-    errors, contexts = [], []
+def look(opening):
+    """look(query, width, height, …): the page of a scene, drawn, by `opening`."""
 
-    def look(query="", width=1280, height=800, first=False, **options):
-        begin = chromium.fresh_context if first else chromium.new_context
-        context = begin(viewport={"width": width, "height": height}, **options)
-        contexts.append(context)
-        context.set_default_timeout(PATIENCE)
-        page = context.new_page()
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda told: told.type == "error" and errors.append(told.text))
-        page.goto(address + query)
+    def look(query="", width=1280, height=800, **options):
+        page = opening(query, width, height, **options)
         drawn(page)
         return page
 
-    yield look
-    for context in contexts:
-        context.close()
-    assert not [error for error in errors if "favicon" not in error]
+    return look
 
 
 def desk(page):
