@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from granforce import statistics
 from granforce.figures import style
+from granforce.measures import statistics
 
 _MEASURES = (
     *(("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15)),

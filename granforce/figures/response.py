@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from granforce import statistics
 from granforce.figures import style
+from granforce.measures import statistics
 
 
 def perturbation(rows, *, limit=False, backend="bokeh"):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import drawn
 from granforce.records import InputError

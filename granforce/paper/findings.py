@@ -6,7 +6,7 @@ packing. They tell why a claim holds or does not.
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.figure4 import departure
 from granforce.paper.claims.groups import (
     LEAST_DYNAMIC,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 
 FIT_INNER, FIT_OUTER = 1.5, 0.4
 FIT_RANGES = tuple(itertools.product((1.0, 1.5, 2.0, 3.0), (0.3, 0.4, 0.5)))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.groups import (
     LEAST_DYNAMIC,
     SMALL,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.figure1 import peaked
 from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
 from granforce.paper.claims.verdicts import PRE, over_all

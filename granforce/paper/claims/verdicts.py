@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 
 REPRODUCED, UNDECIDED, DIFFERS = "reproduced", "undecided", "differs"
 FAILED, FEW, MISSING = "not reproduced", "too few data", "no data"
