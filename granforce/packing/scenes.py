@@ -297,7 +297,7 @@ def _six(mu, dimension=2):
         try:
             made = pack(6, mu=PACKED_AT, seed=seed)
             if ensemble(made).dimension == dimension:
-                return made._replace(mu=mu)
+                return made._replace(mu=mu, info=made.info | {"packed_mu": PACKED_AT})
         except (NotJammedError, UndecidedError):
             continue
     raise InputError(f"no six disks of {MOST_SEEDS} seeds have h = {dimension}")
