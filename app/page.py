@@ -44,8 +44,9 @@ NARROW = """
 """
 # Material UI is fetched and run as soon as the page can, not after the page's contents have come:
 # 0.13 s. Its address must be the one that Panel asks for, or it would be run twice.
+# From one scene's page to another's the old one stays until the new one is seen, and goes over.
 EARLY = """{%% extends "base.html" %%}
-{%% block preamble %%}{{ super() }}<script>
+{%% block preamble %%}{{ super() }}<style>@view-transition { navigation: auto; }</style><script>
   document.addEventListener("load", (event) => {
     if (event.target.src?.includes("es-module-shims")) importShim("%s")
   }, true)
@@ -100,12 +101,14 @@ def _small(document, asked):
     """The page of a small scene, which asks no store."""
     task = Task(computing, _turns(document))
     plain = asked == scenes.asked("")
-    view = Small(asked, task, len(FIRST_STEPS + STEPS), step=asked.step, first=plain)
+    steps = len(FIRST_STEPS + STEPS)
+    view = Small(asked, task, steps, step=asked.step, first=plain, dark=asked.dark)
     whole = pmui.Page(
         title=TITLE,
         main=[view],
         sx={BAR: HIDDEN},
         template=EARLY % pmui.Page._render_esm(server=True),
+        dark_theme=asked.dark,
         busy_indicator=None,
     )
     whole.param.watch(lambda event: view.param.update(dark=event.new), "dark_theme")

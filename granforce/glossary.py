@@ -396,7 +396,7 @@ TERMS = {
         "How many force networks of the one packing are made.",
     ),
     "packed_mu": Term(
-        "packed at μ",
+        "friction during packing",
         "",
         "The friction with which the packing was made, if it is not the one that its forces have "
         "now.",

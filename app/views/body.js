@@ -33,13 +33,14 @@ class Body {
     this.axes = Array.from({ length: this.h }, (_, k) => scene.axes.slice(k * width, (k + 1) * width))
     this.load = Float64Array.from(scene.load)
     this.u = new Array(this.h).fill(0)
+    this.bounded = true // above three dimensions until the server says otherwise
     this.reload()
   }
 
   /** All networks in balance under the present loads: origin + u · axes, if there are any. */
   reload() {
     const { scene } = this, rows = scene.b?.length ?? 0, width = 2 * this.count
-    const b = Float64Array.from(scene.b ?? [])
+    const b = this.b = Float64Array.from(scene.b ?? [])
     ;[...(scene.grains ?? [])].forEach((grain, k) => {
       if (3 * grain + 2 >= this.load.length) return
       b[3 * k] = -this.load[3 * grain]
@@ -77,7 +78,7 @@ class Body {
         else if (rest < -SMALL) still = false
       }
     }
-    this.possible = still && this.consistent && this.count > 0
+    this.possible = still && this.consistent && this.count > 0 && Boolean(this.scene.b)
     this.whole = this.h <= 3
     if (this.whole) this.draw()
     else this.empty = !this.possible
@@ -128,7 +129,7 @@ class Body {
   }
 
   scaleOf() {
-    return Math.max(1e-6, ...this.load.map(Math.abs), ...(this.scene.box[0] ? [...this.scene.b].map(Math.abs) : []))
+    return Math.max(1e-6, ...this.b.map(Math.abs))
   }
 
   /** Σ f_n as slope and rest. */

@@ -70,7 +70,7 @@ class Controls:
         self.mu.link(self.beside, stored="stored")
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
         self.seed = self._number("Seed", 0, RANGES["seed"][1])
-        self.packed = pmui.TextInput(label="Packed at μ", placeholder=SAME, **SMALL)
+        self.packed = pmui.TextInput(label="Friction during packing", placeholder=SAME, **SMALL)
         self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
         self.kind = pmui.Select(label="States from", options=_swap(kinds), **SMALL)

@@ -15,7 +15,7 @@ LABELS = {
     "Disks N": "n",
     "Seed": "seed",
     "States": "states",
-    "Packed at μ": "packed_mu",
+    "Friction during packing": "packed_mu",
     "States from": "s",
     "Relaxation": "accelerated",
     "Finished results": "store",

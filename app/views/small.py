@@ -48,8 +48,10 @@ class Small(Scripted):
     first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
 
-    SCRIPTS: ClassVar = ("ask", "body", "arrows", "space", "builder", "lesson", "small")
-    _esm = joined(*SCRIPTS)
+    _esm = joined(
+        *("ask", "gone", "body", "arrows", "space", "builder", "push", "going", "bars", "saying"),
+        *("lesson", "tourcard", "small"),
+    )
     _stylesheets: ClassVar = [FOLDER / "small.css"]
 
     def __init__(self, asked, task, all_steps, **params):
@@ -86,15 +88,18 @@ class Small(Scripted):
             return
         try:
             if message.get("scene") in (*made.SCENES, scenes.OWN):
-                self._show(message["scene"])
+                self._show(message["scene"], message.get("mu"))
+            if isinstance(message.get("query"), str):
+                asked = scenes.asked(message["query"])
+                self._show(asked.scene, asked.mu, asked.built)
             if isinstance(message.get("built"), str):
                 self._show(scenes.OWN, message.get("mu"), message["built"][: scenes.LONGEST])
             if isinstance(message.get("save"), dict):
                 self._save(**message["save"])
             if isinstance(message.get("fall"), dict):
                 self._fall(**message["fall"])
-            if isinstance(message.get("bounds"), dict):
-                self._bound(**message["bounds"])
+            if isinstance(message.get("measure"), dict):
+                self._measure(**message["measure"])
         except (InputError, NotJammedError, UndecidedError, TypeError) as error:
             self._send_msg({"error": str(error)})
 
@@ -112,9 +117,9 @@ class Small(Scripted):
             lambda file: self._send_msg({"file": base64.b64encode(file).decode()}),
         )
 
-    def _bound(self, mu, load):
+    def _measure(self, mu, load, plane):
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
-            lambda job: scenes.bounds(scenes.packing_of(name, mu, built), load),
-            lambda bounds: self._send_msg({"bounds": bounds, "mu": mu}),
+            lambda job: scenes.measured(scenes.packing_of(name, mu, built), load, plane),
+            lambda found: self._send_msg({"measured": found, "mu": mu, "plane": plane}),
         )

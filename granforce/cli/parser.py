@@ -195,8 +195,8 @@ def _add_pack(commands):
     command.add_argument(
         "--scene",
         metavar="NAME",
-        help="a small scene in place of a packing made from a gas: groove, box, pyramid, leaning, "
-        "column, six, solid or many; of the other options, it takes --mu alone",
+        help="a small scene in place of a packing made from a gas: groove, box, pyramid, press, "
+        "leaning, column, six, solid or many; of the other options, it takes --mu alone",
     )
     _add_packing(command)
     _add_store(command)
