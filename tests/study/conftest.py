@@ -1,9 +1,9 @@
-"""Packings that a scheduler works on: its cluster."""
+"""A dask scheduler with its workers, for scans and series."""
 
 import pytest
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def cluster():
     """Two dask workers, each a process of its own."""
     distributed = pytest.importorskip("dask.distributed")
