@@ -314,7 +314,7 @@ def test_state_opens_near_mu_0_1_and_follows_the_selection(state, wait_for):
     assert state.cell.mu == 0.1 and state.replay.summary["mu"] == 0.1
     state.choose(mu=1)
     wait_for(state)
-    assert state.replay.summary["mu"] == 1 and "finished results" in state.source
+    assert state.replay.summary["mu"] == 1 and "precomputed" in state.source
 
 
 def test_a_cell_in_memory_is_shown_at_once(state):
