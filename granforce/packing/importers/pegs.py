@@ -241,7 +241,7 @@ def _told(account):
         if found:
             more = f"; and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
             told = "; ".join(one.text for one in found[:_LISTED])
-            lines.append(f"{len(found)} {words}: {told}{more}")
+            lines.append(f"{words} ({len(found)}): {told}{more}")
     return lines
 
 

@@ -38,7 +38,7 @@ MOST = 0.1
 _SAME = 0.5, 0.3
 # Gaps fit up to this many mean radii, and radii are of one size within this part.
 _FIT, _SIZE = 0.5, 0.05
-# A force that is so many times the usual one was not measured: a digit too many, or a lost exponent.
+# A force that is so many times the usual one was not measured: digits too many, an exponent lost.
 HUGE = 1e6
 # A force at the edge of its cone lies beyond it by no more than this part.
 _ROUNDING = 1e-9
@@ -82,7 +82,7 @@ class Account(NamedTuple):
             spoilt = [one for one in self.findings if KINDS[one.kind][1:] == (which, 1)]
             if len(spoilt) > self.most * count and not self.strict:
                 kinds = ", ".join(
-                    f"{len(self.of(kind))} {words}"
+                    f"{words} ({len(self.of(kind))})"
                     for kind, (words, *_) in KINDS.items()
                     if KINDS[kind][1:] == (which, 1) and self.of(kind)
                 )
