@@ -155,7 +155,7 @@ def account(report):
         f"Listed are {count('contacts_listed')} contacts of {count('grains')} grains. "
         f"{_walls(report)}"
     )
-    mended = [f"{report[kind]} {words}" for kind, (words, _, spoils) in KINDS.items()
+    mended = [f"{words} ({report[kind]})" for kind, (words, _, spoils) in KINDS.items()
               if spoils and report[kind]]  # fmt: skip
     if mended:
         yield f"Mended, and marked by crosses: {'; '.join(mended)}."

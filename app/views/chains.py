@@ -9,13 +9,14 @@ from .style import BLUE, EDGE, GREY, ORANGE, SERIES, corner, hover, legend_above
 WORDS = {
     "inferred": "inferred; width: fₙ, pale: one standard error more",
     "measured": "measured; width: fₙ",
-    "deviation": "width: inferred fₙ; colour: by how much it differs from the measured one",
+    "deviation": "width: inferred fₙ; colour: its difference",
 }
 STRONG = 0.995  # quantile of f_n from which on chains are as wide as they get
 WIDEST = 0.5  # that width, in mean radii
 FAINT = 0.01  # of that width, below which nothing is drawn
 OFF = 4.0  # σ at which the colour of a difference ends
 AMBER = "#e69f00"  # suspects: a warning
+SCALE = "scale"  # tag of what is a scale
 QUIET = "#808080"  # scales, read by day and by night
 SAMPLES = (0.5, 1.0, 2.0)  # ⟨f_n⟩, of the scale of widths
 STRIP = 0.08  # height of a line of scales below the grains, in widths of the frame
@@ -24,7 +25,7 @@ STRIP = 0.08  # height of a line of scales below the grains, in widths of the fr
 def network(frame, **options):
     """Figure of the frame, and {one of WORDS: renderers} of what it may show; options: ranges."""
     fig = figure(
-        "photoelastic_network", f"{frame.source}, frame {frame.report['frame']}",
+        "photoelastic_network", f"{frame.source.split(': ')[-1]}, frame {frame.report['frame']}",
         "x (unit of the file)", "y (unit of the file)", match_aspect=True, aspect_ratio=0.85,
         sizing_mode="scale_width", **options,
     )  # fmt: skip
@@ -49,8 +50,8 @@ def network(frame, **options):
     for chosen, colour in ((listed, BLUE), (frame.added, ORANGE)):
         chains("inferred", normal, chosen, error, color=colour, fill_alpha=0.35)
     tips = [
-        chains("inferred", normal, listed, color=BLUE, legend_label="listed contacts"),
-        chains("inferred", normal, frame.added, color=ORANGE, legend_label="added contacts"),
+        chains("inferred", normal, listed, color=BLUE, legend_label="listed"),
+        chains("inferred", normal, frame.added, color=ORANGE, legend_label="added"),
         chains("measured", measured, listed, color=BLUE),
     ]
     colours = LinearColorMapper(palette=ramp(ORANGE, GREY, BLUE), low=-OFF, high=OFF)
@@ -78,8 +79,10 @@ def dress(fig, layers, shown, small=False):
         for one in drawn:
             one.visible = name == shown
     fig.select_one({"name": "shown"}).text = shown if small else WORDS[shown]
-    for one in (fig.title, fig.yaxis[0], fig.legend[0]):
+    scales = fig.select({"tags": [SCALE]})
+    for one in (fig.title, fig.yaxis[0], fig.legend[0], *scales):
         one.visible = not small
+    fig.min_border_left = 5 if small else 56
 
 
 def _along(frame, force, width, chosen):
@@ -130,6 +133,7 @@ def _draw_scales(fig, frame, wide):
     r = frame.r[:, None]
     (left, bottom), (right, _) = (frame.x - r).min(axis=0), (frame.x + r).max(axis=0)
     across = right - left
+    before = len(fig.renderers)
     words = {"text_baseline": "middle", "text_font_size": "11px", "text_color": QUIET}
     unit = frame.report["mean_measured_normal_force"]
     at, y = left + across * np.array([0.0, 0.23, 0.46]), bottom - STRIP * across
@@ -144,6 +148,8 @@ def _draw_scales(fig, frame, wide):
     length, y = _round_length(0.25 * across), y - STRIP * across
     fig.segment([left], [y], [left + length], [y], color=QUIET, line_width=3, name="length_scale")
     fig.text([left + length + 0.015 * across], [y], [f"{length:g} (unit of the file)"], **words)
+    for one in fig.renderers[before:]:
+        one.tags = [SCALE]
 
 
 def _round_length(most):

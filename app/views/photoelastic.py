@@ -178,11 +178,15 @@ def listed(frame):
     ]
     told = []
     for count, words, some in (
-        (len(frame.suspects), "measured contacts are beyond 3 σ", suspects),
-        (len(frame.certain), "contacts that were not measured carry for certain (2 σ)", certain),
+        (len(frame.suspects), "Measured contacts beyond 3 σ", suspects),
+        (
+            len(frame.certain),
+            "Contacts that were not measured and carry for certain, by 2 σ",
+            certain,
+        ),
     ):
         more = ", …" if count > len(some) else ""
-        told.append(f"<p>{count} {words}{': ' if some else ''}{', '.join(some)}{more}.</p>")
+        told.append(f"<p>{words} ({count}){': ' if some else ''}{', '.join(some)}{more}.</p>")
     return "".join(told)
 
 

@@ -10,9 +10,12 @@ from small_store import ROOT
 ARTEFACTS = ROOT / "artefacts" / "photoelastic"
 NUMBERS = 1, 2, 3
 # Widths in pixels of the pictures of the frame that the browser shows.
-PICTURES = """() => [...Bokeh.documents[0]._all_models.values()]
-  .filter(model => model.name === "photoelastic_network" && !model.properties.inner_width.is_unset)
-  .map(model => model.inner_width)"""
+PICTURES = """() => {
+  const {_all_models, views_manager} = Bokeh.documents[0]
+  return [..._all_models.values()]
+    .filter(model => model.name === "photoelastic_network" && views_manager.find_one(model))
+    .map(model => model.properties.inner_width.is_unset ? 0 : model.inner_width)
+}"""
 
 pytestmark = pytest.mark.browser
 
