@@ -34,6 +34,30 @@ def adopt(packing, **info):
     return packing._replace(info={**packing.info, **info, **judged(packing)})
 
 
+def alone(packing, count, forces, **info):
+    """The first `count` bodies under what all others, and what was left open, do to them.
+
+    forces (N_c, 2): a network of all contacts in which those bodies are to stay as they are. It
+    becomes their own, and what it leaves over on each of them its load: by their loads the sum
+    Σ f_n ℓ is given, so that S is bounded. Raises InputError where it does not press.
+    """
+    c = packing.contacts
+    inner = (c.i < count) & (c.j < count)
+    # Noise, which grains that carry nothing could not balance without it.
+    carrying = forces[:, :1] > CARRYING * np.abs(forces[:, 0]).mean()
+    forces = np.where(carrying, forces, 0.0)
+    return adopt(
+        packing._replace(
+            x=packing.x[:count],
+            r=packing.r[:count],
+            contacts=c._replace(**{name: values[inner] for name, values in c._asdict().items()}),
+            forces=forces[inner],
+            load=np.zeros((count, 3)),
+        ),
+        **info,
+    )
+
+
 def find(packing, **info):
     """The packing with the admissible force network nearest to equal normal forces.
 
