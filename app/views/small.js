@@ -226,7 +226,7 @@ export function render({ model, view }) {
     part("fixed").classList.toggle("packed", Boolean(scene.packed))
     part("fixed").textContent = scene.packed ? `friction during packing: ${scene.packed}` : "changing μ moves no disk"
     follow()
-    say()
+    say(root.opened ? "" : model.note)
     if (root.opened && !same) address()
     clearTimeout(asleep)
     asleep = setTimeout(rest, REST_MS)

@@ -427,6 +427,12 @@ def test_a_scene_is_built_and_pushed_by_keyboard(look):
     until(page, "small.body.empty")
 
 
+def test_a_link_that_cannot_be_built_says_so_and_begins_anew(look):
+    page = look("?scene=own&built=1,1,1;1.5,1,1%7C0,0,3,0")
+    assert "two disks overlap" in desk(page).locator(".says").inner_text()
+    until(page, "small.body.h === 2 && !small.body.empty")
+
+
 def test_the_lesson_has_three_questions_and_is_printed(look):
     page = look("?scene=groove")
     desk(page).locator(".lesson > summary").click()
