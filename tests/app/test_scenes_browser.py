@@ -78,7 +78,8 @@ def test_the_first_visit_begins_with_the_groove_and_goes_on_to_400_disks(look):
     "name, mu",
     [
         *(("groove", 0.5), ("pyramid", 0.4), ("press", 0.4)),
-        *(("box", 0.1), ("box", 0.3), ("leaning", 0.3)),
+        *(("box", 0.1), ("box", 0.3), ("leaning", 0.3), ("leaning", 0.5)),
+        *(("solid", 0.3), ("solid", 0.5)),
     ],
 )
 def test_the_page_cuts_the_same_body_as_the_library(look, name, mu):
