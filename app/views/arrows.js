@@ -226,6 +226,13 @@ class Arrows {
       g.beginPath()
       g.arc(px, py, R, -Math.PI / 2, -Math.PI / 2 - turn, turn > 0)
       g.stroke()
+      const end = -Math.PI / 2 - turn, sign = Math.sign(turn), tip = [px + R * Math.cos(end), py + R * Math.sin(end)]
+      const ahead = [sign * Math.sin(end), -sign * Math.cos(end)] // along the circle
+      g.fillStyle = look.warm
+      g.beginPath()
+      g.moveTo(tip[0] + 9 * ahead[0], tip[1] + 9 * ahead[1])
+      for (const side of [5, -5]) g.lineTo(tip[0] + side * ahead[1], tip[1] - side * ahead[0])
+      g.fill()
     }
   }
 

@@ -22,7 +22,7 @@ class Builder {
     host.innerHTML = `
       <span role="radiogroup" aria-label="What presses the disks">
         <button type="button" role="radio" data-load="gravity">Gravity</button>
-        <button type="button" role="radio" data-load="pressure" title="No weight: walls press, with a force as large as they are long">Pressure</button>
+        <button type="button" role="radio" data-load="pressure">Pressure</button>
       </span>
       <span role="radiogroup" aria-label="What the hand does">
         <button type="button" role="radio" data-tool="disk">Put or move disks</button>
@@ -32,7 +32,8 @@ class Builder {
         <button type="button" role="radio" data-tool="pull">Pull forces</button>
       </span>
       <label>radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
-      <button type="button" class="anew">Start again</button>`
+      <button type="button" class="anew">Start again</button>
+      <span class="fixed packed presses">no weight; a wall that presses does so with a force as large as it is long</span>`
     host.addEventListener("click", (event) => {
       const { tool, load } = event.target.dataset
       if (tool) { this.tool = tool; this.tell() }
@@ -50,7 +51,7 @@ class Builder {
       button.classList.toggle("on", on)
       button.setAttribute("aria-checked", on)
     }
-    this.host.querySelector("[data-tool=press]").hidden = !this.pressure
+    for (const name of ["[data-tool=press]", ".presses"]) this.host.querySelector(name).hidden = !this.pressure
   }
 
   /** Pressure in place of gravity, or the other way round. */

@@ -31,7 +31,7 @@ class Push {
     }
     let [low, high] = [0, 64 * trial.scaleOf()]
     if (holds(high)) return Infinity
-    for (let k = 0; k < 30; k++) { const F = (low + high) / 2; if (holds(F)) low = F; else high = F }
+    for (let k = 0; k < 22; k++) { const F = (low + high) / 2; if (holds(F)) low = F; else high = F }
     return low
   }
 }

@@ -11,7 +11,7 @@ function stopping({ scene }, side) {
     const verb = `${disk ?? ""}${what === OPENS ? "opens" : `slides${way(scene, contact, what)}`}`
     kinds.set(verb, [...(kinds.get(verb) ?? []), place])
   }
-  return [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ")
+  return [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ").replace("at the left wall and at the right wall", "at both walls")
 }
 
 /** Where a disk is about to slide at a wall: against the friction on it. */
@@ -31,10 +31,11 @@ function counted({ h, count, scene }) {
 
 /** What the picture of S is. */
 function pictured(body) {
-  if (body.empty) return "S: empty"
-  if (!body.h || (body.whole && body.corners.length === 1)) return "S: a single point"
-  return ["", "S: a line", "S: a polygon, in its true shape", "S: a body; drag beside the point to turn it"][body.h] ??
-    `one shadow of S, which has ${body.h} dimensions; its outline is exact`
+  const { h, whole, empty, corners, scene } = body, S = `S, all sets of forces that hold the ${scene.r.length > 1 ? "disks" : "disk"}:`
+  if (empty) return "S: empty"
+  if (!h || (whole && corners.length === 1)) return `${S} a single point`
+  return h > 3 ? `one shadow of S, which has ${h} dimensions; its outline is exact`
+    : `${S} ${["", "a line", "a polygon, in its true shape", "a body; drag beside the point to turn it"][h]}`
 }
 
 /** The sentence over a scene. */
@@ -65,5 +66,5 @@ function falling({ r }, mu, motion) {
   const disks = moving.filter((k) => k < r.length).map((k) => k + 1), pressed = disks.length < moving.length
   const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${disks.join(", ")}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
   const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way: along that motion the loads do work, and no force allowed at any contact takes it up. That proves it.` : ""
-  return `Nothing balances at μ = ${number(mu)}: S is empty.${why}`
+  return `Nothing balances at μ = ${Number(mu.toPrecision(4))}: S is empty.${why}`
 }

@@ -24,7 +24,7 @@ export function render({ model, view }) {
     <p class="says" aria-live="polite"></p>
     <div class="own" hidden></div>
     <div class="pair">
-      <figure><figcaption>the scene: forces on each disk, and the wedge (cone) each must stay in</figcaption>
+      <figure><figcaption>forces on each disk, each within its wedge (friction cone)</figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
       <figure><figcaption class="what"></figcaption>
         <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one network of forces. Arrow keys move the point"></canvas>
@@ -58,8 +58,7 @@ export function render({ model, view }) {
 
   // What is seen
 
-  function colours() {
-    const dark = model.dark
+  function colours(dark = model.dark) {
     return {
       ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#181b20" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",
       fill: dark ? "rgba(150,172,200,0.25)" : "rgba(139,160,187,0.3)", lit: dark ? "rgba(150,172,200,0.45)" : "rgba(139,160,187,0.55)",
@@ -68,6 +67,8 @@ export function render({ model, view }) {
       coneFull: "rgba(232,113,10,0.28)", shade: dark ? "rgba(95,162,232,0.2)" : "rgba(20,100,200,0.14)", state: dark ? "#8fbfee" : "#3d8bd4",
     }
   }
+
+  const dress = () => { root.style.colorScheme = model.dark ? "dark" : "light" } // for the browser's own controls
 
   function paint() {
     waiting = 0
@@ -222,9 +223,10 @@ export function render({ model, view }) {
     if (now.filled) space.fill()
     if (!body.whole && space.dots.length) body.u = body.u.map((_, k) => space.dots.reduce((s, u) => s + u[k], 0) / space.dots.length)
     part("name").value = scene.name
+    part("fixed").classList.toggle("packed", Boolean(scene.packed))
     part("fixed").textContent = scene.packed ? `friction during packing: ${scene.packed}` : "changing μ moves no disk"
     follow()
-    say()
+    say(root.opened ? "" : model.note)
     if (root.opened && !same) address()
     clearTimeout(asleep)
     asleep = setTimeout(rest, REST_MS)
@@ -356,7 +358,11 @@ export function render({ model, view }) {
   part("save").addEventListener("click", () => ask(model, view, { save: { mu, load: [...body.load] } }))
   part("lesson").querySelector("article").innerHTML = lesson()
   for (const button of root.querySelectorAll(".print")) {
-    button.addEventListener("click", () => printed(part("packing").toDataURL(), button.classList.contains("answered")))
+    button.addEventListener("click", () => {
+      arrows.draw({ ...colours(false), ...now }) // paper is white
+      printed(part("packing").toDataURL(), button.classList.contains("answered"))
+      soon()
+    })
   }
   part("tourist").addEventListener("click", () => tour.go(1))
   part("bars").addEventListener("pointerover", (event) => {
@@ -409,7 +415,7 @@ export function render({ model, view }) {
     going.pause()
   })
   model.on("scene", show)
-  model.on("dark", () => { soon(); if (body) address() })
+  model.on("dark", () => { dress(); soon(); if (body) address() })
   model.on("msg:custom", (news) => {
     if (news.fall && body.empty) { now.fall = news.fall.length ? news.fall : null; say(); soon() }
     if (news.measured && news.mu === mu && !body.whole) measured(news.measured, news.plane)
@@ -417,6 +423,7 @@ export function render({ model, view }) {
     if (news.error) { returning = false; say(news.error) }
   })
   Object.defineProperty(root, "small", { get: () => ({ body, now, space, arrows, builder, pushed, mu }) })
+  dress()
   show()
   if (model.step) tour.go(model.step)
   else if (model.first && !tour.seen) tour.go(1)

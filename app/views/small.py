@@ -45,6 +45,7 @@ class Small(Scripted):
     steps = param.List(doc="title, text and what is shown, of each step of the tour")
     all = param.Integer(doc="steps of the whole tour")
     step = param.Integer(doc="of the tour, to begin with; 0 for none")
+    note = param.String(doc="what was wrong with the link")
     first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
 
@@ -67,13 +68,19 @@ class Small(Scripted):
         self._show(asked.scene, asked.mu, asked.built)
 
     def _show(self, name, mu=None, built=""):
+        if name == scenes.MANY:  # has a page of its own
+            return
         if name in ("six", "solid"):  # packed first
             self._task.start(lambda job: scenes.drawn(name, mu), self._put)
             return
         try:
             self._put(scenes.drawn(name, mu, built))
         except (InputError, NotJammedError) as error:
-            self._send_msg({"error": str(error)})
+            if self.scene:
+                self._send_msg({"error": str(error)})
+            else:  # a link that cannot be: its page begins anew, and says why
+                self.note = str(error)
+                self._show(name)
 
     def _put(self, scene):
         self.scene = scene

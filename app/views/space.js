@@ -2,6 +2,8 @@
 // the network on screen as a point in it. With more dimensions, its shadow.
 
 const TURN = 0.008 // radians a pixel
+// Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
+const BESIDE = [[46, 46], [95, 46], [110, 46], [30, 30], [60, 50]]
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
 class Space {
@@ -61,10 +63,19 @@ class Space {
     return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
   }
 
-  /** Pixels of a unit of force; a line has the whole width. */
-  get unit() {
-    const { clientWidth: w, clientHeight: h } = this.canvas
-    return (0.5 * (this.body.h === 1 ? w : Math.min(w, h)) - (this.body.h === 3 ? 30 : 46)) / this.half
+  /** Half the width and height that S may take, which leaves room for words. */
+  get room() {
+    const { clientWidth: w, clientHeight: h } = this.canvas, [x, y] = BESIDE[Math.min(this.body.h, 4)]
+    return [w / 2 - Math.min(x, 0.25 * w), h / 2 - Math.min(y, 0.2 * h)]
+  }
+
+  /** Pixels of a unit of force. */
+  get unit() { return this.room[1] / this.half }
+
+  /** How far this is from the middle of the picture, as a part of the room that it needs there. */
+  far([dx, dy]) {
+    const [wide, high] = this.room
+    return this.body.h === 3 ? Math.hypot(dx, dy) * Math.max(1, high / wide) : Math.max((Math.abs(dx) * high) / wide, Math.abs(dy))
   }
 
   px([x, y]) {
@@ -81,8 +92,8 @@ class Space {
     const [xs, ys] = [0, 1].map((k) => points.map((p) => p[k]))
     const middle = [xs, ys].map((v) => (Math.max(...v) + Math.min(...v)) / 2)
     if (body.h === 3) middle.splice(0, 2, ...this.flat(body.middle))
-    const reach = Math.max(...points.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1])), 1e-6)
-    if (!this.centre || at_once) { this.centre = middle; this.half = reach > 1e-3 * body.scaleOf() ? reach * (body.h === 3 ? 1.1 : 1.25) : 0.5 * body.scaleOf(); return false }
+    const reach = Math.max(...points.map((p) => this.far([p[0] - middle[0], p[1] - middle[1]])), 1e-6)
+    if (!this.centre || at_once) { this.centre = middle; this.half = reach > 1e-3 * body.scaleOf() ? reach * 1.1 : 0.5 * body.scaleOf(); return false }
     const wanted = reach > this.half ? reach * 1.15 : reach < 0.12 * this.half ? reach * 4 : this.half
     const away = Math.hypot(middle[0] - this.centre[0], middle[1] - this.centre[1])
     const moves = Math.abs(wanted - this.half) > 0.01 * this.half || away > 0.02 * this.half
@@ -138,7 +149,7 @@ class Space {
     return moves
   }
 
-  write(x, y, text, colour, size = 12, align = "center") {
+  write(x, y, text, colour, size = 13, align = "center") {
     const { context: g, canvas } = this
     g.font = `${size}px sans-serif`
     g.textAlign = align === "middle" ? "center" : align
@@ -196,7 +207,8 @@ class Space {
       const k = side.corners[0], [x, y] = ends[k], below = order.indexOf(k) ? -1 : 1, lit = this.lit(side)
       g.fillStyle = side.cap ? look.paper : lit ? look.hand : look.cold
       if (!side.cap) g.fillRect(x - 3, y - 13, 6, 26)
-      this.write(x, y + below * 34, side.cap ? "no end this way" : this.told("words", side), lit ? look.hand : look.ink)
+      const text = side.cap ? "no end this way" : this.told("words", side), narrow = g.measureText(text).width > 2 * BESIDE[1][0]
+      this.write(x, y + below * 34, narrow ? text.replace(/ and (?=at |between )/, "\nand ") : text, lit ? look.hand : look.ink)
       this.labels.push({ side, x, y, reach: 30 })
     })
   }
@@ -216,7 +228,9 @@ class Space {
     g.closePath()
     g.fillStyle = look.shade
     g.fill()
-    for (const side of body.sides) {
+    const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
+    this.taken = [] // by words: those of the longest sides come first
+    for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
       const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)
       g.strokeStyle = lit ? look.hand : look.cold
       g.lineWidth = lit ? 5 : 2.5
@@ -230,23 +244,31 @@ class Space {
       const normal = [(a[1] - b[1]) / long, (b[0] - a[0]) / long] // outwards
       const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
       const text = side.cap ? "no end this way" : this.told("words", side)
-      g.font = "12px sans-serif"
+      g.font = "13px sans-serif"
       const words = g.measureText(text).width > long - 8 ? text.replace(/ (at|between) /, "\n$1 ") : text
-      if (long > 14 || lit) this.besides(x, y, ux, uy, words, lit ? look.hand : look.ink)
+      if (long > 14 || lit) this.besides(x, y, ux, uy, words, lit)
       this.labels.push({ side, a, b, reach: 14 })
     }
   }
 
   /** Words outside a side at (x, y), u its normal: along it where they can be read so, else beside it. */
-  besides(x, y, ux, uy, text, colour) {
-    const { context: g } = this, lines = text.split("\n"), high = 12 + 7 * (lines.length - 1)
-    const wide = Math.max(...lines.map((line) => g.measureText(line).width))
-    if (Math.abs(uy) < 0.64) return this.write(x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y, text, colour)
+  besides(x, y, ux, uy, text, lit) {
+    const { context: g, look } = this, lines = text.split("\n"), high = 12 + 7 * (lines.length - 1)
+    const wide = Math.max(...lines.map((line) => g.measureText(line).width)), along = Math.abs(uy) >= 0.64
+    const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
+    if (!this.free(at, along ? wide * Math.abs(uy) : wide, along ? wide * Math.abs(ux) + high : 2 * high) && !lit) return
     g.save()
-    g.translate(x + high * ux, y + high * uy)
-    g.rotate(Math.atan(-ux / uy))
-    this.write(0, 0, text, colour, 12, "middle")
+    g.translate(...at)
+    if (along) g.rotate(Math.atan(-ux / uy))
+    this.write(0, 0, text, lit ? look.hand : look.ink, 13, "middle")
     g.restore()
+  }
+
+  /** Whether nothing is written yet where these words shall be; then they have their place. */
+  free([x, y], wide, high) {
+    if (this.taken.some((t) => Math.abs(t.x - x) < 0.4 * (t.wide + wide) && Math.abs(t.y - y) < 0.35 * (t.high + high))) return false
+    this.taken.push({ x, y, wide, high })
+    return true
   }
 
   drawSolid() {
@@ -344,12 +366,15 @@ class Space {
       g.setLineDash([])
       g.globalAlpha = 1
     }
+    const ends = [0, 1].map((k) => { const all = this.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
+    for (const v of ends[0]) this.write(this.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)
+    for (const v of ends[1]) this.write(52, this.px([0, v])[1], v.toFixed(2), look.cold, 11)
     const [a, b] = this.shadow.map((k) => this.told("name", k))
-    this.write(w / 2, h - 16, `→ ${a}`, look.ink, 12)
+    this.write(w / 2, h - 16, `→ ${a}`, look.ink)
     g.save()
     g.translate(15, h / 2)
     g.rotate(-Math.PI / 2)
-    this.write(0, 0, `→ ${b}`, look.ink, 12, "left")
+    this.write(0, 0, `→ ${b}`, look.ink, 13, "middle")
     g.restore()
   }
 

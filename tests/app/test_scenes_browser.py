@@ -78,7 +78,8 @@ def test_the_first_visit_begins_with_the_groove_and_goes_on_to_400_disks(look):
     "name, mu",
     [
         *(("groove", 0.5), ("pyramid", 0.4), ("press", 0.4)),
-        *(("box", 0.1), ("box", 0.3), ("leaning", 0.3)),
+        *(("box", 0.1), ("box", 0.3), ("leaning", 0.3), ("leaning", 0.5)),
+        *(("solid", 0.3), ("solid", 0.5)),
     ],
 )
 def test_the_page_cuts_the_same_body_as_the_library(look, name, mu):
@@ -425,6 +426,12 @@ def test_a_scene_is_built_and_pushed_by_keyboard(look):
     for _ in range(40):
         page.keyboard.press("ArrowRight")
     until(page, "small.body.empty")
+
+
+def test_a_link_that_cannot_be_built_says_so_and_begins_anew(look):
+    page = look("?scene=own&built=1,1,1;1.5,1,1%7C0,0,3,0")
+    assert "two disks overlap" in desk(page).locator(".says").inner_text()
+    until(page, "small.body.h === 2 && !small.body.empty")
 
 
 def test_the_lesson_has_three_questions_and_is_printed(look):
