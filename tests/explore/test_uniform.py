@@ -241,8 +241,10 @@ def test_one_stuck_chain_or_component_is_recognised():
 @pytest.mark.parametrize("packing", [packed(40, 0.0), two_disks()])
 def test_a_single_point_is_drawn_without_a_step(packing):
     point = ensemble(packing)
+    second = sample_uniform(point, 10, chains=3, method="hit_and_run")
     sample = sample_uniform(point, 10, chains=3, effective=50)
     assert sample.states.shape[:2] == (3, 4) and sample.reached
+    assert np.array_equal(sample.states, second.states[:, :4])
     assert np.ptp(sample.flat, axis=0).max() == 0 and sample.residual.max() < 1e-10
     assert sample.counts["skipped"] == 12 and sample.counts["turns"] == 0
     assert np.isnan(sample.mixing.least_bulk)
