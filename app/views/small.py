@@ -9,7 +9,7 @@ from granforce.packing import scenes as made
 from granforce.records import InputError, NotJammedError, UndecidedError
 
 from .. import scenes
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, joined, said
 
 # Title, text, and what the scene shows, of the steps of the tour before those of large packings.
 FIRST_STEPS = (
@@ -91,8 +91,7 @@ class Small(Scripted):
 
     def _handle_msg(self, message):
         """Another scene, another μ, or the question how it falls."""
-        if not isinstance(message, dict):
-            return
+        message = said(message)
         try:
             if message.get("scene") in (*made.SCENES, scenes.OWN):
                 self._show(message["scene"], message.get("mu"))

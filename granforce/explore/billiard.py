@@ -59,7 +59,7 @@ def all_rows(walls):
 
 def some_rows(walls, part):
     """Rows with room in a part of MEMORY, none of them there yet."""
-    return _room(walls.count, max(2 * lanes.LANES, int(part * MEMORY / (8 * walls.count))))
+    return _room(walls.count, max(2 * lanes.LANES, int(part * MEMORY / (8 * max(1, walls.count)))))
 
 
 def _room(count, places):

@@ -18,6 +18,7 @@ from granforce.forces.contact_problem import (
     in_balance,
     independent_problem_of,
     inner_network,
+    is_a_point,
 )
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
@@ -30,9 +31,6 @@ from granforce.tolerances import BALANCED, FLAT
 
 # What every coordinate is asked to reach, if it can, in the point the centring starts from.
 _AWAY = 0.01
-# Rows of the balance whose pivot, relative to the diagonal, is below this follow from others once
-# some coordinates are held.
-_DEPENDENT = 1e-13
 _MOST_NEWTON_STEPS = 200
 # Newton's decrement at the centre: it only has to make S round. Steps are then balanced so often.
 _NEAR_CENTRE, _POLISH = 1e-3, 3
@@ -92,7 +90,7 @@ def walls(ensemble, weight=None, measured=None):
     if y is None:
         y, held = inner_point(A, b)
     else:
-        held = y == 0
+        held = (y == 0) | is_a_point(ensemble)
     frame = _frame(ensemble, y, held, weight, measured)
     return _walls(frame, _centred(frame, y))
 
@@ -180,7 +178,7 @@ def _frame(ensemble, y, held, weight, measured):
     frame = _Frame(ensemble, problem, contact, normal, held, stiff, target)
     if held.any():
         C, _, _ = _conductances(frame, _barrier(frame, y), stiff)
-        _, out = wall_matrix.factored(problem.network, C, problem.diagonal, _DEPENDENT)
+        _, out = wall_matrix.factored(problem.network, C, problem.diagonal, wall_matrix.DEPENDENT)
         without = contact_program.without_rows(problem, problem.diagonal, out)
         frame = frame._replace(problem=without)
     return frame

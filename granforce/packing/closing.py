@@ -10,12 +10,12 @@ does not reach isostaticity: there linear programs shrink the box under linearis
 from typing import NamedTuple
 
 import numpy as np
-import piqp
 from scipy import sparse
 
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics import highs as programs
+from granforce.numerics import quadratic
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import (
     Cell,
@@ -145,6 +145,7 @@ def _close_contacts(motion, touching):
     exact, force = touching[near].copy(), motion.force[near, 0]
     opened = np.zeros(len(i), bool)
     for _ in range(MOST_CLOSINGS):
+        cancelling.check("compaction")
         normal, length, gap = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
         if max(np.abs(gap[exact]).max(), -gap.min()) < CLOSED:
             came = ~exact & ~opened & (gap < APART)
@@ -190,9 +191,7 @@ def _least_motion(R, gap, exact, force):
     cost = 1e4 * (force[exact] / max(force.mean(), 1e-300) + 1e-3)
     for slack in (0, closed):
         opening = sparse.eye(closed, slack)
-        solver = piqp.SparseSolver()
-        solver.settings.eps_abs = solver.settings.eps_rel = 1e-14
-        solver.setup(
+        program = (
             sparse.block_diag([sparse.identity(n), 1e-8 * sparse.identity(slack)], format="csc"),
             np.concatenate([np.zeros(n), cost[:slack]]),
             sparse.csc_matrix(sparse.hstack([R[exact], -opening])),
@@ -201,11 +200,12 @@ def _least_motion(R, gap, exact, force):
                 sparse.hstack([R[others], sparse.csr_matrix((int(others.sum()), slack))])
             ),
             -gap[others] / scale,
-            np.full(int(others.sum()), np.inf),
             np.concatenate([np.full(n, -np.inf), np.zeros(slack)]),
         )
-        solver.solve()
-        move = np.array(solver.result.x)[:n]
+        if n > quadratic.LONG:
+            move = cancelling.in_child(quadratic.solution, *program)[:n]
+        else:
+            move = quadratic.solution(*program)[:n]
         left = R[exact] @ move + gap[exact] / scale
         if np.abs(left).max() < 1e-3:
             break
