@@ -193,7 +193,8 @@ def step(made, ends, count, rows=None):
     limit, times = uniform.MOST_TURNS * (made.dimension + 1), np.array([_TIME])
 
     def on(drawn, flight, out):
-        return billiard.harmonic(rows, *drawn, times, flight, limit, out, cancelling.flag())
+        speeds, middles = drawn
+        return billiard.fly(rows, speeds, times, middles, flight, limit, out, cancelling.flag())
 
     pulls = np.broadcast_to(made.pull, (len(ends), made.pull.size))
     found, counts = [], 0

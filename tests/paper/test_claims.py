@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from granforce import statistics
-from granforce.paper import claims, findings, tables
+from granforce.paper import claims, findings, tables, tails
 from granforce.paper.claims import figure1, figure2, figure4, groups, verdicts
 
 PACKINGS, CONTACTS = 10, 2000
@@ -406,3 +406,21 @@ def test_every_claim_names_its_sampler_and_its_source():
 def test_without_data_there_is_no_verdict():
     empty = tables.Table({}, [], {name: np.zeros(0) for name in tables.SAMPLES}, [], {}, {})
     assert set(judged(empty).values()) == {verdicts.MISSING}
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
+    rng = np.random.default_rng(0)
+    forces = rng.exponential(1.0, 10**6) if power == 1 else np.abs(rng.normal(0, 1.6, 10**6))
+    counted = np.histogram(forces, np.append(0.0, tables.FORCES))[0]
+    tail = tails.fitted([counted * 0.5, counted * 0.5])
+    assert tail.power == pytest.approx(power, abs=0.15 * power) and tail.low == 2.0
+    right, wrong = tail.off_exponential, tail.off_gaussian
+    right, wrong = (right, wrong) if power == 1 else (wrong, right)
+    assert tail.off <= right < 0.3 * wrong
+    assert tails.fitted([np.r_[100.0, np.zeros(159)]]) is None
+    row = {"part": "tails_stress", "n": 10, "mu": 0.1, "seed": 1}
+    table = tables.Table({}, [row], {}, [], {}, {}, {0: counted.astype(float)})
+    told = [finding.statement for finding in findings.forces(table)]
+    assert len(told) == 3 and all("whole stress prescribed, μ = 0.1, f = 2 …" in t for t in told)
+    assert tails.told(table).startswith("whole stress prescribed, μ = 0.1: b = ")
