@@ -39,7 +39,8 @@ UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
 NARROW = """
 @media (max-width: 1199.95px) {
   .main-content {
-    padding-bottom: calc(var(--task, 0px) + var(--card, 0px)); scroll-padding-bottom: var(--card, 0px)
+    padding-bottom: calc(var(--task, 0px) + var(--card, 0px));
+    scroll-padding-bottom: var(--card, 0px);
   }
 }
 @media (max-width: 599.95px) { .header .title { font-size: 15px !important } }
