@@ -77,7 +77,7 @@ def geometry(packing):
     contacts, count = packing.contacts, packing.info.get("disks", len(packing.r))
     walls = np.reshape(packing.info.get("walls", []), (-1, 4))
     lids = packing.info.get("pressing", [])
-    loaded = np.isfinite(packing.pressure) or np.nan_to_num(packing.load).any()
+    loaded = bool(np.isfinite(packing.pressure) or np.nan_to_num(packing.load).any())
     found = hulls.hull(packing) if len(contacts.i) and loaded else None
     box = [float(side) if np.isfinite(side) else 0.0 for side in packing.box]
     return {
@@ -87,6 +87,7 @@ def geometry(packing):
         "walls": walls.ravel(),
         "pressing": np.array(lids, dtype=np.int32),
         "press": packing.load[count : count + len(lids), :2].ravel(),
+        "idle": not loaded,  # nothing says how large forces are
         "packed": packing.info.get("packed_mu"),
         "box": box,
         "i": contacts.i.astype(np.int32),

@@ -32,6 +32,7 @@ function counted({ h, count, scene }) {
 /** What the picture of S is. */
 function pictured(body) {
   const { h, whole, empty, corners, scene } = body, S = `S, all sets of forces that hold the ${scene.r.length > 1 ? "disks" : "disk"}:`
+  if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
   return h > 3 ? `one shadow of S, which has ${h} dimensions; its outline is exact`
@@ -41,8 +42,8 @@ function pictured(body) {
 /** The sentence over a scene. */
 function sentence(body, mu, now) {
   const { h, scene } = body, several = scene.r.length > 1
-  if (!scene.b && scene.pressing.length) return "A wall presses on nothing: put a disk against it."
-  if (!scene.b) return "Nothing presses on these disks yet: choose “Let a wall press”, then click a wall."
+  if (scene.idle) return "Nothing presses on these disks yet: choose “Let a wall press”, then click a wall."
+  if ([...scene.pressing].some((_, k) => !scene.j.includes(scene.r.length + k))) return "A wall presses on no disk, and nothing holds it: put a disk against it."
   if (body.empty) return falling(scene, mu, now.fall)
   if (!h) return "Everything is determined: there is one network of forces, and mechanics finds it."
   if (body.whole && body.corners.length === 1) {

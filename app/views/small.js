@@ -93,7 +93,7 @@ export function render({ model, view }) {
     part("count").innerHTML = counted(body)
     part("what").textContent = pictured(body)
     part("says").textContent = note || sentence(body, mu, now)
-    part("says").classList.toggle("bad", body.empty)
+    part("says").classList.toggle("bad", body.empty && !body.scene.idle)
     part("undo").disabled = !now.undo.length
   }
 
@@ -159,7 +159,7 @@ export function render({ model, view }) {
   function rest() {
     address() // first: where the server is gone, asking it fails
     if (!body.empty && now.filled && !space.dots.length && body.bounded) { space.fill(); soon() }
-    if (body.empty && body.scene.b) ask(model, view, { fall: { mu, load: [...body.load] } })
+    if (body.empty && !body.scene.idle) ask(model, view, { fall: { mu, load: [...body.load] } })
     measure()
   }
 

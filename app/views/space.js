@@ -127,6 +127,7 @@ class Space {
     g.setTransform(ratio, 0, 0, ratio, 0, 0)
     g.clearRect(0, 0, w, h)
     this.labels = []
+    if (body.scene.idle) return this.write(w / 2, h / 2, "nothing presses yet", look.ink, 14)
     if (body.empty) return this.write(w / 2, h / 2, "S is empty: no forces hold this", look.warm, 14)
     const moves = this.frame(this.sceneDrawn !== body.scene)
     this.sceneDrawn = body.scene

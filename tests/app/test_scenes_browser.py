@@ -398,6 +398,7 @@ def test_a_scene_is_built_under_pressure_and_its_link_carries_it(look, tmp_path)
     across, down = ask(page, "small.arrows.px(0.6, 3.73)")
     page.mouse.click(box["x"] + across, box["y"] + down)
     desk(page).get_by_text("Nothing presses on these disks yet").wait_for()
+    assert "empty" not in desk(page).locator(".what").inner_text()  # of what is not certified
     page.mouse.click(box["x"] + across, box["y"] + down)
     until(page, "small.body.h === 1 && !small.body.empty")
     desk(page).get_by_role("slider", name="friction μ").fill("0.1")
@@ -426,6 +427,14 @@ def test_a_scene_is_built_and_pushed_by_keyboard(look):
     for _ in range(40):
         page.keyboard.press("ArrowRight")
     until(page, "small.body.empty")
+
+
+def test_a_disk_in_the_air_falls_and_a_wall_that_presses_on_no_disk_is_told(look):
+    page = look("?scene=own&built=2,3,1%7C0,0,4,0")
+    until(page, "small.body.empty && small.now.fall")
+    assert "disk 1 gives way" in desk(page).locator(".says").inner_text()
+    page = look("?scene=own&built=2,1,1%7C0,0,4,0;0,4,4,4%7Cp1")
+    assert "presses on no disk" in desk(page).locator(".says").inner_text()
 
 
 def test_a_link_that_cannot_be_built_says_so_and_begins_anew(look):

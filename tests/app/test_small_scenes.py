@@ -99,7 +99,9 @@ def test_a_scene_under_a_press_is_saved_and_opened_by_the_library():
 
 def test_where_no_wall_presses_yet_nothing_is_said_of_forces():
     drawn = scenes.drawn(scenes.OWN, 0.4, UNDER_PRESS[:-1])
-    assert "b" not in drawn and not drawn["load"].any()
+    assert "b" not in drawn and drawn["idle"]
+    alone = scenes.drawn(scenes.OWN, 0.4, "1,5,1|0,0,8,0")  # a weight that falls is no such scene
+    assert not alone["idle"] and scenes.falling(scenes.own("1,5,1|0,0,8,0", 0.4))[1] < 0
 
 
 def test_a_press_that_is_not_borne_gives_way():
