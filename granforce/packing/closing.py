@@ -59,15 +59,14 @@ def jammed_network(motion, mu):
     Its contacts are all pairs that touch once the carrying ones are closed. None, too, where a pair
     neither touches nor is apart for certain: then the dynamics has to go on.
     """
-    pairs = motion.i, motion.j, motion.shift
-    gap = separations(motion.x, motion.r, cell_of(motion), *pairs)[2]
+    gap = separations(motion.x, motion.r, cell_of(motion), motion.i, motion.j, motion.shift)[2]
     touching = (motion.force[:, 0] > 0) | (gap < TOUCHING)
     if not touching.any():
         return None
     as_it_moves = _packing_of(motion, motion.x, cell_of(motion), touching, motion.force, mu)
     if _near_forces(as_it_moves, **_asked(motion)) is None:
         return None
-    closed = _close_contacts(motion, touching)
+    closed = _close_contacts(motion, touching, gap)
     if closed is None:
         return None
     packing = _packing_of(motion, *closed, motion.force, mu)
@@ -112,20 +111,27 @@ def margin(packing):
     unit = packing.r.max()
     i, j, shift = find_pairs(packing.x, packing.r, packing.cell, SKIN / 2 * unit)
     normal, _, gap = separations(packing.x, packing.r, packing.cell, i, j, shift)
-    c = packing.contacts
-    listed = {}
-    for first, second, direction in zip(c.i.tolist(), c.j.tolist(), c.normal, strict=True):
-        listed.setdefault((first, second), []).append(direction)
-        listed.setdefault((second, first), []).append(-direction)
-    # Two grains touch twice only through different images, whose normals differ by 60° or more.
-    other = [
-        all(n @ direction < 0.75 for direction in listed.get((first, second), ()))
-        for n, first, second in zip(normal, i.tolist(), j.tolist(), strict=True)
-    ]
+    other = ~_listed(packing.contacts, i, j, normal, len(packing.r))
     return Margin(
-        float(np.abs(c.gap).max(initial=0.0) / unit),
-        float(gap[np.array(other, bool)].min(initial=SKIN / 2 * unit) / unit),
+        float(np.abs(packing.contacts.gap).max(initial=0.0) / unit),
+        float(gap[other].min(initial=SKIN / 2 * unit) / unit),
     )
+
+
+def _listed(contacts, i, j, normal, n):
+    """Which of the pairs i < j (P,) with their normals (P, 2) are contacts of a list."""
+    turned = contacts.i > contacts.j
+    direction = np.where(turned[:, None], -contacts.normal, contacts.normal)
+    key = np.minimum(contacts.i, contacts.j) * n + np.maximum(contacts.i, contacts.j)
+    order = np.argsort(key, kind="stable")
+    first, last = (np.searchsorted(key[order], i * n + j, side) for side in ("left", "right"))
+    found = np.zeros(len(i), bool)
+    # Two grains touch twice only through different images, whose normals differ by 60° or more.
+    for k in range(int((last - first).max(initial=0))):
+        some = np.flatnonzero(first + k < last)
+        same = direction[order[first[some] + k]]
+        found[some] |= np.sum(normal[some] * same, axis=1) >= 0.75
+    return found
 
 
 def _near_forces(packing, **asked):
@@ -155,7 +161,7 @@ def _packing_of(motion, x, cell, touching, force, mu):
     return make_packing(x, motion.r, cell.box, contacts, force[touching], mu, 1.0, tilt=cell.tilt)
 
 
-def _close_contacts(motion, touching):
+def _close_contacts(motion, touching, gap):
     """Centres, cell, contacts: moved as little as brings touching gaps to 0, others to 0 or more.
 
     Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box (of a free cell, ε² is
@@ -166,8 +172,7 @@ def _close_contacts(motion, touching):
     """
     x, cell = motion.x.copy(), _own_cell(motion)
     pairs = motion.i, motion.j, motion.shift
-    near = separations(x, motion.r, cell, *pairs)[2] < SKIN / 2
-    near |= touching
+    near = touching | (gap < SKIN / 2)
     i, j, shift = (which[near] for which in pairs)
     exact, force = touching[near].copy(), motion.force[near, 0]
     opened = np.zeros(len(i), bool)
