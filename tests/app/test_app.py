@@ -2,6 +2,7 @@
 
 import gc
 import re
+import shlex
 import shutil
 import sys
 import threading
@@ -211,15 +212,26 @@ def test_expected_steps_come_from_the_nearest_packing(library):
 
 @pytest.mark.parametrize(
     "mu, packed, kind, extra",
-    [(0.1, None, "walk", {}), (0.3, 0.0, "walk", {"radii": "uniform:0.9,1", "sweeps": 50})],
+    [
+        (0.1, None, "walk", {}),
+        (0.3, 0.0, "walk", {"radii": "uniform:0.9,1", "sweeps": 50}),
+        (0.3, 0.0, "walk", {"box": "isotropic", "accuracy": 0.02}),
+    ],
 )
 def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
-    from app.selection import link, read_link, select
+    from app import limits
+    from app.selection import command, link, read_link, select
 
     made = select(120, mu, 7, packed, kind=kind, relax="nearest", states=33, seed=4)
     made = made._replace(packing=made.packing | extra)
     read, view = read_link("?" + link(made, {"tab": "perturb"}))
     assert read == made and view == {"tab": "perturb"}
+    read.check(limits.Limits())
+    words = shlex.split(command(made))[2:]  # what the command line takes is the same packing
+    options = dict(zip(words[::2], words[1::2], strict=True))
+    for name, value in extra.items():
+        word = "step-accuracy" if name == "accuracy" else name
+        assert options[f"--{word}"] == str(value)
 
 
 def test_older_links_to_a_renamed_tab_open_it():
