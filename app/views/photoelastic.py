@@ -13,7 +13,7 @@ from .. import photoelastic
 from ..exports import File
 from . import chains
 from .handover import Handover
-from .parts import choice, figure, note, saving
+from .parts import choice, figure, note, saving, together
 from .style import BLUE, ORANGE, corner, hover, legend_above
 
 COMPONENTS = (("fₙ", BLUE), ("fₜ", ORANGE))
@@ -39,7 +39,7 @@ class Frames:
         self.frame, self.playing = first, 0
         self.body = pn.Column(**WIDE)
         self.choice = choice(SHOWN, "inferred")
-        self.choice.param.watch(lambda event: self._dress(), "value")
+        self.choice.param.watch(lambda event: together(self._dress), "value")
         self.pictures = pn.Row(styles={"flex-wrap": "wrap"}, **WIDE)
         self.save = Handover(
             self._hand_over, files={"This frame": {"table": "All contacts (CSV)"}}, margin=(4, 10)
@@ -54,7 +54,7 @@ class Frames:
             show_loop_controls=False, **WIDE,
         )  # fmt: skip
         self.player.param.watch(lambda event: self._turn(event.new), "value")
-        self._show(first)
+        self._fill(first)
 
     def panel(self):
         """All of it, from above."""
@@ -79,6 +79,9 @@ class Frames:
             self.player.direction = self.playing
 
     def _show(self, frame):
+        together(self._fill, frame=frame)
+
+    def _fill(self, frame):
         self.frame = frame
         told = "".join(
             f"<p style='margin:5px 0'>{html.escape(line)}</p>"
@@ -86,8 +89,7 @@ class Frames:
         )
         head = f"<p><b>{html.escape(frame.source)}</b>, frame {frame.report['frame']}</p>"
         self.picture, self.layers = chains.network(frame)
-        self.pictures[:] = [pn.pane.Bokeh(self.picture, **HALF)]
-        self._dress()
+        self.pictures[:] = self._panes()
         self.body[:] = [
             note(head + told + found(frame.report)),
             self.choice,
@@ -100,17 +102,21 @@ class Frames:
             self.save,
         ]
 
-    def _dress(self):
-        """What is chosen, in one picture or, side by side, in two."""
+    def _panes(self):
+        """What is chosen, in one picture or, side by side, in two: dressed before they are seen."""
         shown, one = self.choice.value, self.picture
         both = shown == "beside"
         chains.dress(one, self.layers, "inferred" if both else shown, small=both)
+        old = self.pictures[0] if len(self.pictures) else None
+        first = pn.pane.Bokeh(one, **HALF) if old is None or old.object is not one else old
         if not both:
-            self.pictures[:] = self.pictures[:1]
-        elif len(self.pictures) == 1:
-            other, layers = chains.network(self.frame, x_range=one.x_range, y_range=one.y_range)
-            chains.dress(other, layers, "measured", small=True)
-            self.pictures[:] = [self.pictures[0], pn.pane.Bokeh(other, **HALF)]
+            return [first]
+        other, layers = chains.network(self.frame, x_range=one.x_range, y_range=one.y_range)
+        chains.dress(other, layers, "measured", small=True)
+        return [first, pn.pane.Bokeh(other, **HALF)]
+
+    def _dress(self):
+        self.pictures[:] = self._panes()
 
     def _hand_over(self, key):
         name = f"frame{self.frame.report['frame']}.csv"

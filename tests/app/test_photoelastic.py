@@ -166,6 +166,7 @@ def test_a_frame_is_opened_as_a_packing(state):
     view._open(frame)
     settled(state, done=lambda: state.replay is not None and state.selection.imported)
     S = ensemble(frame.packing)
+    assert frame.packing.r.max() == 1  # as chains of the page are drawn for
     assert S.dimension == state.replay.summary["dimension"] > 0
     inner = np.all(frame.ends < len(frame.r), axis=1)
     forces = frame.inferred[inner] * frame.report["mean_measured_normal_force"]

@@ -47,6 +47,7 @@ def test_pictures_are_seen_and_saved(visit, tmp_path, width):
             arg=count,
         )
         ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        page.get_by_role("button", name="Both").evaluate("e => e.scrollIntoView()")
         page.screenshot(path=ARTEFACTS / f"{width}_{name.split()[0]}.png")
     # Nothing is wider than the page.
     wide = page.evaluate("() => document.scrollingElement.scrollWidth")
@@ -64,10 +65,11 @@ def test_a_series_is_played_to_frames_that_are_inferred_on_the_way(visit, tmp_pa
     page = visit("?scene=many&tab=upload", 1440, 900)
     dropped(page, tmp_path)
     head(page, 3).wait_for()
-    page.locator(".pn-player button.play, button.play").first.click()
+    player = page.locator(".bk-panel-models-widgets-DiscretePlayer")
+    player.locator("button.play").click()
     for number in (1, 2, 3):  # round and round
         head(page, number).wait_for()
-    page.locator("button.pause").first.click()
+    player.locator("button.pause").click()
 
 
 def test_a_frame_is_opened_and_pulled_like_any_packing(visit, tmp_path):
@@ -80,4 +82,5 @@ def test_a_frame_is_opened_and_pulled_like_any_packing(visit, tmp_path):
         arg=page.locator(".scene").element_handle(),
     )
     assert scene(page, "scene.painted") > 0
+    page.locator(".scene").scroll_into_view_if_needed()
     page.screenshot(path=ARTEFACTS / "opened.png")

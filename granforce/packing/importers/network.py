@@ -39,17 +39,21 @@ def alone(packing, count, forces, **info):
 
     forces (N_c, 2): a network of all contacts in which those bodies are to stay as they are. It
     becomes their own, and what it leaves over on each of them its load: by their loads the sum
-    Σ f_n ℓ is given, so that S is bounded. Raises InputError where it does not press.
+    Σ f_n ℓ is given, so that S is bounded. Lengths are then in its largest radii, as those of
+    compacted packings. Raises InputError where it does not press.
     """
-    c = packing.contacts
+    c, unit = packing.contacts, packing.r[:count].max()
     inner = (c.i < count) & (c.j < count)
+    c = c._replace(
+        **{name: getattr(c, name) / unit for name in ("length", "gap", "arm_i", "arm_j")}
+    )
     # Noise, which grains that carry nothing could not balance without it.
     carrying = forces[:, :1] > CARRYING * np.abs(forces[:, 0]).mean()
     forces = np.where(carrying, forces, 0.0)
     return adopt(
         packing._replace(
-            x=packing.x[:count],
-            r=packing.r[:count],
+            x=packing.x[:count] / unit,
+            r=packing.r[:count] / unit,
             contacts=c._replace(**{name: values[inner] for name, values in c._asdict().items()}),
             forces=forces[inner],
             load=np.zeros((count, 3)),
