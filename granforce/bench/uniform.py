@@ -37,7 +37,7 @@ HOPSY_STATES = 600
 # Walls up to which a dense null space is waited for: 1600 disks at μ = 0.1.
 MOST_DENSE_WALLS = 6000
 # States of each chain by which a way to keep rows is timed, after as many that fill them.
-_TIMED = 4
+_TIMED = 2
 # Where rows of K lie, as parts of `billiard.MEMORY`.
 ROOMS = {"16 rows at a time": 0.0, "rows within 1 GiB": 1.0, "all rows kept": 1e3}
 

@@ -191,8 +191,8 @@ def volume(table):
         groups = _values(rows, name)
         if len(groups) > 2:
             # Logarithms are of either sign: the largest of the grid.
-            top = peak(list(groups)) if name == "extent" else _largest(list(groups))
-            yield _finding(f"μ where {told} is largest", top, groups)
+            top = peak if name == "extent" else _largest
+            yield _trend(f"μ where {told} is largest", top, groups)
         yield from _by_range(groups, told)
     known = {(row["mu"], row["seed"]): row for row in table.part("walk")}
     for name in ("eta1", "eta2"):
@@ -271,9 +271,9 @@ def _ratios(table, name, above, below):
     return ratios
 
 
-def _largest(frictions):
-    """Statistic: μ of the grid where the means over packings are largest."""
-    return lambda *values: frictions[int(np.argmax([np.mean(v) for v in values]))]
+def _largest(frictions, means):
+    """μ of the grid where the means over packings are largest."""
+    return float(frictions[int(np.argmax(means))])
 
 
 def _by_range(groups, statement):

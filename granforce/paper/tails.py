@@ -16,6 +16,8 @@ from granforce.paper.tables import FORCES
 PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress prescribed"}
 # Tails are fitted from here on, in ⟨f_n⟩, to the last bin with so many forces.
 _FROM, _ENOUGH = 2.0, 10
+# Fewer bins tell no power: a range of 1 ⟨f_n⟩.
+_FEWEST = 8
 _POWERS = np.linspace(0.3, 4.0, 371)
 
 
@@ -52,7 +54,7 @@ def fitted(packings):
     counted = np.sum(packings, axis=0)
     begins = FORCES - FORCES[0]
     chosen = (begins >= _FROM) & (counted >= _ENOUGH)
-    if chosen.sum() <= 3:
+    if chosen.sum() < _FEWEST:
         return None
     f, beyond = begins[chosen], counted[::-1].cumsum()[::-1][chosen]
     # ln P = −(λ f)^b + ln P₀, a line in f^b: what is left about the best line of each b.

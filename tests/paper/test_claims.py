@@ -424,3 +424,20 @@ def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
     told = [finding.statement for finding in findings.forces(table)]
     assert len(told) == 3 and all("whole stress prescribed, μ = 0.1, f = 2 …" in t for t in told)
     assert tails.told(table).startswith("whole stress prescribed, μ = 0.1: b = ")
+
+
+def test_volumes_tell_where_they_are_largest_and_what_they_follow():
+    frictions, rows = (0.01, 0.1, 1.0), []
+    for mu, width in zip(frictions, (0.02, 0.2, 0.1), strict=True):
+        for seed in (1, 2, 3):
+            row = {"n": 400, "mu": mu, "seed": seed, "dimension": 10}
+            sized = {"extent": width + 0.001 * seed, "log_volume_per_grain": np.log(width)}
+            rows.append(row | {"part": "volume"} | sized)
+            rows.append(row | {"part": "walk", "coordination": 4 - mu, "eta2": width * seed})
+    table = tables.Table({}, rows, {}, [], {}, {})
+    told = {finding.statement: finding.value for finding in findings.volume(table)}
+    assert told["μ where ln V per grain, forces in ⟨f_n⟩ is largest"] == pytest.approx(0.1)
+    extent = told["μ where width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩ is largest"]
+    assert 0.03 < extent < 0.5
+    follows = "rank correlation over packings of all μ, "
+    assert abs(told[follows + "ln V per grain with z"]) < 0.6 < told[follows + "width of S with η2"]

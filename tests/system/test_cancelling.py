@@ -60,8 +60,8 @@ def one_endless_path(S):
     made = walls(S)
     flight, out = billiard.make_flight(uniform.init(made, 0).slacks), np.ones((1, made.count))
     speeds = made.moved(np.random.default_rng(0).standard_normal((1, made.count)))
-    path = speeds, np.array([1e12]), flight, 10**12
-    billiard.straight(billiard.all_rows(made), *path, out, cancelling.flag())
+    path = speeds, np.array([1e12]), np.ones((0, made.count)), flight, 10**12
+    billiard.fly(billiard.all_rows(made), *path, out, cancelling.flag())
     cancelling.check()
 
 
