@@ -165,10 +165,10 @@ def _close_contacts(motion, touching, gap):
     """Centres, cell, contacts: moved as little as brings touching gaps to 0, others to 0 or more.
 
     Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box (of a free cell, ε² is
-    (e_x² + e_y² + g²/2)/2): near μ = 0 the
-    contacts are as many as the coordinates, and close only together with the box. Newton on the
-    gaps, each step a quadratic program. Pairs that came to touch on the way are contacts from then
-    on. None where the contacts cannot all close, or where no margin parts them from other pairs.
+    (e_x² + e_y² + g²/2)/2): near μ = 0 the contacts are as many as the coordinates, and close only
+    together with the box. gap (P,): those of all pairs as they are. Newton on the gaps, each step a
+    quadratic program. Pairs that came to touch on the way are contacts from then on. None where the
+    contacts cannot all close, or where no margin parts them from other pairs.
     """
     x, cell = motion.x.copy(), _own_cell(motion)
     pairs = motion.i, motion.j, motion.shift

@@ -13,6 +13,7 @@ from mutants import mutant
 from packings import skewed
 
 from granforce.forces.ensemble import ensemble, stress_of
+from granforce.packing.closing import margin
 from granforce.packing.compaction import pack
 from granforce.packing.importers import (
     lammps,
@@ -104,7 +105,14 @@ def test_report_counts_what_the_paper_counts():
     assert known["dimension"] == 2 * 159 - (3 * 89 - 1)
     assert 0.8 < known["packing_fraction"] < 0.85
     assert 0 <= known["largest_overlap"] < 1e-4
+    apart = margin(load_packing(SMALL))
+    assert (known["largest_contact_gap"], known["least_other_gap"]) == apart
     assert json.loads(json.dumps(known)) == known
+
+
+def test_soft_disks_have_no_margin():
+    known = report(read_lammps(PARTICLES, CONTACTS, 0.3))
+    assert known["largest_contact_gap"] is known["least_other_gap"] is None
 
 
 def test_report_without_forces_says_none():
