@@ -370,7 +370,7 @@ def test_states_in_no_store_are_missing_until_computed(state, wait_for):
     state.compute()
     wait_for(state)
     assert state.message == "" and state.cell.mu == 0.3 and not state.missing
-    assert "computed here" in state.source and len(state.replay.number) == 9
+    assert "computed on this server" in state.source and len(state.replay.number) == 9
     assert [cell.mu for cell in state.cells()] == [0.3]
     assert len(state.catalogue) == 4
 
@@ -522,7 +522,7 @@ def test_all_that_a_link_may_name_is_limited():
     from app.limits import NAMES
     from app.selection import OPTIONS
 
-    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii"}
+    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii", "box"}
 
 
 def test_limits_are_read_and_wrong_ones_refused():
