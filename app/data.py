@@ -23,7 +23,7 @@ from granforce.study.store import open_store
 from . import geometry
 from .selection import Selection, selected, series
 
-# Environment variable naming a store of finished results to open instead of data/start.zarr.
+# Environment variable naming a store of precomputed results to open instead of data/start.zarr.
 SHIPPED_VARIABLE = "GRANFORCE_DATA"
 SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 
@@ -87,7 +87,7 @@ class Shown(NamedTuple):
 
 
 class Library:
-    """The stores side by side: finished results, read-only, and the user's own cache.
+    """The stores side by side: precomputed results, read-only, and the user's own cache.
 
     Shared by all visitors; its methods may be called from any thread.
     """

@@ -55,7 +55,7 @@ COLUMNS = {
     "contact": "number of the contact in the packing",
     "i": "number of the first grain; the normal n points from i to j",
     "j": "number of the second grain",
-    "f_n_original": "normal force with which the packing came to rest, force",
+    "f_n_original": "normal force that the packing came to rest with, force",
     "f_t_original": "tangential force with it, along t = (-n_y, n_x), force",
     "f_n": "normal force in the state on screen, force",
     "f_t": "tangential force in the state on screen, force",

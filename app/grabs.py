@@ -94,9 +94,10 @@ class Hand:
         count = 0 if self.state.replay is None else len(self.state.replay.backbone)
         match message:
             case {"grab": int(contact)} if 0 <= contact < count:
-                self.grab(contact)
-            case {"hold": [int(contact), int() | float() as value]} if 0 <= contact < count:
-                self.hold((contact, float(value)))
+                self.grab(int(contact))  # which may be a flag
+            case {"hold": [int(contact), int() | float() as value]}:
+                if 0 <= contact < count and np.isfinite(value):
+                    self.hold((int(contact), float(value)))
             case {"point": True}:
                 self.grab_point()
             case {"hold_point": [int() | float() as x, int() | float() as y]}:

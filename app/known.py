@@ -158,7 +158,7 @@ class Knowledge:
         match message:
             case {"hold": [int(contact), int() | float() as value, int() | float() as error]}:
                 if 0 <= contact < count:
-                    self.hold(contact, value, error)
+                    self.hold(int(contact), value, error)
             case {"release": int(contact)}:
                 self.release(contact)
 

@@ -34,18 +34,22 @@ from .views.volume import Volume
 
 # Where it lies over the page, the sidebar begins unseen: player.js shows it once it is closed.
 UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
-# Narrow pages leave room at the lower edge for what is told there (progress.py, tour.js), and have
-# less for their title.
+# Where everything is in one column, it leaves room at the lower edge for what is told there
+# (progress.py, tour.js); narrow pages have less for their title.
 NARROW = """
-@media (max-width: 899.95px) {
-  .main-content { padding-bottom: calc(var(--task, 0px) + var(--card, 0px)) }
+@media (max-width: 1199.95px) {
+  .main-content {
+    padding-bottom: calc(var(--task, 0px) + var(--card, 0px));
+    scroll-padding-bottom: var(--card, 0px);
+  }
 }
 @media (max-width: 599.95px) { .header .title { font-size: 15px !important } }
 """
 # Material UI is fetched and run as soon as the page can, not after the page's contents have come:
 # 0.13 s. Its address must be the one that Panel asks for, or it would be run twice.
+# From one scene's page to another's the old one stays until the new one is seen, and goes over.
 EARLY = """{%% extends "base.html" %%}
-{%% block preamble %%}{{ super() }}<script>
+{%% block preamble %%}{{ super() }}<style>@view-transition { navigation: auto; }</style><script>
   document.addEventListener("load", (event) => {
     if (event.target.src?.includes("es-module-shims")) importShim("%s")
   }, true)
@@ -53,14 +57,21 @@ EARLY = """{%% extends "base.html" %%}
 TITLE = "granforce — see force space"
 # The template's bar, which never shows anything here but which screen readers would tell.
 BAR, HIDDEN = "& .MuiAppBar-root .MuiLinearProgress-root", {"display": "none"}
-# Packing and tabs; under each other where there is no room.
+# Packing and tabs under each other, beside each other, and from 1800 px on (player.js) with force
+# space between them. Beside each other each scrolls by itself: the packing stays on screen.
+TITLE_HEIGHT = 48  # px
+COLUMNS = {"gridTemplateColumns": "repeat(2, minmax(0, 1fr))"}
+BY_ITSELF = {"maxHeight": f"calc(100dvh - {TITLE_HEIGHT + 8}px)", "overflowY": "auto"}
 SIDE_BY_SIDE = {
+    "& .MuiToolbar-root": {"minHeight": f"{TITLE_HEIGHT}px !important"},
     "& .main-content": {
         "display": "grid",
-        "gridTemplateColumns": "repeat(auto-fit, minmax(min(100%, 440px), 1fr))",
+        "gridTemplateColumns": "minmax(0, 1fr)",
         "alignItems": "start",
         "alignContent": "start",
         "columnGap": "8px",
+        "@media (min-width: 1200px)": COLUMNS | {"& > *": BY_ITSELF},
+        "@media (min-width: 1800px)": {"gridTemplateColumns": "repeat(3, minmax(0, 1fr))"},
     },
     BAR: HIDDEN,
 }
@@ -100,12 +111,14 @@ def _small(document, asked):
     """The page of a small scene, which asks no store."""
     task = Task(computing, _turns(document))
     plain = asked == scenes.asked("")
-    view = Small(asked, task, len(FIRST_STEPS + STEPS), step=asked.step, first=plain)
+    steps = len(FIRST_STEPS + STEPS)
+    view = Small(asked, task, steps, step=asked.step, first=plain, dark=asked.dark)
     whole = pmui.Page(
         title=TITLE,
         main=[view],
         sx={BAR: HIDDEN},
         template=EARLY % pmui.Page._render_esm(server=True),
+        dark_theme=asked.dark,
         busy_indicator=None,
     )
     whole.param.watch(lambda event: view.param.update(dark=event.new), "dark_theme")

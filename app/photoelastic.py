@@ -6,9 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.packing.importers.listing import plain
+from granforce.packing.importers.network import alone
 from granforce.packing.importers.pegs import open_frames, take_frame
 from granforce.packing.importers.repair import KINDS
+from granforce.records import Packing
 from granforce.study import series
+from granforce.study.schema import dataset_packing
 
 from . import exports, uploads
 from .limits import LIMITS
@@ -24,6 +27,7 @@ class Frame(NamedTuple):
     source: str  # which files it came from, in words
     report: dict  # of importers.read_pegs
     numbers: tuple  # of all frames in the files
+    packing: Packing  # of the grains alone, under what walls do to them in the inferred network
     x: np.ndarray  # (N, 2) centres of the grains
     r: np.ndarray  # (N,) radii
     ids: np.ndarray  # (N + walls,) their names
@@ -39,14 +43,16 @@ class Frame(NamedTuple):
     at_wall: np.ndarray  # (N,) bool, grains at walls
     left_open: np.ndarray  # (N,) bool, other grains whose balance had to be left open
     found: np.ndarray  # (k, 2) where something was mended
+    region: np.ndarray  # (N_c,) number of the region that a contact lies in, see `series.regions`
     stress: np.ndarray  # (9, 3) xx, yy, xy by region, over the mean pressure
     stress_error: np.ndarray  # (9, 3)
 
 
-def infer(files, *, mu, reverse=False, number=None):
+def infer(files, *, mu, reverse=False, walls=None, number=None):
     """Work, for jobs.Task, that reads a frame and finds its likeliest network with errors; a Frame.
 
-    files: {role: (name, content)}; mu, reverse: as for `importers.read_pegs`; number: of the frame.
+    files: {role: (name, content)}; mu, reverse, walls: as for `importers.read_pegs`; number: of
+    the frame.
     """
 
     def work(job):
@@ -54,7 +60,9 @@ def infer(files, *, mu, reverse=False, number=None):
         job.begin("looking for forces that balance the grains, near the measured ones")
         roles = next(roles for roles in ROLES if roles[0] in files)
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
-        found = take_frame(frames, number, mu=mu, reverse=reverse, most_grains=LIMITS.n)
+        found = take_frame(
+            frames, number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n
+        )
         job.begin("measuring the likeliest network again and again, for error bars")
         dataset = series.infer_frame(found, states=DRAWS)
         names = " and ".join(name for name, _ in files.values())
@@ -79,12 +87,14 @@ def frame_of(dataset, names, numbers):
     left_open, at_wall = np.zeros((2, count + walls), dtype=bool)
     left_open[told["left_open"]] = True
     at_wall[told["at_wall"]] = True
-    places = np.array([[one["x"], one["y"]] for one in told["findings"]]).reshape(-1, 2)
+    mended = [one for one in told["findings"] if KINDS[one["kind"]][2]]
+    places = np.array([[one["x"], one["y"]] for one in mended]).reshape(-1, 2)
     pressure = np.abs(of["regional_stress"][:, :2].mean()) or 1.0
     return Frame(
         source=f"{uploads.FAMILIES['pegs'][0]}: {names}",
         report=report,
         numbers=numbers,
+        packing=alone(dataset_packing(dataset), count, of["inferred"], walls=0),
         x=of["x"][:count],
         r=of["r"][:count],
         ids=of["grain_id"],
@@ -100,25 +110,40 @@ def frame_of(dataset, names, numbers):
         at_wall=at_wall[:count] & ~left_open[:count],
         left_open=left_open[:count],
         found=places[np.isfinite(places).all(axis=1)],
+        region=series.regions(begin + of["arm_i"][:, None] * of["normal"], of["x"][:count])[0],
         stress=of["regional_stress"] / pressure,
         stress_error=of["regional_stress_error"] / pressure,
     )
 
 
 def table(frame):
-    """All contacts as one CSV (bytes): names, measured and inferred forces, errors, marks."""
+    """All that was found as one CSV (bytes): a row for each contact, with names, measured and
+    inferred forces, errors, marks and region; above them the stress of each region."""
     suspect, certain = np.zeros((2, len(frame.ends)), dtype=int)
     suspect[frame.suspects], certain[frame.certain] = 1, 1
     one, two = frame.ids[frame.ends].T
-    columns = {"contact": np.arange(len(one)), "id1": one, "id2": two}
+    x, y = frame.lines.mean(axis=1).T
+    columns = {"contact": np.arange(len(one)), "id1": one, "id2": two, "x": x, "y": y}
     for name, values in (
         ("measured", frame.measured), ("inferred", frame.inferred), ("error", frame.error),
         ("sigmas_off", frame.deviation),
     ):  # fmt: skip
         columns |= {f"{name}_f_{part}": values[:, k] for k, part in enumerate("nt")}
     columns |= {"added": frame.added.astype(int), "suspect": suspect, "certain": certain}
+    columns |= {"region": frame.region}
     unit = frame.report["mean_measured_normal_force"]
-    return exports.csv(columns, f"# forces in their mean measured normal force, {unit:.9g}\n")
+    head = [
+        f"{frame.source}, frame {frame.report['frame']}",
+        f"forces in their mean measured normal force, {unit:.9g}; f_t along (-n_y, n_x)",
+        "id2 below 0: a wall; added: not listed; suspect: beyond 3 sigma; certain: not measured, "
+        "and inferred above 2 standard errors",
+        "stress by region over the mean pressure, ± standard error; regions column by column:",
+    ]
+    for k, (values, errors) in enumerate(zip(frame.stress, frame.stress_error, strict=True)):
+        parts = zip(("xx", "yy", "xy"), values, errors, strict=True)
+        told = (f"{part} {value:.4g} ± {error:.2g}" for part, value, error in parts)
+        head.append(f"region {k}: {', '.join(told)}")
+    return exports.csv(columns, "".join(f"# {line}\n" for line in head))
 
 
 def account(report):
@@ -130,7 +155,7 @@ def account(report):
         f"Listed are {count('contacts_listed')} contacts of {count('grains')} grains. "
         f"{_walls(report)}"
     )
-    mended = [f"{report[kind]} {words}" for kind, (words, _, spoils) in KINDS.items()
+    mended = [f"{words} ({report[kind]})" for kind, (words, _, spoils) in KINDS.items()
               if spoils and report[kind]]  # fmt: skip
     if mended:
         yield f"Mended, and marked by crosses: {'; '.join(mended)}."

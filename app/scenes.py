@@ -15,6 +15,7 @@ FIRST, MANY, OWN = "groove", "many", "own"
 MOST_DISKS, MOST_WALLS = 30, 12
 LONGEST = 4000  # characters of a built scene in a link
 BEGIN = "1,1,1;3,1,1|0,5,0,0;0,0,7,0;7,0,7,5"  # what a visitor begins to build with
+PRESSED = re.compile(r"p(\d+(,\d+)*)?")  # part of a built scene: which walls press
 SNAP = 1e-6  # of the largest radius: what a visitor's hand left open is closed up to here
 
 
@@ -24,6 +25,7 @@ class Asked(NamedTuple):
     scene: str  # MANY for the page of large packings
     mu: float | None
     step: int  # of the tour, 0 for none
+    dark: bool
     built: str  # a scene of the visitor's, as text
     query: str  # for the page of large packings
 
@@ -45,7 +47,8 @@ def asked(query):
     step = int(given["tour"]) if re.fullmatch("[1-9]", given.get("tour", "")) else 0
     if "scene" in dict(parse_qsl(query.lstrip("?"))):
         query = f"?{urlencode(given)}" if given else ""
-    return Asked(name, mu, step, given.get("built", "")[:LONGEST], query)
+    dark = given.get("dark") == "1"
+    return Asked(name, mu, step, dark, given.get("built", "")[:LONGEST], query)
 
 
 def titles():
@@ -60,7 +63,8 @@ def drawn(name, mu=None, built=""):
     """
     packing = packing_of(name, mu, built)
     built = (built or BEGIN) if name == OWN else ""
-    return {"name": name, "built": built, "mu": packing.mu, **geometry(packing)}
+    begins = built == BEGIN
+    return {"name": name, "built": built, "begins": begins, "mu": packing.mu, **geometry(packing)}
 
 
 def packing_of(name, mu=None, built=""):
@@ -72,13 +76,19 @@ def geometry(packing):
     """Disks, walls, contacts and the balance of a packing without its cones."""
     contacts, count = packing.contacts, packing.info.get("disks", len(packing.r))
     walls = np.reshape(packing.info.get("walls", []), (-1, 4))
-    found = hulls.hull(packing) if len(contacts.i) else None
+    lids = packing.info.get("pressing", [])
+    loaded = bool(np.isfinite(packing.pressure) or np.nan_to_num(packing.load).any())
+    found = hulls.hull(packing) if len(contacts.i) and loaded else None
     box = [float(side) if np.isfinite(side) else 0.0 for side in packing.box]
     return {
         "x": packing.x[:count].ravel(),
         "r": packing.r[:count],
         "load": packing.load[:count].ravel(),
         "walls": walls.ravel(),
+        "pressing": np.array(lids, dtype=np.int32),
+        "press": packing.load[count : count + len(lids), :2].ravel(),
+        "idle": not loaded,  # nothing says how large forces are
+        "packed": packing.info.get("packed_mu"),
         "box": box,
         "i": contacts.i.astype(np.int32),
         "j": contacts.j.astype(np.int32),
@@ -105,20 +115,25 @@ def _balance(found):
 def names(packing, count):
     """Where each contact is, in words."""
     contacts, said = packing.contacts, []
-    several = count > 1
+    several, lids = count > 1, len(packing.info.get("pressing", []))
     for i, j, (n_x, n_y) in zip(contacts.i, contacts.j, contacts.normal, strict=True):
         if j < count:
             said.append(f"between {i + 1} and {j + 1}")
             continue
         wall = "floor" if n_y < -0.9 else "ceiling" if n_y > 0.9 else "right wall"
         wall = "left wall" if wall == "right wall" and n_x < 0 else wall
+        wall = "press" if j < count + lids else wall
         said.append(f"disk {i + 1} at the {wall}" if several else f"at the {wall}")
     return said
 
 
 def falling(packing, load=None):
-    """Motion (N, 3) of the disks that proves that nothing balances, flat; empty without a proof."""
+    """Motion (N, 3) of the disks, and of walls that press, that proves that nothing balances.
+
+    Flat; empty without a proof.
+    """
     packing, count = _loaded(packing, load), packing.info.get("disks", len(packing.r))
+    count += len(packing.info.get("pressing", []))
     try:
         motion = hulls.fall(packing)
     except NotJammedError:  # nothing touches: everything falls
@@ -127,10 +142,19 @@ def falling(packing, load=None):
     return np.zeros(0) if motion is None else motion[:count].ravel()
 
 
-def bounds(packing, load=None):
-    """[least, largest f_n] of every contact, exactly; None where a contact carries nothing."""
-    found = hulls.bounds(_loaded(packing, load))
-    return [None if np.isnan(low) else [float(low), float(high)] for low, high in found]
+def measured(packing, load=None, plane=()):
+    """What is exact about S where it is not drawn whole: its ends, and its outline in a plane.
+
+    plane: two force components, 2 c for f_n and 2 c + 1 for f_t of contact c. bounds: [least,
+    largest f_n] of every contact, None where not certified. outline: corners, flat, empty where
+    there is no area. Both are left out where S has no end.
+    """
+    packing = _loaded(packing, load)
+    found = hulls.bounds(packing)
+    if found is None:
+        return {"endless": True}
+    bounds = [None if np.isnan(low) else [float(low), float(high)] for low, high in found]
+    return {"bounds": bounds, "outline": hulls.outline(packing, plane).ravel().tolist()}
 
 
 def _loaded(packing, load):
@@ -144,15 +168,30 @@ def _loaded(packing, load):
 
 
 def own(text, mu=None):
-    """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", disks and walls, under gravity."""
-    disks, walls = ([*(text or BEGIN).split("|"), ""])[:2]
+    """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", disks and walls, under gravity.
+
+    With a third part, "p1,2", there is none, and walls 1 and 2 press: with 1 on a length of 1.
+    """
+    disks, walls, press = ([*(text or BEGIN).split("|"), "", ""])[:3]
     disks, walls = _numbers(disks, 3, MOST_DISKS, "disks"), _numbers(walls, 4, MOST_WALLS, "walls")
     if not len(disks):
         raise InputError("there is no disk; put one")
     x, r = disks[:, :2], disks[:, 2]
+    load, pressing = scenes.weights(r), np.zeros(len(walls))
+    if press:
+        load, lids = 0 * load, _pressing(press, len(walls))
+        pressing[lids] = np.hypot(*(walls[lids, 2:] - walls[lids, :2]).T)
     mu = 0.5 if mu is None else friction(mu)
-    made = scenes.assembled(x, r, walls, scenes.weights(r), mu, tolerance=SNAP)
+    made = scenes.assembled(x, r, walls, load, mu, pressing=pressing, tolerance=SNAP)
     return made._replace(info=made.info | {"scene": OWN})
+
+
+def _pressing(text, walls):
+    """Which of so many walls press."""
+    lids = [int(k) for k in text[1:].split(",") if k] if PRESSED.fullmatch(text) else [walls]
+    if max(lids, default=0) >= walls and lids:
+        raise InputError("this link's walls that press cannot be read")
+    return np.unique(np.array(lids, dtype=np.int64))
 
 
 def _numbers(text, width, most, what):

@@ -16,7 +16,8 @@ SOLVERS = {
 }
 KINDS = {"walk": "the paper's random walk", "uniform": "uniform in S"}
 # Command-line options of a packing, apart from N, μ and seed.
-OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy")
+OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "box")
+WORDS = {"accuracy": "step-accuracy"}  # those that are called otherwise on the command line
 # Stored states take at most about this much; measures are those of all states anyway.
 KEPT_BYTES = 64e6
 LONGEST_REASON = 200  # characters of a message about a link, which may hold anything
@@ -103,14 +104,15 @@ def selected(kind, parameters):
     return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"])
 
 
-def select(n=400, mu=0.1, packing_seed=1, packed_mu=None, **others):
+def select(n=400, mu=0.1, packing_seed=1, packed_mu=None, box="square", **others):
     """A Selection of a packing made here; InputError for what cannot be.
 
-    packed_mu: friction during compaction, by default that of the ensemble. others: fields of
-    Selection.
+    packed_mu: friction during compaction, by default that of the ensemble. box: as for `pack`.
+    others: fields of Selection.
     """
     mu = friction(mu)
-    packing = kinds.PACKING.parameters(n, mu if packed_mu is None else packed_mu, packing_seed)
+    packed = mu if packed_mu is None else packed_mu
+    packing = kinds.PACKING.parameters(n, packed, packing_seed, box=box)
     if packing["n"] < 3:
         raise InputError(f"a packing needs at least 3 disks, got {n}")
     return Selection(packing, mu, **others)
@@ -118,7 +120,7 @@ def select(n=400, mu=0.1, packing_seed=1, packed_mu=None, **others):
 
 def _unusual(packing):
     usual = kinds.PACKING.parameters(packing["n"], packing["mu"], packing["seed"])
-    return {name: packing[name] for name in OPTIONS if packing[name] != usual[name]}
+    return {name: packing[name] for name in OPTIONS if packing.get(name) != usual.get(name)}
 
 
 def series(selection, parameters=None):
@@ -163,7 +165,7 @@ def of_packing(selection):
     else:
         words = ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
         for name, value in _unusual(packing).items():
-            words += [f"--{name.replace('_', '-')}", value]
+            words += [f"--{WORDS.get(name, name.replace('_', '-'))}", value]
     if not selection.same_mu:
         words += ["--ensemble-mu", f"{selection.mu:.9g}"]
     return words
@@ -216,6 +218,7 @@ def _read_selection(given):
         mu,
         int(given.pop("seed", 1)),
         packed,
+        given.pop("box", "square"),
         kind=kind,
         relax=relax,
         **rest,

@@ -39,6 +39,7 @@ SORTS = {
     "position": "place of the original in its interval",
     "shortened": "how much what is known shortened it",
 }
+PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 SCALES = {"mean": "fₙ / ⟨fₙ⟩", "own": "fₙ / original fₙ"}
 
 
@@ -317,8 +318,8 @@ class AppState(param.Parameterized):
         cell = cell or self.cell
         if cell is None:
             return ""
-        here = "" if cell.store is self.library.shipped else ", computed here"
-        return f"μ = {cell.mu:g}, {cell.series} (from finished results{here})"
+        shipped = cell.store is self.library.shipped
+        return f"μ = {cell.mu:g}, {cell.series} ({PRECOMPUTED if shipped else COMPUTED})"
 
     def _is_grown(self, replay):
         """Whether a Replay is what the walk on screen has grown into."""

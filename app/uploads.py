@@ -157,14 +157,23 @@ def bring(library, files, **options):
     def work(job):
         job.begin("reading")
         packing = read(files, **options)
+        names = " and ".join(name for name, _ in files.values())
+        return keep(library, packing, f"{FAMILIES[family(files)][0]}: {names}")(job)
+
+    return work
+
+
+def keep(library, packing, source):
+    """Work, for jobs.Task, that reports on a packing and keeps it in the cache; a Brought."""
+
+    def work(job):
         job.begin("looking for its backbone")
         report = importers.report(packing)
         if library.cache is None:
             raise InputError("no cache folder can be written, so nothing can be taken in")
         params = kinds.imported_parameters(packing)
         kinds.keep_packing(library.cache, params, packing)
-        names = " and ".join(name for name, _ in files.values())
-        return Brought(params, report, f"{FAMILIES[family(files)][0]}: {names}")
+        return Brought(params, report, source)
 
     return work
 

@@ -20,8 +20,8 @@ TERMS = {
     "packing": Term(
         "packing",
         "",
-        "Rigid disks pressed together until none can move. They never move here: every state is "
-        "another set of contact forces on the same disks.",
+        "Rigid disks pressed together until none can move. They never move here: every "
+        "network is another set of contact forces on the same disks.",
     ),
     "network": Term(
         "force network",
@@ -45,8 +45,8 @@ TERMS = {
     "original": Term(
         "original network",
         "",
-        "The forces with which the packing came to rest when it was compressed: one of all those "
-        "that are possible.",
+        "The forces that the packing came to rest with when it was compressed: one of all the "
+        "networks that are possible.",
     ),
     "paper": Term(
         "the paper",
@@ -59,7 +59,7 @@ TERMS = {
         "friction coefficient",
         "μ",
         "A contact holds as long as its tangential force is at most μ times its normal force. "
-        "Each μ here is a packing of its own, made with that friction.",
+        "Each μ here has its own packing, made with that friction.",
     ),
     "n": Term(
         "number of disks",
@@ -72,7 +72,7 @@ TERMS = {
         "The part of the box's area that the disks cover, loose ones too.",
     ),
     "z": Term(
-        "contacts per grain",
+        "contacts per disk",
         "z",
         "How many contacts that can carry a disk has on average, loose disks left out: 4 without "
         "friction, near 3 with much of it.",
@@ -396,13 +396,13 @@ TERMS = {
         "How many force networks of the one packing are made.",
     ),
     "packed_mu": Term(
-        "packed at μ",
+        "friction during packing",
         "",
         "The friction with which the packing was made, if it is not the one that its forces have "
         "now.",
     ),
     "store": Term(
-        "finished results",
+        "precomputed results",
         "",
         "States that were computed before and kept, each series with the values of μ that it has: "
         "some came with the page, others were computed here since.",

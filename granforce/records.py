@@ -239,7 +239,7 @@ def friction(mu: Any) -> float:
     """μ as a float on the storage grid (9 significant digits); InputError unless finite and ≥ 0."""
     try:
         value = float(mu)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"friction coefficient must be a number, got {mu!r}") from None
     if not np.isfinite(value) or value < 0:
         raise InputError(f"friction coefficient must be finite and ≥ 0, got {mu}")
@@ -250,7 +250,7 @@ def positive(value: Any, name: str) -> float:
     """The value as a finite float > 0; InputError otherwise."""
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} must be a number, got {value!r}") from None
     if not np.isfinite(number) or number <= 0:
         raise InputError(f"{name} must be finite and > 0, got {value}")

@@ -36,6 +36,7 @@ PACKING = {
     "--dt": POSITIVE,
     "--step-accuracy": POSITIVE,
     "--box-mass": POSITIVE,
+    "--box": ["", "round", "1 1"],
     "--sweeps": [*WHOLE, LONG],
 }
 ONE_PACKING = PACKING | {"--mu": FRICTION, "--seed": SEEDS}

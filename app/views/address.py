@@ -23,7 +23,7 @@ class Address(Scripted):
         default=list(PASSING), doc="what changes the address but is not gone back to"
     )
 
-    _esm = joined("ask", "address")
+    _esm = joined("ask", "gone", "address")
     _stylesheets: ClassVar = [FOLDER / "address.css"]
 
     def __init__(self, state, **params):

@@ -21,6 +21,8 @@ class Arrows {
   /** Fit disks and walls into the canvas. */
   fit(body, same = false) {
     this.body = body
+    const mean = body.sumAt(body.u) / body.count
+    this.forceUnit = (0.75 * Math.max(...body.scene.r)) / (Math.max(Math.abs(mean), 1e-6) || 1)
     if (same) return // where it is built, nothing moves but what the hand moves
     const { scene } = body, { x, r, walls, box } = scene
     const xs = [], ys = []
@@ -29,20 +31,32 @@ class Arrows {
       ys.push(x[2 * g + 1] - r[g], x[2 * g + 1] + r[g])
     }
     for (let k = 0; k < walls.length; k += 2) { xs.push(walls[k]); ys.push(walls[k + 1]) }
+    for (const { from } of this.pressing()) { xs.push(from[0]); ys.push(from[1]) }
     if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight
     const room = box[0] ? 0.12 : 0.1
     this.unit = Math.min(width / ((right - left) * (1 + 2 * room)), height / ((high - low) * (1 + 2 * room)))
-    this.unit = Math.min(this.unit, 0.22 * Math.min(width, height) / Math.max(...r))
+    this.unit = Math.min(this.unit, 0.27 * Math.min(width, height) / Math.max(...r))
     this.x0 = width / 2 - (this.unit * (left + right)) / 2
     this.y0 = height / 2 + (this.unit * (low + high)) / 2
-    const mean = body.sumAt(body.u) / body.count
-    this.forceUnit = (0.75 * Math.max(...r)) / (Math.max(Math.abs(mean), 1e-6) || 1)
   }
+
+  /** What is in the middle of the canvas. */
+  get middle() { return this.back(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2) }
 
   px(x, y) { return [this.x0 + this.unit * x, this.y0 - this.unit * y] }
   back(px, py) { return [(px - this.x0) / this.unit, (this.y0 - py) / this.unit] }
+
+  /** Arrows of walls that press, three a wall: {from, force of length 1}. */
+  pressing() {
+    const { walls, pressing, press, r } = this.body.scene, long = 0.8 * Math.max(...r)
+    return [...pressing].flatMap((wall, k) => {
+      const [ax, ay, bx, by] = walls.slice(4 * wall, 4 * wall + 4), size = Math.hypot(press[2 * k], press[2 * k + 1])
+      const force = [press[2 * k] / size, press[2 * k + 1] / size]
+      return [0.2, 0.5, 0.8].map((s) => ({ from: [ax + s * (bx - ax) - long * force[0], ay + s * (by - ay) - long * force[1]], force }))
+    })
+  }
 
   /** Both ends of every contact: {contact, disk, at, inward: force on the disk of f_n = 1, across}. */
   ends() {
@@ -74,6 +88,7 @@ class Arrows {
     if (F) for (const end of this.ends()) this.drawEnd(end, F)
     if (look.fall) this.drawFall(look.fall)
     this.drawLoads()
+    if (look.cursor) this.drawCursor(this.px(...look.cursor))
     if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
 
@@ -95,6 +110,16 @@ class Arrows {
     const [left, top] = this.px(0, box[1])
     g.strokeRect(left, top, box[0] * this.unit, box[1] * this.unit)
     g.setLineDash([])
+  }
+
+  /** Where the keyboard's hand is. */
+  drawCursor([x, y]) {
+    const { context: g, look } = this
+    g.strokeStyle = look.hand
+    g.lineWidth = 2
+    g.beginPath()
+    for (const [dx, dy] of [[9, 0], [0, 9]]) { g.moveTo(x - dx, y - dy); g.lineTo(x + dx, y + dy) }
+    g.stroke()
   }
 
   drawDisks() {
@@ -177,12 +202,19 @@ class Arrows {
     const { body, look } = this, { x, r } = body.scene
     for (let d = 0; d < r.length; d++) {
       const load = [body.load[3 * d], body.load[3 * d + 1]]
-      if (Math.hypot(...load) > 1e-9) this.arrow(...this.px(x[2 * d], x[2 * d + 1] ), load, look.weight, 2.5)
+      if (Math.hypot(...load) > 1e-9) this.arrow(...this.px(x[2 * d], x[2 * d + 1]), load, look.weight, 2.5)
     }
+    const long = (0.72 * Math.max(...r)) / this.forceUnit
+    for (const { from, force } of this.pressing()) this.arrow(...this.px(...from), force.map((v) => v * long), look.weight, 2.5)
   }
 
   drawFall(motion) {
-    const { body, look, context: g } = this, { x, r } = body.scene
+    const { body, look, context: g } = this, { x, r, walls, pressing } = body.scene
+    pressing.forEach((wall, k) => {
+      const at = 3 * (r.length + k), big = (0.9 * Math.max(...r)) / this.forceUnit
+      const middle = [0, 1].map((d) => (walls[4 * wall + d] + walls[4 * wall + 2 + d]) / 2)
+      this.arrow(...this.px(...middle), [motion[at] * big, motion[at + 1] * big], look.warm, 4)
+    })
     for (let d = 0; d < r.length; d++) {
       const [vx, vy, spin] = [motion[3 * d], motion[3 * d + 1], motion[3 * d + 2]]
       const [px, py] = this.px(x[2 * d], x[2 * d + 1]), big = 0.9 * r[d] / this.forceUnit
@@ -194,6 +226,13 @@ class Arrows {
       g.beginPath()
       g.arc(px, py, R, -Math.PI / 2, -Math.PI / 2 - turn, turn > 0)
       g.stroke()
+      const end = -Math.PI / 2 - turn, sign = Math.sign(turn), tip = [px + R * Math.cos(end), py + R * Math.sin(end)]
+      const ahead = [sign * Math.sin(end), -sign * Math.cos(end)] // along the circle
+      g.fillStyle = look.warm
+      g.beginPath()
+      g.moveTo(tip[0] + 9 * ahead[0], tip[1] + 9 * ahead[1])
+      for (const side of [5, -5]) g.lineTo(tip[0] + side * ahead[1], tip[1] - side * ahead[0])
+      g.fill()
     }
   }
 

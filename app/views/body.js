@@ -5,7 +5,11 @@ const FAR = [1e4, 1e8] // where S seems to have no end it is cut so far outside,
 const SMALL = 1e-9
 const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
 
-const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0)
+function dot(a, b) {
+  let sum = 0
+  for (let k = 0; k < a.length; k++) sum += a[k] * b[k]
+  return sum
+}
 
 /** The solution of a small square system, null where its rows depend on each other. */
 function solve(rows, right) {
@@ -33,13 +37,14 @@ class Body {
     this.axes = Array.from({ length: this.h }, (_, k) => scene.axes.slice(k * width, (k + 1) * width))
     this.load = Float64Array.from(scene.load)
     this.u = new Array(this.h).fill(0)
+    this.bounded = true // above three dimensions until the server says otherwise
     this.reload()
   }
 
   /** All networks in balance under the present loads: origin + u · axes, if there are any. */
   reload() {
     const { scene } = this, rows = scene.b?.length ?? 0, width = 2 * this.count
-    const b = Float64Array.from(scene.b ?? [])
+    const b = this.b = Float64Array.from(scene.b ?? [])
     ;[...(scene.grains ?? [])].forEach((grain, k) => {
       if (3 * grain + 2 >= this.load.length) return
       b[3 * k] = -this.load[3 * grain]
@@ -77,7 +82,7 @@ class Body {
         else if (rest < -SMALL) still = false
       }
     }
-    this.possible = still && this.consistent && this.count > 0
+    this.possible = still && this.consistent && this.count > 0 && Boolean(this.scene.b)
     this.whole = this.h <= 3
     if (this.whole) this.draw()
     else this.empty = !this.possible
@@ -128,7 +133,7 @@ class Body {
   }
 
   scaleOf() {
-    return Math.max(1e-6, ...this.load.map(Math.abs), ...(this.scene.box[0] ? [...this.scene.b].map(Math.abs) : []))
+    return Math.max(1e-6, ...this.b.map(Math.abs))
   }
 
   /** Σ f_n as slope and rest. */
@@ -154,8 +159,30 @@ class Body {
       if (picked.length === h) return add(picked)
       for (let k = from; k < rows.length; k++) pick(k + 1, [...picked, rows[k]])
     }
-    pick(0, [])
+    if (h === 3) this.edges(rows, (picked) => add(picked.map((k) => rows[k])))
+    else pick(0, [])
     return found
+  }
+
+  /** met([row, row, row]) at both ends of what all others leave of the line in which two sides meet. */
+  edges(rows, met) {
+    for (let i = 0; i < rows.length; i++) for (let j = i + 1; j < rows.length; j++) {
+      const [one, other] = [rows[i], rows[j]], along = cross(one.slope, other.slope), size = dot(along, along)
+      if (size < 1e-12) continue
+      const [a, b] = [cross(other.slope, along), cross(along, one.slope)]
+      const from = a.map((v, k) => -(one.rest * v + other.rest * b[k]) / size), long = Math.sqrt(size)
+      let [low, high, first, last, outside] = [-Infinity, Infinity, -1, -1, false]
+      for (let k = 0; k < rows.length && !outside; k++) {
+        if (k === i || k === j) continue
+        const { slope, rest } = rows[k], lean = dot(slope, along) / long, room = dot(slope, from) + rest
+        if (Math.abs(lean) < SMALL) outside = room < -1e-7 * (1 + Math.hypot(...from))
+        else if (lean > 0 && -room / lean > low) { low = -room / lean; first = k }
+        else if (lean < 0 && -room / lean < high) { high = -room / lean; last = k }
+      }
+      if (outside || low > high + 1e-7 * (1 + Math.abs(low))) continue
+      if (first >= 0) met([i, j, first])
+      if (last >= 0) met([i, j, last])
+    }
   }
 
   /** Sides: {corners in order, stops: [[contact, what], …], cap}; those of one place together. */

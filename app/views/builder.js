@@ -2,6 +2,8 @@
 
 const NEAR = 0.45 // of the largest radius, within which a disk is drawn into contact
 const MOST_DISKS = 30, MOST_WALLS = 12
+// What those begin with who let walls press: three disks under one that does.
+const UNDER_PRESS = "1,1,1;3,1,1;2,2.732050807569,1|0,0,4,0;0.4,3.732050807569,3.6,3.732050807569|p1"
 
 class Builder {
   /** changed(text): of another scene, of the one to begin with if empty. */
@@ -12,42 +14,79 @@ class Builder {
     this.disks = []
     this.walls = []
     this.held = null
+    this.cursor = null // of the keyboard
+    this.pressure = false // in place of gravity
+    this.pressing = new Set() // of walls
+    this.untouched = true // the scene is one to begin with
+    this.host = host
     host.innerHTML = `
+      <span role="radiogroup" aria-label="What presses the disks">
+        <button type="button" role="radio" data-load="gravity">Gravity</button>
+        <button type="button" role="radio" data-load="pressure">Pressure</button>
+      </span>
       <span role="radiogroup" aria-label="What the hand does">
         <button type="button" role="radio" data-tool="disk">Put or move disks</button>
         <button type="button" role="radio" data-tool="wall">Draw a wall</button>
+        <button type="button" role="radio" data-tool="press" title="Click a wall: it presses, or no longer does">Let a wall press</button>
         <button type="button" role="radio" data-tool="remove">Remove</button>
         <button type="button" role="radio" data-tool="pull">Pull forces</button>
       </span>
       <label>radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
-      <button type="button" class="anew">Start again</button>`
+      <button type="button" class="anew">Start again</button>
+      <span class="fixed packed presses">no weight; a wall that presses does so with a force as large as it is long</span>`
     host.addEventListener("click", (event) => {
-      const { tool } = event.target.dataset
-      if (tool) { this.tool = tool; this.tell(host) }
-      if (event.target.classList.contains("anew")) changed("")
+      const { tool, load } = event.target.dataset
+      if (tool) { this.tool = tool; this.tell() }
+      if (load) this.choose(load === "pressure")
+      if (event.target.classList.contains("anew")) this.begin()
     })
     host.querySelector(".size").addEventListener("input", (event) => { this.size = Number(event.target.value) })
-    this.tell(host)
+    this.tell()
   }
 
-  tell(host) {
-    for (const button of host.querySelectorAll("[data-tool]")) {
-      button.classList.toggle("on", button.dataset.tool === this.tool)
-      button.setAttribute("aria-checked", button.dataset.tool === this.tool)
+  tell() {
+    const chosen = [this.tool, this.pressure ? "pressure" : "gravity"]
+    for (const button of this.host.querySelectorAll("[role=radio]")) {
+      const on = chosen.includes(button.dataset.tool ?? button.dataset.load)
+      button.classList.toggle("on", on)
+      button.setAttribute("aria-checked", on)
     }
+    for (const name of ["[data-tool=press]", ".presses"]) this.host.querySelector(name).hidden = !this.pressure
   }
 
-  /** Take over a scene from its text, unless the hand is ahead of it. */
-  read(text) {
-    if (text === this.text || this.held) return
+  /** Pressure in place of gravity, or the other way round. */
+  choose(pressure) {
+    if (pressure === this.pressure) return
+    this.pressure = pressure
+    if (!pressure && this.tool === "press") this.tool = "disk"
+    this.tell()
+    if (this.untouched) this.begin()
+    else this.publish()
+  }
+
+  /** The scene to begin with, under the load that is chosen. */
+  begin() {
+    this.text = null // whatever comes is taken over
+    this.changed(this.pressure ? UNDER_PRESS : "")
+  }
+
+  /** Take over a scene from its text, unless the hand is ahead of it; whether it is another one. */
+  read(text, begins) {
+    if (text === this.text || this.held) return false
+    this.untouched = begins || text === UNDER_PRESS
     const rows = (part) => (part ?? "").split(";").filter(Boolean).map((row) => row.split(",").map(Number))
-    const [disks, walls] = text.split("|")
-    Object.assign(this, { disks: rows(disks), walls: rows(walls), text })
+    const [disks, walls, press] = text.split("|")
+    Object.assign(this, { disks: rows(disks), walls: rows(walls), text, pressure: press !== undefined })
+    this.pressing = new Set((press ?? "").slice(1).split(",").filter(Boolean).map((k) => this.walls[k]))
+    this.tell()
+    return true
   }
 
   publish() {
     const spelled = (rows) => rows.map((row) => row.map((v) => Number(v.toFixed(12))).join()).join(";")
-    this.text = `${spelled(this.disks)}|${spelled(this.walls)}`
+    const press = this.walls.flatMap((wall, k) => (this.pressing.has(wall) ? [k] : [])).join()
+    this.untouched = false
+    this.text = `${spelled(this.disks)}|${spelled(this.walls)}${this.pressure ? `|p${press}` : ""}`
     this.changed(this.text)
   }
 
@@ -56,6 +95,7 @@ class Builder {
     if (this.tool === "pull") return false
     const own = this.disks.findIndex(([x, y, r]) => Math.hypot(at[0] - x, at[1] - y) < r)
     if (this.tool === "remove") return this.remove(own, at)
+    if (this.tool === "press") return this.switchWall(at)
     if (this.tool === "wall") {
       if (this.walls.length >= MOST_WALLS) return true
       this.walls.push([...at, ...at])
@@ -74,14 +114,26 @@ class Builder {
   }
 
   remove(own, at) {
+    const wall = this.wallAt(at)
     if (own >= 0) this.disks.splice(own, 1)
-    else {
-      const far = this.walls.map(([a, b, c, d]) => distance([a, b], [c, d], ...at))
-      if (!far.length || Math.min(...far) > 0.4) return true
-      this.walls.splice(far.indexOf(Math.min(...far)), 1)
-    }
+    else if (wall >= 0) this.walls.splice(wall, 1)
+    if (own >= 0 || wall >= 0) this.publish()
+    return true
+  }
+
+  /** The wall at the hand presses, or no longer does. */
+  switchWall(at) {
+    const wall = this.walls[this.wallAt(at)]
+    if (!wall) return true
+    if (!this.pressing.delete(wall)) this.pressing.add(wall)
     this.publish()
     return true
+  }
+
+  /** Number of the wall at the hand, −1 without one. */
+  wallAt(at) {
+    const far = this.walls.map(([a, b, c, d]) => distance([a, b], [c, d], ...at)), least = Math.min(...far)
+    return least < 0.4 ? far.indexOf(least) : -1
   }
 
   carry(at) {
@@ -105,6 +157,19 @@ class Builder {
     const through = this.disks.some(([x, y, r]) => distance([a, b], [c, d], x, y) < r - 1e-9)
     if (short || through) this.walls.splice(held.wall, 1)
     else this.publish()
+  }
+
+  /** By keyboard: arrow keys move a cursor that begins at `from`, Enter takes what is there, and lets go. */
+  key(key, from) {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key]
+    if (!step && key !== "Enter") return false
+    this.cursor ??= from
+    if (step) {
+      this.cursor = this.cursor.map((v, k) => v + 0.25 * step[k])
+      this.carry(this.cursor)
+    } else if (this.held) this.release()
+    else this.press(this.cursor)
+    return true
   }
 
   /** Walls that are nearly level or upright become so. */

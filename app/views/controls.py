@@ -1,4 +1,4 @@
-"""The sidebar: which states to see, how to see them, and how to take them along."""
+"""The sidebar: which states to see, how to see them, and how to share them."""
 
 import panel as pn
 import panel_material_ui as pmui
@@ -22,7 +22,7 @@ SAME = "as S"  # a packing made with the friction of the ensemble
 
 
 def offered(state):
-    """Options and value of the finished results: each series with where it has states."""
+    """Options and value of the precomputed results: each series with where it has states."""
     # The series on screen is among them even before the catalogue is read anew: a Select whose
     # value is not on offer takes the first one, as if a visitor had chosen it.
     on_screen = [] if state.cell is None else [state.cell]
@@ -70,12 +70,12 @@ class Controls:
         self.mu.link(self.beside, stored="stored")
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
         self.seed = self._number("Seed", 0, RANGES["seed"][1])
-        self.packed = pmui.TextInput(label="Packed at μ", placeholder=SAME, **SMALL)
+        self.packed = pmui.TextInput(label="Friction during packing", placeholder=SAME, **SMALL)
         self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
         self.kind = pmui.Select(label="States from", options=_swap(kinds), **SMALL)
         self.relax = pmui.Select(label="Relaxation", options=_swap(SOLVERS), **SMALL)
-        self.series = pmui.Select(label="Finished results", options=[], **SMALL)
+        self.series = pmui.Select(label="Precomputed results", options=[], **SMALL)
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
         self.colour = pmui.Select(label="Colour", options=_swap(COLOURS), **SMALL)
         self.thickness = pmui.Select(label="Width", options=_swap(WIDTHS), **SMALL)
@@ -111,7 +111,7 @@ class Controls:
             self.colour,
             self.thickness,
             self.overlay,
-            pmui.Typography("Take along", **HEADING),
+            pmui.Typography("Share", **HEADING),
             pn.Row(self.link, self.command, **WIDE),
         ]
 

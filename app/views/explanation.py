@@ -7,7 +7,7 @@ import param
 from .hints import term
 from .scripts import Scripted, joined
 
-QUESTION = "What am I seeing? Why are there many?"
+QUESTION = "What am I seeing? Why more than one force network?"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
@@ -22,9 +22,10 @@ def first(summary):
     """What moves and what does not."""
     return (
         f"<p><b>The disks never move.</b> These {summary['n']} rigid disks are held by one "
-        "pressure. Every state is another set of contact forces on the same "
-        f"{term('packing')}: in each, all disks are in balance. Thick lines are large forces. "
-        f"What plays goes from one such {term('network')} to the next.</p>"
+        "pressure. Playback steps through "
+        f"{term('network', 'force networks')}: sets of contact forces on the same "
+        f"{term('packing')}, each of which keeps all disks in balance. Thick lines are large "
+        "forces.</p>"
     )
 
 
@@ -41,7 +42,7 @@ def rest(summary):
     else:
         needed = forces - free
         why = (
-            f"Newton's laws ask for balance: two forces and a torque at each of {grains} disks "
+            f"Newton's laws require balance: two forces and a torque at each of {grains} disks "
             f"that carry, and the pressure{_dependent(3 * grains + 1 - needed)}: {needed} "
             f"equations. But {summary['contacts']} contacts carry {forces} forces, a {term('fn')} "
             f"and a {term('ft')} each: <b>h = {free}</b> numbers are left free ({term('h')}). "
@@ -55,14 +56,14 @@ def rest(summary):
         f"states. {term('eta2')}: how far apart two states are. {term('eta3')}: how long a "
         "contact's interval of possible forces is. All are measured against the mean force: 0 "
         "means determined, 0.1 means uncertain by about a tenth.</p>"
-        "<p><b>What friction does.</b> Each μ is a packing of its own. More friction lets each "
-        "contact carry more different forces, but a packing made with more friction comes to rest "
-        "with fewer contacts, so fewer forces are free. Little friction leaves many directions "
-        "open, each of them narrow; much friction few, but wide: the indeterminacy rises and "
+        "<p><b>How friction matters.</b> Each μ has its own packing. More friction lets each "
+        "contact carry a wider range of forces, but a packing made with more friction comes to "
+        "rest with fewer contacts, so fewer forces are free. With little friction many directions "
+        "are open, but narrow; with a lot of it few, but wide: the indeterminacy rises and "
         "then falls, and is largest around μ = 0.1 to 0.2.</p>"
         f"<p><b>Where the states come from.</b> {term('walk')}: kick all forces at random, take "
         f"the network in balance that is nearest to the kicked forces, go on from there. The "
-        f"{term('original')} is that with which the packing came to rest. All this follows "
+        f"{term('original')} is the one it came to rest with. All this follows "
         f"{term('paper')}.</p>"
     )
 

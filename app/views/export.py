@@ -1,4 +1,4 @@
-"""Take along what is on screen: pictures, tables, datasets, the packing, the parameters."""
+"""Share what is on screen: pictures, tables, datasets, the packing, the parameters."""
 
 import panel as pn
 
@@ -15,8 +15,8 @@ from .style import palettes
 
 FILES = {
     "Picture of the packing": {"svg": "SVG", "png": "PNG"},
-    "Movie of what plays": {"webm": "Movie (WebM)", "gif": "Movie (GIF)"},
-    "To send to somebody": {"html": "This view as a page (HTML)"},
+    "Animation": {"webm": "Movie (WebM)", "gif": "Movie (GIF)"},
+    "Share with others": {"html": "This view as a page (HTML)"},
     "Data on screen": {
         "csv": "Contacts (CSV)",
         "netcdf": "States (NetCDF)",

@@ -2,7 +2,7 @@
 
 const SNAP = 0.07 // decades within which the thumb jumps to a stored value
 
-const NARROW = "(max-width: 599.95px)" // where the sidebar lies over the page
+const NARROW = "(max-width: 1199.95px)" // where the sidebar begins closed
 
 const place = (mu, least) => (mu > 0 ? Math.max(least, Math.log10(mu)) : least)
 const rounded = (mu) => Number(mu.toPrecision(2))

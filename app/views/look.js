@@ -84,7 +84,7 @@ class Look {
     const n = mixed.normal[c], t = mixed.tangential[c]
     const told = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
     const rows = [
-      ["contact", `${walk.backbone[c]} (grains ${walk.i[k]} – ${walk.j[k]})`],
+      ["contact", `${walk.backbone[c]} (disks ${walk.i[k]} – ${walk.j[k]})`],
       ["fₙ / ⟨fₙ⟩", n.toFixed(3)],
       ["fₜ / ⟨fₙ⟩", t.toFixed(3)],
       ["fₜ/(μ fₙ)", this.mobilised(n, t)?.toFixed(2) ?? "–"],
@@ -98,7 +98,7 @@ class Look {
   grain(k) {
     const { walk } = this
     return [
-      ["grain", `${walk.grain[k]}${walk.kind[k] % 2 ? " (rattler)" : ""}`],
+      ["disk", `${walk.grain[k]}${walk.kind[k] % 2 ? " (rattler)" : ""}`],
       ["radius", walk.r[k].toFixed(3)],
       ["contacts", walk.touching[k]],
     ]

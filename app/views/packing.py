@@ -41,15 +41,16 @@ LEGEND = """
    fill="currentColor" fill-opacity="0.65"/></svg></span>
  <span tabindex="0" data-term="{colour_term}">colour: {colour} {bar}</span>
  {marks}
- <span tabindex="0" data-term="rattler">pale disks: loose; dashed: the box{sides},
-  outside it images</span>
+ <span tabindex="0" data-term="rattler">pale disks: loose; dashed: the box{sides};
+  disks outside are periodic copies</span>
 </div>
 """
 JAMMING = """
 <div style="display:flex;flex-wrap:wrap;gap:3px 20px;font-size:12px">
- <span tabindex="0" data-term="fn">width: normal force fₙ of what touches just now</span>
+ <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
  <span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
- <span>pale disks: touch nothing; dashed: the box, which shrinks, outside it images</span>
+ <span>pale disks: touch nothing; dashed: the box, which shrinks; disks outside
+  are periodic copies</span>
 </div>
 """
 BAR = """{low} <span style="display:inline-block;width:96px;height:10px;vertical-align:middle;

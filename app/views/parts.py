@@ -20,15 +20,16 @@ SVG_ICON = (
     "<text x='12' y='16' font-family='sans-serif' font-size='10' font-weight='bold' "
     "text-anchor='middle' fill='gray'>SVG</text></svg>"
 )
-SAVE_SVG = """
+SAVE = """
 const view = fig.document.views_manager.find_one(fig)
-const blob = await view.export("svg").to_blob()
+const blob = await view.export(kind).to_blob()
 const link = document.createElement("a")
 link.href = URL.createObjectURL(blob)
-link.download = name + ".svg"
+link.download = `${name}.${kind}`
 link.click()
 setTimeout(() => URL.revokeObjectURL(link.href), 1000)
 """
+SAVED = f"(async () => {{{SAVE}}})()"
 
 # Panel builds the views of a new child before React mounts them; told of another size of the
 # window in between, Bokeh measures plots that have no layout yet, fails, and leaves all as it was.
@@ -119,16 +120,28 @@ class TabView:
 
 def savable(fig, name):
     """The figure with buttons that save it as PNG and as SVG under this name."""
-    code = f"(async () => {{{SAVE_SVG}}})()"
     fig.add_tools(
         SaveTool(filename=name),
         CustomAction(
             icon=SVG_ICON,
             description="Save as SVG",
-            callback=CustomJS(args={"fig": fig, "name": name}, code=code),
+            callback=CustomJS(args={"fig": fig, "name": name, "kind": "svg"}, code=SAVED),
         ),
     )
     return fig
+
+
+def saving(fig, name):
+    """A button each that saves the figure as PNG and as SVG, for all to see."""
+    buttons = []
+    for kind in ("png", "svg"):
+        button = pmui.Button(
+            label=f"Picture ({kind.upper()})", variant="outlined", size="small", margin=(4, 5),
+            sx=PLAIN,
+        )  # fmt: skip
+        button.js_on_click(args={"fig": fig, "name": name, "kind": kind}, code=SAVED)
+        buttons.append(button)
+    return buttons
 
 
 def figure(name, title, x, y, **options):

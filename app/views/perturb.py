@@ -12,7 +12,11 @@ from .parts import TabView, choice, figure, note
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
-WHAT = {"one": "one contact", "all": "limit loads of all", "store": "critical force – η2"}
+WHAT = {
+    "one": "one contact",
+    "all": "failure load of every contact",
+    "store": "critical force against η2",
+}
 TILE = (
     '<div style="padding:4px 10px;border-radius:6px;background:rgba(128,128,128,.1)"{}>'
     '<div style="font-size:11px;opacity:.75">{}</div>'
@@ -26,14 +30,13 @@ EXPLAINED = {  # words on tiles → keys of the glossary
 }
 TILES = '<div style="display:flex;flex-wrap:wrap;gap:6px">{}</div>'
 HINT = (
-    "Click a contact in the packing: two opposite forces will press its two disks apart. Why? How "
-    "much load a packing bears, and how far a disturbance reaches, is where it shows that its "
-    "forces are undetermined."
+    "Click a contact in the packing: two opposite forces will press its two disks apart. Why it "
+    "matters: indeterminacy shows in the failure load and in how far a push reaches."
 )
 
 
 class View(TabView):
-    """The selected contact pushed; limit loads of all; critical force and decay over the store."""
+    """The selected contact pushed; every contact's limit load; critical force and decay."""
 
     name, title = "perturb", "Perturb"
 
@@ -181,7 +184,7 @@ class View(TabView):
         seen = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
         fig.scatter(
             pushed.distance[seen], pushed.size[seen], size=4, color=DARK, alpha=0.5,
-            legend_label="grains",
+            legend_label="disks",
         )  # fmt: skip
         known = np.isfinite(pushed.profile) & (pushed.profile > 0)
         fig.line(

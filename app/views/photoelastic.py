@@ -4,52 +4,57 @@ import html
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, LinearColorMapper, Title
+import panel_material_ui as pmui
+from bokeh.models import ColumnDataSource
 
 from granforce.records import InputError
 
 from .. import photoelastic
 from ..exports import File
+from . import chains
 from .handover import Handover
-from .parts import choice, figure, note
-from .style import BLUE, EDGE, GREY, ORANGE, SERIES, corner, hover, legend_above, ramp
+from .parts import choice, figure, note, saving, together
+from .style import BLUE, ORANGE, corner, hover, legend_above
 
 COMPONENTS = (("fₙ", BLUE), ("fₜ", ORANGE))
-WIDEST = 9.0  # px, of the strongest contacts
-STRONG = 0.995  # quantile of f_n from which on they are that wide
-SHOWN = {"inferred": "Inferred", "measured": "Measured", "deviation": "Difference in σ"}
-WORDS = {
-    "inferred": "inferred; width: fₙ, pale: one standard error more",
-    "measured": "measured; width: fₙ",
-    "deviation": "inferred less measured fₙ, in its σ",
+SHOWN = {
+    "inferred": "Inferred",
+    "measured": "Measured",
+    "beside": "Both",
+    "deviation": "Difference in σ",
 }
-OFF = 4.0  # σ at which the colour of a difference ends
-AMBER = "#e69f00"  # suspects: a warning
 TOLD = 12  # contacts that are listed
 PLAYED_MS = 700  # a frame of a series
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
+HALF = WIDE | {"styles": {"flex": "1 1 240px"}, "min_width": 240}  # of two, where they fit
 
 
 class Frames:
     """What there is to see of the frames in the files that were dropped, one at a time."""
 
-    def __init__(self, first, files, task, **options):
+    def __init__(self, first, files, task, on_open, **options):
+        """on_open(frame): the frame is wanted as a packing; options: of `photoelastic.infer`."""
         self.files, self.task, self.options = files, task, options
         self.known = {first.report["frame"]: first}
-        self.frame = first
+        self.frame, self.playing = first, 0
         self.body = pn.Column(**WIDE)
         self.choice = choice(SHOWN, "inferred")
-        self.choice.param.watch(lambda event: self._dress(event.new), "value")
+        self.choice.param.watch(lambda event: together(self._dress), "value")
+        self.pictures = pn.Row(styles={"flex-wrap": "wrap"}, **WIDE)
         self.save = Handover(
             self._hand_over, files={"This frame": {"table": "All contacts (CSV)"}}, margin=(4, 10)
         )
+        self.open = pmui.Button(
+            label="Open as a packing", color="primary", size="small", margin=(4, 10)
+        )
+        self.open.on_click(lambda event: on_open(self.frame))
         self.player = pn.widgets.DiscretePlayer(
             label="frame", options=list(first.numbers), value=first.report["frame"],
             interval=PLAYED_MS, loop_policy="loop", visible=len(first.numbers) > 1,
             show_loop_controls=False, **WIDE,
         )  # fmt: skip
         self.player.param.watch(lambda event: self._turn(event.new), "value")
-        self._show(first)
+        self._fill(first)
 
     def panel(self):
         """All of it, from above."""
@@ -60,6 +65,7 @@ class Frames:
         if number in self.known:
             self._show(self.known[number])
         elif not self.task.running:
+            self.playing = self.player.direction
             self.player.pause()
             work = photoelastic.infer(self.files, number=number, **self.options)
             self.task.start(work, self._came)
@@ -69,31 +75,48 @@ class Frames:
         self._show(frame)
         if self.player.value not in self.known:  # turned on in the meantime
             self._turn(self.player.value)
+        else:
+            self.player.direction = self.playing
 
     def _show(self, frame):
+        together(self._fill, frame=frame)
+
+    def _fill(self, frame):
         self.frame = frame
         told = "".join(
             f"<p style='margin:5px 0'>{html.escape(line)}</p>"
             for line in photoelastic.account(frame.report)
         )
         head = f"<p><b>{html.escape(frame.source)}</b>, frame {frame.report['frame']}</p>"
-        self.picture, self.layers = network(frame)
-        self._dress(self.choice.value)
+        self.picture, self.layers = chains.network(frame)
+        self.pictures[:] = self._panes()
         self.body[:] = [
-            note(head + told),
+            note(head + told + found(frame.report)),
             self.choice,
-            pn.pane.Bokeh(self.picture, **WIDE),
+            self.pictures,
+            pn.FlexBox(*saving(self.picture, f"frame{frame.report['frame']}"), self.open, **WIDE),
+            note(OPENED),
             note(listed(frame)),
             pn.pane.Bokeh(compared(frame), **WIDE),
             note(stresses(frame)),
             self.save,
         ]
 
-    def _dress(self, shown):
-        for name, drawn in self.layers.items():
-            for renderer in drawn:
-                renderer.visible = name == shown
-        self.picture.select_one({"name": "shown"}).text = WORDS[shown]
+    def _panes(self):
+        """What is chosen, in one picture or, side by side, in two: dressed before they are seen."""
+        shown, one = self.choice.value, self.picture
+        both = shown == "beside"
+        chains.dress(one, self.layers, "inferred" if both else shown, small=both)
+        old = self.pictures[0] if len(self.pictures) else None
+        first = pn.pane.Bokeh(one, **HALF) if old is None or old.object is not one else old
+        if not both:
+            return [first]
+        other, layers = chains.network(self.frame, x_range=one.x_range, y_range=one.y_range)
+        chains.dress(other, layers, "measured", small=True)
+        return [first, pn.pane.Bokeh(other, **HALF)]
+
+    def _dress(self):
+        self.pictures[:] = self._panes()
 
     def _hand_over(self, key):
         name = f"frame{self.frame.report['frame']}.csv"
@@ -101,6 +124,20 @@ class Frames:
             self.save.hand_over(File(name, "text/csv", photoelastic.table(self.frame)))
         except InputError:
             self.save.rest()
+
+
+OPENED = """
+As a packing the frame is the packing of this page: its inferred forces, and what walls do in them
+to the grains held fixed. Then intervals, pulls and outlines tell what else balance would allow.
+"""
+
+
+def found(report):
+    """What was found, kind by kind and line by line, folded up."""
+    if not report["findings"]:
+        return ""
+    lines = "".join(f"<li>{html.escape(line)}</li>" for line in report["findings"])
+    return f"<details><summary>Line by line</summary><ul>{lines}</ul></details>"
 
 
 def compared(frame):
@@ -131,82 +168,6 @@ def compared(frame):
     return fig
 
 
-def network(frame):
-    """Figure of the network on the grains, and {shown: renderers} of what it may show."""
-    fig = figure(
-        "photoelastic_network", None, "x as listed", "y as listed", match_aspect=True,
-        aspect_ratio=1.0, sizing_mode="scale_width",
-    )  # fmt: skip
-    _draw_grains(fig, frame)
-    layers = {name: [] for name in SHOWN}
-    strong = max(np.quantile(frame.inferred[:, 0], STRONG), 1e-9)
-
-    def chains(layer, normal, chosen, **options):
-        width = WIDEST * np.clip(np.nan_to_num(normal) / strong, 0.0, 1.0)
-        here = np.flatnonzero(chosen & (width > 0.1) & np.isfinite(frame.lines).all(axis=(1, 2)))
-        (x0, y0), (x1, y1) = frame.lines[here, 0].T, frame.lines[here, 1].T
-        source = {
-            "x0": x0, "y0": y0, "x1": x1, "y1": y1, "width": width[here], "contact": here,
-            "off": np.nan_to_num(frame.deviation[here, 0]), "f": np.nan_to_num(normal[here]),
-            "error": frame.error[here, 0],
-        }  # fmt: skip
-        drawn = fig.segment(
-            "x0", "y0", "x1", "y1", line_width="width", line_cap="round",
-            source=ColumnDataSource(source), **options,
-        )  # fmt: skip
-        layers[layer].append(drawn)
-        return drawn
-
-    everywhere, listed_ones = np.ones(len(frame.added), dtype=bool), ~frame.added
-    inferred, measured = frame.inferred[:, 0], frame.measured[:, 0]
-    chains("inferred", inferred + frame.error[:, 0], everywhere, color=GREY, line_alpha=0.25)
-    tips = [
-        chains("inferred", inferred, listed_ones, color=BLUE, legend_label="listed contacts"),
-        chains("inferred", inferred, frame.added, color=ORANGE, legend_label="added contacts"),
-        chains("measured", measured, listed_ones, color=BLUE),
-    ]
-    colours = LinearColorMapper(palette=ramp(ORANGE, GREY, BLUE), low=-OFF, high=OFF)
-    off = {"field": "off", "transform": colours}
-    tips.append(chains("deviation", inferred, np.isfinite(measured), color=off))
-    rows = ("contact", "@contact"), ("fₙ", "@f{0.00} ± @error{0.00}"), ("off by", "@off{0.0} σ")
-    fig.add_tools(hover(tips, *rows))
-    _mark(fig, frame)
-    legend_above(fig, 3)
-    corner(fig, WORDS["inferred"])
-    next(one for one in fig.above if isinstance(one, Title)).name = "shown"
-    return fig, layers
-
-
-def _draw_grains(fig, frame):
-    x, y = frame.x.T
-    kinds = (
-        ("grains", ~(frame.at_wall | frame.left_open), EDGE, 0.18),
-        ("at a wall", frame.at_wall, EDGE, 0.5),
-        ("left open", frame.left_open, SERIES[1], 0.9),
-    )
-    for label, chosen, colour, alpha in kinds:
-        if chosen.any():
-            fig.circle(
-                x[chosen], y[chosen], radius=frame.r[chosen], fill_color=colour,
-                fill_alpha=alpha, line_color=colour, line_alpha=0.5, legend_label=label,
-            )  # fmt: skip
-
-
-def _mark(fig, frame):
-    """Suspects, contacts that carry for certain, and what was mended."""
-    middle = frame.lines.mean(axis=1)
-    for label, places, marker, colour in (
-        ("suspect", middle[frame.suspects], "triangle", AMBER),
-        ("certain", middle[frame.certain], "circle", SERIES[2]),
-        ("mended", frame.found, "x", AMBER),
-    ):
-        if len(places):
-            fig.scatter(
-                *places.T, marker=marker, size=8, line_color=colour, fill_color=None,
-                line_width=2, legend_label=label,
-            )  # fmt: skip
-
-
 def listed(frame):
     """Suspects and certain contacts as sentences."""
 
@@ -223,11 +184,15 @@ def listed(frame):
     ]
     told = []
     for count, words, some in (
-        (len(frame.suspects), "measured contacts are beyond 3 σ", suspects),
-        (len(frame.certain), "contacts that were not measured carry for certain (2 σ)", certain),
+        (len(frame.suspects), "Measured contacts beyond 3 σ", suspects),
+        (
+            len(frame.certain),
+            "Contacts that were not measured and carry for certain, by 2 σ",
+            certain,
+        ),
     ):
         more = ", …" if count > len(some) else ""
-        told.append(f"<p>{count} {words}{': ' if some else ''}{', '.join(some)}{more}.</p>")
+        told.append(f"<p>{words} ({count}){': ' if some else ''}{', '.join(some)}{more}.</p>")
     return "".join(told)
 
 

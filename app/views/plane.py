@@ -24,8 +24,8 @@ PLANES = {
 }
 
 # What is offered beside states of a kind, and what the others are called.
-ALSO = {"walk": "uniform states too", "uniform": "the walk too"}
-CALLED = {"uniform": "uniform states", "walk": "walk"}
+ALSO = {"walk": "also show uniformly sampled states", "uniform": "also show the walk"}
+CALLED = {"uniform": "uniformly sampled states", "walk": "walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "states of the walk (triangles)"}
 ENOUGH = 300  # states beside those shown, where they have to be computed
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
@@ -347,7 +347,7 @@ class View(TabView):
         legend_above(fig, 5)
         (self.marks,) = (item for item in fig.legend[0].items if item.label == value("beside"))
         self.marks.visible = False
-        corner(fig, "outline: exact; states: seen")
+        corner(fig, "exact outline; sampled states")
         fig.add_tools(hover([states], ("state", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
 

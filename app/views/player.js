@@ -6,7 +6,8 @@ const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take lon
 const SWING = 2.2 // s, for the displacement field to go to and fro
 const CROSSING = 8 // times as long as a step takes the way between two states
 const OLD = 0.35 // opacity of what is of other states than those asked for
-const WIDE = 1440 // px; from there on force space has a place of its own
+const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
+const ROOMY = 1200 // px; from there on the sidebar begins open
 const OVER_PAGE = ".MuiDrawer-modal" // the sidebar where it does
 
 class Player {
@@ -316,15 +317,19 @@ export function render({ model, view }) {
   return player.buttons.root
 }
 
-/** On a narrow page the sidebar lies over it and begins open: it is unseen until it has heard
- * that it is closed, which it does not before it listens. */
+/** The sidebar begins open. Below ROOMY it is closed: it would take the room of the packing; on
+ * a narrow page it lies over it and is unseen until it has heard that it is closed, which it does
+ * not before it listens. */
 function closeSidebar(page, view) {
   const data = [...page._all_models.values()].find(({ data }) => data?.sidebar_open !== undefined)?.data
   const close = () => {
-    if (!view.root.shadow_el.querySelector(OVER_PAGE)) return document.documentElement.style.setProperty("--sidebar", "visible")
-    data.sidebar_open = true // as only a change is told
-    data.sidebar_open = false
-    setTimeout(close, 100)
+    const over = view.root.shadow_el.querySelector(OVER_PAGE)
+    if (over || window.innerWidth < ROOMY) {
+      data.sidebar_open = true // as only a change is told
+      data.sidebar_open = false
+    }
+    if (over) setTimeout(close, 100)
+    else document.documentElement.style.setProperty("--sidebar", "visible")
   }
   if (data) close() // a page taken along has none
 }

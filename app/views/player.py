@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, joined, said
 
 
 class Player(Scripted):
@@ -80,6 +80,7 @@ class Player(Scripted):
 
     def _handle_msg(self, message):
         """Digits pressed anywhere on the page; what the browser has painted of a computation."""
+        message = said(message)
         if self.on_digit is not None and isinstance(message.get("tab"), int):
             self.on_digit(message["tab"])
         if self.on_hand is not None and isinstance(message.get("hand"), dict):

@@ -1,4 +1,4 @@
-// The list of scenes: another one is another page.
+// The list of scenes: another one is another page, in the theme of this one, and with its friction if that was chosen.
 
 export function render({ model }) {
   const root = document.createElement("label")
@@ -6,7 +6,10 @@ export function render({ model }) {
   root.innerHTML = `Scene <select aria-label="Scene">${model.titles.map(([name, title]) =>
     `<option value="${name}" ${name === model.shown ? "selected" : ""}>${title}</option>`).join("")}</select>`
   root.querySelector("select").addEventListener("change", (event) => {
-    window.location.assign(`?scene=${event.target.value}`)
+    const here = new URLSearchParams(window.location.search), there = new URLSearchParams({ scene: event.target.value })
+    if (here.get("dark")) there.set("dark", here.get("dark"))
+    if (here.has("mu") && Number(here.get("mu")) !== model.usual) there.set("mu", here.get("mu"))
+    window.location.assign(`?${there}`)
   })
   return root
 }

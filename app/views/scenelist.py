@@ -4,6 +4,8 @@ from typing import ClassVar
 
 import param
 
+from granforce.packing.scenes import SCENES
+
 from .. import scenes
 from .scripts import FOLDER, Scripted, joined
 
@@ -13,9 +15,10 @@ class SceneList(Scripted):
 
     titles = param.List(doc="[name, title] of every scene")
     shown = param.String(default=scenes.MANY)
+    usual = param.Number(doc="μ of the page as it opens, which is not taken along")
 
     _esm = joined("scenelist")
     _stylesheets: ClassVar = [FOLDER / "scenelist.css"]
 
     def __init__(self, **params):
-        super().__init__(titles=scenes.titles(), **params)
+        super().__init__(titles=scenes.titles(), usual=SCENES[scenes.MANY].mu, **params)

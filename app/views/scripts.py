@@ -12,6 +12,18 @@ def joined(*names):
     return "\n".join((FOLDER / f"{name}.js").read_text() for name in names)
 
 
+def said(message):
+    """The message of a script, a dict; an empty one for what no script can have sent."""
+    return message if isinstance(message, dict) and _from_browser(message) else {}
+
+
+def _from_browser(part):
+    """Whether all whole numbers are such as browsers have: larger ones are no floats either."""
+    if isinstance(part, dict | list):
+        return all(map(_from_browser, part.values() if isinstance(part, dict) else part))
+    return not isinstance(part, int) or abs(part) <= 2**53
+
+
 class Scripted(JSComponent):
     """A component whose script the browser runs as it is written.
 

@@ -1,10 +1,7 @@
-// The page of a small scene: the scene and its S side by side, friction, and what is counted and said.
+// The page of a small scene: the scene and its S side by side, friction, and what is done with them.
 
 const MOST_MU = 1.5 // on the slider; larger ones can be typed
 const REST_MS = 150 // after which what only the server tells is asked for
-const PATH = 60
-const NARROW = "(max-width: 759.95px)" // where S lies below the scene
-const UNSEEN = "granforce.tour" // remembered in the browser: that the tour was seen
 
 export function render({ model, view }) {
   const root = document.createElement("div")
@@ -14,24 +11,27 @@ export function render({ model, view }) {
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${MOST_MU}" step="0.005" aria-label="friction μ">
         <input class="typed" inputmode="decimal" aria-label="μ"></label>
+      <span class="fixed" title="Changing μ moves no disk: S is cut anew out of all networks in balance"></span>
       <span class="buttons">
         <button type="button" class="play" title="Go at random through S">Walk</button>
         <button type="button" class="fill" title="Networks of S, by a walk that in the end is everywhere equally often">Fill S</button>
         <button type="button" class="undo" title="Take the last pull back (Z)" disabled>Undo</button>
-        <button type="button" class="push" title="Drag a disk to push it">Push a disk</button>
+        <button type="button" class="push" title="Drag a disk, or use the arrow keys, to push it" aria-pressed="false">Push a disk</button>
         <button type="button" class="save" title="This scene as a file for granforce: gf.load_packing">Save NPZ</button>
         <button type="button" class="tourist">Tour</button>
       </span>
     </div>
     <p class="says" aria-live="polite"></p>
+    <div class="own" hidden></div>
     <div class="pair">
-      <figure><figcaption>the scene: forces on each disk, and the wedge (cone) each must stay in</figcaption>
+      <figure><figcaption>forces on each disk, each within its wedge (friction cone)</figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
       <figure><figcaption class="what"></figcaption>
-        <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one network of forces. Arrow keys move the point"></canvas></figure>
+        <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one network of forces. Arrow keys move the point"></canvas>
+        <div class="plane" hidden><label>across <select aria-label="force shown across"></select></label>
+          <label>up <select aria-label="force shown upwards"></select></label></div></figure>
     </div>
     <p class="count"></p>
-    <div class="own" hidden></div>
     <div class="bars" role="list"></div>
     <details class="lesson" hidden><summary>The groove: a lesson of one page, with three questions</summary>
       <button type="button" class="print">Print</button> <button type="button" class="print answered">Print with answers</button>
@@ -42,16 +42,23 @@ export function render({ model, view }) {
         <button type="button" class="next">Next</button><button type="button" class="close">Close</button></div>
     </section>`
   const part = (name) => root.querySelector(`.${name}`)
-  const now = { contact: null, disk: null, side: null, contacts: new Set(), fall: null, filled: false, path: [], walk: null, undo: [], push: false, limit: null }
-  let body = null, mu = model.scene.mu, waiting = 0, asleep = 0, step = 0
+  const now = { contact: null, disk: null, side: null, contacts: new Set(), fall: null, filled: false, path: [], undo: [] }
+  let body = null, mu = model.scene.mu, chosenMu = false, waiting = 0, asleep = 0, returning = false
 
+  const gone = goneBanner(view, "What is in the page still moves.")
+  root.prepend(gone)
   const builder = new Builder(part("own"), (built) => ask(model, view, { built, mu }))
   const arrows = new Arrows(part("packing"), heard), space = new Space(part("space"), heard)
+  const going = new Going(part("play"), (path) => { now.path = path; soon() })
+  const pushed = new Push(), bars = new Bars(part("bars")), planes = [...part("plane").querySelectorAll("select")]
+  const tour = new TourCard(root, model.steps, model.all, (does) => {
+    if (does.mu !== undefined) setMu(does.mu)
+    Object.assign(part("card").style, { background: colours().paper, color: colours().ink })
+  }, () => leave("many", "&tour=1"))
 
   // What is seen
 
-  function colours() {
-    const dark = model.dark
+  function colours(dark = model.dark) {
     return {
       ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#181b20" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",
       fill: dark ? "rgba(150,172,200,0.25)" : "rgba(139,160,187,0.3)", lit: dark ? "rgba(150,172,200,0.45)" : "rgba(139,160,187,0.55)",
@@ -61,11 +68,14 @@ export function render({ model, view }) {
     }
   }
 
+  const dress = () => { root.style.colorScheme = model.dark ? "dark" : "light" } // for the browser's own controls
+
   function paint() {
     waiting = 0
     if (!body || !root.isConnected) return
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
-    const look = { ...colours(), ...now, wall, dots: now.filled && space.dots.length }
+    const cursor = builds() && root.getRootNode().activeElement === part("packing") ? builder.cursor : null
+    const look = { ...colours(), ...now, wall, cursor, dots: now.filled && space.dots.length }
     if (body.scene !== arrows.body?.scene || arrows.wide !== part("packing").clientWidth) {
       arrows.fit(body, body.scene.name === "own" && arrows.own === part("packing").clientWidth)
       arrows.own = body.scene.name === "own" ? part("packing").clientWidth : 0
@@ -73,98 +83,25 @@ export function render({ model, view }) {
     }
     arrows.draw(look)
     if (space.draw(body, look, now.path)) soon()
-    bars()
+    bars.draw(body, now.contacts, now.bounds)
     root.painted = (root.painted ?? 0) + 1
   }
 
   const soon = () => { waiting ||= requestAnimationFrame(paint) }
 
-  function bars() {
-    const host = part("bars")
-    if (host.children.length !== body.count) {
-      host.innerHTML = Array.from({ length: body.count }, (_, c) => `
-        <div role="listitem" data-contact="${c}"><span class="label"></span><span class="rail"><i class="span"></i><i class="dot"></i></span><span class="value"></span></div>`).join("")
-    }
-    if (body.empty) { host.hidden = true; return }
-    host.hidden = false
-    const F = body.forces(), ends = Array.from(F.slice(0, body.count), (_, c) => (body.whole ? body.interval(2 * c) : now.bounds?.[c] ?? [NaN, NaN]))
-    const finite = [...ends.flat().filter(Number.isFinite), ...F.filter((_, k) => k % 2 === 0)]
-    const most = Math.max(...finite, 1e-9) * 1.1
-    ;[...host.children].forEach((row, c) => {
-      const [low, high] = ends[c], value = F[2 * c], at = (v) => `${(100 * Math.min(v, most)) / most}%`
-      row.classList.toggle("lit", now.contacts.has(c))
-      row.querySelector(".label").textContent = `fₙ ${body.scene.names[c]}`
-      const span = row.querySelector(".span")
-      span.hidden = Number.isNaN(low)
-      span.style.left = at(low)
-      span.style.right = `${100 - (100 * Math.min(high, most)) / most}%`
-      row.querySelector(".dot").style.left = at(value)
-      const range = span.hidden ? "" : ` in ${number(low)} … ${Number.isFinite(high) ? number(high) : "∞"}`
-      row.querySelector(".value").textContent = `${number(value)}${range}`
-    })
-  }
-
-  const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) < 10 ? 3 : 1))
-
-  // What is said
-
-  function words(side) {
-    const kinds = new Map()
-    for (const [contact, what] of side.stops) {
-      const [, disk, place] = body.scene.names[contact].match(/^(disk \d+ )?(.*)$/)
-      const verb = `${disk ?? ""}${what === OPENS ? "opens" : `slides${way(contact, what)}`}`
-      kinds.set(verb, [...(kinds.get(verb) ?? []), place])
-    }
-    return [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ")
-  }
-
-  /** Where a disk is about to slide at a wall: against the friction on it. */
-  function way(contact, what) {
-    const { scene } = body
-    if (scene.j[contact] < scene.r.length) return ""
-    const [x, y] = [-what * scene.normal[2 * contact + 1], what * scene.normal[2 * contact]]
-    return Math.abs(y) > 0.3 ? (y > 0 ? " up" : " down") : x > 0 ? " right" : " left"
-  }
-
-  function say() {
-    const { h, count, scene } = body, forces = 2 * count, equations = scene.equations ?? 0
-    part("count").innerHTML = `<b>${forces} forces − ${equations} equations = ${h} free</b> ` +
-      `<span>(${count} contact${count === 1 ? "" : "s"} with a normal and a tangential force each; every disk's forces and torque must balance` +
-      `${scene.box[0] ? ", and the pressure is given" : ""})</span>`
-    part("what").textContent = body.empty ? "S: empty" : body.whole && body.corners.length === 1 ? "S: a single point" : { 0: "S: a single point", 1: "S: a line", 2: "S: a polygon, in its true shape", 3: "S: a body; drag beside the point to turn it" }[h] ??
-      `a shadow of S, which has ${h} dimensions; dots: networks drawn from it`
-    part("says").textContent = sentence()
-    part("says").classList.toggle("bad", body.empty)
+  function say(note = pushed.on ? now.note : "") {
+    part("count").innerHTML = counted(body)
+    part("what").textContent = pictured(body)
+    part("says").textContent = note || sentence(body, mu, now)
+    part("says").classList.toggle("bad", body.empty && !body.scene.idle)
     part("undo").disabled = !now.undo.length
-  }
-
-  function sentence() {
-    const { h } = body
-    if (now.note) return now.note
-    if (body.empty) {
-      const falls = now.fall ? [...body.scene.r.keys()].filter((d) => Math.hypot(...now.fall.slice(3 * d, 3 * d + 3)) > 0.05) : []
-      const which = `disk${falls.length > 1 ? "s" : ""} ${falls.map((d) => d + 1).join(", ")}`
-      const why = falls.length ? `The orange arrows show how ${which} give${falls.length > 1 ? "" : "s"} way: along that motion the loads do work, and no force allowed at any contact takes it up. That proves it.` : ""
-      return `Nothing balances at μ = ${number(mu)}: S is empty. ${why}`
-    }
-    if (!h) return "Everything is determined: there is one network of forces, and mechanics finds it."
-    if (h > 3) return `${h} free numbers: infinitely many networks of forces hold these disks. What is drawn is a shadow of S. Drag the point or an arrow: all forces follow, and everything stays in balance.`
-    const size = h === 1 ? "line" : h === 2 ? "polygon" : "body"
-    if (body.corners.length === 1) {
-      return mu ? "S is one point: of all forces in balance, only these stay in their cones. Everything is determined."
-        : "Without friction S is one point: everything is determined. Open the cones with the slider."
-    }
-    if (!body.bounded) return `S has no end in some direction: the disk${body.scene.r.length > 1 ? "s have" : " has"} wedged ${body.scene.r.length > 1 ? "themselves" : "itself"}, and the forces may be as large as you like. (Proof: a change of forces that is in balance by itself and stays in every cone.)`
-    const fixed = body.scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
-    const determined = fixed ? ` ${fixed} of ${body.count} normal forces are determined all the same.` : ""
-    return `Every point of this ${size} is one way to hold the same disk${body.scene.r.length > 1 ? "s" : ""}, in balance, within friction. Drag the point, or an arrow.${determined}`
   }
 
   // What is done
 
   function heard(what, given) {
-    if (what === "words") return words(given)
-    if (what === "name") return body.scene.names[given]
+    if (what === "words") return stopping(body, given)
+    if (what === "name") return `${given % 2 ? "fₜ" : "fₙ"} ${body.scene.names[given >> 1]}`
     if (what === "hover" || what === "select") {
       now.disk = given ? given.disk : null
       if (what === "select" || !now.chosen) choose(given && !given.loose ? given.contact : null)
@@ -177,8 +114,8 @@ export function render({ model, view }) {
       now.contacts = new Set(given ? given.stops.map(([c]) => c) : now.contact === null ? [] : [now.contact])
     }
     if (what === "begin") remember()
-    if (what === "go") { pause(); body.goTo(given) }
-    if (what === "pull") { pause(); body.pull(given.contact, given.normal, given.tangential) }
+    if (what === "go") { going.pause(); body.goTo(given) }
+    if (what === "pull") { going.pause(); body.pull(given.contact, given.normal, given.tangential) }
     if (what === "press") return press(given)
     if (what === "carry") carry(given)
     if (what === "release" && builds()) builder.release()
@@ -188,9 +125,6 @@ export function render({ model, view }) {
   function choose(contact) {
     now.contact = contact
     now.contacts = new Set(contact === null ? [] : [contact])
-    if (contact !== null && body.h > 3) {
-      space.shadow = [contact, space.shadow[0] === contact ? space.shadow[1] : space.shadow[0]]
-    }
   }
 
   function remember() {
@@ -201,7 +135,7 @@ export function render({ model, view }) {
 
   function undo() {
     const u = now.undo.pop()
-    if (u) { pause(); body.goTo(u) }
+    if (u) { going.pause(); body.goTo(u) }
     part("undo").disabled = !now.undo.length
     soon()
   }
@@ -210,6 +144,7 @@ export function render({ model, view }) {
   function cut() {
     body.cut(mu)
     now.fall = now.bounds = null
+    space.outline.stale = true
     if (!body.empty && !body.goTo(body.u)) body.empty = true
     if (!body.empty && body.whole && !Number.isFinite(body.u[0] ?? 0)) body.u = body.middle
     if (now.filled && body.whole) space.fill()
@@ -222,16 +157,50 @@ export function render({ model, view }) {
   }
 
   function rest() {
-    if (body.empty) ask(model, view, { fall: { mu, load: [...body.load] } })
-    else if (now.filled && !space.dots.length) { space.fill(); soon() }
-    if (!body.empty && !body.whole) ask(model, view, { bounds: { mu, load: [...body.load] } })
-    address()
+    address() // first: where the server is gone, asking it fails
+    if (!body.empty && now.filled && !space.dots.length && body.bounded) { space.fill(); soon() }
+    if (body.empty && !body.scene.idle) ask(model, view, { fall: { mu, load: [...body.load] } })
+    measure()
+  }
+
+  /** Above three dimensions, what only linear programs tell. */
+  function measure() {
+    if (!body.empty && !body.whole) ask(model, view, { measure: { mu, load: [...body.load], plane: space.shadow } })
+  }
+
+  function measured({ bounds, outline, endless }, plane) {
+    now.bounds = bounds
+    body.bounded = !endless
+    if (endless) space.dots = []
+    if (plane.join() === space.shadow.join()) space.outline = { points: outline ?? [], stale: false }
+    say()
+    soon()
+  }
+
+  // The address: a scene is a step to go back to, friction is not
+
+  function query() {
+    const { name, built } = body.scene
+    return new URLSearchParams({ scene: name, mu: String(Number(mu.toPrecision(6))), ...(built ? { built } : {}), ...(model.dark ? { dark: 1 } : {}) })
   }
 
   function address() {
-    const { name, built } = body.scene
-    const query = new URLSearchParams({ scene: name, mu: String(Number(mu.toPrecision(6))), ...(built ? { built } : {}) })
-    history.replaceState(null, "", `?${query}`)
+    if (returning) return
+    const there = new URLSearchParams(location.search).get("scene"), step = there && there !== body.scene.name
+    history[step ? "pushState" : "replaceState"](null, "", `?${query()}`)
+  }
+
+  function returned() {
+    const { search } = location
+    if (new URLSearchParams(search).get("scene") === "many") return location.reload()
+    returning = true
+    ask(model, view, { query: search })
+  }
+
+  /** To a page of its own; the theme goes along, and the friction if it was chosen by hand. */
+  function leave(name, more = "") {
+    clearTimeout(asleep)
+    window.location.assign(`?scene=${name}${chosenMu ? `&mu=${query().get("mu")}` : ""}${model.dark ? "&dark=1" : ""}${more}`)
   }
 
   function show() {
@@ -239,27 +208,41 @@ export function render({ model, view }) {
     part("own").hidden = scene.name !== "own"
     part("lesson").hidden = scene.name !== "groove"
     if (!scene.i) return void (part("says").textContent = "The disks are being pressed together …")
-    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), fall: null, path: [], undo: [], chosen: false, bounds: null, push: false, limit: null, note: "" })
-    pause()
+    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), fall: null, path: [], undo: [], chosen: false, bounds: null })
+    pushes(false)
+    going.pause()
     mu = scene.mu
     body = new Body(scene).cut(mu)
-    if (scene.name === "own") builder.read(scene.built)
-    space.shadow = [0, Math.min(1, body.count - 1)]
-    Object.assign(space, { body, dots: [] })
+    returning = false
+    if (scene.name === "own" && builder.read(scene.built, scene.begins)) arrows.own = 0
+    Object.assign(space, { body, dots: [], outline: { points: [], stale: true } })
+    showPlane()
     if (body.whole && !body.empty) body.u = [...body.middle]
     else if (!body.empty && !startInside()) body.empty = true
     if (!body.whole && !body.empty) now.filled = true
     if (now.filled) space.fill()
     if (!body.whole && space.dots.length) body.u = body.u.map((_, k) => space.dots.reduce((s, u) => s + u[k], 0) / space.dots.length)
     part("name").value = scene.name
+    part("fixed").classList.toggle("packed", Boolean(scene.packed))
+    part("fixed").textContent = scene.packed ? `friction during packing: ${scene.packed}` : "changing μ moves no disk"
     follow()
-    say()
-    part("push").classList.remove("on")
+    say(root.opened ? "" : model.note)
     if (root.opened && !same) address()
     clearTimeout(asleep)
     asleep = setTimeout(rest, REST_MS)
     root.opened = true
     soon()
+  }
+
+  /** Which two forces S casts its shadow on. */
+  function showPlane() {
+    part("plane").hidden = body.whole
+    space.shadow = [0, 2 * Math.min(1, body.count - 1)]
+    if (body.whole) return
+    planes.forEach((select, k) => {
+      select.innerHTML = body.scene.names.map((_, c) => [0, 1].map((part) => `<option value="${2 * c + part}">${heard("name", 2 * c + part)}</option>`).join("")).join("")
+      select.value = space.shadow[k]
+    })
   }
 
   function startInside() {
@@ -281,147 +264,107 @@ export function render({ model, view }) {
     cut()
   }
 
-  // Going by itself
-
-  function pause() {
-    if (now.walk) cancelAnimationFrame(now.walk)
-    now.walk = null
-    part("play").textContent = "Walk"
-    part("play").classList.remove("on")
-  }
-
-  function walk() {
-    if (now.walk) return pause()
-    if (body.empty || !body.h) return
-    part("play").textContent = "Stop"
-    part("play").classList.add("on")
-    now.path = [body.u]
-    let from = body.u, to = body.step(from), begun = performance.now()
-    const go = (time) => {
-      const part = Math.min(1, (time - begun) / 450)
-      body.u = from.map((v, k) => v + part * (to[k] - v))
-      now.path[now.path.length - 1] = body.u
-      if (part === 1) {
-        from = to
-        to = body.step(from)
-        begun = time
-        now.path = [...now.path, from].slice(-PATH)
-      }
-      soon()
-      now.walk = requestAnimationFrame(go)
-    }
-    now.path.push(body.u)
-    now.walk = requestAnimationFrame(go)
+  function chooseMu(value) {
+    chosenMu = true
+    setMu(value)
   }
 
   // A push on a disk
 
-  const builds = () => body?.scene.name === "own" && !now.push
+  const builds = () => body?.scene.name === "own" && !pushed.on
+
+  function pushes(on) {
+    pushed.on = on
+    pushed.stop()
+    part("push").classList.toggle("on", on)
+    part("push").setAttribute("aria-pressed", on)
+    now.note = on ? "Drag a disk, or choose one with N and push with the arrow keys: S shrinks until nothing balances. Press the button again to let go." : ""
+  }
 
   function press({ found, at }) {
     if (builds()) return builder.press(at)
-    if (!now.push || !found || found.disk === undefined) return false
-    now.pushed = { disk: found.disk, at, load: [...body.load], good: null }
-    pause()
+    if (!pushed.on || !found || found.disk === undefined) return false
+    const before = pushed.disk === found.disk ? pushed.force : [0, 0]
+    now.grip = { disk: found.disk, from: at.map((v, k) => v - before[k] * arrows.forceUnit) }
+    going.pause()
     return true
   }
 
   function carry({ at }) {
     if (builds()) return builder.carry(at)
-    const { disk, at: from, load } = now.pushed, unit = arrows.forceUnit
-    const push = [0, 1].map((k) => (at[k] - from[k]) / unit)
-    body.load = Float64Array.from(load)
-    body.load[3 * disk] += push[0]
-    body.load[3 * disk + 1] += push[1]
-    body.reload()
-    cut()
-    limit(disk, push, load)
+    const { disk, from } = now.grip
+    pushBy(disk, at.map((v, k) => (v - from[k]) / arrows.forceUnit))
   }
 
-  /** How much may push that way before nothing balances any more, by halving. */
-  function limit(disk, push, load) {
-    const size = Math.hypot(...push)
-    if (size < 1e-6 || !body.whole) return
-    const trial = new Body(body.scene), along = push.map((v) => v / size)
-    const holds = (F) => {
-      trial.load = Float64Array.from(load)
-      trial.load[3 * disk] += F * along[0]
-      trial.load[3 * disk + 1] += F * along[1]
-      trial.reload()
-      return !trial.cut(mu).empty
-    }
-    let [low, high] = [0, 64 * body.scaleOf()]
-    if (holds(high)) low = Infinity
-    else for (let k = 0; k < 30; k++) { const F = (low + high) / 2; if (holds(F)) low = F; else high = F }
-    const most = Number.isFinite(low) ? `at most ${number(low)} can be borne this way (the limit load)` : "no push this way is too large: it only presses the disks against their walls"
-    now.note = `You push disk ${disk + 1} with ${number(size)}: ${most}.${body.empty ? " Now nothing balances." : ""}`
+  function pushBy(disk, force) {
+    pushed.load(body, disk, force)
+    cut()
+    now.note = pushed.told(body) || now.note
     say()
   }
 
-  // The tour
-
-  function tour(number) {
-    step = number
-    const steps = model.steps, card = part("card")
-    card.hidden = !step
-    root.style.paddingBottom = ""
-    if (!step) return
-    try { localStorage.setItem(UNSEEN, "seen") } catch { /* private */ }
-    const [title, text, does] = steps[step - 1]
-    card.querySelector("h2").textContent = title
-    card.querySelector("p").textContent = text
-    card.querySelector(".of").textContent = `${step} of ${model.all}`
-    part("earlier").disabled = step === 1
-    root.style.paddingBottom = `${card.offsetHeight + 20}px` // what lies under the card can be scrolled to
-    if (does.mu !== undefined) setMu(does.mu)
-    Object.assign(card.style, { background: colours().paper, color: colours().ink })
-    requestAnimationFrame(() => {
-      if (window.matchMedia(NARROW).matches) part(does.see ?? "pair").scrollIntoView({ block: "start" })
-      card.querySelector("h2").focus({ preventScroll: true })
-    })
+  /** Arrow keys push the disk that was chosen. */
+  function pushByKey(key) {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[key]
+    if (!step || !pushed.on) return false
+    const disk = now.disk ?? pushed.disk ?? 0, force = pushed.disk === disk ? pushed.force : [0, 0]
+    now.disk = disk
+    pushBy(disk, force.map((v, k) => v + 0.02 * step[k] * body.scaleOf()))
+    return true
   }
-
-  const onwards = () => (step < model.steps.length ? tour(step + 1) : window.location.assign("?scene=many&tour=1"))
 
   // Widgets
 
   part("name").innerHTML = model.titles.map(([name, title]) => `<option value="${name}">${title}</option>`).join("")
   part("name").addEventListener("change", (event) => {
     const name = event.target.value
-    if (name === "many") return window.location.assign("?scene=many")
+    if (name === "many") return leave(name)
+    if (!gone.hidden) { // the page opens anew with its address, once there is a server again
+      history.pushState(null, "", `?scene=${name}`)
+      return say("This scene opens once the connection is back.")
+    }
     part("says").textContent = `Making “${event.target.selectedOptions[0].textContent}” …`
-    ask(model, view, { scene: name })
+    ask(model, view, { scene: name, ...(chosenMu ? { mu } : {}) })
   })
-  part("range").addEventListener("input", (event) => setMu(Number(event.target.value)))
+  part("range").addEventListener("input", (event) => chooseMu(Number(event.target.value)))
   part("typed").addEventListener("change", (event) => {
     const value = Number(event.target.value.replace(",", "."))
-    if (Number.isFinite(value) && value >= 0) setMu(value)
-    else { now.note = "μ is a number from 0 on"; say(); now.note = ""; follow() }
+    if (Number.isFinite(value) && value >= 0) chooseMu(value)
+    else { say("μ is a number from 0 on"); follow() }
   })
-  part("play").addEventListener("click", walk)
+  part("play").addEventListener("click", () => going.toggle(body))
   part("fill").addEventListener("click", () => {
     now.filled = !now.filled
     if (now.filled) space.fill()
     part("fill").classList.toggle("on", now.filled)
+    say()
     soon()
   })
   part("undo").addEventListener("click", undo)
   part("push").addEventListener("click", () => {
-    now.push = !now.push
-    part("push").classList.toggle("on", now.push)
-    now.note = now.push ? "Drag a disk: you push it, and S shrinks until nothing balances. Press again to let go." : ""
-    if (!now.push) { body.load = Float64Array.from(body.scene.load); body.reload(); cut() }
+    const was = pushed.disk !== null
+    pushes(!pushed.on)
+    if (was) { body.load = Float64Array.from(body.scene.load); body.reload(); cut() }
     say()
   })
+  for (const select of planes) {
+    select.addEventListener("change", () => {
+      space.shadow = planes.map((chosen) => Number(chosen.value))
+      Object.assign(space, { outline: { points: [], stale: true }, sceneDrawn: null })
+      measure()
+      soon()
+    })
+  }
   part("save").addEventListener("click", () => ask(model, view, { save: { mu, load: [...body.load] } }))
   part("lesson").querySelector("article").innerHTML = lesson()
   for (const button of root.querySelectorAll(".print")) {
-    button.addEventListener("click", () => printed(part("packing").toDataURL(), button.classList.contains("answered")))
+    button.addEventListener("click", () => {
+      arrows.draw({ ...colours(false), ...now }) // paper is white
+      printed(part("packing").toDataURL(), button.classList.contains("answered"))
+      soon()
+    })
   }
-  part("tourist").addEventListener("click", () => tour(1))
-  part("earlier").addEventListener("click", () => tour(step - 1))
-  part("next").addEventListener("click", onwards)
-  part("close").addEventListener("click", () => tour(0))
+  part("tourist").addEventListener("click", () => tour.go(1))
   part("bars").addEventListener("pointerover", (event) => {
     const row = event.target.closest("[data-contact]")
     if (row) { choose(Number(row.dataset.contact)); soon() }
@@ -439,9 +382,11 @@ export function render({ model, view }) {
     if (event.metaKey || event.ctrlKey || !root.isConnected) return
     const { key } = event, over = (names) => event.composedPath().some((node) => node.matches?.(names))
     if (over("input, select, textarea") || (key === " " && over("button, summary"))) return
+    if (pushByKey(key)) return event.preventDefault()
+    if (builds() && over(".packing") && builder.key(key, arrows.middle)) { event.preventDefault(); return soon() }
     if (key === "z" || key === "Z") undo()
-    else if (key === " ") walk()
-    else if (key === "Escape") { tour(0); choose(null); now.chosen = false }
+    else if (key === " ") going.toggle(body)
+    else if (key === "Escape") { tour.go(0); choose(null); now.chosen = false }
     else if (key === "[" || key === "]") {
       const contact = now.contact ?? 0, F = body.forces(), push = (key === "]" ? 0.05 : -0.05) * body.scaleOf()
       if (body.empty || !body.count) return
@@ -449,6 +394,8 @@ export function render({ model, view }) {
       now.chosen = true
       remember()
       body.pull(contact, F[2 * contact] + push, F[2 * contact + 1])
+    } else if ((key === "n" || key === "N") && pushed.on) {
+      now.disk = ((now.disk ?? -1) + 1) % body.scene.r.length
     } else if (key === "n" || key === "N") {
       choose(body.count ? ((now.contact ?? -1) + 1) % body.count : null)
       now.chosen = true
@@ -460,19 +407,25 @@ export function render({ model, view }) {
   const sized = new ResizeObserver(() => { arrows.wide = 0; soon() })
   sized.observe(root)
   window.addEventListener("keydown", key)
-  model.on("remove", () => { window.removeEventListener("keydown", key); sized.disconnect(); pause() })
+  window.addEventListener("popstate", returned)
+  model.on("remove", () => {
+    window.removeEventListener("keydown", key)
+    window.removeEventListener("popstate", returned)
+    sized.disconnect()
+    going.pause()
+  })
   model.on("scene", show)
-  model.on("dark", soon)
+  model.on("dark", () => { dress(); soon(); if (body) address() })
   model.on("msg:custom", (news) => {
     if (news.fall && body.empty) { now.fall = news.fall.length ? news.fall : null; say(); soon() }
-    if (news.bounds && news.mu === mu && !body.whole) { now.bounds = news.bounds; soon() }
+    if (news.measured && news.mu === mu && !body.whole) measured(news.measured, news.plane)
     if (news.file) download(news.file)
-    if (news.error) { now.note = news.error; say(); now.note = "" }
+    if (news.error) { returning = false; say(news.error) }
   })
-  Object.defineProperty(root, "small", { get: () => ({ body, now, space, arrows, builder, mu }) })
+  Object.defineProperty(root, "small", { get: () => ({ body, now, space, arrows, builder, pushed, mu }) })
+  dress()
   show()
-  const seen = () => { try { return localStorage.getItem(UNSEEN) !== null } catch { return true } }
-  if (model.step) tour(model.step)
-  else if (model.first && !seen()) tour(1)
+  if (model.step) tour.go(model.step)
+  else if (model.first && !tour.seen) tour.go(1)
   return root
 }

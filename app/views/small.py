@@ -9,7 +9,7 @@ from granforce.packing import scenes as made
 from granforce.records import InputError, NotJammedError, UndecidedError
 
 from .. import scenes
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, joined, said
 
 # Title, text, and what the scene shows, of the steps of the tour before those of large packings.
 FIRST_STEPS = (
@@ -45,11 +45,14 @@ class Small(Scripted):
     steps = param.List(doc="title, text and what is shown, of each step of the tour")
     all = param.Integer(doc="steps of the whole tour")
     step = param.Integer(doc="of the tour, to begin with; 0 for none")
+    note = param.String(doc="what was wrong with the link")
     first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
 
-    SCRIPTS: ClassVar = ("ask", "body", "arrows", "space", "builder", "lesson", "small")
-    _esm = joined(*SCRIPTS)
+    _esm = joined(
+        *("ask", "gone", "body", "arrows", "space", "builder", "push", "going", "bars", "saying"),
+        *("lesson", "tourcard", "small"),
+    )
     _stylesheets: ClassVar = [FOLDER / "small.css"]
 
     def __init__(self, asked, task, all_steps, **params):
@@ -65,13 +68,19 @@ class Small(Scripted):
         self._show(asked.scene, asked.mu, asked.built)
 
     def _show(self, name, mu=None, built=""):
+        if name == scenes.MANY:  # has a page of its own
+            return
         if name in ("six", "solid"):  # packed first
             self._task.start(lambda job: scenes.drawn(name, mu), self._put)
             return
         try:
             self._put(scenes.drawn(name, mu, built))
         except (InputError, NotJammedError) as error:
-            self._send_msg({"error": str(error)})
+            if self.scene:
+                self._send_msg({"error": str(error)})
+            else:  # a link that cannot be: its page begins anew, and says why
+                self.note = str(error)
+                self._show(name)
 
     def _put(self, scene):
         self.scene = scene
@@ -82,19 +91,21 @@ class Small(Scripted):
 
     def _handle_msg(self, message):
         """Another scene, another μ, or the question how it falls."""
-        if not isinstance(message, dict):
-            return
+        message = said(message)
         try:
             if message.get("scene") in (*made.SCENES, scenes.OWN):
-                self._show(message["scene"])
+                self._show(message["scene"], message.get("mu"))
+            if isinstance(message.get("query"), str):
+                asked = scenes.asked(message["query"])
+                self._show(asked.scene, asked.mu, asked.built)
             if isinstance(message.get("built"), str):
                 self._show(scenes.OWN, message.get("mu"), message["built"][: scenes.LONGEST])
             if isinstance(message.get("save"), dict):
                 self._save(**message["save"])
             if isinstance(message.get("fall"), dict):
                 self._fall(**message["fall"])
-            if isinstance(message.get("bounds"), dict):
-                self._bound(**message["bounds"])
+            if isinstance(message.get("measure"), dict):
+                self._measure(**message["measure"])
         except (InputError, NotJammedError, UndecidedError, TypeError) as error:
             self._send_msg({"error": str(error)})
 
@@ -112,9 +123,9 @@ class Small(Scripted):
             lambda file: self._send_msg({"file": base64.b64encode(file).decode()}),
         )
 
-    def _bound(self, mu, load):
+    def _measure(self, mu, load, plane):
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
-            lambda job: scenes.bounds(scenes.packing_of(name, mu, built), load),
-            lambda bounds: self._send_msg({"bounds": bounds, "mu": mu}),
+            lambda job: scenes.measured(scenes.packing_of(name, mu, built), load, plane),
+            lambda found: self._send_msg({"measured": found, "mu": mu, "plane": plane}),
         )

@@ -2,6 +2,8 @@
 // the network on screen as a point in it. With more dimensions, its shadow.
 
 const TURN = 0.008 // radians a pixel
+// Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
+const BESIDE = [[46, 46], [95, 46], [110, 46], [30, 30], [60, 50]]
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
 class Space {
@@ -14,7 +16,8 @@ class Space {
     this.half = 0
     this.centre = null
     this.held = null
-    this.shadow = [0, 1] // contacts whose f_n are its axes above three dimensions
+    this.shadow = [0, 2] // forces that are its axes above three dimensions: 2 c for f_n, 2 c + 1 for f_t
+    this.outline = { points: [], stale: true } // of S on them, flat, by linear programs
     this.dots = []
     const at = (event) => {
       const box = canvas.getBoundingClientRect()
@@ -41,7 +44,7 @@ class Space {
     const { body } = this
     if (body.h > 3) {
       const F = body.forces(u)
-      return [F[2 * this.shadow[0]], F[2 * this.shadow[1]], 0]
+      return [F[this.shadow[0]], F[this.shadow[1]], 0]
     }
     if (body.h < 3) return [u[0] ?? 0, u[1] ?? 0, 0]
     return this.view.map((row) => dot(row, u))
@@ -51,7 +54,7 @@ class Space {
   moving(u, dx, dy) {
     const { body } = this
     if (body.h > 3) {
-      const row = (c) => body.axes.map((axis) => axis[2 * c])
+      const row = (k) => body.axes.map((axis) => axis[k])
       const [a, b] = this.shadow.map(row), M = [[dot(a, a), dot(a, b)], [dot(a, b), dot(b, b)]]
       const part = solve(M, [dx, dy]) ?? [dx / (M[0][0] || 1), 0]
       return u.map((v, k) => v + part[0] * a[k] + part[1] * b[k])
@@ -60,8 +63,23 @@ class Space {
     return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
   }
 
+  /** Half the width and height that S may take, which leaves room for words. */
+  get room() {
+    const { clientWidth: w, clientHeight: h } = this.canvas, [x, y] = BESIDE[Math.min(this.body.h, 4)]
+    return [w / 2 - Math.min(x, 0.25 * w), h / 2 - Math.min(y, 0.2 * h)]
+  }
+
+  /** Pixels of a unit of force. */
+  get unit() { return this.room[1] / this.half }
+
+  /** How far this is from the middle of the picture, as a part of the room that it needs there. */
+  far([dx, dy]) {
+    const [wide, high] = this.room
+    return this.body.h === 3 ? Math.hypot(dx, dy) * Math.max(1, high / wide) : Math.max((Math.abs(dx) * high) / wide, Math.abs(dy))
+  }
+
   px([x, y]) {
-    const { clientWidth: w, clientHeight: h } = this.canvas, unit = (0.5 * Math.min(w, h) - 46) / this.half
+    const { clientWidth: w, clientHeight: h } = this.canvas, { unit } = this
     return [w / 2 + (x - this.centre[0]) * unit, h / 2 - (y - this.centre[1]) * unit]
   }
 
@@ -69,12 +87,13 @@ class Space {
   frame(at_once) {
     const { body } = this
     const points = (body.whole ? body.corners.map(({ u }) => u) : [...this.dots, body.u]).map((u) => this.flat(u))
+    if (!body.whole) points.push(...this.corners())
     if (!points.length) return false
     const [xs, ys] = [0, 1].map((k) => points.map((p) => p[k]))
     const middle = [xs, ys].map((v) => (Math.max(...v) + Math.min(...v)) / 2)
     if (body.h === 3) middle.splice(0, 2, ...this.flat(body.middle))
-    const reach = Math.max(...points.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1])), 1e-6)
-    if (!this.centre || at_once) { this.centre = middle; this.half = reach > 1e-3 * body.scaleOf() ? reach * 1.25 : 0.5 * body.scaleOf(); return false }
+    const reach = Math.max(...points.map((p) => this.far([p[0] - middle[0], p[1] - middle[1]])), 1e-6)
+    if (!this.centre || at_once) { this.centre = middle; this.half = reach > 1e-3 * body.scaleOf() ? reach * 1.1 : 0.5 * body.scaleOf(); return false }
     const wanted = reach > this.half ? reach * 1.15 : reach < 0.12 * this.half ? reach * 4 : this.half
     const away = Math.hypot(middle[0] - this.centre[0], middle[1] - this.centre[1])
     const moves = Math.abs(wanted - this.half) > 0.01 * this.half || away > 0.02 * this.half
@@ -86,7 +105,7 @@ class Space {
   fill() {
     const { body } = this
     this.dots = []
-    if (body.empty || !body.h || (body.whole && !body.bounded) || body.least(body.u) < -1e-6) return
+    if (body.empty || !body.h || !body.bounded || body.least(body.u) < -1e-6) return
     let u = body.u
     const between = Math.max(1, Math.ceil(body.h / 2))
     const draws = Math.min(DRAWS, WORK / (between * body.h * body.rows.length))
@@ -108,14 +127,15 @@ class Space {
     g.setTransform(ratio, 0, 0, ratio, 0, 0)
     g.clearRect(0, 0, w, h)
     this.labels = []
+    if (body.scene.idle) return this.write(w / 2, h / 2, "nothing presses yet", look.ink, 14)
     if (body.empty) return this.write(w / 2, h / 2, "S is empty: no forces hold this", look.warm, 14)
     const moves = this.frame(this.sceneDrawn !== body.scene)
     this.sceneDrawn = body.scene
+    if (body.h > 3) this.drawShadow()
     if (look.dots) this.drawDots()
     if (body.h === 1) this.drawSegment()
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) this.drawSolid()
-    if (body.h > 3) this.drawShadow()
     if (body.whole && body.h > 1 && look.contact !== null) this.drawInterval(look.contact)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
@@ -130,18 +150,19 @@ class Space {
     return moves
   }
 
-  write(x, y, text, colour, size = 12, align = "center") {
+  write(x, y, text, colour, size = 13, align = "center") {
     const { context: g, canvas } = this
     g.font = `${size}px sans-serif`
-    g.textAlign = align
+    g.textAlign = align === "middle" ? "center" : align
     g.textBaseline = "middle"
-    const words = [text], wide = g.measureText(text).width
-    if (wide > canvas.clientWidth - 12) { // in two lines
+    const words = text.split("\n"), wide = g.measureText(text).width
+    if (words.length === 1 && align === "center" && wide > canvas.clientWidth - 12) { // in two lines
       const middle = text.indexOf(" ", text.length / 2)
       if (middle > 0) words.splice(0, 1, text.slice(0, middle), text.slice(middle + 1))
     }
     const half = Math.max(...words.map((line) => g.measureText(line).width)) / 2
     if (align === "center") x = Math.min(Math.max(x, half + 5), canvas.clientWidth - half - 5)
+    y -= 0.6 * size * (words.length - 1)
     g.lineWidth = 3
     g.strokeStyle = this.look.paper
     g.fillStyle = colour
@@ -187,7 +208,8 @@ class Space {
       const k = side.corners[0], [x, y] = ends[k], below = order.indexOf(k) ? -1 : 1, lit = this.lit(side)
       g.fillStyle = side.cap ? look.paper : lit ? look.hand : look.cold
       if (!side.cap) g.fillRect(x - 3, y - 13, 6, 26)
-      this.write(x, y + below * 34, side.cap ? "no end this way" : this.told("words", side), lit ? look.hand : look.ink)
+      const text = side.cap ? "no end this way" : this.told("words", side), narrow = g.measureText(text).width > 2 * BESIDE[1][0]
+      this.write(x, y + below * 34, narrow ? text.replace(/ and (?=at |between )/, "\nand ") : text, lit ? look.hand : look.ink)
       this.labels.push({ side, x, y, reach: 30 })
     })
   }
@@ -207,7 +229,9 @@ class Space {
     g.closePath()
     g.fillStyle = look.shade
     g.fill()
-    for (const side of body.sides) {
+    const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
+    this.taken = [] // by words: those of the longest sides come first
+    for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
       const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)
       g.strokeStyle = lit ? look.hand : look.cold
       g.lineWidth = lit ? 5 : 2.5
@@ -217,14 +241,35 @@ class Space {
       g.lineTo(...b)
       g.stroke()
       g.setLineDash([])
-      const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], away = Math.hypot(x - middle[0], y - middle[1]) || 1
-      const [ux, uy] = [(x - middle[0]) / away, (y - middle[1]) / away], long = Math.hypot(a[0] - b[0], a[1] - b[1])
+      const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], long = Math.hypot(a[0] - b[0], a[1] - b[1]) || 1
+      const normal = [(a[1] - b[1]) / long, (b[0] - a[0]) / long] // outwards
+      const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
       const text = side.cap ? "no end this way" : this.told("words", side)
-      g.font = "11px sans-serif"
-      const far = 10 + 0.5 * g.measureText(text).width * Math.abs(ux)
-      if (long > 14 || lit) this.write(x + far * ux, y + (far + 6) * uy, text, lit ? look.hand : look.ink, 11)
+      g.font = "13px sans-serif"
+      const words = g.measureText(text).width > long - 8 ? text.replace(/ (at|between) /, "\n$1 ") : text
+      if (long > 14 || lit) this.besides(x, y, ux, uy, words, lit)
       this.labels.push({ side, a, b, reach: 14 })
     }
+  }
+
+  /** Words outside a side at (x, y), u its normal: along it where they can be read so, else beside it. */
+  besides(x, y, ux, uy, text, lit) {
+    const { context: g, look } = this, lines = text.split("\n"), high = 12 + 7 * (lines.length - 1)
+    const wide = Math.max(...lines.map((line) => g.measureText(line).width)), along = Math.abs(uy) >= 0.64
+    const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
+    if (!this.free(at, along ? wide * Math.abs(uy) : wide, along ? wide * Math.abs(ux) + high : 2 * high) && !lit) return
+    g.save()
+    g.translate(...at)
+    if (along) g.rotate(Math.atan(-ux / uy))
+    this.write(0, 0, text, lit ? look.hand : look.ink, 13, "middle")
+    g.restore()
+  }
+
+  /** Whether nothing is written yet where these words shall be; then they have their place. */
+  free([x, y], wide, high) {
+    if (this.taken.some((t) => Math.abs(t.x - x) < 0.4 * (t.wide + wide) && Math.abs(t.y - y) < 0.35 * (t.high + high))) return false
+    this.taken.push({ x, y, wide, high })
+    return true
   }
 
   drawSolid() {
@@ -297,17 +342,40 @@ class Space {
     })
   }
 
+  corners() {
+    const { points } = this.outline
+    return Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1]])
+  }
+
   drawShadow() {
     const { context: g, look, canvas } = this, { clientWidth: w, clientHeight: h } = canvas
     g.strokeStyle = look.edge
     g.lineWidth = 1
     g.strokeRect(30, 8, w - 40, h - 40)
-    const [a, b] = this.shadow.map((c) => this.told("name", c))
-    this.write(w / 2, h - 16, `→ fₙ ${a}`, look.ink, 12)
+    const corners = this.corners().map((p) => this.px(p)), { stale } = this.outline
+    if (corners.length) {
+      g.beginPath()
+      corners.forEach((p, n) => (n ? g.lineTo(...p) : g.moveTo(...p)))
+      g.closePath()
+      g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
+      g.fillStyle = look.shade
+      g.fill()
+      g.strokeStyle = look.cold
+      g.lineWidth = 2.5
+      g.setLineDash(stale ? [4, 4] : [])
+      g.stroke()
+      g.setLineDash([])
+      g.globalAlpha = 1
+    }
+    const ends = [0, 1].map((k) => { const all = this.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
+    for (const v of ends[0]) this.write(this.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)
+    for (const v of ends[1]) this.write(52, this.px([0, v])[1], v.toFixed(2), look.cold, 11)
+    const [a, b] = this.shadow.map((k) => this.told("name", k))
+    this.write(w / 2, h - 16, `→ ${a}`, look.ink)
     g.save()
     g.translate(15, h / 2)
     g.rotate(-Math.PI / 2)
-    this.write(0, 0, `→ fₙ ${b}`, look.ink, 12, "left")
+    this.write(0, 0, `→ ${b}`, look.ink, 13, "middle")
     g.restore()
   }
 
@@ -336,7 +404,7 @@ class Space {
       Object.assign(held, { px, py })
       return this.told("turned")
     }
-    const unit = (0.5 * Math.min(this.canvas.clientWidth, this.canvas.clientHeight) - 46) / this.half
+    const { unit } = this
     this.told("go", this.moving(held.u, (px - held.px) / unit, -(py - held.py) / unit))
   }
 

@@ -16,7 +16,7 @@ WHAT = {
     "eta": "η(μ)",
     "extent": "P(ΔFₙ)",
     "correlation": "corr(μ)",
-    "scatter": "ΔFₙ – fₙ",
+    "scatter": "ΔFₙ against fₙ",
     "force": "P(fₙ)",
 }
 SCALES = {"linear": "linear", "log": "logarithmic"}

@@ -22,7 +22,7 @@ SAMPLERS = {
     "exact": "exact",
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
-OWN = "finished results"
+OWN = "precomputed results"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
@@ -91,7 +91,7 @@ def indeterminacy(own, exact, log):
     _own(seen, statistics.means(own, "eta3", factor=0.15), log, COLOURS[0], MARKERS[0])
     _own(seen, statistics.means(exact, "eta3", factor=0.15), log, COLOURS[3], MARKERS[3])
     corner(seen, "dashed exact, others measured")
-    z = _over_mu("coordination", "contacts per grain z", 220)
+    z = _over_mu("coordination", "contacts per disk z", 220)
     _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
     _own(z, statistics.means(own, "coordination"), False, COLOURS[0])
     corner(z, "measured: of the packings")
@@ -102,8 +102,8 @@ def indeterminacy(own, exact, log):
         f"How undetermined the forces are, against friction: {term('eta1')}, {term('eta2')}, "
         f"{term('eta3', '0.15 η3')}; {STUDY}; {RINGS}. Friction "
         "widens what each contact may carry, but a packing made with more of it has fewer contacts "
-        "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ is "
-        "a packing of its own. A tap on a point shows the states of that μ, or asks for them. The "
+        "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ "
+        "has its own packing. A tap on a point shows the states of that μ, or asks for them. The "
         f"second figure: 0.15 η3 of the {term('walk', 'random walk')}, of the "
         f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')} to two unbalances, of states "
         f"{term('uniform')}, and {term('exact', 'exact')}."

@@ -22,8 +22,8 @@ STYLE = """
 # Words and symbol, name among the summary's numbers, form, and key of the glossary.
 TILES = (
     ("disks N", "n", "d", "n"),
-    ("covered φ", "packing_fraction", ".4f", "phi"),
-    ("contacts per grain z", "coordination", ".3f", "z"),
+    ("packing fraction φ", "packing_fraction", ".4f", "phi"),
+    ("contacts per disk z", "coordination", ".3f", "z"),
     ("free dimensions h", "dimension", "d", "h"),
     ("spread η1", "eta1", ".4f", "eta1"),
     ("distance η2", "eta2", ".4f", "eta2"),

@@ -20,17 +20,18 @@ STEPS = (
         "scene",
     ),
     (
-        "Not the only way to hold",
-        "The same disks, in the same places, held by other forces: the picture goes over to "
-        "another network and back, and every network on the way balances every disk, too. Nothing "
-        "in mechanics says which of them the packing carries; drag the slider to go yourself.",
+        "Other forces balance too",
+        "The same disks, in the same places, held by other forces: the picture changes into "
+        "another network and back, and every network on the way balances every disk, too. Balance "
+        "and friction alone don't say which of them the packing carries. Drag the slider under "
+        "the packing to step through them yourself.",
         "scene",
     ),
     (
-        "Take a force in your hand",
-        "Drag the marked contact: its force goes from the least to the largest that it can have, "
-        "and the others follow, so that every disk stays in balance. Let go and it stays (Z takes "
-        "it back); the pale bars say how far each contact can go.",
+        "Grab a force",
+        "Drag the marked contact: its force moves between its smallest and largest possible "
+        "values, and the others follow, so that every disk stays in balance. Let go and it stays "
+        "(press Z to undo); the pale bars show how far each contact can go.",
         "scene",
     ),
     (
@@ -41,16 +42,17 @@ STEPS = (
         "plane",
     ),
     (
-        "Friction decides how many",
-        "More friction widens what each contact may carry, but leaves fewer contacts per grain "
+        "How friction matters",
+        "More friction widens what each contact may carry, but leaves fewer contacts per disk "
         "(z), so that the indeterminacy η rises and then falls. Drag the friction μ, marked here, "
-        "and see packing and forces change.",
+        "and watch the packing and its forces change.",
         "friction",
     ),
     (
-        "What it means when you push",
+        "Push until it gives way",
         "Two forces press the disks of the marked contact apart until the packing gives way: press "
-        "Push to see how much it bears, and how it begins to move. That is all; touch anything.",
+        "Push to see how much load it can take, and how it begins to move. That's the tour. Try "
+        "anything.",
         "perturb",
     ),
 )

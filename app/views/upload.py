@@ -23,12 +23,19 @@ contacts; <b>tables</b> (CSV): grains with columns x, y, r, and, if there are an
 columns i, j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
 y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code>
 of PeGS 2, for which the nearest forces in balance are found. The files are read in memory; only a
-packing is kept, in the cache; a frame is not.
+packing is kept, in the cache; a frame is not, unless it is opened as one.
 """
 REPORT = """
 <table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
 """
 ROW = '<tr><td style="padding:2px 18px 2px 0;opacity:.75">{}</td><td><b>{}</b></td></tr>'
+WALLS = {
+    "": "as listed",
+    "box": "a box",
+    "annulus": "an annulus",
+    "circle": "a circle",
+    "open": "left open",
+}
 SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
 
 
@@ -52,6 +59,9 @@ class View:
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
         self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
         self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
+        self.walls = pmui.Select(
+            label="Walls", options={words: key for key, words in WALLS.items()}, **SMALL
+        )
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
@@ -67,7 +77,7 @@ class View:
         return pn.Column(
             self.dropper,
             pn.FlexBox(
-                *(self.mu, self.box, self.pressure, self.reverse, self.read),
+                *(self.mu, self.box, self.pressure, self.walls, self.reverse, self.read),
                 sizing_mode="stretch_width",
             ),
             Progress(self.task),
@@ -83,7 +93,7 @@ class View:
         """Show the fields that the files at hand need."""
         kind = uploads.family(self.files) if self.files else None
         self.mu.visible = kind in ("lammps", "table", "pegs", "solved")
-        self.reverse.visible = kind in ("pegs", "solved")
+        self.reverse.visible = self.walls.visible = kind in ("pegs", "solved")
         self.box.visible = self.pressure.visible = kind == "table"
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
 
@@ -121,7 +131,7 @@ class View:
         kind = uploads.family(self.files)
         options = {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
         if kind in ("pegs", "solved"):
-            options["reverse"] = self.reverse.value
+            options |= {"reverse": self.reverse.value, "walls": self.walls.value or None}
         if kind == "table":
             sides = (self.box.value_input or self.box.value).replace(",", " ").split()
             if len(sides) not in (0, 2, 3):
@@ -142,9 +152,17 @@ class View:
         self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
 
     def _compare(self, frame):
-        """Measured beside inferred forces; the frame itself stays here, as it has no pressure."""
-        shown = measured.Frames(frame, dict(self.files), self.task, **self._options())
+        """Measured beside inferred forces."""
+        options = self._options()
+        shown = measured.Frames(frame, dict(self.files), self.task, self._open, **options)
         self.frame[:] = shown.panel()
+
+    def _open(self, frame):
+        """The frame as a packing like any other."""
+        if self.task.running:
+            return
+        packing, source = frame.packing, f"{frame.source}, frame {frame.report['frame']}"
+        self.task.start(uploads.keep(self.state.library, packing, source), self._show)
 
     def _clear(self):
         self.report.object = ""

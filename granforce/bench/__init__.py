@@ -15,7 +15,7 @@ from granforce.bench.report import environment, note, table
 from granforce.bench.skips import skips
 from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
 from granforce.bench.states import batches, interval_methods, intervals, walks
-from granforce.bench.uniform import uniform
+from granforce.bench.uniform import uniform, uniform_growth
 from granforce.system.files import make_folder, written
 from granforce.system.plain import json_text
 
@@ -43,6 +43,7 @@ __all__ = [
     "starts",
     "tile",
     "uniform",
+    "uniform_growth",
     "walks",
 ]
 
@@ -63,6 +64,7 @@ PARTS = {
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),
     "uniform": (uniform, "Uniform sampling of S"),
+    "uniform_growth": (uniform_growth, "Uniform sampling against the number of disks"),
     "inference": (inference, "The likeliest network of a measurement"),
     "frames": (frames, "Photoelastic frames of known forces: distance from the truth in ⟨f_n⟩"),
     "knowledge": (knowledge, "What is prescribed and known, beside HiGHS and PIQP"),

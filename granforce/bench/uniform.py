@@ -3,6 +3,7 @@
 hopsy (pip install hopsy) is optional: it brings GLPK, and is used for nothing else.
 """
 
+import resource
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -11,12 +12,21 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from granforce.bench.report import note
-from granforce.explore.billiard import all_rows
+from granforce.bench.report import exponent, note
+from granforce.bench.solvers import tile
+from granforce.explore.billiard import all_rows, make_rows, some_rows
 from granforce.explore.mixing import Mixing, mixing
-from granforce.explore.uniform import METHODS, forces_of, step, varying, warm_up
+from granforce.explore.uniform import (
+    METHODS,
+    forces_of,
+    sample_uniform,
+    step,
+    varying,
+    warm_up,
+)
 from granforce.explore.walls import walls
 from granforce.forces.ensemble import ensemble
+from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
 
 # Dimension up to which hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79, is waited
@@ -24,6 +34,12 @@ from granforce.packing.compaction import pack
 MOST_ROUNDED = 60
 STATES = 1000
 HOPSY_STATES = 600
+# Walls up to which a dense null space is waited for: 1600 disks at μ = 0.1.
+MOST_DENSE_WALLS = 6000
+# States of each chain by which a way to keep rows is timed, after as many that fill them.
+_TIMED = 2
+# Where rows of K lie, as parts of `billiard.MEMORY`.
+ROOMS = {"16 rows at a time": 0.0, "rows within 1 GiB": 1.0, "all rows kept": 1e3}
 
 
 def uniform(quick=True, *, n=None, frictions=None, seed=1, rounded=None):
@@ -87,6 +103,65 @@ def _ours(S, made, kept, method, seed):
         seconds = time.process_time() - begin
     states = forces_of(S, made, np.array([one.slacks for one in done]))
     return _Run(method, states, mixing(states, varying(S, made)), seconds, 0.0)
+
+
+def uniform_growth(quick=True, *, n=None, mu=0.1, tiles=None, effective=100, seed=1):
+    """Rows: what an effective state takes against the number of disks, one packing repeated.
+
+    reached: `effective` states (bulk and tail, of every component) were drawn, in `seconds` of
+    processor time in all, set-up, warm-up and diagnosis included; peak_MB: largest memory of the
+    process until then. seconds_per_state: processor time per effective state of going on, by where
+    rows of K lie, which changes no bit of the states. setup_seconds: centre, factor and, where
+    there is room, rows of K; null_space_ratio: a dense null space of the balance over that.
+    """
+    n, tiles = n or (100 if quick else 400), tiles or ((1, 2) if quick else (1, 2, 4))
+    base = ensemble(pack(n, mu, seed))
+    sample_uniform(ensemble(tile(base, 1), prune=False), 8)  # compiles
+    rows = []
+    for k in tiles:
+        note(f"uniform: N = {n * k * k}")
+        S = ensemble(tile(base, k), prune=False)
+        begin = time.process_time()
+        made = walls(S)
+        all_rows(made)
+        setup = time.process_time() - begin
+        begin = time.process_time()
+        sample = sample_uniform(S, effective, seed=seed, effective=effective)
+        row = {"n": n * k * k, "h": made.dimension, "walls": made.count, "states": len(sample.flat)}
+        row |= {"effective": sample.effective, "reached": sample.reached}
+        row |= {"seconds": time.process_time() - begin, "peak_MB": _peak(), "setup_seconds": setup}
+        if made.count <= MOST_DENSE_WALLS:
+            row["null_space_ratio"] = _null_space(S, made) / setup
+        worth = sample.effective / len(sample.flat)
+        for place, part in ROOMS.items():
+            cost = {
+                "n": n * k * k,
+                "rows": place,
+                "seconds_per_state": _going_on(sample, part) / worth,
+            }
+            rows.append(cost | row if part == 1.0 else cost)
+    fits = {
+        place: exponent([(r["n"], r["seconds_per_state"]) for r in rows if r["rows"] == place])
+        for place in ROOMS
+    }
+    return rows + [{"n": "fit", "rows": place, "exponent": fit} for place, fit in fits.items()]
+
+
+def _peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+
+
+def _going_on(sample, part):
+    """Seconds of processor time per state, rows of K in a part of the memory meant for them."""
+    made, ends, rows = sample.walls, sample.ends, some_rows(sample.walls, part)
+    if len(rows.owner) == made.count:
+        for first in range(0, len(made.moving), LANES):
+            make_rows(made, rows, range(first, min(first + LANES, len(made.moving))))
+    for _ in range(2):
+        begin = time.process_time()
+        ends, _ = step(made, ends, count=_TIMED, reach=sample.reach, rows=rows)
+        seconds = time.process_time() - begin
+    return seconds / (_TIMED * len(ends))
 
 
 def _null_space(S, made):

@@ -66,6 +66,7 @@ def _packing_parameters(arguments, mu, seed):
         box_mass=arguments.box_mass,
         sweeps=arguments.sweeps,
         accuracy=arguments.step_accuracy,
+        box=arguments.box,
     )
 
 

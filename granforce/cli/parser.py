@@ -132,6 +132,13 @@ def _add_packing(command, several=False):
         help="breach of the contact laws that ends a step, relative to the fastest grain "
         "(default 0.01)",
     )
+    group.add_argument(
+        "--box",
+        choices=("square", "isotropic"),
+        default="square",
+        help="square, or a cell whose sides and tilt follow until the stress is isotropic, so that "
+        "the packing is jammed against shear too (default square)",
+    )
 
 
 def _add_any_packing(command):
@@ -195,8 +202,8 @@ def _add_pack(commands):
     command.add_argument(
         "--scene",
         metavar="NAME",
-        help="a small scene in place of a packing made from a gas: groove, box, pyramid, leaning, "
-        "column, six, solid or many; of the other options, it takes --mu alone",
+        help="a small scene in place of a packing made from a gas: groove, box, pyramid, press, "
+        "leaning, column, six, solid or many; of the other options, it takes --mu alone",
     )
     _add_packing(command)
     _add_store(command)

@@ -59,7 +59,7 @@ def all_rows(walls):
 
 def some_rows(walls, part):
     """Rows with room in a part of MEMORY, none of them there yet."""
-    return _room(walls.count, max(2 * lanes.LANES, int(part * MEMORY / (8 * walls.count))))
+    return _room(walls.count, max(2 * lanes.LANES, int(part * MEMORY / (8 * max(1, walls.count)))))
 
 
 def _room(count, places):
@@ -121,78 +121,62 @@ def follow(walls, rows, flights, on):
 
 
 @compiled
-def straight(rows, speeds, lengths, flight, limit, out, stop):
-    """Billiard walk (Polyak, Gryazina, EJOR 238, 497 (2014)): straight paths, mirrored at walls.
+def fly(rows, speeds, times, middles, flight, limit, out, stop):
+    """Path after path of speeds (paths, walls) and times (paths,), from where the last one ended.
 
-    Path after path has the speeds (paths, walls), of a random direction, and a length (paths,)
-    whose law does not depend on the place: the flow of the billiard keeps volume and can be run
-    backwards, so the uniform measure is stationary (their Theorem 1). A path with more than `limit`
-    turns is not taken, which is as likely as for its reverse. out (paths, walls) gets the slacks
-    after each. Returns −1, or the wall whose row is missing. Ends early, with states that mean
-    nothing, once stop[0] is raised.
+    Without middles (0, walls) they are straight, and mirrored at walls: a billiard walk (Polyak,
+    Gryazina, EJOR 238, 497 (2014)). For speeds in a random direction and times whose law does not
+    depend on the place, its flow keeps volume and can be run backwards, so the uniform measure is
+    stationary (their Theorem 1). With middles (paths, walls), or (1, walls) for all, they are
+    middle + (s − middle) cos t + w sin t, for up to π/2, and leave the normal distribution of
+    covariance K around the slacks `middle`, cut by the walls, as it is: energy is conserved and
+    walls are met at times in closed form (Pakman, Paninski, arXiv:1208.4118).
+
+    A path with more than `limit` turns is not taken, which is as likely as for its reverse. out
+    (paths, walls) gets the slacks after each. Returns −1, or the wall whose row is missing. Ends
+    early, with states that mean nothing, once stop[0] is raised.
     """
     s, w, rate, left, count = flight.s, flight.w, flight.rate, flight.left, flight.count
-    top = np.empty(LANES)
-    while count[_PATH] < len(lengths):
-        path = count[_PATH]
-        if not count[_FLYING]:
-            _begin(flight, speeds[path], lengths[path])
-        _advance(s, w, rate, rows.values[0], 0.0, 0.0)
-        while True:
-            wall, fastest = _next_wall(rate, top)
-            if fastest * left[0] <= 1.0:
-                _axpy(s, left[0], w)
-                break
-            if count[_HITS] == limit or stop[0]:
-                _refuse(flight)
-                break
-            place = rows.place[wall]
-            if place < 0:
-                return wall
-            rows.used[place] = True
-            row, time = rows.values[place], 1.0 / fastest
-            left[0] -= time
-            _advance(s, w, rate, row, time, 2.0 * w[wall] / row[wall])
-            count[_HITS] += 1
-        _end(flight, out[path])
-    return -1
-
-
-@compiled
-def harmonic(rows, speeds, middles, times, flight, limit, out, stop):
-    """Paths middle + (s − middle) cos t + w sin t, mirrored at walls that are met.
-
-    They leave the normal distribution of covariance K around the slacks `middle`, cut by the walls,
-    as it is: energy is conserved and walls are met at times in closed form (Pakman, Paninski,
-    arXiv:1208.4118). middles (paths, walls), or (1, walls) for all; times (paths,) up to π/2; other
-    arguments and what is returned as for `straight`.
-    """
-    s, w, rate, left, count = flight.s, flight.w, flight.rate, flight.left, flight.count
-    top = np.empty(LANES)
+    top, still, harmonic = np.empty(LANES), rows.values[0], len(middles) > 0
     while count[_PATH] < len(times):
         path = count[_PATH]
-        middle = middles[min(path, len(middles) - 1)]
+        middle = middles[min(path, len(middles) - 1)] if harmonic else s
         if not count[_FLYING]:
             _begin(flight, speeds[path], times[path])
-        while True:
+        if harmonic:
             _meetings(s, w, middle, rate)
+        else:
+            _advance(s, w, rate, still, 0.0, 0.0)
+        while True:
             wall, soonest = _next_wall(rate, top)
-            if soonest * np.tan(0.5 * left[0]) <= 1.0:
-                _swing(s, w, middle, np.cos(left[0]), np.sin(left[0]))
+            if soonest * (np.tan(0.5 * left[0]) if harmonic else left[0]) <= 1.0:
+                if harmonic:
+                    _swing(s, w, middle, rate, still, np.cos(left[0]), np.sin(left[0]), 0.0)
+                else:
+                    _axpy(s, left[0], w)
                 break
             if count[_HITS] == limit or stop[0]:
-                _refuse(flight)
+                s[:] = flight.start
+                count[_REFUSED] += 1
                 break
             place = rows.place[wall]
             if place < 0:
                 return wall
             rows.used[place] = True
-            row, time = rows.values[place], 2.0 * np.arctan(1.0 / soonest)
+            row, time = rows.values[place], 1.0 / soonest
+            if harmonic:
+                time = 2.0 * np.arctan(time)
+                cos, sin = np.cos(time), np.sin(time)
+                kick = 2.0 * (cos * w[wall] - sin * (s[wall] - middle[wall])) / row[wall]
+                _swing(s, w, middle, rate, row, cos, sin, kick)
+            else:
+                _advance(s, w, rate, row, time, 2.0 * w[wall] / row[wall])
             left[0] -= time
-            _swing(s, w, middle, np.cos(time), np.sin(time))
-            _axpy(w, -2.0 * w[wall] / row[wall], row)
             count[_HITS] += 1
-        _end(flight, out[path])
+        out[path] = s
+        count[_TURNS] += count[_HITS]
+        count[_PATH] += 1
+        count[_FLYING] = 0
     return -1
 
 
@@ -224,20 +208,6 @@ def _begin(flight, speeds, left):
 
 
 @within
-def _refuse(flight):
-    flight.s[:] = flight.start
-    flight.count[_REFUSED] += 1
-
-
-@within
-def _end(flight, out):
-    out[:] = flight.s
-    flight.count[_TURNS] += flight.count[_HITS]
-    flight.count[_PATH] += 1
-    flight.count[_FLYING] = 0
-
-
-@within
 def _axpy(x, factor, y):
     for i in range(len(x)):
         x[i] += factor * y[i]
@@ -256,32 +226,40 @@ def _advance(s, w, rate, row, time, kick):
 
 
 @within
+def _swing(s, w, middle, rate, row, cos, sin, kick):
+    """As `_advance` on harmonic paths, by the cosine and sine of a time, in one pass."""
+    for k in range(len(s)):
+        away, speed = s[k] - middle[k], w[k]
+        slack = middle[k] + cos * away + sin * speed
+        speed = cos * speed - sin * away - kick * row[k]
+        s[k] = slack
+        w[k] = speed
+        rate[k] = _meeting(slack, speed, middle[k])
+
+
+@within
 def _meetings(s, w, middle, rate):
-    """The inverse of tan(t/2) for the time t < π at which each slack is 0 first; 0 if it never is.
+    """The rate of each wall where a harmonic path begins."""
+    for k in range(len(s)):
+        rate[k] = _meeting(s[k], w[k], middle[k])
+
+
+@within
+def _meeting(slack, speed, middle):
+    """The inverse of tan(t/2) for the time t < π at which a slack is 0 first; 0 if it never is.
 
     middle + (s − middle) cos t + w sin t = 0 is, for the inverse q of tan(t/2), the quadratic
     equation s q² + 2 w q + 2 middle − s = 0; of the two forms of its larger root the one is taken
     in which nothing cancels.
     """
-    for k in range(len(s)):
-        slack, speed = s[k], w[k]
-        slack = slack if slack > _LEAST else _LEAST
-        rest = 2.0 * middle[k] - slack
-        square = speed * speed - rest * slack
-        reaches = square > 0.0
-        root = np.sqrt(square if reaches else 0.0)
-        above = root - speed if speed < 0.0 else -rest
-        below = slack if speed < 0.0 else root + speed
-        rate[k] = above / below if reaches else 0.0
-
-
-@within
-def _swing(s, w, middle, cos, sin):
-    """Slacks and their speeds after a time whose cosine and sine are given."""
-    for k in range(len(s)):
-        away, speed = s[k] - middle[k], w[k]
-        s[k] = middle[k] + cos * away + sin * speed
-        w[k] = cos * speed - sin * away
+    slack = slack if slack > _LEAST else _LEAST
+    rest = 2.0 * middle - slack
+    square = speed * speed - rest * slack
+    reaches = square > 0.0
+    root = np.sqrt(square if reaches else 0.0)
+    above = root - speed if speed < 0.0 else -rest
+    below = slack if speed < 0.0 else root + speed
+    return above / below if reaches else 0.0
 
 
 @within

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import HalfspaceIntersection
 
 from granforce import notebook
-from granforce.explore.walls import inner_point
+from granforce.explore.walls import inner_point, null_space
 from granforce.forces.ensemble import ensemble
 from granforce.numerics import certificates
 from granforce.records import InputError
@@ -82,7 +82,7 @@ def body(S):
     A, b, T = S.scaled_form
     y, held = inner_point(A, b)
     moving = np.flatnonzero(~held)
-    null = _null_space(A.toarray()[:, moving])
+    null = null_space(A.toarray()[:, moving])
     h = null.shape[1]
     if h > MOST_DIMENSIONS:
         raise InputError(f"S has {h} dimensions; up to {MOST_DIMENSIONS} can be drawn whole")
@@ -116,13 +116,6 @@ def fall(packing, mu=None):
     motion = np.zeros((len(packing.r), 3))
     motion[whole.grains, :size] = moved.reshape(-1, size)
     return motion / (np.abs(motion).max() or 1.0)
-
-
-def _null_space(dense):
-    """Orthonormal (n, h), by singular values."""
-    _, values, rows = np.linalg.svd(dense)
-    rank = int(np.sum(values > FLAT * values.max(initial=0.0)))
-    return rows[rank:].T
 
 
 def _balanced(A, b, y, moving):

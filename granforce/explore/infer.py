@@ -122,14 +122,19 @@ def infer(
     chains, workers = whole(chains, "chains", 1), whole(workers, "workers", 1)
     m, s = checked(ensemble, measured, sigma)
     best = likeliest(ensemble, m, s, unmeasured)
-    far = np.nan_to_num(np.abs(best.deviation)).max(axis=1, initial=0.0)
-    beyond = np.flatnonzero(far > SUSPECT)
     draws = None
     if states:
         draws = _draws(
             ensemble, *_fit(ensemble, m, s, unmeasured), states, chains, seed, workers, progress
         )
-    return Inference(
+    return told(Inference, ensemble, best, draws, begin)
+
+
+def told(kind, ensemble, best, draws, begin):
+    """The Inference, or one of its kind, of a likeliest network and draws, and what it took."""
+    far = np.nan_to_num(np.abs(best.deviation)).max(axis=1, initial=0.0)
+    beyond = np.flatnonzero(far > SUSPECT)
+    return kind(
         *best,
         ensemble.index[beyond[np.argsort(-far[beyond], kind="stable")]],
         ensemble.residual(best.forces),
@@ -137,6 +142,13 @@ def infer(
         draws,
         time.perf_counter() - begin,
     )
+
+
+def judged(ensemble, found, worth, mixed, counts, *seconds):
+    """The Draws of states (chains, k, N_c, 2), by the judges of the ensemble and their mixing."""
+    residual, violation = ensemble.residual(found), ensemble.violation(found)
+    inside = residual.max() <= BALANCED and violation.max() <= ADMISSIBLE
+    return Draws(found, residual, violation, worth, bool(inside and mixed), counts, *seconds)
 
 
 def _fit(ensemble, m, s, unmeasured):
@@ -167,15 +179,10 @@ def _draws(ensemble, weight, m, states, chains, seed, workers, progress):
         have += count
     found = np.concatenate(parts, axis=1)
     drawn = time.perf_counter()
-    residual, violation = ensemble.residual(found), ensemble.violation(found)
     worth = mixing(found, uniform.varying(ensemble, made))
-    inside = residual.max() <= BALANCED and violation.max() <= ADMISSIBLE
-    mixed = not made.dimension or worth.worst_r_hat <= uniform.MIXED
     counts |= {"dropped": _DROPPED * chains, "held": len(made.centre) - len(made.moving)}
-    return Draws(
-        *(found, residual, violation, worth, bool(inside and mixed), counts),
-        *(ready - begin, drawn - ready),
-    )
+    mixed = not made.dimension or worth.worst_r_hat <= uniform.MIXED
+    return judged(ensemble, found, worth, mixed, counts, ready - begin, drawn - ready)
 
 
 def step(made, ends, count, rows=None):
@@ -193,7 +200,8 @@ def step(made, ends, count, rows=None):
     limit, times = uniform.MOST_TURNS * (made.dimension + 1), np.array([_TIME])
 
     def on(drawn, flight, out):
-        return billiard.harmonic(rows, *drawn, times, flight, limit, out, cancelling.flag())
+        speeds, middles = drawn
+        return billiard.fly(rows, speeds, times, middles, flight, limit, out, cancelling.flag())
 
     pulls = np.broadcast_to(made.pull, (len(ends), made.pull.size))
     found, counts = [], 0

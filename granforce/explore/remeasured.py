@@ -17,13 +17,12 @@ import time
 
 import numpy as np
 
-from granforce.explore.infer import SUSPECT, Draws, Inference
+from granforce.explore.infer import Inference, judged, told
 from granforce.explore.mixing import Mixing
 from granforce.forces.likeliest import checked, fitted_many, likeliest
 from granforce.numerics.lanes import LANES
 from granforce.records import positive, whole
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED
 
 # Forces that were not measured are known to so many ⟨f_n⟩ beforehand.
 UNMEASURED = 2.0
@@ -77,26 +76,14 @@ def remeasured(
     scale = positive(unmeasured, "unmeasured") * ensemble.force_scale
     m, s = checked(ensemble, measured, sigma)
     best = likeliest(ensemble, m, s, unmeasured)
-    far = np.nan_to_num(np.abs(best.deviation)).max(axis=1, initial=0.0)
-    beyond = np.flatnonzero(far > SUSPECT)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), scale, s)
     found = _again(ensemble, best.forces, width, states, chains, seed, workers, progress)
-    drawn = time.perf_counter()
-    residual, violation = ensemble.residual(found), ensemble.violation(found)
     # Independent draws: there is nothing to mix, and nothing is said of it.
     worth = Mixing(*np.full((3, *s.shape), np.nan))
-    inside = bool(residual.max() <= BALANCED and violation.max() <= ADMISSIBLE)
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
-    draws = Draws(*(found, residual, violation, worth, inside, counts), 0.0, drawn - ready)
-    return Remeasured(
-        *best,
-        ensemble.index[beyond[np.argsort(-far[beyond], kind="stable")]],
-        ensemble.residual(best.forces),
-        ensemble.violation(best.forces),
-        draws,
-        time.perf_counter() - begin,
-    )
+    draws = judged(ensemble, found, worth, True, counts, 0.0, time.perf_counter() - ready)
+    return told(Remeasured, ensemble, best, draws, begin)
 
 
 def _again(ensemble, forces, s, states, chains, seed, workers, progress):

@@ -121,9 +121,10 @@ def step(made, ends, *, count, reach, rows=None, method="billiard"):
         return _hit_and_run(made, ends, count)
     rows = billiard.some_rows(made, 1.0) if rows is None else rows
     limit, lengths = MOST_TURNS * (made.dimension + 1), PATH * reach
+    straight = np.ones((0, made.count))
 
     def on(drawn, flight, out):
-        return billiard.straight(rows, *drawn, flight, limit, out, cancelling.flag())
+        return billiard.fly(rows, *drawn, straight, flight, limit, out, cancelling.flag())
 
     found, counts = [], 0
     left = count * PATHS_PER_STATE
@@ -142,7 +143,7 @@ def step(made, ends, *, count, reach, rows=None, method="billiard"):
 def flown(made, rows, ends, on, drawn):
     """Chains on by a batch of paths: (ends, slacks (chains, paths, walls), turns and refused).
 
-    on(drawn, flight, out): as `billiard.straight`, for what was drawn for the paths of a chain.
+    on(drawn, flight, out): as `billiard.fly`, for what was drawn for the paths of a chain.
     """
     flights = [billiard.make_flight(end.slacks) for end in ends]
     outs = np.ones((len(ends), len(drawn[0][0]), made.count))

@@ -8,7 +8,7 @@ averaged has a standard deviation of STEP:
     Z(β′)/Z(β) = ⟨exp(½ (β − β′) q)⟩_β = 1/⟨exp(−½ (β − β′) q)⟩_β′
 
 The geometric mean of both takes off the bias of either to first order. Draws follow harmonic paths
-between the walls (`billiard.harmonic`). Two ladders are climbed by chains of their own, one down
+between the walls (`billiard.fly`). Two ladders are climbed by chains of their own, one down
 from the narrowest distribution and one up from uniform states: were chains too short to forget
 where they came from, both would differ.
 """
@@ -175,14 +175,11 @@ def _flown(made, rows, rung, count):
     """The rung with so many more paths, in whole batches."""
     beta, end, found = rung.beta, rung.end, [rung.q]
     counts = np.zeros(2, dtype=np.int64)
-    limit, middle = uniform.MOST_TURNS * (made.dimension + 1), np.ones((1, made.count))
+    limit = uniform.MOST_TURNS * (made.dimension + 1)
+    middle = np.ones((1 if beta > 0 else 0, made.count))
 
     def on(drawn, flight, out):
-        stop = cancelling.flag()
-        if beta > 0:
-            speeds, times = drawn
-            return billiard.harmonic(rows, speeds, middle, times, flight, limit, out, stop)
-        return billiard.straight(rows, *drawn, flight, limit, out, stop)
+        return billiard.fly(rows, *drawn, middle, flight, limit, out, cancelling.flag())
 
     for _ in range(0, count, uniform.BATCH):
         speeds, parts = uniform.directions(made, end.rng, uniform.BATCH, unit=not beta)

@@ -18,6 +18,7 @@ from granforce.forces.contact_problem import (
     in_balance,
     independent_problem_of,
     inner_network,
+    is_a_point,
 )
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
@@ -30,12 +31,11 @@ from granforce.tolerances import BALANCED, FLAT
 
 # What every coordinate is asked to reach, if it can, in the point the centring starts from.
 _AWAY = 0.01
-# Rows of the balance whose pivot, relative to the diagonal, is below this follow from others once
-# some coordinates are held.
-_DEPENDENT = 1e-13
 _MOST_NEWTON_STEPS = 200
 # Newton's decrement at the centre: it only has to make S round. Steps are then balanced so often.
 _NEAR_CENTRE, _POLISH = 1e-3, 3
+# Dimensions up to which they are counted by dense matrices as well.
+_THIN = 4
 # Random forces that tell what varies in S.
 PROBES = 8
 
@@ -92,7 +92,7 @@ def walls(ensemble, weight=None, measured=None):
     if y is None:
         y, held = inner_point(A, b)
     else:
-        held = y == 0
+        held = (y == 0) | is_a_point(ensemble)
     frame = _frame(ensemble, y, held, weight, measured)
     return _walls(frame, _centred(frame, y))
 
@@ -180,7 +180,7 @@ def _frame(ensemble, y, held, weight, measured):
     frame = _Frame(ensemble, problem, contact, normal, held, stiff, target)
     if held.any():
         C, _, _ = _conductances(frame, _barrier(frame, y), stiff)
-        _, out = wall_matrix.factored(problem.network, C, problem.diagonal, _DEPENDENT)
+        _, out = wall_matrix.factored(problem.network, C, problem.diagonal, wall_matrix.DEPENDENT)
         without = contact_program.without_rows(problem, problem.diagonal, out)
         frame = frame._replace(problem=without)
     return frame
@@ -279,6 +279,10 @@ def _walls(frame, y):
     h, shape = _shape(frame, _barrier(frame, y), known)
     # f_t is in units of μ: its own length is μ times that.
     plain = np.maximum(known, knowledge.units(frame.ensemble.mu) ** 2)
+    units = _shape(frame, np.zeros_like(y), plain)[1] - shape
+    if h <= _THIN and frame.ensemble.A.shape[0] <= MOST_DENSE:
+        dense = _thin_shape(frame.ensemble, y, moving)
+        h, units = (h, units) if dense[0] == h else dense
     return Walls(
         centre=y,
         moving=moving,
@@ -287,8 +291,27 @@ def _walls(frame, y):
         pull=frame.pull(y),
         root=np.sqrt(weight).ravel(),
         barrier=barrier.C,
-        units=_shape(frame, np.zeros_like(y), plain)[1] - shape,
+        units=units,
     )
+
+
+def _thin_shape(ensemble, y, moving):
+    """Dimension h, and ln of the volume in ⟨f_n⟩ over that in slacks, by dense matrices.
+
+    A whole stress leaves rows that follow from others where S is thin: pivots do not tell those.
+    """
+    A, _, T = ensemble.scaled_form
+    null = null_space(A.toarray()[:, moving])
+    forces, slacks = T.tocsc()[:, moving] @ null, null / y[moving, None]
+    logs = [np.linalg.slogdet(part.T @ part)[1] for part in (forces, slacks)]
+    return null.shape[1], 0.5 * float(logs[0] - logs[1])
+
+
+def null_space(dense):
+    """Orthonormal (n, h) of a matrix (rows, n), by singular values."""
+    _, values, rows = np.linalg.svd(dense)
+    rank = int(np.sum(values > FLAT * values.max(initial=0.0)))
+    return rows[rank:].T
 
 
 def _shape(frame, curvature, stiff):

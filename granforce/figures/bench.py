@@ -8,7 +8,8 @@ def benchmark(results, *, backend="bokeh"):
 
     relaxation: time against μ by solver; scaling: against N; compaction: mean overlap against time;
     intervals: part of the exact mean ΔF_n that walks see against time, per μ; uniform: processor
-    time per effective state against h. None where the results have none of them.
+    time per effective state against h; uniform_growth: against N. None where the results have none
+    of them.
     """
     style.ready(backend)
     frames = []
@@ -52,12 +53,20 @@ def _uniform(rows, backend):
     yield _frame(series, backend, words, room=200.0, logx=True, logy=True)
 
 
+def _uniform_growth(rows, backend):
+    series = _by([row for row in rows if row["n"] != "fit"], "rows", "n", "seconds_per_state")
+    words = {"title": "uniform sampling against size", "x": "N"}
+    words["y"] = "processor time per effective state / s"
+    yield _frame(series, backend, words, room=50.0, logx=True, logy=True)
+
+
 _DRAWN = {
     "relaxation": _relaxation,
     "scaling": _scaling,
     "compaction": _compaction,
     "intervals": _intervals,
     "uniform": _uniform,
+    "uniform_growth": _uniform_growth,
 }
 
 

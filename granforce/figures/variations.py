@@ -1,5 +1,7 @@
 """Beyond the paper's figures: other sizes, boundaries and frictions, and the centre of S."""
 
+import numpy as np
+
 from granforce.figures import style
 from granforce.measures import statistics
 
@@ -188,22 +190,29 @@ def volumes(rows, larger=(), *, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
-def tails(groups, *, fits=None, backend="bokeh"):
+def tails(groups, *, backend="bokeh"):
     """P(f_n/⟨f_n⟩) of uniform states, semi-logarithmic, one frame for each word.
 
-    groups: {word: {μ: [(f, P), …]}}; fits: {word: {μ: (b, from, to)}} of tails exp(−(λ f)^b),
-    fitted in that range of f.
+    groups: {word: {μ: [(f, P), …]}}. Beside them exponential and Gaussian forces of mean 1.
     """
     style.ready(backend)
+    points = [point for curves in groups.values() for some in curves.values() for point in some]
+    least, f = min(p for _, p in points), np.linspace(0, max(f for f, _ in points), 200)
+    laws = {
+        "exponential": ("dashed", np.exp(-f)),
+        "Gaussian": ("dotted", 2 / np.pi * np.exp(-(f**2) / np.pi)),
+    }
     frames = []
     for last, (word, curves) in enumerate(groups.items(), 1 - len(groups)):
         drawn = []
-        for k, (mu, points) in enumerate(sorted(curves.items())):
-            fit = (fits or {}).get(word, {}).get(mu)
-            told = "" if fit is None or last else f", b = {fit[0]:.2f}"
+        for k, (mu, some) in enumerate(curves.items()):
             colour, marker = style.COLOURS[k], style.MARKERS[k]
-            drawn.append(style.line(points, f"μ = {mu:g}{told}", colour, backend))
-            drawn.append(style.dots(points, f"μ = {mu:g}{told}", colour, backend, marker))
+            drawn.append(style.line(some, f"μ = {mu:g}", colour, backend))
+            drawn.append(style.dots(some, f"μ = {mu:g}", colour, backend, marker, size=4))
+        for law, (dash, density) in laws.items():
+            seen = density >= least
+            ends = list(zip(f[seen], density[seen], strict=True))
+            drawn.append(style.line(ends, law, style.GREY, backend, dash))
         legend = None if last else "right"
         axes = {"x": "f_n / ⟨f_n⟩", "y": "P(f_n)", "logy": True, "legend": legend}
         frames.append(style.frame(drawn, backend, title=word, **axes))

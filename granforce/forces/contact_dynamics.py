@@ -12,6 +12,17 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from granforce.forces.box_motion import (
+    carried,
+    driven,
+    fastest,
+    keep_rate,
+    pushed,
+    rate_in,
+    sheared,
+    soften,
+    stretched,
+)
 from granforce.numerics.lanes import (
     ONE,
     compiled,
@@ -82,7 +93,8 @@ def _push(problem, c, f_n, f_t, velocity, dilation, lanes):
     store(velocity, j + 1, lanes, load(velocity, j + 1, lanes) + w_j * f_y)
     store(velocity, i + 2, lanes, load(velocity, i + 2, lanes) - u_i * f_t)
     store(velocity, j + 2, lanes, load(velocity, j + 2, lanes) - u_j * f_t)
-    return dilation + same(lanes, problem.box_compliance * problem.length[c]) * f_n
+    compliance = same(lanes, problem.box_compliance * problem.length[c])
+    return pushed(dilation, compliance, f_n, f_t, n_x, n_y)
 
 
 @compiled
@@ -102,7 +114,7 @@ def sweep(problem, order, mu, force, velocity, dilation, lanes):
         v_x = load(velocity, j, lanes) - load(velocity, i, lanes)
         v_y = load(velocity, j + 1, lanes) - load(velocity, i + 1, lanes)
         length, closing = same(lanes, problem.length[c]), same(lanes, problem.closing[c])
-        v_n = v_x * n_x + v_y * n_y + dilation * length + closing
+        v_n = v_x * n_x + v_y * n_y + stretched(dilation, n_x, n_y) * length + closing
         old_n, old_t = load(force, 2 * c, lanes), load(force, 2 * c + 1, lanes)
         f_n = larger(old_n - v_n * same(lanes, problem.stiff_n[c]), zero)
         if vanishes(f_n) and vanishes(old_n) and vanishes(old_t):
@@ -113,6 +125,7 @@ def sweep(problem, order, mu, force, velocity, dilation, lanes):
             - same(lanes, problem.arm_i[c]) * load(velocity, i + 2, lanes)
             - same(lanes, problem.arm_j[c]) * load(velocity, j + 2, lanes)
         )
+        v_t = sheared(dilation, v_t, length, n_x, n_y)
         most = same(lanes, mu) * f_n
         f_t = larger(old_t - v_t * same(lanes, problem.stiff_t[c]), -most)
         f_t = pick(f_t, most, most, f_t)
@@ -133,7 +146,8 @@ class Motion(NamedTuple):
     r: np.ndarray  # (N,)
     mass: np.ndarray  # (N,) π r²
     box: np.ndarray  # (2,)
-    dilation: np.ndarray  # (1,) λ
+    tilt: np.ndarray  # (1,) of the cell
+    dilation: np.ndarray  # (1,) λ; or (1, 3) e_x, e_y, g of a cell that is free in its shape
     i: np.ndarray  # (P,) neighbour list
     j: np.ndarray  # (P,)
     shift: np.ndarray  # (P, 2)
@@ -198,22 +212,21 @@ def _step(motion, mu, pressure, pace, counters, stop):
     volume, dt = box[0] * box[1], motion.pace[0]
     active, problem, overlap = _near_contacts(motion, dt, pace.box_mass * 2.0 * volume)
     before = velocity.copy()
-    kinetic = 0.0
-    for k in range(motion.x.shape[0]):
-        kinetic += motion.mass[k] * (velocity[k, 0] ** 2 + velocity[k, 1] ** 2)
-    free = motion.dilation[0] + (kinetic / (2.0 * volume) - pressure) * dt / pace.box_mass
+    free = rate_in(motion.dilation)
+    free = driven(free, velocity, motion.mass, pressure, volume, dt, pace.box_mass)
 
     count = active.shape[0]
     force = np.empty((count, 2))
     for c in range(count):
         force[c, 0], force[c, 1] = motion.force[active[c], 0], motion.force[active[c], 1]
     set_stiffness(problem)
+    soften(free, problem)
     free = add_forces(problem, force, velocity, free)
     dilation = _swept(motion, problem, mu, pace, force, velocity, free, dt, counters, stop)
     motion.force[:] = 0.0
     for c in range(count):
         motion.force[active[c], 0], motion.force[active[c], 1] = force[c, 0], force[c, 1]
-    motion.dilation[0] = dilation
+    keep_rate(dilation, motion.dilation)
     _move(motion, dilation, dt)
     stride = _fastest(problem, force, velocity) * dt
     growth = min(GROWTH, max(1.0 / GROWTH, pace.stride / max(stride, 1e-300)))
@@ -267,13 +280,15 @@ def _breach(problem, mu, force, velocity, dilation, factor):
         i, j = problem.i[c], problem.j[c]
         n_x, n_y = problem.n_x[c], problem.n_y[c]
         v_x, v_y = velocity[j, 0] - velocity[i, 0], velocity[j, 1] - velocity[i, 1]
-        v_n = v_x * n_x + v_y * n_y + dilation * problem.length[c] + problem.closing[c]
+        length = problem.length[c]
+        v_n = v_x * n_x + v_y * n_y + stretched(dilation, n_x, n_y) * length + problem.closing[c]
         stiff_n, stiff_t = problem.stiff_n[c] / factor, problem.stiff_t[c] / factor
         f_n = max(force[c, 0] - v_n * stiff_n, 0.0)
         if f_n == 0.0 and force[c, 0] == 0.0:
             continue
         spin = problem.arm_i[c] * velocity[i, 2] + problem.arm_j[c] * velocity[j, 2]
-        f_t = force[c, 1] - (v_y * n_x - v_x * n_y - spin) * stiff_t
+        v_t = sheared(dilation, v_y * n_x - v_x * n_y - spin, length, n_x, n_y)
+        f_t = force[c, 1] - v_t * stiff_t
         f_t = min(max(f_t, -mu * f_n), mu * f_n)
         worst = max(worst, abs(f_n - force[c, 0]) / stiff_n, abs(f_t - force[c, 1]) / stiff_t)
     return worst
@@ -298,7 +313,7 @@ def _near_contacts(motion, dt, box_inertia):
     for k in range(x.shape[0]):
         speed = max(speed, motion.velocity[k, 0] ** 2 + motion.velocity[k, 1] ** 2)
     # Twice the fastest free approach, and the way that forces may push grains in this step.
-    margin = 2.0 * dt * (2.0 * np.sqrt(speed) + 2.0 * abs(motion.dilation[0]) * r.max())
+    margin = 2.0 * dt * (2.0 * np.sqrt(speed) + 2.0 * fastest(rate_in(motion.dilation)) * r.max())
     margin = min(margin + (2e-3 + 4.0 * dt * dt) * r.max(), REACH * r.max())
     pairs = motion.i.shape[0]
     active = np.empty(pairs, np.int64)
@@ -308,7 +323,7 @@ def _near_contacts(motion, dt, box_inertia):
     touching = 0
     for p in range(pairs):
         i, j = motion.i[p], motion.j[p]
-        d_x = x[j, 0] - x[i, 0] + motion.shift[p, 0] * box[0]
+        d_x = x[j, 0] - x[i, 0] + motion.shift[p, 0] * box[0] + motion.shift[p, 1] * motion.tilt[0]
         d_y = x[j, 1] - x[i, 1] + motion.shift[p, 1] * box[1]
         reach = r[i] + r[j] + margin
         square = d_x * d_x + d_y * d_y
@@ -349,17 +364,18 @@ def _near_contacts(motion, dt, box_inertia):
 
 @within
 def _move(motion, dilation, dt):
-    growth = 1.0 + dilation * dt
-    fastest = 0.0
+    quickest = 0.0
     for k in range(motion.x.shape[0]):
         v_x, v_y = motion.velocity[k, 0], motion.velocity[k, 1]
-        motion.x[k, 0] = motion.x[k, 0] * growth + v_x * dt
-        motion.x[k, 1] = motion.x[k, 1] * growth + v_y * dt
-        fastest = max(fastest, v_x * v_x + v_y * v_y)
-    for k in range(2):
-        motion.box[k] *= growth
+        x, y = carried(dilation, motion.x[k, 0], motion.x[k, 1], dt)
+        motion.x[k, 0] = x + v_x * dt
+        motion.x[k, 1] = y + v_y * dt
+        quickest = max(quickest, v_x * v_x + v_y * v_y)
+    motion.box[0], _ = carried(dilation, motion.box[0], 0.0, dt)
+    motion.tilt[0], motion.box[1] = carried(dilation, motion.tilt[0], motion.box[1], dt)
     # Two grains at twice the largest radius approach by at most this much.
-    motion.drift[0] += 2.0 * np.sqrt(fastest) * dt + abs(dilation * dt) * 3.0 * motion.r.max()
+    approach = fastest(dilation) * dt * 3.0 * motion.r.max()
+    motion.drift[0] += 2.0 * np.sqrt(quickest) * dt + approach
 
 
 @within

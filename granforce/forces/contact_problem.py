@@ -238,7 +238,7 @@ def inner_network(ensemble: Ensemble) -> Floats | None:
     are scaled up, or all but follow from others, magnify what the centre is out of balance by: that
     is taken off first.
     """
-    if _is_a_point(ensemble) and ensemble.member is not None:
+    if is_a_point(ensemble) and ensemble.member is not None:
         y = ensemble.coordinates(ensemble.member)
         return np.where(y > 0.1 * BALANCED, y, 0.0)
     middle = linear_programs.centre(independent_problem_of(ensemble))
@@ -258,7 +258,7 @@ def inner_network(ensemble: Ensemble) -> Floats | None:
     return inner if inner.min(initial=1.0) > 0 else None
 
 
-def _is_a_point(ensemble: Ensemble) -> bool:
+def is_a_point(ensemble: Ensemble) -> bool:
     """Whether S is the network at hand alone, as far as that is asked of dense matrices."""
     few = ensemble.A.shape[0] <= MOST_DENSE
     return few and ensemble.member is not None and ensemble.dimension == 0

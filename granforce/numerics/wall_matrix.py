@@ -35,6 +35,9 @@ from granforce.numerics.lanes import (
 from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
 
+# Rows whose pivot is below this, relative to the diagonal, follow from others.
+DEPENDENT = 1e-13
+
 
 class WallMatrix(NamedTuple):
     """K in factors; walls are padded with such that meet no force."""
@@ -81,10 +84,33 @@ def factored(network: Network, C: Floats, diagonal: Floats, least: float) -> tup
     _begin(network, C, diagonal, factors, ONE)
     bound = least * factors.lower[contact_matrix.diagonals(network), 0].ravel()
     bound = np.maximum(bound, contact_matrix.NO_PIVOT)
+    m = network.border.shape[1] // 2
+    weight = np.diag(factors.corner.reshape(m, m)).copy()
     contact_matrix.factor(network, bound, factors, cancelling.flag(), ONE)
     cancelling.check()
+    _without_dependent(factors.corner.reshape(m, m), weight)
     out = contact_matrix.left_out(network, factors)
     return Factors(*(shared(part) for part in factors)), out
+
+
+def _without_dependent(corner: Floats, weight: Floats) -> None:
+    """Leave global rows out, in place, whose pivot is but rounding of their weight (m,) in A C Aᵀ.
+
+    Known forces can be such that a pressure follows from them.
+    """
+    inverse = np.diag(corner)
+    kept = inverse > 0
+    pivot = np.where(kept, 1 / np.where(kept, inverse, 1.0), 0.0)
+    if np.all(pivot[kept] ** 2 > DEPENDENT * weight[kept]):
+        return
+    factor = np.tril(corner, -1) + np.diag(pivot)
+    rest = factor @ factor.T
+    for a in range(len(corner)):
+        there = rest[a, a] > DEPENDENT * weight[a]
+        column = rest[a:, a] / np.sqrt(rest[a, a]) if there else np.zeros(len(corner) - a)
+        rest[a:, a:] -= np.outer(column, column)
+        corner[a:, a] = column
+        corner[a, a] = 1 / column[0] if there else 0.0
 
 
 def global_rows(network: Network, factors: Factors) -> int:

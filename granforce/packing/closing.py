@@ -4,18 +4,20 @@ Which pairs are contacts is decided by their gaps, not by what they carry: a pai
 nothing may touch all the same, and belongs to S. Once the carrying contacts are closed, gaps are
 rounding (below CLOSED) or clearly larger (above APART); where one lies between, or more contacts
 had carried than rigid disks can close at once, the dynamics goes on. At μ = 0 contact dynamics
-does not reach isostaticity: there linear programs shrink the box under linearised non-overlap.
+does not reach isostaticity: there linear programs shrink the box under linearised non-overlap. A
+box that is free in its shape strains in three ways, not one (e_x, e_y, g as in `box_motion`), and
+its networks have to carry the same pressure along x and y, and no shear stress.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-import piqp
 from scipy import sparse
 
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics import highs as programs
+from granforce.numerics import quadratic
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import (
     Cell,
@@ -37,6 +39,18 @@ NETWORK_ITERATIONS = 60
 LARGEST_CORRECTION, MOST_CLOSINGS = 1e-2, 16
 # Largest move of a grain in one of the linear programs, along each axis.
 TRUST = 0.05
+# By the number of strains of the box: what weighs each against the displacements of grains, and its
+# bounds and part of the area's change in the linear programs.
+WEIGHTS = {1: 1.0, 3: np.array([0.5, 0.5, 0.25]) ** 0.5}
+STRAINS = {
+    1: ((-TRUST / 2,), (0.0,), (1.0,)),
+    3: ((-TRUST / 3,) * 3, (TRUST / 3,) * 3, (0.5, 0.5, 0.0)),
+}
+
+
+def cell_of(motion):
+    """The periodic cell of a moving packing."""
+    return Cell(motion.box, float(motion.tilt[0]))
 
 
 def jammed_network(motion, mu):
@@ -45,24 +59,35 @@ def jammed_network(motion, mu):
     Its contacts are all pairs that touch once the carrying ones are closed. None, too, where a pair
     neither touches nor is apart for certain: then the dynamics has to go on.
     """
-    pairs = motion.i, motion.j, motion.shift
-    gap = separations(motion.x, motion.r, Cell(motion.box, 0.0), *pairs)[2]
+    gap = separations(motion.x, motion.r, cell_of(motion), motion.i, motion.j, motion.shift)[2]
     touching = (motion.force[:, 0] > 0) | (gap < TOUCHING)
     if not touching.any():
         return None
-    as_it_moves = _packing_of(motion, motion.x, motion.box, touching, motion.force, mu)
-    if _near_forces(as_it_moves) is None:
+    as_it_moves = _packing_of(motion, motion.x, cell_of(motion), touching, motion.force, mu)
+    if _near_forces(as_it_moves, **_asked(motion)) is None:
         return None
-    closed = _close_contacts(motion, touching)
+    closed = _close_contacts(motion, touching, gap)
     if closed is None:
         return None
     packing = _packing_of(motion, *closed, motion.force, mu)
-    found = _near_forces(packing)
+    found = _near_forces(packing, **_asked(motion))
     if found is None:
         # Overlap had jammed more contacts than rigid disks can have: go on from where they fit.
-        motion.x[:], motion.box[:] = closed[:2]
+        motion.x[:], (motion.box[:], motion.tilt[0]) = closed[:2]
         return None
-    return _on_backbone(packing._replace(forces=found))
+    return _on_backbone(packing._replace(forces=found), **_asked(motion))
+
+
+def _rates(motion):
+    """In how many ways the box may strain."""
+    return motion.dilation.size
+
+
+def _asked(motion):
+    """What the ensemble prescribes besides the pressure, in units of it."""
+    if _rates(motion) == 1:
+        return {}
+    return {"prescribed": "stress", "stress": (1.0, 1.0, 0.0)}
 
 
 class Margin(NamedTuple):
@@ -86,87 +111,116 @@ def margin(packing):
     unit = packing.r.max()
     i, j, shift = find_pairs(packing.x, packing.r, packing.cell, SKIN / 2 * unit)
     normal, _, gap = separations(packing.x, packing.r, packing.cell, i, j, shift)
-    c = packing.contacts
-    listed = {}
-    for first, second, direction in zip(c.i.tolist(), c.j.tolist(), c.normal, strict=True):
-        listed.setdefault((first, second), []).append(direction)
-        listed.setdefault((second, first), []).append(-direction)
-    # Two grains touch twice only through different images, whose normals differ by 60° or more.
-    other = [
-        all(n @ direction < 0.75 for direction in listed.get((first, second), ()))
-        for n, first, second in zip(normal, i.tolist(), j.tolist(), strict=True)
-    ]
+    other = ~_listed(packing.contacts, i, j, normal, len(packing.r))
     return Margin(
-        float(np.abs(c.gap).max(initial=0.0) / unit),
-        float(gap[np.array(other, bool)].min(initial=SKIN / 2 * unit) / unit),
+        float(np.abs(packing.contacts.gap).max(initial=0.0) / unit),
+        float(gap[other].min(initial=SKIN / 2 * unit) / unit),
     )
 
 
-def _near_forces(packing):
+def _listed(contacts, i, j, normal, n):
+    """Which of the pairs i < j (P,) with their normals (P, 2) are contacts of a list."""
+    turned = contacts.i > contacts.j
+    direction = np.where(turned[:, None], -contacts.normal, contacts.normal)
+    key = np.minimum(contacts.i, contacts.j) * n + np.maximum(contacts.i, contacts.j)
+    order = np.argsort(key, kind="stable")
+    first, last = (np.searchsorted(key[order], i * n + j, side) for side in ("left", "right"))
+    found = np.zeros(len(i), bool)
+    # Two grains touch twice only through different images, whose normals differ by 60° or more.
+    for k in range(int((last - first).max(initial=0))):
+        some = np.flatnonzero(first + k < last)
+        same = direction[order[first[some] + k]]
+        found[some] |= np.sum(normal[some] * same, axis=1) >= 0.75
+    return found
+
+
+def _near_forces(packing, **asked):
     """The balanced network nearest to the packing's forces, or None if it is not close to them."""
-    S = ensemble(packing, prune=False)
+    S = ensemble(packing, prune=False, **asked)
     forces = nearest(S, S.original, max_iterations=NETWORK_ITERATIONS).forces
     far = np.linalg.norm(forces - packing.forces) / np.linalg.norm(packing.forces)
     return forces if S.admits(forces) and far <= JAMMED_DISTANCE else None
 
 
-def _on_backbone(packing):
+def _on_backbone(packing, **asked):
     """The packing with forces on its backbone alone, balanced to the last digits; None if not."""
     try:
-        S = ensemble(packing)
+        S = ensemble(packing, **asked)
     except (NotJammedError, UndecidedError):
         return None
     forces = nearest(S, S.original).forces
     return packing._replace(forces=S.expand(forces)) if S.admits(forces) else None
 
 
-def _packing_of(motion, x, box, touching, force, mu):
+def _packing_of(motion, x, cell, touching, force, mu):
     i, j, shift = motion.i[touching], motion.j[touching], motion.shift[touching]
-    normal, length, _ = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
+    normal, length, _ = separations(x, motion.r, cell, i, j, shift)
     contacts = make_contacts(i, j, normal, np.maximum(length, 0), motion.r)
     # Overlap that contact dynamics left is closed before the packing is handed out: rigid arms.
     contacts = contacts._replace(arm_i=motion.r[i], arm_j=motion.r[j])
-    return make_packing(x, motion.r, box, contacts, force[touching], mu, 1.0)
+    return make_packing(x, motion.r, cell.box, contacts, force[touching], mu, 1.0, tilt=cell.tilt)
 
 
-def _close_contacts(motion, touching):
-    """Centres, box and contacts, moved as little as brings touching gaps to 0, others to 0 or more.
+def _close_contacts(motion, touching, gap):
+    """Centres, cell, contacts: moved as little as brings touching gaps to 0, others to 0 or more.
 
-    Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box: near μ = 0 the
-    contacts are as many as the coordinates, and close only together with the box. Newton on the
-    gaps, each step a quadratic program. Pairs that came to touch on the way are contacts from then
-    on. None where the contacts cannot all close, or where no margin parts them from other pairs.
+    Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box (of a free cell, ε² is
+    (e_x² + e_y² + g²/2)/2): near μ = 0 the contacts are as many as the coordinates, and close only
+    together with the box. gap (P,): those of all pairs as they are. Newton on the gaps, each step a
+    quadratic program. Pairs that came to touch on the way are contacts from then on. None where the
+    contacts cannot all close, or where no margin parts them from other pairs.
     """
-    x, box = motion.x.copy(), motion.box.copy()
+    x, cell = motion.x.copy(), _own_cell(motion)
     pairs = motion.i, motion.j, motion.shift
-    near = separations(x, motion.r, Cell(box, 0.0), *pairs)[2] < SKIN / 2
-    near |= touching
+    near = touching | (gap < SKIN / 2)
     i, j, shift = (which[near] for which in pairs)
     exact, force = touching[near].copy(), motion.force[near, 0]
     opened = np.zeros(len(i), bool)
     for _ in range(MOST_CLOSINGS):
-        normal, length, gap = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
+        cancelling.check("compaction")
+        normal, length, gap = separations(x, motion.r, cell, i, j, shift)
         if max(np.abs(gap[exact]).max(), -gap.min()) < CLOSED:
             came = ~exact & ~opened & (gap < APART)
             if not came.any():
                 closed = np.zeros(len(near), bool)
                 closed[near] = exact
                 # What had to open may have come to rest in between: that is for the dynamics.
-                return None if np.any(opened & (gap < APART)) else (x, box, closed)
+                return None if np.any(opened & (gap < APART)) else (x, cell, closed)
             exact |= came
-        weight = box[0] * np.sqrt(len(x))
-        R = sparse.hstack(
-            [_approach(i, j, normal, len(x)), sparse.csc_matrix(length[:, None] / weight)]
-        )
+        weight = cell.box[0] * np.sqrt(len(x)) * WEIGHTS[_rates(motion)]
+        stretch = _stretch(normal, length, _rates(motion)) / weight
+        R = sparse.hstack([_approach(i, j, normal, len(x)), sparse.csc_matrix(stretch)])
         move, had_to = _least_motion(sparse.csr_matrix(R), gap, exact, force)
         opened |= had_to
         exact &= ~had_to
-        if np.abs(move[:-1]).max() > LARGEST_CORRECTION or not exact.any():
+        u, strain = move[: x.size], move[x.size :] / weight
+        if np.abs(u).max() > LARGEST_CORRECTION or not exact.any():
             return None
-        strain = move[-1] / weight
-        x = x * (1 + strain) + move[:-1].reshape(-1, 2)
-        box = box * (1 + strain)
+        x, cell = _strained(x, cell, strain)
+        x = x + u.reshape(-1, 2)
     return None
+
+
+def _own_cell(motion):
+    return cell_of(motion)._replace(box=motion.box.copy())
+
+
+def _stretch(normal, length, rates):
+    """First-order change (pairs, rates) of each gap with the strain of the box."""
+    if rates == 1:
+        return length[:, None]
+    n_x, n_y = normal.T
+    return np.column_stack([n_x * n_x, n_y * n_y, n_x * n_y]) * length[:, None]
+
+
+def _strained(x, cell, strain):
+    """Points (N, 2) and cell after a strain (1,) of a square box, or (3,) of a free cell."""
+    if len(strain) == 1:
+        return x * (1 + strain), Cell(cell.box * (1 + strain), cell.tilt)
+    e_x, e_y, g = strain
+    D = np.array([[e_x, g], [0.0, e_y]])
+    a, b = cell.vectors + cell.vectors @ D.T
+    return x + x @ D.T, Cell(np.array([a[0], b[1]]), float(b[0]))
 
 
 def _approach(i, j, normal, n):
@@ -190,9 +244,7 @@ def _least_motion(R, gap, exact, force):
     cost = 1e4 * (force[exact] / max(force.mean(), 1e-300) + 1e-3)
     for slack in (0, closed):
         opening = sparse.eye(closed, slack)
-        solver = piqp.SparseSolver()
-        solver.settings.eps_abs = solver.settings.eps_rel = 1e-14
-        solver.setup(
+        program = (
             sparse.block_diag([sparse.identity(n), 1e-8 * sparse.identity(slack)], format="csc"),
             np.concatenate([np.zeros(n), cost[:slack]]),
             sparse.csc_matrix(sparse.hstack([R[exact], -opening])),
@@ -201,11 +253,12 @@ def _least_motion(R, gap, exact, force):
                 sparse.hstack([R[others], sparse.csr_matrix((int(others.sum()), slack))])
             ),
             -gap[others] / scale,
-            np.full(int(others.sum()), np.inf),
             np.concatenate([np.full(n, -np.inf), np.zeros(slack)]),
         )
-        solver.solve()
-        move = np.array(solver.result.x)[:n]
+        if n > quadratic.LONG:
+            move = cancelling.in_child(quadratic.solution, *program)[:n]
+        else:
+            move = quadratic.solution(*program)[:n]
         left = R[exact] @ move + gap[exact] / scale
         if np.abs(left).max() < 1e-3:
             break
@@ -221,42 +274,43 @@ def shrink_to_isostatic(motion, mu, work):
     in the displacements, so no step makes an overlap; at the end the contacts that carry force
     are exactly isostatic, N_c = 2M − 1.
     """
-    x, box = motion.x.copy(), motion.box.copy()
-    x, box = _without_overlap(x, box, motion)
+    x, cell = _without_overlap(motion)
     for _ in range(60):
         cancelling.check("compaction")
-        i, j, shift = find_pairs(x, motion.r, Cell(box, 0.0), 4 * TRUST)
-        normal, length, gap = separations(x, motion.r, Cell(box, 0.0), i, j, shift)
-        move, strain = _shrink_program(i, j, normal, length, gap, len(x))
+        i, j, shift = find_pairs(x, motion.r, cell, 4 * TRUST)
+        normal, length, gap = separations(x, motion.r, cell, i, j, shift)
+        stretch = _stretch(normal, length, _rates(motion))
+        move, strain = _shrink_program(i, j, normal, stretch, gap, len(x))
         work["linear_programs"] += 1
-        x = x * (1 + strain) + move
-        box = box * (1 + strain)
+        x, cell = _strained(x, cell, strain)
+        x = x + move
         # Rattlers move at the programs' whim to the end; only the box tells that nothing is left.
-        if strain > -1e-13:
+        if strain[:2].mean() > -1e-13:
             break
-    i, j, shift = find_pairs(x, motion.r, Cell(box, 0.0), TOUCHING)
+    i, j, shift = find_pairs(x, motion.r, cell, TOUCHING)
     at_rest = motion._replace(i=i, j=j, shift=shift)
     touching = np.ones(len(i), bool)
-    packing = _packing_of(at_rest, x, box, touching, np.zeros((len(i), 2)), mu)
-    return _on_backbone(packing)
+    packing = _packing_of(at_rest, x, cell, touching, np.zeros((len(i), 2)), mu)
+    return _on_backbone(packing, **_asked(motion))
 
 
-def _without_overlap(x, box, motion):
-    """Expand the box until the largest overlap is gone: the programs start feasible."""
+def _without_overlap(motion):
+    """Centres and cell, expanded until the largest overlap is gone: the programs start feasible."""
     pairs = motion.i, motion.j, motion.shift
-    _, length, gap = separations(x, motion.r, Cell(box, 0.0), *pairs)
+    _, length, gap = separations(motion.x, motion.r, cell_of(motion), *pairs)
     growth = 1 + max(0.0, float(np.max(-gap / length, initial=0.0)))
-    return x * growth, box * growth
+    return motion.x * growth, Cell(motion.box * growth, float(motion.tilt[0]) * growth)
 
 
-def _shrink_program(i, j, normal, length, gap, n):
-    """Displacements (n, 2) and strain of the box of the linear program, by HiGHS."""
-    R = sparse.hstack([_approach(i, j, normal, n), sparse.csc_matrix(length[:, None])])
+def _shrink_program(i, j, normal, stretch, gap, n):
+    """Displacements (n, 2) and strain (1,) or (3,) of the box of the linear program, by HiGHS."""
+    R = sparse.hstack([_approach(i, j, normal, n), sparse.csc_matrix(stretch)])
     # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the pairs' reach.
-    lower = np.append(np.full(2 * n, -TRUST), -TRUST / 2)
-    upper = np.append(np.full(2 * n, TRUST), 0.0)
+    least, most, along = STRAINS[stretch.shape[1]]
+    lower = np.append(np.full(2 * n, -TRUST), least)
+    upper = np.append(np.full(2 * n, TRUST), most)
     # The duals are the contact forces: this cost makes their mean about 1, the tolerances' scale.
-    cost = np.append(np.zeros(2 * n), 4.0 * n)
+    cost = np.append(np.zeros(2 * n), 4.0 * n * np.array(along))
     rows = -gap, np.full(len(gap), np.inf)
     model = programs.bounded(R, rows, (lower, upper), cost)
     u = programs.optimal(model)
@@ -265,4 +319,4 @@ def _shrink_program(i, j, normal, length, gap, n):
             "the last step of the compaction is undecided: no solver found the optimum of one of "
             "its linear programs; take another seed"
         )
-    return u[:-1].reshape(-1, 2), float(u[-1])
+    return u[: 2 * n].reshape(-1, 2), u[2 * n :]

@@ -13,10 +13,15 @@ import numpy as np
 
 from granforce.forces import contact_dynamics as dynamics
 from granforce.numerics.lanes import compiled
-from granforce.packing.closing import SKIN, jammed_network, margin, shrink_to_isostatic
+from granforce.packing.closing import (
+    SKIN,
+    cell_of,
+    jammed_network,
+    margin,
+    shrink_to_isostatic,
+)
 from granforce.packing.neighbours import find_pairs
 from granforce.records import (
-    Cell,
     InputError,
     NotJammedError,
     float_array,
@@ -42,6 +47,8 @@ MOVED = SKIN - dynamics.REACH
 # Time steps begin with this part of the longest, and grow while no grain that carries moves farther
 # than STRIDE (in largest radii).
 SHORTEST, STRIDE = 0.1, 0.02
+# What the box may be, with the number of its strain rates.
+BOXES = {"square": 1, "isotropic": 3}
 # Steps between two looks of whoever watches.
 WATCH_EVERY = 5
 
@@ -74,18 +81,21 @@ def pack(
     box_mass=100.0,
     sweeps=600,
     accuracy=0.01,
+    box="square",
     max_steps=100_000,
     progress=None,
     watch=None,
     cancel=None,
 ):
-    """A jammed packing of n disks with friction coefficient μ in a doubly periodic square box.
+    """A jammed packing of n disks with friction coefficient μ in a doubly periodic box.
 
     radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii.
     pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
     radius, P0 and the mass density; dt is the longest step, taken while no grain that carries moves
     farther than STRIDE. accuracy: largest velocity by which a step may breach the laws of Signorini
-    and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step.
+    and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step. box:
+    "square", or "isotropic", whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and
+    σ_xy = 0: jammed against shear too.
     progress(step, message) is called now and then, watch(Glimpse) at least every WATCH_EVERY steps;
     neither changes a bit of the result. cancel() returning True raises Cancelled.
 
@@ -107,10 +117,11 @@ def pack(
         positive(value, name)
     if sweeps < 1 or max_steps < 1:
         raise InputError("sweeps and max_steps must be at least 1")
+    check_box(box)
     rng = np.random.default_rng(seed)
     r = draw_radii(radii, int(n), rng)
     unit = r.max()
-    motion = _dilute_gas(r / unit, rng)
+    motion = _dilute_gas(r / unit, rng, BOXES[box])
     motion.pace[:] = SHORTEST * dt, dynamics.MOST_RELAXATION
     pace = dynamics.Pace(box_mass, SHORTEST * dt, dt, STRIDE, int(sweeps), accuracy)
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
@@ -131,8 +142,8 @@ def pack(
         if step >= max_steps:
             raise NotJammedError(
                 f"not jammed after {step} steps: φ = {_fraction(motion):.4f}, unbalance "
-                f"{unbalance:.1e} ⟨f_n⟩, strain rate {motion.dilation[0]:.1e}; allow more steps "
-                "(max_steps) or more sweeps"
+                f"{unbalance:.1e} ⟨f_n⟩, strain rate {_fastest_strain(motion):.1e}; allow more "
+                "steps (max_steps) or more sweeps"
             )
     _check_repeated(finished)
     apart = margin(finished)
@@ -140,6 +151,7 @@ def pack(
         "seed": seed,
         "radii": radii if isinstance(radii, str) else "list",
         **settings,
+        **({} if box == "square" else {"box": box}),
         "steps": step,
         "sweeps_done": int(counters[dynamics.SWEEPS]),
         "contact_updates": int(counters[dynamics.UPDATES]),
@@ -160,6 +172,13 @@ def _check_repeated(packing):
             f"{len(packing.r)} disks are too few for a periodic box: two of them touch through "
             "both sides of it; take more disks, or another seed"
         )
+
+
+def check_box(box):
+    """The name of a box; InputError where there is none of this name."""
+    if not isinstance(box, str) or box not in BOXES:
+        raise InputError(f"box must be square or isotropic, got {box!r:.40}")
+    return box
 
 
 def draw_radii(spec, n, rng):
@@ -187,7 +206,7 @@ def draw_radii(spec, n, rng):
     return r
 
 
-def _dilute_gas(r, rng):
+def _dilute_gas(r, rng, rates):
     fraction = INITIAL_FRACTION
     largest_first = np.argsort(-r, kind="stable")
     while True:
@@ -203,6 +222,7 @@ def _dilute_gas(r, rng):
     return _with_new_list(
         dynamics.Motion(
             *(x, velocity, r, np.pi * r**2, np.full(2, side), np.zeros(1)),
+            np.zeros(1) if rates == 1 else np.zeros((1, rates)),
             *(*_no_pairs(), np.zeros(1), np.zeros(2)),
         )
     )
@@ -249,16 +269,30 @@ def _insert(r, order, side, rng, attempts, stop):
 
 
 def _with_new_list(motion):
-    if motion.box[0] <= 2 * motion.r.max():
+    motion = _leant_back(motion)
+    if cell_of(motion).shortest <= 2 * motion.r.max():
         raise NotJammedError(
             "the box shrank to the largest disk's diameter without jamming: too few disks"
         )
-    i, j, shift = find_pairs(motion.x, motion.r, Cell(motion.box, 0.0), SKIN)
+    i, j, shift = find_pairs(motion.x, motion.r, cell_of(motion), SKIN)
     # In an order of their own, pairs are swept in the same order however often the list is made.
     order = np.lexsort((shift[:, 1], shift[:, 0], j, i))
     i, j, shift = i[order], j[order], shift[order]
     force = _carry_over(motion.i, motion.j, motion.shift, motion.force, i, j, shift)
     return motion._replace(i=i, j=j, shift=shift, force=force, drift=np.zeros(1))
+
+
+def _leant_back(motion):
+    """The motion with a tilt between ∓L_x/2 that spans the same lattice."""
+    times = np.round(motion.tilt[0] / motion.box[0])
+    if times == 0:
+        return motion
+    # The image s_x a + s_y b is (s_x + times s_y) a + s_y (b − times a).
+    along = motion.shift[:, 0] + int(times) * motion.shift[:, 1]
+    return motion._replace(
+        tilt=motion.tilt - times * motion.box[0],
+        shift=np.column_stack([along, motion.shift[:, 1]]),
+    )
 
 
 @compiled
@@ -290,17 +324,19 @@ def _looking(watch, unit, pressure, counters):
     def look(motion, unbalance):
         carrying = motion.force[:, 0] > 0
         i, j, shift = motion.i[carrying], motion.j[carrying], motion.shift[carrying]
+        cell = cell_of(motion)
         glimpse = Glimpse(
             int(counters[dynamics.STEPS]),
-            np.mod(motion.x, motion.box) * unit,
+            cell.wrapped(motion.x) * unit,
             motion.r * unit,
             motion.box * unit,
             i,
             j,
-            (motion.x[j] - motion.x[i] + shift * motion.box) * unit,
+            (motion.x[j] - motion.x[i] + shift @ cell.vectors) * unit,
             motion.force[carrying] * (unit * pressure),
             _fraction(motion),
             float(unbalance),
+            cell.tilt * unit,
         )
         watch(glimpse)
 
@@ -328,10 +364,14 @@ def _fraction(motion):
     return float(np.pi * np.sum(motion.r**2) / np.prod(motion.box))
 
 
+def _fastest_strain(motion):
+    return float(np.abs(motion.dilation).max())
+
+
 def _finish(motion, mu, unbalance, work):
     """The finished packing in natural units, or None while it is not jammed."""
     if mu <= NEARLY_FRICTIONLESS:
-        if abs(motion.dilation[0]) * motion.pace[0] > BOX_AT_REST:
+        if _fastest_strain(motion) * motion.pace[0] > BOX_AT_REST:
             return None
         return shrink_to_isostatic(motion, mu, work)
     if unbalance > NEARLY_BALANCED:
@@ -344,7 +384,7 @@ def _in_users_units(packing, unit, pressure, info):
     contacts = packing.contacts
     lengths = {name: getattr(contacts, name) * unit for name in ("length", "gap", "arm_i", "arm_j")}
     return make_packing(
-        np.mod(packing.x, packing.box) * unit,
+        packing.cell.wrapped(packing.x) * unit,
         packing.r * unit,
         packing.box * unit,
         contacts._replace(**lengths),
@@ -352,4 +392,5 @@ def _in_users_units(packing, unit, pressure, info):
         packing.mu,
         pressure,
         info=info,
+        tilt=packing.tilt * unit,
     )

@@ -2,8 +2,10 @@
 
 Disks rest on each other and on straight walls. A wall takes part as a grain behind each place where
 a disk touches it, whose balance is left open (load NaN); weight is a load on each disk, r² in units
-of that of the largest disk; nothing prescribes a pressure, and the box is open on all sides. Such a
-set is a Packing like any other, and nothing else in granforce knows of scenes.
+of that of the largest disk; nothing prescribes a pressure, and the box is open on all sides. A wall
+that presses is one grain, touched by all its disks, with the force on it as a load: it may slide
+along itself, so that its forces f_t add up to 0, and does not tilt, since f_n act on its middle.
+Such a set is a Packing like any other, and nothing else in granforce knows of scenes.
 """
 
 from functools import partial
@@ -29,7 +31,8 @@ from granforce.records import (
 # A disk touches a wall or another disk where the gap (in largest radii) is below this, if nothing
 # else is said.
 SNAPPED = 1e-9
-# Radius of the grain behind a place where a wall is touched, relative to the disk's.
+# Radius of the grain behind a place where a wall is touched, relative to the disk's; of a wall that
+# presses, relative to the largest disk's.
 STUD = 0.25
 # Friction at which the six disks are pressed together, and how many seeds are tried.
 PACKED_AT, MOST_SEEDS = 0.5, 100
@@ -42,6 +45,7 @@ class Sketch(NamedTuple):
     r: np.ndarray  # (N,) radii
     walls: np.ndarray  # (k, 4) both ends x, y, x, y of each wall
     load: np.ndarray  # (N, 3) force and torque on each disk
+    pressing: np.ndarray | None = None  # (k,) force with which each wall presses; 0: it is held
 
 
 class _Scene(NamedTuple):
@@ -74,51 +78,50 @@ def sketched(name, mu=None, **options):
         asked = ", ".join(options)
         raise InputError(f"the scene {name} has no option {asked}") from None
     if isinstance(made, Sketch):
-        made = assembled(*made, mu)
+        made = assembled(*made[:4], mu, pressing=made.pressing)
     return made._replace(info=made.info | {"scene": name})
 
 
-def assembled(x, r, walls, load, mu, *, tolerance=SNAPPED):
+def assembled(x, r, walls, load, mu, *, pressing=None, tolerance=SNAPPED):
     """The Packing of a Sketch, with a contact wherever disks and walls touch, without a network.
 
-    Its info has the walls, as lists of four numbers. tolerance: gap (in largest radii) up to which
-    a disk touches.
+    Its info has the walls, as lists of four numbers, and which of them press; grains are the disks,
+    the walls that press, and what is behind the places of the others. tolerance: gap (in largest
+    radii) up to which a disk touches.
 
-    Raises InputError where disks overlap each other or a wall, and as `make_packing`.
+    Raises InputError where disks overlap each other or a wall, lie on both sides of a wall that
+    presses or at its end, and as `make_packing`.
     """
     r = float_array(r, (-1,), "radii")
     x = float_array(x, (len(r), 2), "centres")
     walls = float_array(np.reshape(walls, (-1, 4)), (-1, 4), "walls")
     load = float_array(load, (len(r), 3), "loads")
+    pressing = np.zeros(len(walls)) if pressing is None else pressing
+    pressing = float_array(pressing, (len(walls),), "forces of walls")
     if not len(r):
         raise InputError("there is no disk; put one")
     i, j = np.triu_indices(len(r), 1)
     branch, reach = x[j] - x[i], r[i] + r[j]
     between = _touching(np.hypot(*branch.T) - reach, r, "two disks", tolerance)
-    disk, place = _places(x, walls)
-    away = place - x[disk]
-    against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall", tolerance)
-    disk, away = disk[against], away[against]
-    away /= np.hypot(*away.T)[:, None]
-    stud = STUD * r[disk]
-    number = len(r) + np.arange(len(disk))
     branch, reach = branch[between], reach[between]
+    behind = _behind(x, r, walls, pressing, tolerance)
+    radii = np.concatenate([r, behind.r])
     contacts = make_contacts(
-        np.concatenate([i[between], disk]),
-        np.concatenate([j[between], number]),
-        np.concatenate([branch / np.hypot(*branch.T)[:, None], away]),
-        np.concatenate([reach, r[disk] + stud]),
-        np.concatenate([r, stud]),
+        np.concatenate([i[between], behind.disk]),
+        np.concatenate([j[between], len(r) + behind.grain]),
+        np.concatenate([branch / np.hypot(*branch.T)[:, None], behind.away]),
+        np.concatenate([reach, r[behind.disk] + behind.r[behind.grain]]),
+        radii,
     )
     return make_packing(
-        np.concatenate([x, x[disk] + away * (r[disk] + stud)[:, None]]),
-        np.concatenate([r, stud]),
+        np.concatenate([x, behind.x]),
+        radii,
         [np.inf, np.inf],
         contacts,
         np.zeros((len(contacts.i), 2)),
         mu,
-        load=np.concatenate([load, np.full((len(disk), 3), np.nan)]),
-        info={"walls": walls.tolist(), "disks": len(r)},
+        load=np.concatenate([load, behind.load]),
+        info={"walls": walls.tolist(), "disks": len(r), "pressing": behind.lids.tolist()},
     )
 
 
@@ -157,7 +160,7 @@ def _touching(gap, r, what, tolerance):
 
 
 def _places(x, walls):
-    """Each disk with each wall: disk (k,) and the wall's nearest place (k, 2), none given twice.
+    """Each disk with each wall: disk and wall (k,) and the wall's nearest place (k, 2), each once.
 
     Walls that meet have one place for a disk in the open angle between them, their common end.
     """
@@ -167,11 +170,65 @@ def _places(x, walls):
         raise InputError(f"wall {int(np.argmax(size == 0))} has no length")
     share = ((x[:, None] - begin) * along).sum(axis=-1) / size
     place = begin + np.clip(share, 0, 1)[..., None] * along
-    disk = np.repeat(np.arange(len(x)), len(walls))
+    disk, wall = (index.ravel() for index in np.indices(share.shape))
     flat = place.reshape(-1, 2)
     keys = np.column_stack([disk, np.round(flat, 9)])
     first = np.sort(np.unique(keys, axis=0, return_index=True)[1])
-    return disk[first], flat[first]
+    return disk[first], wall[first], flat[first]
+
+
+class _Behind(NamedTuple):
+    """Grains behind walls: those that press, then one for each place where another is touched."""
+
+    disk: np.ndarray  # (k,) that touches
+    grain: np.ndarray  # (k,) which it touches, among these
+    away: np.ndarray  # (k, 2) unit vector from one to the other
+    x: np.ndarray  # (m, 2) centres
+    r: np.ndarray  # (m,) radii
+    load: np.ndarray  # (m, 3) the force of walls that press, NaN else
+    lids: np.ndarray  # (l,) which walls press
+
+
+def _behind(x, r, walls, pressing, tolerance):
+    disk, wall, place = _places(x, walls)
+    away = place - x[disk]
+    against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall", tolerance)
+    disk, wall, place, away = disk[against], wall[against], place[against], away[against]
+    away /= np.hypot(*away.T)[:, None]
+    held = pressing[wall] == 0
+    lids = np.flatnonzero(pressing)
+    grain = np.empty(len(disk), dtype=np.int64)
+    grain[held] = len(lids) + np.arange(held.sum())
+    grain[~held] = np.searchsorted(lids, wall[~held])
+    stud, lid = STUD * r[disk[held]], STUD * r.max()
+    inwards = [_inwards(x, walls[k], away[wall == k]) for k in lids]
+    inwards = np.reshape(inwards, (-1, 2))
+    load = np.full((len(lids) + len(stud), 3), np.nan)
+    load[: len(lids)] = np.column_stack([inwards * pressing[lids, None], np.zeros(len(lids))])
+    centres = (walls[lids, :2] + walls[lids, 2:]) / 2 - inwards * lid
+    return _Behind(
+        disk,
+        grain,
+        away,
+        np.concatenate([centres, place[held] + away[held] * stud[:, None]]),
+        np.concatenate([np.full(len(lids), lid), stud]),
+        load,
+        lids,
+    )
+
+
+def _inwards(x, wall, away):
+    """Unit vector (2,) in which a wall presses: towards the disks, which touch it along away."""
+    along = wall[2:] - wall[:2]
+    across = np.array([-along[1], along[0]]) / np.hypot(*along)
+    side = -away @ across
+    if np.any(np.abs(side) < 1 - SNAPPED):
+        raise InputError("a disk touches the end of a wall that presses: make the wall longer")
+    if np.any(side < 0) and np.any(side > 0):
+        raise InputError("disks lie on both sides of a wall that presses: move them to one")
+    if not len(side):
+        side = (x - wall[:2]).mean(axis=0, keepdims=True) @ across
+    return across * np.copysign(1.0, side[0])
 
 
 # The scenes: centres from school geometry, radius 1.
@@ -211,6 +268,14 @@ def _pyramid(mu, angle=30.0):
     return _resting([[-side, 1], [side, 1], [0, 1 + height]], [[-side - 1.8, 0, side + 1.8, 0]])
 
 
+def _press(mu):
+    """The close pyramid without weight, under a wall that presses with 1."""
+    made = _pyramid(mu)
+    lid = 2 + np.sqrt(3)
+    walls = [*made.walls.tolist(), [-1.6, lid, 1.6, lid]]
+    return made._replace(walls=np.array(walls), load=0 * made.load, pressing=np.array([0, 1.0]))
+
+
 def _leaning(mu):
     made = _pyramid(mu)
     return made._replace(walls=np.array([[-2, 4.2, -2, 0], [-2, 0, 2.8, 0]], dtype=float))
@@ -232,7 +297,7 @@ def _six(mu, dimension=2):
         try:
             made = pack(6, mu=PACKED_AT, seed=seed)
             if ensemble(made).dimension == dimension:
-                return made._replace(mu=mu)
+                return made._replace(mu=mu, info=made.info | {"packed_mu": PACKED_AT})
         except (NotJammedError, UndecidedError):
             continue
     raise InputError(f"no six disks of {MOST_SEEDS} seeds have h = {dimension}")
@@ -246,6 +311,7 @@ SCENES = {
     "groove": _Scene("One disk in a groove", 0.5, _groove),
     "box": _Scene("Two disks in a box", 0.3, _box),
     "pyramid": _Scene("Three disks as a pyramid", 0.4, _pyramid),
+    "press": _Scene("Three disks under a press", 0.4, _press),
     "leaning": _Scene("A pyramid against a wall", 0.4, _leaning),
     "column": _Scene("Ten disks in a column", 0.3, _column),
     "six": _Scene("Six disks under pressure", 0.5, _six),

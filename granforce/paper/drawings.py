@@ -3,8 +3,8 @@
 import numpy as np
 
 from granforce import figures
+from granforce.paper import tails
 from granforce.paper.claims.groups import SAMPLERS, drawn
-from granforce.paper.tables import FORCES
 from granforce.system.files import make_folder
 
 SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
@@ -69,8 +69,9 @@ CAPTIONS = {
     "backbone against the friction coefficient μ, V the volume of S with forces in ⟨f_n⟩; and ln V "
     f"per grain against the number N of disks; {_POINTS}.",
     "tails": "Distribution of the normal forces of uniform states of S, in ⟨f_n⟩, where the "
-    "pressure and where the whole stress is prescribed, semi-logarithmic. Tails exp(−(λ f)^b) are "
-    "fitted from 2 ⟨f_n⟩ to the last bin with ten forces or more: {tails}.",
+    "pressure and where the whole stress is prescribed, semi-logarithmic; grey, exponential and "
+    "Gaussian forces of the same mean. Tails P(f_n > f) ~ exp(−(λ f)^b) are fitted from 2 ⟨f_n⟩ to "
+    "the last bin with ten forces or more: {tails}.",
     "distances": "Distance of the original network and of the walk's states from the centre of S, "
     "in units of that of uniform states; bars are standard errors over packings.",
 }
@@ -91,7 +92,7 @@ def paper_sampler(table):
 def captions(table):
     """{file name: caption} of the figures of a table."""
     walk = _RELAXED[paper_sampler(table)]
-    told = _told(table) or "–"
+    told = tails.told(table) or "–"
     return {name: caption.format(walk=walk, tails=told) for name, caption in CAPTIONS.items()}
 
 
@@ -186,70 +187,16 @@ def _beyond(table):
     if table.part("volume"):
         made["volumes"] = _later(figures.volumes, table.part("volume"), table.part("volume_size"))
     if table.tails:
-        made["tails"] = _later(figures.tails, _forces_drawn(table), fits=_fitted(table))
+        made["tails"] = _later(figures.tails, _densities(table))
     return made
 
 
-# What uniform states of large packings are drawn for, in words.
-_PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress prescribed"}
-# Tails are fitted from here on, in ⟨f_n⟩, to the last bin with so many forces.
-_FITTED_FROM, _ENOUGH = 2.0, 10
-
-
-def _tail_counts(table):
-    """{word: {μ: counts of f_n in bins up to FORCES, over all packings}}."""
-    found = {}
-    for k, counts in table.tails.items():
-        row = table.rows[k]
-        known = found.setdefault(_PRESCRIBED[row["part"]], {})
-        known[row["mu"]] = known.get(row["mu"], 0.0) + counts
-    return found
-
-
-def _forces_drawn(table):
-    """{word: {μ: [(f, P), …]}} where there are forces."""
-    width = FORCES[0]
+def _densities(table):
+    """{word: {μ: [(f, P), …]}} of uniform states of large packings."""
     return {
-        word: {
-            mu: [
-                (f - width / 2, c / (counts.sum() * width))
-                for f, c in zip(FORCES, counts, strict=True)
-                if c
-            ]
-            for mu, counts in known.items()
-        }
-        for word, known in _tail_counts(table).items()
+        word: {mu: tails.densities(packings) for mu, packings in known.items()}
+        for word, known in tails.counts(table).items()
     }
-
-
-def _fitted(table):
-    """{word: {μ: (b, from, to)}} of tails P(f_n > f) ~ exp(−(λ f)^b)."""
-    found = {}
-    for word, known in _tail_counts(table).items():
-        for mu, counts in known.items():
-            beyond = counts[::-1].cumsum()[::-1]
-            chosen = (FORCES - FORCES[0] >= _FITTED_FROM) & (counts >= _ENOUGH)
-            if chosen.sum() > 3:
-                from_, part = FORCES[chosen] - FORCES[0], beyond[chosen] / counts.sum()
-                found.setdefault(word, {})[mu] = _stretch(from_, part)
-    return found
-
-
-def _stretch(f, part):
-    """b of exp(−(λ f)^b) for the part of forces beyond f, and the range of f."""
-    # ln P = −(λ f)^b + ln P₀: the power is that of the best line through (f^b, ln P).
-    powers = np.linspace(0.3, 4.0, 371)
-    left = [np.polyfit(f**b, np.log(part), 1, full=True)[1].sum() for b in powers]
-    return float(powers[int(np.argmin(left))]), float(f[0]), float(f[-1])
-
-
-def _told(table):
-    """The fits in words."""
-    return "; ".join(
-        f"{word}, μ = {mu:g}: b = {b:.2f} from {low:g} to {high:g} ⟨f_n⟩"
-        for word, known in _fitted(table).items()
-        for mu, (b, low, high) in sorted(known.items())
-    )
 
 
 def _chance(rows):

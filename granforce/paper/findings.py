@@ -7,6 +7,7 @@ packing. They tell why a claim holds or does not.
 import numpy as np
 
 from granforce.measures import statistics
+from granforce.paper import tails
 from granforce.paper.claims.figure4 import departure
 from granforce.paper.claims.groups import (
     LEAST_DYNAMIC,
@@ -190,8 +191,8 @@ def volume(table):
         groups = _values(rows, name)
         if len(groups) > 2:
             # Logarithms are of either sign: the largest of the grid.
-            top = peak(list(groups)) if name == "extent" else _largest(list(groups))
-            yield _finding(f"μ where {told} is largest", top, groups)
+            top = peak if name == "extent" else _largest
+            yield _trend(f"μ where {told} is largest", top, groups)
         yield from _by_range(groups, told)
     known = {(row["mu"], row["seed"]): row for row in table.part("walk")}
     for name in ("eta1", "eta2"):
@@ -201,6 +202,20 @@ def volume(table):
             if walk and walk.get(name) and row.get("extent"):
                 ratios.setdefault(row["mu"], []).append(row["extent"] / walk[name])
         yield from _by_range(ratios, f"width of S over {name[:-1].replace('eta', 'η')}{name[-1]}")
+    walked = [
+        (row, known[row["mu"], row["seed"]]) for row in rows if (row["mu"], row["seed"]) in known
+    ]
+    for name, other, what in (
+        ("log_volume_per_grain", "coordination", "ln V per grain with z"),
+        ("log_volume_per_grain", "eta2", "ln V per grain with η2"),
+        ("extent", "eta2", "width of S with η2"),
+    ):
+        pairs = [(row[name], walk[other]) for row, walk in walked if name in row and other in walk]
+        if len(pairs) > 2:
+            told = f"rank correlation over packings of all μ, {what}"
+            yield _finding(
+                told, lambda some: statistics.rank_correlation(*np.transpose(some)), [pairs]
+            )
     for mu in sorted({row["mu"] for row in table.part("volume_size")}):
         sized = [row for row in table.part("volume", "volume_size") if row["mu"] == mu]
         largest = max(row["n"] for row in sized)
@@ -213,9 +228,31 @@ def volume(table):
             yield _finding(told, lambda many, few: np.mean(many) - np.mean(few), groups)
 
 
+def forces(table):
+    """How the normal forces of uniform states fall off, against an exponential and a Gaussian."""
+    for word, known in tails.counts(table).items():
+        for mu, packings in known.items():
+            tail = tails.fitted(packings)
+            if tail is None:
+                continue
+            case = f"{word}, μ = {mu:g}, f = {tail.low:g} … {tail.high:g} ⟨f_n⟩"
+            for name, what in (
+                ("power", "b of exp(−(λ f)^b) for uniform P(f_n > f)"),
+                ("off_exponential", "ln of uniform P(f_n > f) about an exponential, rms"),
+                ("off_gaussian", "ln of uniform P(f_n > f) about a Gaussian, rms"),
+            ):
+                told = f"{what}, {case}"
+                yield _finding(told, lambda some, name=name: _part(some, name), [packings])
+
+
+def _part(packings, name):
+    """One number of the tail of some packings, NaN without one."""
+    return getattr(tails.fitted(packings), name, np.nan)
+
+
 FAMILIES = (
     *(sampled_part, measure, solver, exact_shape, distribution, opened, size, preparation),
-    *(strength, shear, volume),
+    *(strength, shear, volume, forces),
 )
 
 
@@ -234,9 +271,9 @@ def _ratios(table, name, above, below):
     return ratios
 
 
-def _largest(frictions):
-    """Statistic: μ of the grid where the means over packings are largest."""
-    return lambda *values: frictions[int(np.argmax([np.mean(v) for v in values]))]
+def _largest(frictions, means):
+    """μ of the grid where the means over packings are largest."""
+    return float(frictions[int(np.argmax(means))])
 
 
 def _by_range(groups, statement):

@@ -10,11 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.explore import bodies
+from granforce.explore import outline as outlines
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import ensemble
+from granforce.numerics import certificates
+from granforce.records import InputError, are_whole
 
 # Singular values of A below this, relative to the largest, are 0.
 _RANK = 1e-10
+# How far the outline may be from the half planes that hold all of S, relative to its extent.
+_OUTLINED = 1e-4
 
 
 class Hull(NamedTuple):
@@ -44,9 +49,34 @@ def fall(packing):
 
 
 def bounds(packing):
-    """Least and largest f_n (N_c, 2) of every contact, NaN where not certified; 0 where idle."""
+    """Least and largest f_n (N_c, 2) of every contact, NaN where not certified; 0 where idle.
+
+    None where S has no end, by a certificate.
+    """
     S = ensemble(packing)
+    if certificates.recession(S.scaled_form[0]) is not None:
+        return None
     found = intervals(S)
     both = np.zeros((len(packing.contacts.i), 2))
     both[S.index] = np.column_stack([found.lower[:, 0], found.upper[:, 0]])
     return both
+
+
+def outline(packing, plane):
+    """Corners (k, 2) of the outline of S on two force components, in force; none without an area.
+
+    plane: two numbers, 2 c for f_n and 2 c + 1 for f_t of contact c of the packing. Its certified
+    outer polygon is _OUTLINED of the extent away at most.
+
+    Raises InputError for other components, and where S is not bounded.
+    """
+    S = ensemble(packing)
+    chosen = np.array(plane)
+    if chosen.shape != (2,) or not are_whole(chosen, 2 * len(packing.contacts.i) - 1).all():
+        raise InputError("a plane has two force components: 2 c for f_n, 2 c + 1 for f_t")
+    axes = np.zeros((2, len(packing.contacts.i), 2))
+    axes.reshape(2, -1)[[0, 1], chosen] = 1.0
+    carrying = axes[:, S.index]
+    if chosen[0] == chosen[1] or not carrying.any(axis=(1, 2)).all():
+        return np.empty((0, 2))
+    return S.force_scale * outlines.outline(S, carrying, tolerance=_OUTLINED).inner

@@ -24,7 +24,7 @@ from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.packing.compaction import draw_radii, pack
+from granforce.packing.compaction import check_box, draw_radii, pack
 from granforce.perturb.critical_force import MOST_STEPS, RISE, critical_force, critical_forces
 from granforce.records import InputError, check_memory, friction, positive, random_seed, whole
 from granforce.study import slices
@@ -76,6 +76,7 @@ def _packing_parameters(
     box_mass=100.0,
     sweeps=600,
     accuracy=0.01,
+    box="square",
 ):
     """The parameters that name a packing in the store; as for `pack`.
 
@@ -96,6 +97,8 @@ def _packing_parameters(
         "box_mass": positive(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
         "accuracy": positive(accuracy, "accuracy"),
+        # Only where it is not square: keys of packings in square boxes stay what they were.
+        **({} if check_box(box) == "square" else {"box": box}),
     }
 
 

@@ -218,9 +218,7 @@ def regional_stress(contacts, x, grains, forces):
     """
     arm = np.where(contacts.j < grains, contacts.length, contacts.arm_i)
     at = x[contacts.i] + contacts.arm_i[:, None] * contacts.normal
-    low, high = x[:grains].min(axis=0), x[:grains].max(axis=0)
-    side = np.maximum((high - low) / REGIONS, 1e-300)
-    cell = np.clip(((at - low) / side).astype(int), 0, REGIONS - 1) @ [REGIONS, 1]
+    cell, side = regions(at, x[:grains])
     tangent = np.column_stack([-contacts.normal[:, 1], contacts.normal[:, 0]])
     force = forces[..., :1] * contacts.normal + forces[..., 1:] * tangent
     branch = arm[:, None] * contacts.normal
@@ -229,6 +227,16 @@ def regional_stress(contacts, x, grains, forces):
     for k in range(REGIONS**2):
         total[..., k, :] = parts[..., cell == k, :].sum(axis=-2)
     return total / np.prod(side)
+
+
+def regions(at, x):
+    """Parts (k,) of the frame in which points (k, 2) lie, column by column, and a part's sides.
+
+    x (N, 2): centres of the grains.
+    """
+    low, high = x.min(axis=0), x.max(axis=0)
+    side = np.maximum((high - low) / REGIONS, 1e-300)
+    return np.clip(((at - low) / side).astype(int), 0, REGIONS - 1) @ [REGIONS, 1], side
 
 
 FRAME = Kind("frame", 1, "frames", "frame", parameters, _inferred)

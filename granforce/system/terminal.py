@@ -18,13 +18,17 @@ def print_list(rows: Sequence[Mapping[str, Any]], names: Sequence[str], as_json:
 
 
 def report(lines: Mapping[str, Any], as_json: bool) -> None:
-    """A report on stdout: names and numbers in two columns, or JSON."""
+    """A report on stdout: names and numbers in two columns, sentences line by line, or JSON."""
     if as_json:
         print(json_text(lines))
         return
     width = max(len(name) for name in lines)
     for name, value in lines.items():
-        print(f"{name.replace('_', ' '):<{width}}  {text(value)}")
+        sentences = isinstance(value, list) and any(" " in str(part) for part in value)
+        name = name.replace("_", " ")
+        for part in value if sentences else [value]:
+            print(f"{name:<{width}}  {text(part)}")
+            name = ""
 
 
 def table(

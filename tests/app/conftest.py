@@ -61,11 +61,12 @@ def _returning(browser, **options):
 def opening(chromium, address):
     """opening(query, width, height, …): a page on its way; at the end no error was told.
 
-    first: whether it is of somebody who was never here; further options are of its context.
+    first: whether it is of somebody who was never here; at: another server's address; wanted: what
+    errors may say; further options are of its context.
     """
-    errors, contexts = [], []
+    errors, contexts, allowed = [], [], ["favicon"]
 
-    def opening(query, width, height, first=False, **options):
+    def opening(query, width, height, first=False, at=None, wanted=(), **options):
         begin = chromium.fresh_context if first else chromium.new_context
         context = begin(viewport={"width": width, "height": height}, **options)
         contexts.append(context)
@@ -73,13 +74,14 @@ def opening(chromium, address):
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda told: told.type == "error" and errors.append(told.text))
-        page.goto(address + query)
+        allowed.extend(wanted)
+        page.goto((at or address) + query)
         return page
 
     yield opening
     for context in contexts:
         context.close()
-    assert not [error for error in errors if "favicon" not in error]
+    assert not [error for error in errors if not any(words in error for words in allowed)]
 
 
 @pytest.fixture

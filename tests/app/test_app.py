@@ -2,6 +2,7 @@
 
 import gc
 import re
+import shlex
 import shutil
 import sys
 import threading
@@ -211,15 +212,26 @@ def test_expected_steps_come_from_the_nearest_packing(library):
 
 @pytest.mark.parametrize(
     "mu, packed, kind, extra",
-    [(0.1, None, "walk", {}), (0.3, 0.0, "walk", {"radii": "uniform:0.9,1", "sweeps": 50})],
+    [
+        (0.1, None, "walk", {}),
+        (0.3, 0.0, "walk", {"radii": "uniform:0.9,1", "sweeps": 50}),
+        (0.3, 0.0, "walk", {"box": "isotropic", "accuracy": 0.02}),
+    ],
 )
 def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
-    from app.selection import link, read_link, select
+    from app import limits
+    from app.selection import command, link, read_link, select
 
     made = select(120, mu, 7, packed, kind=kind, relax="nearest", states=33, seed=4)
     made = made._replace(packing=made.packing | extra)
     read, view = read_link("?" + link(made, {"tab": "perturb"}))
     assert read == made and view == {"tab": "perturb"}
+    read.check(limits.Limits())
+    words = shlex.split(command(made))[2:]  # what the command line takes is the same packing
+    options = dict(zip(words[::2], words[1::2], strict=True))
+    for name, value in extra.items():
+        word = "step-accuracy" if name == "accuracy" else name
+        assert options[f"--{word}"] == str(value)
 
 
 def test_older_links_to_a_renamed_tab_open_it():
@@ -314,7 +326,7 @@ def test_state_opens_near_mu_0_1_and_follows_the_selection(state, wait_for):
     assert state.cell.mu == 0.1 and state.replay.summary["mu"] == 0.1
     state.choose(mu=1)
     wait_for(state)
-    assert state.replay.summary["mu"] == 1 and "finished results" in state.source
+    assert state.replay.summary["mu"] == 1 and "precomputed" in state.source
 
 
 def test_a_cell_in_memory_is_shown_at_once(state):
@@ -358,7 +370,7 @@ def test_states_in_no_store_are_missing_until_computed(state, wait_for):
     state.compute()
     wait_for(state)
     assert state.message == "" and state.cell.mu == 0.3 and not state.missing
-    assert "computed here" in state.source and len(state.replay.number) == 9
+    assert "computed on this server" in state.source and len(state.replay.number) == 9
     assert [cell.mu for cell in state.cells()] == [0.3]
     assert len(state.catalogue) == 4
 
@@ -510,7 +522,7 @@ def test_all_that_a_link_may_name_is_limited():
     from app.limits import NAMES
     from app.selection import OPTIONS
 
-    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii"}
+    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii", "box"}
 
 
 def test_limits_are_read_and_wrong_ones_refused():

@@ -390,7 +390,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     "tab, words",
     [
         ("intervals", ("possible: exact; seen: so far",)),
-        ("plane", ("outline: exact; states: seen",)),
+        ("plane", ("exact outline; sampled states",)),
         ("statistics", ("measured: of the random walk's states", "dashed exact, others measured")),
     ],
 )

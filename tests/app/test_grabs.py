@@ -105,6 +105,7 @@ def test_messages_that_make_no_sense_are_ignored(page, state):
         {"grab": "a"},
         {"hold": [10**9, 1.0]},
         {"hold": 3},
+        {"hold": [4, float("nan")]},
     ):
         page.hand.heard(message)
     assert not page.told and not state.pulls and not state.busy

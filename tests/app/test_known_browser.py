@@ -1,7 +1,6 @@
-"""In a browser: forces are held, intervals shrink, stresses, photoelastic frames."""
+"""In a browser: forces are held, intervals shrink, stresses."""
 
 import pytest
-from frames import frame, write
 from serving import MODEL, column, painted, scene
 from small_store import ROOT
 
@@ -87,15 +86,3 @@ def test_the_plane_of_stresses(visit):
     page.get_by_text("The pressure alone is held").wait_for()
     assert len(column(page, "outer", "x")) > 3
     picture(page, "stresses")
-
-
-def test_a_photoelastic_frame_is_compared(visit, tmp_path):
-    grains, rows, _ = frame(60, missing=0.1, noise=0.05)
-    write(tmp_path, grains, rows)
-    page = visit("?tab=upload")
-    page.locator("input[type=file]").set_input_files(
-        [tmp_path / "positions.txt", tmp_path / "adjacency.txt"]
-    )
-    page.get_by_text("Listed are").wait_for()
-    page.wait_for_function(f"() => {MODEL}('photoelastic_n')?.get_length() > 20")
-    picture(page, "photoelastic")

@@ -234,7 +234,7 @@ def test_cancelled_the_old_picture_is_back_and_says_what_is_not_computed(state, 
     browser.stream.tick()
     assert state.seen is old and state.live is None and state.missing
     assert state.asked.startswith("of μ = 0.1; not computed: μ = 0.27")
-    assert "finished results" in state.source
+    assert "precomputed" in state.source
     assert browser.player.walk["room"] == 0 and browser.player.walk["mu"] == 0.1
 
 

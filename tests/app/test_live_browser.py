@@ -475,6 +475,27 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
 
 
+@pytest.mark.parametrize("width, height", [(1280, 800), (1440, 900), (1536, 864), (1700, 900)])
+def test_the_tabs_are_beside_a_packing_that_the_window_holds(visit, width, height):
+    page = visit("", width, height)
+    first, last = (page.get_by_role("tab", name=name) for name in ("Intervals", "Export"))
+    last.wait_for()
+    packing = page.locator(".scene").first.bounding_box()
+    assert first.bounding_box()["x"] > packing["x"] + 0.9 * packing["width"]
+    assert inside(page, ".scene") and last.bounding_box()["y"] < 0.4 * height
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("width", [700, 1024, 1170])
+def test_the_sidebar_leaves_its_room_to_the_packing_where_there_is_little(visit, width):
+    page = visit("", width, 768)
+    page.get_by_role("button", name="Open drawer").wait_for()
+    page.wait_for_function("() => document.querySelectorAll('.friction').length <= 1")
+    box = page.locator(".scene").first.bounding_box()
+    assert inside(page, ".scene") and box["height"] < 0.6 * 768
+    assert page.get_by_label("logarithm of μ").count() == 1
+
+
 def test_on_a_phone_the_player_is_below_the_packing(visit):
     page = visit("", 400, 900)
     above, below = (page.locator(f".stage .{name}").bounding_box() for name in ("scene", "bar"))

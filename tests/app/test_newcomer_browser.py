@@ -59,11 +59,11 @@ def cancelled():
 def test_where_a_series_has_no_states_none_of_another_friction_is_named(visit, cancelled):
     page = visit(AT)
     shows(page, 0.1)
-    chosen = page.get_by_role("combobox", name="Finished results")
+    chosen = page.get_by_role("combobox", name="Precomputed results")
     assert chosen.inner_text().endswith("3 μ from 0 to 1")
     computing(page)
     cancelled(page)
-    page.get_by_role("combobox", name="Finished results").filter(
+    page.get_by_role("combobox", name="Precomputed results").filter(
         has_text="none with N = 9000"
     ).wait_for()
 

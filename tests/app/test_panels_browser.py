@@ -139,7 +139,7 @@ def test_statistics_are_drawn_one_after_another(visit):
     for words, text in (
         ("P(ΔFₙ)", "How the extents ΔFₙ"),
         ("corr(μ)", "Whether strong contacts"),
-        ("ΔFₙ – fₙ", "Correlation of fₙ with ΔFₙ"),
+        ("ΔFₙ against fₙ", "Correlation of fₙ with ΔFₙ"),
         ("P(fₙ)", "of the forces lie beyond"),
         ("η(μ)", "How undetermined the forces are"),
     ):

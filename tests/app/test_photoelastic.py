@@ -5,9 +5,14 @@ import pytest
 from frames import NEWTON, file, frame
 from test_panels import opened, settled
 
+import granforce as gf
 from app import photoelastic, uploads
+from app.views import chains
 from app.views.upload import View
+from granforce.forces.ensemble import ensemble
+from granforce.packing.importers import read_pegs
 from granforce.records import InputError
+from granforce.study import series
 
 
 def files(n=60, **options):
@@ -43,7 +48,7 @@ def test_exact_measurements_are_taken_as_they_are(state):
     assert view.task.running and view.reverse.visible and not view.pressure.visible
     settled(state, done=lambda: len(view.frame) > 0)
     player, body = view.frame
-    account, _, _, _, compared, stress, save = body
+    account, _, _, _, _, _, compared, stress, save = body
     assert not player.visible and "σₓₓ" in stress.object and save.files
     for words in ("60 grains", "at walls", "every inner grain is balanced", "not measured"):
         assert words in account.object
@@ -107,29 +112,87 @@ def test_the_picture_shows_measured_inferred_and_differences(state):
     view = dropped(state, new)
     settled(state, done=lambda: len(view.frame) > 0)
     _, body = view.frame
-    choice, picture = body[1], body[2].object
-    seen = {}
-    for shown, words in (("measured", "measured"), ("deviation", "σ"), ("inferred", "pale")):
+    choice, pictures = body[1], body[2]
+    picture, seen = pictures[0].object, {}
+    for shown, words in (
+        ("measured", "measured"),
+        ("deviation", "difference"),
+        ("inferred", "pale"),
+    ):
         choice.value = shown
         seen[shown] = tuple(one.visible for one in picture.renderers)
-        assert words in picture.select_one({"name": "shown"}).text
+        assert words in picture.select_one({"name": "shown"}).text and len(pictures) == 1
     assert len(set(seen.values())) == 3
+    choice.value = "beside"
+    left, right = (one.object for one in pictures)
+    assert left is picture and right.x_range is left.x_range
+    words = [each.select_one({"name": "shown"}).text for each in (left, right)]
+    assert words == ["inferred", "measured"]
+    choice.value = "measured"
+    assert tuple(one.visible for one in picture.renderers) == seen["measured"]
     labels = {item.label.value for item in picture.legend[0].items}
-    assert {"listed contacts", "added contacts", "certain"} <= labels
-    assert "carry for certain" in body[3].object
+    assert {"listed", "added", "certain"} <= labels
+    assert "carry for certain" in body[5].object
 
 
-def test_all_contacts_are_one_table():
-    from granforce.packing.importers import read_pegs
-    from granforce.study import series
+def test_widths_and_lengths_have_scales():
+    frame = made(60, missing=0.1, noise=0.05)
+    picture, layers = chains.network(frame)
+    told = [text for one in picture.renderers for text in one.data_source.data.get("text", [])]
+    assert len(told) == 5 and f"{frame.report['mean_measured_normal_force']:.3g}" in told[3]
+    bar, sample = (
+        picture.select_one({"name": f"{name}_scale"}).data_source.data
+        for name in ("length", "width")
+    )
+    (length,) = np.subtract(bar["x1"], bar["x0"])
+    assert told[4].startswith(f"{length:g} ") and 50 < length < np.ptp(frame.x[:, 0])
+    # Of one force the sample is as wide as the chain.
+    chain = layers["inferred"][2].data_source.data
+    force, width = (np.asarray(chain[name]) for name in ("f", "width"))
+    thin = force < 1
+    np.testing.assert_allclose(width[thin], sample["height"][1] * force[thin])
+    assert sample["height"][0] == pytest.approx(sample["height"][1] / 2)
+    # Pale: by one standard error more.
+    pale = layers["inferred"][0].data_source.data
+    both = np.isin(pale["contact"], chain["contact"])
+    more = pale["width"][both] - width
+    np.testing.assert_allclose(more, sample["height"][1] * pale["error"][both])
 
-    new, _ = files(n=60, missing=0.2, noise=0.1)
+
+def test_a_frame_is_opened_as_a_packing(state):
+    """Chains are the inferred ones, and what walls do is held: S is bounded."""
+    frame = made(60, missing=0.1, noise=0.05)
+    view = View(state)
+    view._open(frame)
+    settled(state, done=lambda: state.replay is not None and state.selection.imported)
+    S = ensemble(frame.packing)
+    assert frame.packing.r.max() == 1  # as chains of the page are drawn for
+    assert S.dimension == state.replay.summary["dimension"] > 0
+    inner = np.all(frame.ends < len(frame.r), axis=1)
+    forces = frame.inferred[inner] * frame.report["mean_measured_normal_force"]
+    shown = state.replay.normal[0] * state.replay.force_scale
+    np.testing.assert_allclose(shown, forces[S.index, 0], rtol=1e-5, atol=1e-7 * S.force_scale)
+    exact = gf.intervals(S)
+    assert np.isfinite(exact.upper).all() and exact.max_gap < 1e-6
+
+
+def made(n, **options):
+    """A Frame as it comes of files."""
+    new, _ = files(n=n, **options)
     found = read_pegs(*(uploads.opened(*one) for one in new), mu=0.3)
-    frame = photoelastic.frame_of(series.infer_frame(found, states=8), "files", (1,))
+    return photoelastic.frame_of(series.infer_frame(found, states=8), "files", (1,))
+
+
+def test_all_that_was_found_is_one_table():
+    frame = made(60, missing=0.2, noise=0.1)
     lines = photoelastic.table(frame).decode().splitlines()
-    assert lines[0].startswith("#") and lines[1].startswith("contact,id1,id2,measured_f_n")
-    assert len(lines) == 2 + len(frame.ends)
-    values = np.genfromtxt(lines[1:], delimiter=",", names=True)
+    head = [line for line in lines if line.startswith("#")]
+    rows = lines[len(head) :]
+    assert sum("region" in line and "±" in line and "xx" in line for line in head) == 9
+    assert rows[0].startswith("contact,id1,id2,x,y,measured_f_n")
+    assert len(rows) == 1 + len(frame.ends)
+    values = np.genfromtxt(rows, delimiter=",", names=True)
+    assert set(values["region"]) == set(range(9))
     assert np.array_equal(values["added"], frame.added)
     assert np.allclose(values["inferred_f_n"], frame.inferred[:, 0], atol=1e-8)
     assert set(np.flatnonzero(values["suspect"])) == set(frame.suspects.tolist())

@@ -1,8 +1,10 @@
 """Small scenes as a visitor has them in hand: S whole, pulled, cut by friction, and empty."""
 
+import signal
+
 import numpy as np
 import pytest
-from serving import painted
+from serving import free_port, painted, serve
 from small_store import ROOT
 
 import granforce as gf
@@ -11,7 +13,7 @@ from app import scenes
 PATIENCE = 60_000  # ms, on a busy machine
 # Pictures to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "scenes"
-WIDTHS = [(390, 844), (1280, 800), (1440, 900), (1920, 1080)]
+WIDTHS = [(390, 844), (1024, 768), (1280, 800), (1440, 900), (1536, 864), (1920, 1080)]
 
 pytestmark = pytest.mark.browser
 
@@ -74,7 +76,11 @@ def test_the_first_visit_begins_with_the_groove_and_goes_on_to_400_disks(look):
 
 @pytest.mark.parametrize(
     "name, mu",
-    [("groove", 0.5), ("pyramid", 0.4), ("box", 0.1), ("box", 0.3), ("leaning", 0.3)],
+    [
+        *(("groove", 0.5), ("pyramid", 0.4), ("press", 0.4)),
+        *(("box", 0.1), ("box", 0.3), ("leaning", 0.3), ("leaning", 0.5)),
+        *(("solid", 0.3), ("solid", 0.5)),
+    ],
 )
 def test_the_page_cuts_the_same_body_as_the_library(look, name, mu):
     page = look(f"?scene={name}&mu={mu}")
@@ -250,6 +256,86 @@ def test_a_column_has_a_shadow_and_exact_bounds(look):
     assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-9
 
 
+def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
+    page = look("?scene=column")
+    assert "one shadow of S" in desk(page).locator(".says").inner_text()
+    desk(page).get_by_role("combobox", name="force shown upwards").select_option(
+        "fₜ between 1 and 2"
+    )
+    until(page, "small.space.shadow.join() === '0,1' && !small.space.outline.stale")
+    S = gf.ensemble(gf.scene("column"))
+    axes = np.zeros((2, len(S.index), 2))
+    axes[0, 0, 0] = axes[1, 0, 1] = 1
+    exact = gf.outline(S, axes, tolerance=1e-4).inner * S.force_scale
+    seen = np.reshape(ask(page, "[...small.space.outline.points]"), (-1, 2))
+    np.testing.assert_allclose(seen, exact, atol=1e-7)
+    dots = np.array(ask(page, "small.space.dots.map(u => small.space.flat(u).slice(0, 2))"))
+    assert len(dots) > 100
+    assert np.all((seen.min(axis=0) - 1e-3 < dots) & (dots < seen.max(axis=0) + 1e-3))
+
+
+@pytest.mark.parametrize("name, mu", [("groove", 1), ("box", 0.6), ("column", 2)])
+def test_what_has_no_end_is_not_filled_and_the_page_says_why(look, name, mu):
+    page = look(f"?scene={name}&mu={mu}")
+    until(page, "!small.body.bounded")
+    if not ask(page, "small.now.filled"):
+        desk(page).get_by_role("button", name="Fill S").click()
+    desk(page).get_by_text("Nothing can fill it evenly").wait_for()
+    assert ask(page, "small.space.dots.length") == 0
+    forces = ask(page, "[...small.body.forces()]")
+    desk(page).get_by_role("button", name="Walk").click()
+    page.wait_for_function(
+        "([e, F]) => e.small.body.forces().some((v, k) => Math.abs(v - F[k]) > 1e-6)",
+        arg=[desk(page).element_handle(), forces],
+    )
+
+
+def test_back_goes_to_the_scene_before(look):
+    page = look("?scene=groove&mu=0.7")
+    desk(page).get_by_role("combobox", name="Scene").select_option("box")
+    until(page, "small.body.h === 2")
+    page.wait_for_function("() => location.search.includes('scene=box')")
+    page.go_back()
+    until(page, "small.body.scene.name === 'groove' && small.mu === 0.7")
+    page.go_forward()
+    until(page, "small.body.scene.name === 'box' && small.mu === 0.3")
+
+
+def test_400_disks_take_the_theme_and_the_friction_along_and_back(look):
+    page = look("?scene=groove&dark=1")
+    desk(page).get_by_role("textbox", name="μ").fill("0.5")
+    desk(page).get_by_role("textbox", name="μ").press("Enter")
+    desk(page).get_by_role("textbox", name="μ").fill("1")
+    desk(page).get_by_role("textbox", name="μ").press("Enter")
+    desk(page).get_by_role("combobox", name="Scene").select_option("many")
+    painted(page, PATIENCE)
+    page.wait_for_function("() => /mu=1&/.test(location.search) && /dark=1/.test(location.search)")
+    page.get_by_role("combobox", name="Scene").first.select_option("box")
+    drawn(page)
+    until(page, "small.body.scene.name === 'box' && small.mu === 1")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(18, 18, 18)"
+    page.go_back()
+    painted(page, PATIENCE)
+
+
+def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
+    port = free_port()
+    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)) as (url, server):
+        expected = ("WebSocket", "Failed to load resource", "not connected")
+        page = opening("?scene=groove", 1280, 800, at=url, wanted=expected)
+        drawn(page)
+        server.send_signal(signal.SIGKILL)
+        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
+        desk(page).get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
+        until(page, "Math.abs(small.body.interval(0)[1] - Math.SQRT1_2 / 0.2) < 1e-9")
+        page.wait_for_function("() => location.search.includes('mu=0.8')")
+        desk(page).get_by_role("combobox", name="Scene").select_option("box")
+    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)):
+        page.get_by_text("Connection lost").wait_for(state="detached")
+        drawn(page)
+        until(page, "small.body.scene.name === 'box'")
+
+
 def test_a_finger_drags_the_point(look):
     page = look("?scene=groove", 390, 844, has_touch=True)
     box = desk(page).locator("canvas.space").bounding_box()
@@ -287,6 +373,73 @@ def test_a_scene_is_built_by_hand_and_its_link_carries_it(look, tmp_path):
     assert "disk 3 gives way" in desk(page).locator(".says").inner_text()
     desk(page).get_by_role("radio", name="Remove").click()
     page.mouse.click(*at(5.5, 3.5))
+    until(page, "small.body.h === 2 && !small.body.empty")
+
+
+def test_a_scene_is_built_under_pressure_and_its_link_carries_it(look, tmp_path):
+    page = look("?scene=own")
+    desk(page).get_by_role("radio", name="Pressure").click()
+    until(page, "small.body.scene.pressing.length === 1 && small.body.h === 1")
+    page.wait_for_function("() => location.search.includes('%7Cp1')")
+    with page.expect_download() as file:
+        desk(page).get_by_role("button", name="Save NPZ").click()
+    file.value.save_as(tmp_path / "own.npz")
+    packing = gf.load_packing(tmp_path / "own.npz")
+    S = gf.ensemble(packing)
+    assert S.admits(packing.forces) and not packing.load[:3].any()
+    page.reload()
+    drawn(page)
+    until(page, "small.body.scene.pressing.length === 1")
+    low, high = gf.body(S).intervals
+    seen = np.array(ask(page, "small.body.scene.names.map((_, c) => small.body.interval(2 * c))"))
+    np.testing.assert_allclose(seen, np.column_stack([low[:, 0], high[:, 0]]), atol=1e-7)
+    desk(page).get_by_role("radio", name="Let a wall press").click()
+    box = desk(page).locator("canvas.packing").bounding_box()
+    across, down = ask(page, "small.arrows.px(0.6, 3.73)")
+    page.mouse.click(box["x"] + across, box["y"] + down)
+    desk(page).get_by_text("Nothing presses on these disks yet").wait_for()
+    assert "empty" not in desk(page).locator(".what").inner_text()  # of what is not certified
+    page.mouse.click(box["x"] + across, box["y"] + down)
+    until(page, "small.body.h === 1 && !small.body.empty")
+    desk(page).get_by_role("slider", name="friction μ").fill("0.1")
+    desk(page).get_by_text("the wall that presses give way").wait_for()
+    desk(page).get_by_role("radio", name="Gravity").click()
+    until(page, "small.body.scene.pressing.length === 0 && small.body.scene.load[1] === -1")
+
+
+def test_a_scene_is_built_and_pushed_by_keyboard(look):
+    page = look("?scene=own")
+    desk(page).locator("canvas.packing").focus()
+    for _ in range(2):
+        page.keyboard.press("ArrowUp")
+    page.keyboard.press("Enter")  # a disk is put, and let go
+    until(page, "small.body.scene.r.length === 3")
+    page.keyboard.press("Enter")
+    assert ask(page, "small.builder.held") is None
+    page.goto(page.url.split("?")[0] + "?scene=pyramid")
+    drawn(page)
+    desk(page).get_by_role("button", name="Push a disk").click()
+    for _ in range(3):
+        page.keyboard.press("n")
+    page.keyboard.press("ArrowRight")
+    assert ask(page, "[small.pushed.disk, small.body.load[6]]") == [2, pytest.approx(0.02)]
+    assert "limit load" in desk(page).locator(".says").inner_text()
+    for _ in range(40):
+        page.keyboard.press("ArrowRight")
+    until(page, "small.body.empty")
+
+
+def test_a_disk_in_the_air_falls_and_a_wall_that_presses_on_no_disk_is_told(look):
+    page = look("?scene=own&built=2,3,1%7C0,0,4,0")
+    until(page, "small.body.empty && small.now.fall")
+    assert "disk 1 gives way" in desk(page).locator(".says").inner_text()
+    page = look("?scene=own&built=2,1,1%7C0,0,4,0;0,4,4,4%7Cp1")
+    assert "presses on no disk" in desk(page).locator(".says").inner_text()
+
+
+def test_a_link_that_cannot_be_built_says_so_and_begins_anew(look):
+    page = look("?scene=own&built=1,1,1;1.5,1,1%7C0,0,3,0")
+    assert "two disks overlap" in desk(page).locator(".says").inner_text()
     until(page, "small.body.h === 2 && !small.body.empty")
 
 

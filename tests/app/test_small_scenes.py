@@ -10,6 +10,7 @@ from app import scenes
 from granforce.records import InputError
 from granforce.study import hulls
 
+UNDER_PRESS = "1,1,1;3,1,1;2,2.732050807569,1|0,0,4,0;0.4,3.732050807569,3.6,3.732050807569|p1"
 PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
 
 
@@ -30,6 +31,7 @@ def test_links_name_a_scene(query, scene, mu, step):
     asked = scenes.asked(query)
     assert (asked.scene, asked.mu, asked.step) == (scene, mu, step)
     assert "scene" not in asked.query
+    assert not asked.dark and scenes.asked(f"{query or '?scene=groove'}&dark=1").dark
 
 
 def test_every_scene_of_the_library_is_on_the_list():
@@ -37,7 +39,9 @@ def test_every_scene_of_the_library_is_on_the_list():
     assert listed[0] == scenes.FIRST and set(listed) >= {"many", "own", "column"}
 
 
-@pytest.mark.parametrize("name", ["groove", "box", "pyramid", "leaning", "column", "solid"])
+@pytest.mark.parametrize(
+    "name", ["groove", "box", "pyramid", "press", "leaning", "column", "solid"]
+)
 def test_forces_less_equations_is_free(name):
     drawn = scenes.drawn(name)
     count = len(drawn["i"])
@@ -75,6 +79,59 @@ def test_a_built_scene_is_saved_and_opened_by_the_library():
         gf.ensemble(empty)
 
 
+def test_walls_of_a_built_scene_press():
+    built, made = scenes.own(UNDER_PRESS, 0.4), gf.scene("press", 0.4)
+    assert not built.load[:3].any() and built.load[3].tolist() == [0, -3.2, 0]  # as it is long
+    expected = gf.body(gf.ensemble(made)).intervals
+    for end, exact in zip(gf.body(gf.ensemble(built)).intervals, expected, strict=True):
+        np.testing.assert_allclose(end, 3.2 * exact, atol=1e-9)
+    drawn = scenes.drawn(scenes.OWN, 0.4, UNDER_PRESS)
+    assert (drawn["h"], drawn["equations"], len(drawn["i"])) == (1, 11, 6)
+    assert drawn["names"][-1] == "disk 3 at the press"
+
+
+def test_a_scene_under_a_press_is_saved_and_opened_by_the_library():
+    packing = gf.load_packing(io.BytesIO(scenes.file_of(scenes.own(UNDER_PRESS, 0.4))))
+    S = gf.ensemble(packing)
+    assert S.admits(packing.forces) and S.dimension == 1
+    assert packing.info["pressing"] == [1]
+
+
+def test_where_no_wall_presses_yet_nothing_is_said_of_forces():
+    drawn = scenes.drawn(scenes.OWN, 0.4, UNDER_PRESS[:-1])
+    assert "b" not in drawn and drawn["idle"]
+    alone = scenes.drawn(scenes.OWN, 0.4, "1,5,1|0,0,8,0")  # a weight that falls is no such scene
+    assert not alone["idle"] and scenes.falling(scenes.own("1,5,1|0,0,8,0", 0.4))[1] < 0
+
+
+def test_a_press_that_is_not_borne_gives_way():
+    motion = scenes.falling(scenes.own(UNDER_PRESS, 0.2)).reshape(-1, 3)
+    assert len(motion) == 4 and motion[3, 1] < 0
+
+
+def test_a_column_has_an_exact_outline():
+    packing, S = gf.scene("column"), gf.ensemble(gf.scene("column"))
+    plane = [0, 2 * 9 + 1]  # f_n of the first contact, f_t of the tenth
+    found = scenes.measured(packing, None, plane)
+    axes = np.zeros((2, len(S.index), 2))
+    axes.reshape(2, -1)[[0, 1], plane] = 1
+    outline = gf.outline(S, axes, tolerance=1e-4)
+    corners = np.reshape(found["outline"], (-1, 2))
+    np.testing.assert_allclose(corners, outline.inner * S.force_scale)
+    low, high = found["bounds"][0]
+    assert (corners[:, 0].min(), corners[:, 0].max()) == pytest.approx((low, high), rel=1e-3)
+
+
+def test_what_has_no_end_has_neither_ends_nor_outline():
+    assert scenes.measured(scenes.packing_of("column", 2.0), None, [0, 2]) == {"endless": True}
+
+
+@pytest.mark.parametrize("plane", [[0], [0, 40], [0, 0.5], ["a", 1], None])
+def test_a_plane_that_is_not_there_is_refused(plane):
+    with pytest.raises(InputError):
+        scenes.measured(gf.scene("column"), None, plane)
+
+
 def test_a_disk_in_the_air_falls_and_the_others_stay():
     motion = scenes.falling(scenes.own("1,1,1;3,1,1;2,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
     assert motion[2, 1] < 0 and np.abs(motion[:2]).max() < 1e-9
@@ -83,7 +140,11 @@ def test_a_disk_in_the_air_falls_and_the_others_stay():
 
 
 @pytest.mark.parametrize(
-    "text", ["1,1", "a,b,c", ";".join(["1,1,0.1"] * 31), "0,0,1;1,0,1", "nan,0,1", "1,1,-1"]
+    "text",
+    [
+        *("1,1", "a,b,c", ";".join(["1,1,0.1"] * 31), "0,0,1;1,0,1", "nan,0,1", "1,1,-1"),
+        *("1,1,1|0,0,3,0|p1", "1,1,1|0,0,3,0|px", "1,1,1|0,0,3,0|0"),
+    ],
 )
 def test_what_cannot_be_built_is_refused(text):
     with pytest.raises(InputError):

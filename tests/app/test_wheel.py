@@ -1,4 +1,4 @@
-"""The wheel brings the page and its finished results; `granforce app` opens it."""
+"""The wheel brings the page and its precomputed results; `granforce app` opens it."""
 
 import os
 import re
@@ -89,7 +89,7 @@ def test_granforce_app_opens_the_page(installed, tmp_path):
 
 
 def _look(address):
-    """The packing of the finished results is painted."""
+    """The packing of the precomputed results is painted."""
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as context:
         browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)

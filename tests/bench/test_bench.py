@@ -233,3 +233,15 @@ def test_frames_are_nearer_to_the_truth_when_inferred():
     assert 0 < row["likeliest_f_n"] < row["raw_f_n"] and row["likeliest_f_t"] < row["raw_f_t"]
     assert row["stress"] < row["raw_stress"] and row["suspected"] > 0.7
     assert 0.4 < row["cover"] < 0.95 and 0.5 < row["chi"] < 1.6
+
+
+def test_uniform_states_against_size_reach_what_was_asked_for():
+    rows = bench.uniform_growth(True, n=30, mu=0.3, tiles=(1, 2), effective=60)
+    ours = [row for row in rows if "effective" in row]
+    assert [row["n"] for row in ours] == [30, 120]
+    assert all(row["reached"] and row["effective"] >= 60 for row in ours)
+    assert ours[1]["h"] == 4 * (ours[0]["h"] - 1) + 1 and ours[1]["null_space_ratio"] > 0
+    for place in ("16 rows at a time", "rows within 1 GiB", "all rows kept"):
+        *sizes, fit = [row for row in rows if row["rows"] == place]
+        cost = [row["seconds_per_state"] for row in sizes]
+        assert min(cost) > 0 and np.isclose(fit["exponent"], np.log(cost[1] / cost[0]) / np.log(4))

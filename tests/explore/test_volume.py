@@ -90,6 +90,18 @@ def test_a_point_has_no_extent_and_crystals_have_one():
     assert found.dimension == crystal.dimension and found.extent > 0
 
 
+@pytest.mark.parametrize("n, mu, seed, h", [(6, 0.3, 1, 0), (8, 1.0, 1, 0), (16, 1.0, 1, 1)])
+def test_a_thin_s_under_a_whole_stress_is_what_its_corners_say(n, mu, seed, h):
+    """Rows of its balance follow from others: a point is drawn as one, a segment has its length."""
+    S = gf.ensemble(packed(n, mu, seed), prescribed="stress")
+    corners = gf.body(S).corners / S.force_scale
+    found, sample = gf.volume(S), gf.sample_uniform(S, 80)
+    assert corners.shape[1] == found.dimension == sample.walls.dimension == h
+    assert found.reached and sample.residual.max() < 1e-10 and sample.counts["refused"] == 0
+    length = np.log(np.ptp(corners)) if h else 0.0
+    assert abs(found.log_volume - length) <= 4 * found.error
+
+
 def test_what_has_no_volume_is_told():
     S = gf.ensemble(packed(40, 0.3))
     for options in ({"accuracy": 0.0}, {"accuracy": -1.0}, {"workers": 0}, {"seed": -1}):

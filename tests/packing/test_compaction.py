@@ -4,11 +4,17 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.forces.ensemble import ensemble
-from granforce.packing.closing import margin
-from granforce.packing.compaction import WATCH_EVERY, draw_radii, pack
+from granforce.forces.ensemble import ensemble, stress_of
+from granforce.packing.closing import _strained, _stretch, cell_of, margin
+from granforce.packing.compaction import (
+    WATCH_EVERY,
+    _dilute_gas,
+    _leant_back,
+    draw_radii,
+    pack,
+)
 from granforce.packing.neighbours import find_pairs, separations
-from granforce.records import Cancelled, InputError, NotJammedError
+from granforce.records import Cancelled, Cell, InputError, NotJammedError
 from granforce.tolerances import APART, CLOSED, LARGEST_FRICTION
 
 
@@ -210,3 +216,54 @@ def test_steps_are_as_accurate_as_asked():
 def test_too_few_disks_for_a_periodic_box_are_told(n):
     with pytest.raises(NotJammedError, match="too few"):
         pack(n, 0.3, 1)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.01, 0.3, 10.0])
+def test_isotropic_boxes_end_with_one_pressure_and_no_shear(mu):
+    packing = pack(60, mu, 1, box="isotropic", pressure=3.0, radii="uniform:1,2")
+    S = check(packing)
+    np.testing.assert_allclose(stress_of(packing, packing.forces), [3, 3, 0], rtol=0, atol=3e-9)
+    # The certificate against shear: its own network, judged with the stress prescribed.
+    held = ensemble(packing, prescribed="stress", stress=(3, 3, 0))
+    assert held.residual(packing.forces[held.index]) < 1e-10
+    assert held.violation(packing.forces[held.index]) < 1e-9
+    assert packing.tilt != 0
+    assert packing.box[0] != packing.box[1]
+    if mu == 0:
+        # One more contact for each way in which the cell may strain besides the volume.
+        assert len(S.index) == 2 * len(S.grains) + 1
+        assert held.dimension == 0
+
+
+def test_square_boxes_hold_a_shear_stress_that_isotropic_ones_do_not():
+    with pytest.raises(NotJammedError):
+        ensemble(packed(60, 0.3), prescribed="stress", stress=(1, 1, 0))
+    with pytest.raises(InputError, match="box must be square or isotropic, got 'round'"):
+        pack(20, 0.3, 0, box="round")
+
+
+def test_rates_of_a_free_box_change_lengths_as_the_box_strains(rng):
+    x, box, tilt = rng.uniform(0, 9, (30, 2)), np.array([9.0, 8.0]), 1.5
+    cell, strain = Cell(box, tilt), 1e-6 * np.array([1.0, -2.0, 3.0])
+    pairs = find_pairs(x, np.full(30, 0.5), cell, 1.0)
+    normal, before, _ = separations(x, np.full(30, 0.5), cell, *pairs)
+    after = separations(*_moved(x, cell, strain), *pairs)[1]
+    expected = _stretch(normal, before, 3) @ strain
+    np.testing.assert_allclose(after - before, expected, rtol=0, atol=1e-10)
+
+
+def _moved(x, cell, strain):
+    x, cell = _strained(x, cell, strain)
+    return x, np.full(len(x), 0.5), cell
+
+
+def test_a_cell_that_leans_back_keeps_its_lattice(rng):
+    motion = _dilute_gas(np.full(12, 1.0), rng, 3)
+    motion.tilt[0] = 1.3 * motion.box[0]
+    shift = np.array([[0, 1], [2, -1]])
+    motion = motion._replace(shift=shift)
+    back = _leant_back(motion)
+    assert abs(back.tilt[0]) <= back.box[0] / 2
+    np.testing.assert_allclose(
+        back.shift @ cell_of(back).vectors, shift @ cell_of(motion).vectors, atol=1e-12
+    )

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from mutants import mutant
 from packings import skewed
 
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import ensemble, stress_of
+from granforce.packing.closing import margin
+from granforce.packing.compaction import pack
 from granforce.packing.importers import (
     lammps,
     load_packing,
@@ -103,7 +105,14 @@ def test_report_counts_what_the_paper_counts():
     assert known["dimension"] == 2 * 159 - (3 * 89 - 1)
     assert 0.8 < known["packing_fraction"] < 0.85
     assert 0 <= known["largest_overlap"] < 1e-4
+    apart = margin(load_packing(SMALL))
+    assert (known["largest_contact_gap"], known["least_other_gap"]) == apart
     assert json.loads(json.dumps(known)) == known
+
+
+def test_soft_disks_have_no_margin():
+    known = report(read_lammps(PARTICLES, CONTACTS, 0.3))
+    assert known["largest_contact_gap"] is known["least_other_gap"] is None
 
 
 def test_report_without_forces_says_none():
@@ -389,6 +398,41 @@ def test_lammps_tilted_boxes_are_read(basis):
         len(S.grains),
         len(S.index),
     )
+
+
+def test_isotropic_packings_come_back_from_lammps():
+    """Dumped as LAMMPS would: other origin, grains by id, forces on the first of each pair."""
+    packing = pack(20, 0.3, 7, box="isotropic", radii="bidisperse:1,1.4,0.5", pressure=2.0)
+    assert packing.tilt != 0
+    c, (f_n, f_t) = packing.contacts, packing.forces.T[..., None]
+    normal, tangential = -f_n * c.normal, -f_t * np.stack([-c.normal[:, 1], c.normal[:, 0]], axis=1)
+    (width, height), tilt = packing.box.tolist(), packing.tilt
+    bounds = [
+        "ITEM: BOX BOUNDS xy xz yz pp pp pp",
+        f"{3 + min(0, tilt)!r} {3 + width + max(0, tilt)!r} {tilt!r}",
+        f"-2 {height - 2!r} 0.0",
+        "-0.5 0.5 0.0",
+    ]
+    files = []
+    for what, columns in (
+        ("ATOMS id x y radius", (np.arange(20) + 1, *(packing.x + np.array([3, -2])).T, packing.r)),
+        (
+            "ENTRIES atom1 atom2 distance fx fy px py",
+            (c.i + 1, c.j + 1, c.length, *normal.T, *tangential.T),
+        ),
+    ):
+        rows = [
+            " ".join(map(repr, row)) for row in zip(*(k.tolist() for k in columns), strict=True)
+        ]
+        title = "NUMBER OF ATOMS" if what.startswith("ATOMS") else "NUMBER OF ENTRIES"
+        head = ["ITEM: TIMESTEP", "5", f"ITEM: {title}", str(len(rows)), *bounds, f"ITEM: {what}"]
+        files.append(io.StringIO("\n".join([*head, *rows])))
+    again = read_lammps(*files, 0.3)
+    assert again.tilt == pytest.approx(packing.tilt, abs=1e-12)
+    np.testing.assert_allclose(stress_of(again, again.forces), [2, 2, 0], rtol=0, atol=1e-9)
+    S = ensemble(again, prescribed="stress", stress=(2, 2, 0))
+    assert S.residual(again.forces[S.index]) < 1e-9
+    assert S.dimension == ensemble(packing, prescribed="stress").dimension
 
 
 def test_lammps_bounds_are_those_of_the_manual():

@@ -155,6 +155,20 @@ def test_damaged_lines_and_forces_that_pull_are_not_measured():
     assert np.isfinite(found.packing.forces).all()
 
 
+@pytest.mark.parametrize("column", [3, 4])
+def test_a_force_of_many_digits_too_many_is_not_measured(column):
+    """One number beyond all others would leave programs for the forces without an end."""
+    grains, rows, _ = frame(40)
+    rows = [list(row) for row in rows]
+    rows[0][column] = rows[1][column] = 1e33
+    found = read(grains, rows)
+    assert found.report["unreadable_contacts"] == 2 and found.report["contacts_listed"] > 20
+    assert any("1e+33" in line and "usual" in line for line in found.report["findings"])
+    assert np.nanmax(np.abs(found.measured)) < 100 * NEWTON
+    with pytest.raises(InputError, match="usual"):
+        read(grains, rows, repair=False)
+
+
 def test_a_contact_too_long_to_touch_is_left_out():
     grains, rows, _ = frame()
     x = np.array([row[2:4] for row in grains])

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog
 
 import granforce as gf
-from granforce.packing.scenes import SCENES, assembled, sketched, weights
+from granforce.packing.scenes import SCENES, assembled, sketched, weights, with_network
 from granforce.records import InputError, NotJammedError
 
 EXACT = 1e-10
@@ -29,8 +29,11 @@ def unit(S, contact, component):
     return cost
 
 
-@pytest.mark.parametrize("angle", [40, 60, 90, 120, 150])
-@pytest.mark.parametrize("mu", [0, 0.1, 0.35])
+@pytest.mark.parametrize(
+    ("angle", "mu"),
+    [(angle, mu) for angle in (40, 60, 90, 120, 150) for mu in (0, 0.1, 0.35)]
+    + [(60, 0.5), (90, 0.5), (90, 0.9), (120, 1.5), (150, 3.5)],
+)
 def test_the_groove_has_both_ends_of_the_textbook(angle, mu):
     # Torque: f_t is the same at both walls; f_n too. Vertical: 2 (f_n sin α ± f_t cos α) = 1.
     half = np.radians(angle / 2)
@@ -118,6 +121,43 @@ def test_the_close_pyramid_stands_on_the_same_friction():
         gf.scene("pyramid", 2 - np.sqrt(3) - 1e-6)
 
 
+def test_a_press_holds_disks_without_weight():
+    # The wall's total friction is 0, and it has one contact: f_t = 0 there. Then each side of the
+    # top disk bears as under a weight of 1: f_n = 1/2 with f_t/f_n = tan 15° where the lower two do
+    # not press each other, and on the floor the same: no weight is added below.
+    S = gf.ensemble(gf.scene("press", 0.4))
+    lid = int(np.flatnonzero(S.contacts.j == 3)[0])
+    assert S.dimension == 1 and len(S.packing.r) == 6
+    assert ends(S, unit(S, lid, 0)) == pytest.approx([1, 1], abs=EXACT)
+    assert ends(S, unit(S, lid, 1)) == pytest.approx([0, 0], abs=EXACT)
+    between = int(np.flatnonzero((S.contacts.i == 0) & (S.contacts.j == 1))[0])
+    corners = gf.body(S).forces(gf.body(S).corners)
+    opened = corners[np.argmin(corners[:, between, 0])]
+    carrying = opened[:, 0] > 0.1
+    np.testing.assert_allclose(sorted(opened[carrying, 0]), [0.5] * 4 + [1], atol=EXACT)
+    ratio = np.abs(opened[carrying, 1] / opened[carrying, 0])
+    np.testing.assert_allclose(sorted(ratio), [0] + [2 - np.sqrt(3)] * 4, atol=EXACT)
+    gf.scene("press", 2 - np.sqrt(3) + 1e-8)
+    with pytest.raises(NotJammedError, match="no admissible force network"):
+        gf.scene("press", 2 - np.sqrt(3) - 1e-6)
+
+
+@pytest.mark.parametrize("mu", [0, 0.3])
+def test_a_wall_that_presses_shares_its_force_among_its_disks(mu):
+    # Two disks side by side on a floor, which do not touch: each carries any part of the force.
+    walls = [[0, 0, 8, 0], [0, 2, 8, 2]]
+    packing = assembled(
+        [[2, 1], [6, 1]], [1, 1], walls, np.zeros((2, 3)), mu, pressing=np.array([0, 3.0])
+    )
+    S = gf.ensemble(with_network(packing))
+    lid = S.contacts.j == 2
+    assert ends(S, unit(S, int(np.flatnonzero(lid)[0]), 0)) == pytest.approx([0, 3], abs=EXACT)
+    total = np.zeros((len(S.index), 2))
+    total[lid, 0] = 1
+    assert ends(S, total) == pytest.approx([3, 3], abs=EXACT)
+    assert ends(S, np.roll(total, 1, axis=1)) == pytest.approx([0, 0], abs=EXACT)  # it may slide
+
+
 @pytest.mark.parametrize("mu", [0.05, 0.2, 0.4])
 def test_the_walls_of_a_column_carry_what_janssen_allows(mu):
     """What the floor bears of n disks between rough walls, by going down from disk to disk.
@@ -152,7 +192,7 @@ def test_the_walls_of_a_column_carry_what_janssen_allows(mu):
     S = gf.ensemble(gf.scene("column", mu))
     floor = int(np.flatnonzero((S.contacts.j >= 10) & (S.contacts.normal[:, 1] < -0.5))[0])
     assert ends(S, unit(S, floor, 0)) == pytest.approx(
-        (n - friction[1], n - friction[0]), abs=EXACT * n
+        (n - friction[1], n - friction[0]), abs=EXACT
     )
     assert S.dimension == 10
 
@@ -182,6 +222,12 @@ def test_a_disk_in_a_corner_is_touched_once_by_walls_that_meet():
     assert len(disk.contacts.i) == 1
 
 
+def pressed(x, wall):
+    r = np.ones(len(x))
+    r[1:] = 1.2
+    return assembled(x, r, [wall], np.zeros((len(x), 3)), 0.3, pressing=[1.0])
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -192,6 +238,8 @@ def test_a_disk_in_a_corner_is_touched_once_by_walls_that_meet():
         (lambda: assembled([[0, 0], [0, 1]], [1, 1], [], np.zeros((2, 3)), 0), "two disks overlap"),
         (lambda: assembled([[0, 0.5]], [1], [[-1, 0, 1, 0]], [[0, 0, 0]], 0), "a wall overlap"),
         (lambda: assembled([[0, 1]], [1], [[0, 0, 0, 0]], [[0, 0, 0]], 0), "no length"),
+        (lambda: pressed([[0, 1], [0, -1.2]], [-3, 0, 3, 0]), "both sides"),
+        (lambda: pressed([[-0.6, 0.8]], [0, 0, 3, 0]), "touches the end"),
         (lambda: assembled(np.empty((0, 2)), [], [], np.empty((0, 3)), 0), "no disk"),
     ],
 )

@@ -28,6 +28,28 @@ def mat(particles, name="Step09-0007_solved.mat", **options):
     return made
 
 
+def mat73(particles, name="Step09-0007_solved.mat"):
+    """The same of version 7.3: each field a column of references to arrays with swapped axes."""
+    import h5py
+
+    made = io.BytesIO()
+    with h5py.File(made, "w") as file:
+        group, refs = file.create_group("particle"), file.create_group("#refs#")
+        for field in particles[0]:
+            column = group.create_dataset(field, (len(particles), 1), dtype=h5py.ref_dtype)
+            for k, one in enumerate(particles):
+                value = np.atleast_2d(np.asarray(one[field], dtype=float)).T
+                empty = not value.size  # MATLAB keeps the shape in place of the array
+                value = np.array([0, 0], np.uint64) if empty else value
+                stored = refs.create_dataset(f"{field}{k}", data=value)
+                if empty:
+                    stored.attrs["MATLAB_empty"] = np.uint8(1)
+                column[k, 0] = stored.ref
+    made.seek(0)
+    made.name = name
+    return made
+
+
 def by_pair(found, truth):
     pairs = zip(found.packing.contacts.i.tolist(), found.packing.contacts.j.tolist(), strict=True)
     return np.array([truth.get(pair, np.full(2, np.nan)) for pair in pairs])
@@ -126,26 +148,33 @@ def test_what_is_no_such_file_is_told(content, tmp_path):
         read_pegs(mat(solved()[0]), mu=0.3, frame=8)
 
 
-def test_version_7_3(tmp_path):
-    """The layout of MATLAB: each field a column of references to arrays with swapped axes."""
-    h5py = pytest.importorskip("h5py")
+def test_version_7_3():
+    pytest.importorskip("h5py")
     particles, _ = solved()
-    path = tmp_path / "Step-0007_solved.mat"
-    with h5py.File(path, "w") as file:
-        group, refs = file.create_group("particle"), file.create_group("#refs#")
-        for field in particles[0]:
-            column = group.create_dataset(field, (len(particles), 1), dtype=h5py.ref_dtype)
-            for k, one in enumerate(particles):
-                value = np.atleast_2d(np.asarray(one[field], dtype=float)).T
-                stored = refs.create_dataset(f"{field}{k}", data=value)
-                if not value.size:
-                    del refs[f"{field}{k}"]
-                    stored = refs.create_dataset(f"{field}{k}", data=np.array([0, 0], np.uint64))
-                    stored.attrs["MATLAB_empty"] = np.uint8(1)
-                column[k, 0] = stored.ref
-    found = read_pegs(path, mu=0.3, reach=0)
+    found = read_pegs(mat73(particles), mu=0.3, reach=0)
     same = read_pegs(mat(particles), mu=0.3, reach=0)
     assert np.array_equal(found.packing.forces, same.packing.forces)
+    assert found.report["frame"] == 7
+
+
+def test_version_7_3_takes_nothing_from_other_files(tmp_path):
+    """A file may point to others, which somebody who sends one to a server must not read."""
+    h5py = pytest.importorskip("h5py")
+    whole, _ = solved()
+    (tmp_path / "secret").write_bytes(np.arange(8.0).tobytes())
+    (tmp_path / "other.mat").write_bytes(mat73(whole).getvalue())
+    outside = io.BytesIO()
+    with h5py.File(outside, "w") as file:
+        file["particle"] = h5py.ExternalLink(str(tmp_path / "other.mat"), "particle")
+    raw = mat73(whole)
+    with h5py.File(raw, "r+") as file:
+        external = [(str(tmp_path / "secret"), 0, 64)]
+        stored = file.create_dataset("#refs#/taken", (1, 8), "f8", external=external)
+        file["particle/x"][0, 0] = stored.ref
+    for made in (outside, raw):
+        made.seek(0)
+        with pytest.raises(InputError, match=r"particle|damaged"):
+            read_pegs(made, mu=0.3)
 
 
 def test_version_7_3_without_h5py_is_told(monkeypatch):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from granforce.measures import statistics
-from granforce.paper import claims, findings, tables
+from granforce.paper import claims, findings, tables, tails
 from granforce.paper.claims import figure1, figure2, figure4, groups, verdicts
 
 PACKINGS, CONTACTS = 10, 2000
@@ -406,3 +406,38 @@ def test_every_claim_names_its_sampler_and_its_source():
 def test_without_data_there_is_no_verdict():
     empty = tables.Table({}, [], {name: np.zeros(0) for name in tables.SAMPLES}, [], {}, {})
     assert set(judged(empty).values()) == {verdicts.MISSING}
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_tails_of_uniform_forces_tell_an_exponential_from_a_gaussian(power):
+    rng = np.random.default_rng(0)
+    forces = rng.exponential(1.0, 10**6) if power == 1 else np.abs(rng.normal(0, 1.6, 10**6))
+    counted = np.histogram(forces, np.append(0.0, tables.FORCES))[0]
+    tail = tails.fitted([counted * 0.5, counted * 0.5])
+    assert tail.power == pytest.approx(power, abs=0.15 * power) and tail.low == 2.0
+    right, wrong = tail.off_exponential, tail.off_gaussian
+    right, wrong = (right, wrong) if power == 1 else (wrong, right)
+    assert tail.off <= right < 0.3 * wrong
+    assert tails.fitted([np.r_[100.0, np.zeros(159)]]) is None
+    row = {"part": "tails_stress", "n": 10, "mu": 0.1, "seed": 1}
+    table = tables.Table({}, [row], {}, [], {}, {}, {0: counted.astype(float)})
+    told = [finding.statement for finding in findings.forces(table)]
+    assert len(told) == 3 and all("whole stress prescribed, μ = 0.1, f = 2 …" in t for t in told)
+    assert tails.told(table).startswith("whole stress prescribed, μ = 0.1: b = ")
+
+
+def test_volumes_tell_where_they_are_largest_and_what_they_follow():
+    frictions, rows = (0.01, 0.1, 1.0), []
+    for mu, width in zip(frictions, (0.02, 0.2, 0.1), strict=True):
+        for seed in (1, 2, 3):
+            row = {"n": 400, "mu": mu, "seed": seed, "dimension": 10}
+            sized = {"extent": width + 0.001 * seed, "log_volume_per_grain": np.log(width)}
+            rows.append(row | {"part": "volume"} | sized)
+            rows.append(row | {"part": "walk", "coordination": 4 - mu, "eta2": width * seed})
+    table = tables.Table({}, rows, {}, [], {}, {})
+    told = {finding.statement: finding.value for finding in findings.volume(table)}
+    assert told["μ where ln V per grain, forces in ⟨f_n⟩ is largest"] == pytest.approx(0.1)
+    extent = told["μ where width of S per free dimension, V^(1/h)/√(2πe), in ⟨f_n⟩ is largest"]
+    assert 0.03 < extent < 0.5
+    follows = "rank correlation over packings of all μ, "
+    assert abs(told[follows + "ln V per grain with z"]) < 0.6 < told[follows + "width of S with η2"]

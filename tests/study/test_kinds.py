@@ -8,7 +8,7 @@ import pytest
 from granforce.packing.importers.measurements import Measurement
 from granforce.paper import tables
 from granforce.study import cells as study
-from granforce.study.kinds import KINDS, PACKING
+from granforce.study.kinds import KINDS, PACKING, get_packing
 from granforce.study.store import open_store
 
 DATA = Path(__file__).resolve().parents[2] / "data"
@@ -94,3 +94,15 @@ def test_keys_do_not_change(name, tmp_path):
 
 def test_a_kind_is_called_by_its_name():
     assert all(kind.name == name for name, kind in KINDS.items())
+
+
+def test_a_box_of_free_shape_names_another_packing(tmp_path):
+    assert PACKING.parameters(20, 0.3, 1, box="square") == MADE
+    asked = PACKING.parameters(20, 0.3, 7, box="isotropic")
+    assert asked == PACKING.parameters(20, 0.3, 7) | {"box": "isotropic"}
+    store = open_store(tmp_path / "s")
+    made, cached = get_packing(store, asked)
+    again, found = get_packing(store, asked)
+    assert not cached and found
+    assert again.tilt == made.tilt != 0
+    assert again.info["box"] == "isotropic"

@@ -198,16 +198,6 @@ def test_cells_of_every_kind_are_counted_and_kept(tmp_path):
     assert load(store, *small_cells()[2])["limit_load"].dtype == "float64"
 
 
-@pytest.fixture(scope="module")
-def cluster():
-    """Two dask workers, each a process of its own."""
-    distributed = pytest.importorskip("dask.distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
-    ) as cluster:
-        yield cluster
-
-
 def test_dask_workers_give_the_same_as_processes(tmp_path, cluster):
     cells = small_cells()
     assert not scan.run(tmp_path / "one", cells, workers=2)

@@ -50,6 +50,21 @@ def test_frames_are_inferred_and_found_again(tmp_path):
     assert xr.testing.assert_identical(dataset, again) is None and not seen
 
 
+def test_dask_workers_give_the_same_as_processes(tmp_path, cluster):
+    """The second frame is refused, by a worker in the same words as here."""
+    frames = series.frames_of(folder_of(tmp_path))
+    (tmp_path / "Step-0002_Adjacency.txt").write_text("2,900,901,0,1\n2,903,904,0,1\n")
+    (one, lost), (two, missed) = (
+        series.infer_series(tmp_path / name, frames, **chosen, **OPTIONS)
+        for name, chosen in (
+            ("one", {"workers": 2}),
+            ("two", {"scheduler": cluster.scheduler_address}),
+        )
+    )
+    assert xr.testing.assert_identical(one, two) is None and one.sizes["frame"] == 2
+    assert lost == missed and len(lost) == 1
+
+
 def test_a_frame_that_is_refused_costs_only_itself(tmp_path):
     folder = folder_of(tmp_path)
     (tmp_path / "Step-0002_Adjacency.txt").write_text("2,900,901,0,1\n2,903,904,0,1\n")

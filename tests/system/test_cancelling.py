@@ -3,6 +3,7 @@
 No test measures a second: the work here would take hours (or for ever), and has ended long before.
 """
 
+import itertools
 import os
 import signal
 import subprocess
@@ -59,8 +60,8 @@ def one_endless_path(S):
     made = walls(S)
     flight, out = billiard.make_flight(uniform.init(made, 0).slacks), np.ones((1, made.count))
     speeds = made.moved(np.random.default_rng(0).standard_normal((1, made.count)))
-    path = speeds, np.array([1e12]), flight, 10**12
-    billiard.straight(billiard.all_rows(made), *path, out, cancelling.flag())
+    path = speeds, np.array([1e12]), np.ones((0, made.count)), flight, 10**12
+    billiard.fly(billiard.all_rows(made), *path, out, cancelling.flag())
     cancelling.check()
 
 
@@ -98,6 +99,10 @@ def endless_call():
     cancelling.apart(time.sleep, 1e5)
 
 
+def endless_call_that_holds_the_interpreter():
+    cancelling.in_child(sum, itertools.repeat(0))
+
+
 def long_elimination():
     pairs = np.random.default_rng(0).integers(50_000, size=(150_000, 2))
     elimination.pattern(np.random.default_rng(1).random((50_000, 2)), *pairs.T)
@@ -108,7 +113,7 @@ def long_elimination():
     [
         endless_steps, endless_insertion, endless_sweeps, endless_walk, endless_paths,
         one_endless_path, endless_hits, endless_motion, endless_motions_side_by_side, endless_call,
-        long_elimination,
+        endless_call_that_holds_the_interpreter, long_elimination,
         lambda: long_program("simplex"), lambda: long_program("ipm"),
     ],
 )  # fmt: skip
@@ -184,6 +189,13 @@ def test_an_error_in_cancel_is_told(S):
 
     with pytest.raises(ZeroDivisionError):
         gf.walk(S, 3, 0, cancel=broken)
+
+
+def test_a_child_gives_what_its_parent_would():
+    with cancelling.watched(lambda: False):
+        assert cancelling.in_child(divmod, 7, 2) == (3, 1)
+        with pytest.raises(ZeroDivisionError):
+            cancelling.in_child(divmod, 7, 0)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")

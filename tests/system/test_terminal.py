@@ -63,3 +63,12 @@ def test_what_is_not_a_number_is_null_in_json(capsys):
     assert told == {"eta": None, "deciles": [1.0, None], "fit": [None, {"x": None}]}
     print_list([{"gap": math.nan}], ("gap",), True)
     assert strict(capsys.readouterr().out) == [{"gap": None}]
+
+
+def test_sentences_stand_line_by_line(capsys):
+    report({"left_open": [1, 2], "findings": ["2 grains: a, b", "3 contacts: c"]}, False)
+    assert capsys.readouterr().out.splitlines() == [
+        "left open  1 2",
+        "findings   2 grains: a, b",
+        "           3 contacts: c",
+    ]

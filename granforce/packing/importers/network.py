@@ -5,9 +5,10 @@ import numpy as np
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
+from granforce.packing.closing import margin
 from granforce.packing.importers.geometry import overlapping
 from granforce.records import InputError, NotJammedError, UndecidedError
-from granforce.tolerances import CARRYING
+from granforce.tolerances import CARRYING, RIGID_OVERLAP
 
 # The loads of an open set may miss balance by this part of ⟨f_n⟩ (digits lost in the file); the
 # difference is then taken off them, since S would be empty otherwise.
@@ -32,6 +33,34 @@ def adopt(packing, **info):
     elif not packing.load.any():
         packing = packing._replace(load=_left_over(packing))
     return packing._replace(info={**packing.info, **info, **judged(packing)})
+
+
+def alone(packing, count, forces, **info):
+    """The first `count` bodies under what all others, and what was left open, do to them.
+
+    forces (N_c, 2): a network of all contacts in which those bodies are to stay as they are. It
+    becomes their own, and what it leaves over on each of them its load: by their loads the sum
+    Σ f_n ℓ is given, so that S is bounded. Lengths are then in its largest radii, as those of
+    compacted packings. Raises InputError where it does not press.
+    """
+    c, unit = packing.contacts, packing.r[:count].max()
+    inner = (c.i < count) & (c.j < count)
+    c = c._replace(
+        **{name: getattr(c, name) / unit for name in ("length", "gap", "arm_i", "arm_j")}
+    )
+    # Noise, which grains that carry nothing could not balance without it.
+    carrying = forces[:, :1] > CARRYING * np.abs(forces[:, 0]).mean()
+    forces = np.where(carrying, forces, 0.0)
+    return adopt(
+        packing._replace(
+            x=packing.x[:count] / unit,
+            r=packing.r[:count] / unit,
+            contacts=c._replace(**{name: values[inner] for name, values in c._asdict().items()}),
+            forces=forces[inner],
+            load=np.zeros((count, 3)),
+        ),
+        **info,
+    )
 
 
 def find(packing, **info):
@@ -63,7 +92,9 @@ def report(packing, ens=None):
 
     ens: the packing's ensemble if known. Lengths in largest radii, residual and violation of the
     packing's own network in ⟨f_n⟩, mean normal force (over the backbone) and pressure in the
-    packing's units. Raises NotJammedError where no admissible network exists.
+    packing's units. largest_contact_gap and least_other_gap: the `margin` of its contacts, which
+    soft disks (overlaps beyond RIGID_OVERLAP) do not have. Raises NotJammedError where no
+    admissible network exists.
     """
     ens = ensemble(packing) if ens is None else ens
     loaded = bool(packing.forces.any())
@@ -84,6 +115,7 @@ def report(packing, ens=None):
         "residual": verdict["residual"],
         "violation": verdict["violation"],
         "largest_overlap": _largest_overlap(packing),
+        **_margin(packing),
     }
 
 
@@ -104,6 +136,12 @@ def _held(whole):
     """Grains on which the packing's own network presses by more than its noise."""
     pressing = whole.original[:, 0] > CARRYING * whole.force_scale
     return np.union1d(whole.contacts.i[pressing], whole.contacts.j[pressing])
+
+
+def _margin(packing):
+    soft = packing.contacts.gap.min(initial=0.0) < -RIGID_OVERLAP * packing.r.max()
+    apart = (None, None) if soft else margin(packing)
+    return dict(zip(("largest_contact_gap", "least_other_gap"), apart, strict=True))
 
 
 def _largest_overlap(packing):

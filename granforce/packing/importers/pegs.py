@@ -39,6 +39,8 @@ from granforce.records import (
 _CHANGE = 0.2
 # Unbalance in ⟨f_n⟩ up to which a grain is balanced.
 _BALANCED = 1e-6
+# Steps of interior points after which another method is tried: they take 10 to 40.
+_ITERATIONS = 500
 # Contacts a grain needs at least to be judged by its balance.
 _ENOUGH = 3
 # Findings of one kind that are listed in the report.
@@ -239,7 +241,7 @@ def _told(account):
         if found:
             more = f"; and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
             told = "; ".join(one.text for one in found[:_LISTED])
-            lines.append(f"{len(found)} {words}: {told}{more}")
+            lines.append(f"{words} ({len(found)}): {told}{more}")
     return lines
 
 
@@ -368,6 +370,7 @@ def _unbalance(packing, m, unit):
     right = np.concatenate([np.zeros(rows), m[seen]])
     # Five times as fast as the simplex method here; its crossover ends in a vertex as well.
     model = highs.standard_form(sparse.hstack([both, slack, -slack]), right, solver="ipm")
+    model.setOptionValue("ipm_iteration_limit", _ITERATIONS)
     highs.set_cost(model, np.concatenate([np.zeros(columns), cost, cost]))
     found = highs.optimal(model)
     if found is None:

@@ -19,7 +19,7 @@ KINDS = {
     "unreadable_grains": ("grains with a field that is no finite number, or no radius", 0, 1),
     "doubled_grains": ("grains listed twice", 0, 1),
     "false_detections": ("grains inside others, which fit fewer contacts and sizes", 0, 1),
-    "unreadable_contacts": ("contacts with a field that is no finite number", 1, 1),
+    "unreadable_contacts": ("contacts with a field that cannot be a name or a force", 1, 1),
     "contacts_with_themselves": ("contacts of a grain with itself", 1, 1),
     "contacts_of_missing_grains": ("contacts that name a grain that is not there", 1, 1),
     "contacts_too_long": ("contacts of grains too far apart to touch", 1, 1),
@@ -38,6 +38,8 @@ MOST = 0.1
 _SAME = 0.5, 0.3
 # Gaps fit up to this many mean radii, and radii are of one size within this part.
 _FIT, _SIZE = 0.5, 0.05
+# A force that is so many times the usual one was not measured: digits too many, an exponent lost.
+HUGE = 1e6
 # A force at the edge of its cone lies beyond it by no more than this part.
 _ROUNDING = 1e-9
 
@@ -80,7 +82,7 @@ class Account(NamedTuple):
             spoilt = [one for one in self.findings if KINDS[one.kind][1:] == (which, 1)]
             if len(spoilt) > self.most * count and not self.strict:
                 kinds = ", ".join(
-                    f"{len(self.of(kind))} {words}"
+                    f"{words} ({len(self.of(kind))})"
                     for kind, (words, *_) in KINDS.items()
                     if KINDS[kind][1:] == (which, 1) and self.of(kind)
                 )
@@ -291,9 +293,20 @@ def _fits(listing):
 def _without_unreadable_contacts(listing, account):
     """Lines without two names go; forces that are no numbers are not measured."""
     named = np.isfinite(listing.ends).all(axis=1)
-    told = np.isfinite(listing.forces).all(axis=1)
+    finite = np.isfinite(listing.forces).all(axis=1)
+    size = np.abs(np.where(finite[:, None], listing.forces, 0.0)).max(axis=1, initial=0.0)
+    usual = np.median(size[size > 0]) if np.any(size > 0) else np.inf
+    told = finite & (size <= HUGE * usual)
     bad = np.flatnonzero(~(named & told))
-    texts = [f"{listing.place(1, k)}: a name or a force is not a finite number" for k in bad]
+    texts = [
+        f"{listing.place(1, k)}: "
+        + (
+            f"a force of {size[k]:.3g}, where {usual:.3g} is usual"
+            if named[k] and finite[k]
+            else "a name or a force is not a finite number"
+        )
+        for k in bad
+    ]
     account.note("unreadable_contacts", texts, _places(listing, bad))
     forces = np.where(told[:, None], listing.forces, np.nan)
     return listing._replace(forces=forces).with_contacts(np.flatnonzero(named))

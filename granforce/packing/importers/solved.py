@@ -103,24 +103,40 @@ def _version_73(name, content):
             "by save(…, '-v7')"
         ) from None
     with h5py.File(io.BytesIO(content), "r") as file:
-        if "particle" not in file or not hasattr(file["particle"], "keys"):
+        if "particle" not in file or not hasattr(_own(file, "particle"), "keys"):
             return []
         group = file["particle"]
-        columns = {}
-        for field in set(_FIELDS) & set(group):
-            values = group[field]
-            if values.dtype == object:
-                columns[field] = [_value(file[one]) for one in np.ravel(values[()])]
-            else:  # a single particle is kept without references
-                columns[field] = [_value(values)]
+        fields = {field: _own(group, field) for field in set(_FIELDS) & set(group)}
+        # A single particle is kept without references.
+        stored = {
+            field: [file[one] for one in np.ravel(_value(values))]
+            if values.dtype == object
+            else [values]
+            for field, values in fields.items()
+        }
+        if sum(one.nbytes for column in stored.values() for one in column) > _LARGEST_FILE:
+            raise ValueError("unpacked")
+        columns = {field: list(map(_value, column)) for field, column in stored.items()}
         counts = {len(column) for column in columns.values()}
         if len(counts) != 1:
             return []
         return [{field: columns[field][k] for field in columns} for k in range(*counts)]
 
 
+def _own(group, name):
+    """What the group holds by this name; ValueError for a link to another file."""
+    if hasattr(group.get(name, getlink=True), "filename"):
+        raise ValueError("link")
+    return group[name]
+
+
 def _value(dataset):
-    """A dataset as MATLAB holds it: empty arrays are kept as their shape."""
+    """A dataset as MATLAB holds it: empty arrays are kept as their shape.
+
+    ValueError for one whose data lie in other files, which are not the sender's to show.
+    """
+    if dataset.external or dataset.is_virtual or dataset.nbytes > _LARGEST_FILE:
+        raise ValueError("dataset")
     if dataset.attrs.get("MATLAB_empty", 0):
         return np.zeros(0)
     value = dataset[()]

@@ -21,6 +21,7 @@ UNMEASURED = "not measured"
 
 LEAST_DISKS = 1000  # in all packings of one μ
 NEAR_PEAK = 2.0  # in μ: what lies within this factor of the largest says where the maximum is
+MOST_NAMED = 3  # μ that are named one by one where leaving out any of them changes a verdict
 
 
 class Claim(NamedTuple):
@@ -101,17 +102,31 @@ def over_all(statement, sampler, source, measured, statistic, groups, *, good, f
     verdict = ranges.verdict(low, high)
     if verdict == UNDECIDED:
         return Claim(*said, value, low, high, str(ranges), verdict)
-    turned = {"with another draw of packings": ranges.verdict(*farthest)}
+    turned = {None: ranges.verdict(*farthest)}  # by the μ left out; None: another draw
     for k, key in enumerate(keys) if len(keys) > least else ():
         without = statistic(np.delete(keys, k), np.delete(means, k, axis=0))
         if np.isfinite(without):
-            turned[f"without μ = {key:g}"] = ranges.verdict(without, without)
-    why = ", ".join(f"{told} {cause}" for cause, told in turned.items() if told != verdict)
+            turned[key] = ranges.verdict(without, without)
+    why = _turns(turned, verdict)
     if why:
         # What is outside of the good range for certain does not become open.
         outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
         verdict = DIFFERS if outside else UNDECIDED
     return Claim(*said, value, low, high, str(ranges), verdict, why)
+
+
+def _turns(turned, verdict):
+    """What other verdicts there are, in words, and by which cause."""
+    why = []
+    for other in sorted(set(turned.values()) - {verdict}):
+        if turned[None] == other:
+            why.append(f"{other} with another draw of packings")
+        left_out = [f"{mu:g}" for mu, told in turned.items() if mu is not None and told == other]
+        if len(left_out) > MOST_NAMED:
+            why.append(f"{other} without any one of {len(left_out)} μ")
+        elif left_out:
+            why.append(f"{other} without μ = {' or '.join(left_out)}")
+    return ", ".join(why)
 
 
 def at_each(statement, sampler, source, measured, groups, *, good, fair=None, interval=None):

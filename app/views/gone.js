@@ -1,0 +1,34 @@
+// Where the server is gone, that is said; when there is one again, the page opens anew with its
+// address, which holds the view.
+
+const RETRY_MS = 1000 // how often a server that is gone is asked for
+
+/** The banner that says so; still: what goes on meanwhile. */
+function goneBanner(view, still) {
+  const banner = document.createElement("div")
+  banner.className = "gone"
+  banner.setAttribute("role", "alert")
+  banner.hidden = true
+  let lost = false
+
+  function gone() {
+    if (lost) return
+    lost = true
+    banner.textContent = `Connection lost, trying again. ${still}`
+    banner.hidden = false
+    retry()
+  }
+
+  async function retry() {
+    const asked = new URL("static/js/bokeh.min.js", window.location.href)
+    try {
+      const answer = await fetch(asked, { method: "HEAD", cache: "no-store" })
+      if (answer.ok) return window.location.reload()
+    } catch { /* still gone */ }
+    setTimeout(retry, RETRY_MS)
+  }
+
+  window.addEventListener("offline", gone)
+  view.model.document.on_event("connection_lost", gone)
+  return banner
+}

@@ -1,0 +1,43 @@
+// The card of the tour at the lower edge of a small scene: its first steps; the others are of 400 disks.
+
+const NARROW = "(max-width: 759.95px)" // where S lies below the scene
+const UNSEEN = "granforce.tour" // remembered in the browser: that the tour was seen
+
+class TourCard {
+  /** root: the page; shown(does): have it show what a step is about; onwards(): after the last step. */
+  constructor(root, steps, all, shown, onwards) {
+    Object.assign(this, { root, steps, all, shown, step: 0 })
+    this.card = root.querySelector(".card")
+    this.part("earlier").addEventListener("click", () => this.go(this.step - 1))
+    this.part("next").addEventListener("click", () => (this.step < steps.length ? this.go(this.step + 1) : onwards()))
+    this.part("close").addEventListener("click", () => this.go(0))
+  }
+
+  part(name) { return this.card.querySelector(`.${name}`) }
+
+  get seen() { try { return localStorage.getItem(UNSEEN) !== null } catch { return true } }
+
+  /** Show this step, none for 0. */
+  go(step) {
+    const { card, root } = this, was = this.step
+    this.step = step
+    card.hidden = !step
+    root.style.paddingBottom = ""
+    if (!step) {
+      if (was) root.querySelector(".tourist").focus({ preventScroll: true })
+      return
+    }
+    try { localStorage.setItem(UNSEEN, "seen") } catch { /* private */ }
+    const [title, text, does] = this.steps[step - 1]
+    card.querySelector("h2").textContent = title
+    card.querySelector("p").textContent = text
+    this.part("of").textContent = `${step} of ${this.all}`
+    this.part("earlier").disabled = step === 1
+    root.style.paddingBottom = `${card.offsetHeight + 20}px` // what lies under the card can be scrolled to
+    this.shown(does)
+    requestAnimationFrame(() => {
+      if (window.matchMedia(NARROW).matches) root.querySelector(`.${does.see ?? "pair"}`).scrollIntoView({ block: "start" })
+      card.querySelector("h2").focus({ preventScroll: true })
+    })
+  }
+}

@@ -1,0 +1,180 @@
+"""How the box moves: at one rate λ, or at three where both sides and the tilt follow the stress.
+
+A square box grows at one dilation rate λ, which the pressure drives. A cell free in its shape has a
+strain rate
+
+    D = ( e_x  g  ),    x → (1 + D Δt) x,
+        (  0  e_y )
+
+which keeps its side **a** along x. A contact force **F** over the branch ℓ **n** works at the rate
+ℓ (e_x F_x n_x + e_y F_y n_y + g F_x n_y) on it. Its inertia ½ V M_λ (e_x² + e_y² + g²/2) prefers no
+direction, so that
+
+    e_x ← e_x + (σ_xx − P0) Δt/M_λ,   e_y likewise,   g ← g + 2 σ_xy Δt/M_λ,
+
+and (e_x + e_y)/2 is the λ of a square box. Each function has two bodies, and the compiler takes one
+by the type of the rate: a number λ (or lanes of it), or a tuple (e_x, e_y, g). So the square box
+pays nothing for the other.
+"""
+
+from numba import types
+from numba.extending import overload
+
+_OPTIONS = {"forceinline": True, "error_model": "numpy"}
+
+
+def _several(rate):
+    return isinstance(rate, types.BaseTuple)
+
+
+def rate_in(kept):
+    """The rate that an array keeps: λ in (1,), or e_x, e_y, g in (1, 3)."""
+
+
+@overload(rate_in, jit_options=_OPTIONS)
+def _rate_in(kept):
+    if kept.ndim == 2:
+        return lambda kept: (kept[0, 0], kept[0, 1], kept[0, 2])
+    return lambda kept: kept[0]
+
+
+def keep_rate(rate, kept):
+    """Keep a rate in an array."""
+
+
+@overload(keep_rate, jit_options=_OPTIONS)
+def _keep_rate(rate, kept):
+    if not _several(rate):
+
+        def keep(rate, kept):
+            kept[0] = rate
+
+        return keep
+
+    def keep(rate, kept):
+        kept[0, 0], kept[0, 1], kept[0, 2] = rate
+
+    return keep
+
+
+def stretched(rate, n_x, n_y):
+    """Relative rate n·D n at which a branch along n grows."""
+
+
+@overload(stretched, jit_options=_OPTIONS)
+def _stretched(rate, n_x, n_y):
+    if _several(rate):
+        return lambda rate, n_x, n_y: rate[0] * n_x * n_x + (rate[1] * n_y + rate[2] * n_x) * n_y
+    return lambda rate, n_x, n_y: rate
+
+
+def sheared(rate, v_t, length, n_x, n_y):
+    """Tangential velocity v_t of a contact with what the box adds, ℓ t·D n; λ adds nothing."""
+
+
+@overload(sheared, jit_options=_OPTIONS)
+def _sheared(rate, v_t, length, n_x, n_y):
+    if _several(rate):
+        return lambda rate, v_t, length, n_x, n_y: (
+            v_t + length * ((rate[1] - rate[0]) * n_x - rate[2] * n_y) * n_y
+        )
+    return lambda rate, v_t, length, n_x, n_y: v_t
+
+
+def pushed(rate, compliance, f_n, f_t, n_x, n_y):
+    """The rate after a contact pushed; compliance: change of λ per unit f_n."""
+
+
+@overload(pushed, jit_options=_OPTIONS)
+def _pushed(rate, compliance, f_n, f_t, n_x, n_y):
+    if not _several(rate):
+        return lambda rate, compliance, f_n, f_t, n_x, n_y: rate + compliance * f_n
+
+    def push(rate, compliance, f_n, f_t, n_x, n_y):
+        f_x, f_y = f_n * n_x - f_t * n_y, f_n * n_y + f_t * n_x
+        twice = 2.0 * compliance
+        return (
+            rate[0] + twice * f_x * n_x,
+            rate[1] + twice * f_y * n_y,
+            rate[2] + 2.0 * twice * f_x * n_y,
+        )
+
+    return push
+
+
+def driven(rate, velocity, mass, pressure, volume, dt, box_mass):
+    """The rate after one step under the pressure outside and the moving grains inside."""
+
+
+@overload(driven, jit_options=_OPTIONS)
+def _driven(rate, velocity, mass, pressure, volume, dt, box_mass):
+    if not _several(rate):
+
+        def drive(rate, velocity, mass, pressure, volume, dt, box_mass):
+            kinetic = 0.0
+            for k in range(mass.shape[0]):
+                kinetic += mass[k] * (velocity[k, 0] ** 2 + velocity[k, 1] ** 2)
+            return rate + (kinetic / (2.0 * volume) - pressure) * dt / box_mass
+
+        return drive
+
+    def drive(rate, velocity, mass, pressure, volume, dt, box_mass):
+        xx, yy, xy = 0.0, 0.0, 0.0
+        for k in range(mass.shape[0]):
+            v_x, v_y = velocity[k, 0], velocity[k, 1]
+            xx += mass[k] * v_x * v_x
+            yy += mass[k] * v_y * v_y
+            xy += mass[k] * v_x * v_y
+        gain = dt / box_mass
+        return (
+            rate[0] + (xx / volume - pressure) * gain,
+            rate[1] + (yy / volume - pressure) * gain,
+            rate[2] + 2.0 * xy / volume * gain,
+        )
+
+    return drive
+
+
+def soften(rate, problem):
+    """Add to the inverse stiffness of each contact how it moves the shape of the box itself."""
+
+
+@overload(soften, jit_options=_OPTIONS)
+def _soften(rate, problem):
+    if not _several(rate):
+        return lambda rate, problem: None
+
+    def add(rate, problem):
+        for c in range(problem.i.shape[0]):
+            # The trace is in stiff_n already; e_x − e_y and g double it for n, whatever its angle.
+            box = problem.box_compliance * problem.length[c] ** 2
+            shear = 4.0 * box * problem.n_y[c] ** 2
+            problem.stiff_n[c] = 1.0 / (1.0 / problem.stiff_n[c] + box)
+            problem.stiff_t[c] = 1.0 / (1.0 / problem.stiff_t[c] + shear)
+
+    return add
+
+
+def fastest(rate):
+    """Largest relative rate at which a length may change, from above."""
+
+
+@overload(fastest, jit_options=_OPTIONS)
+def _fastest(rate):
+    if _several(rate):
+        return lambda rate: abs(rate[0]) + abs(rate[1]) + abs(rate[2])
+    return lambda rate: abs(rate)
+
+
+def carried(rate, x, y, dt):
+    """Where the box carries a point in one step."""
+
+
+@overload(carried, jit_options=_OPTIONS)
+def _carried(rate, x, y, dt):
+    if _several(rate):
+        return lambda rate, x, y, dt: (
+            x * (1.0 + rate[0] * dt) + y * (rate[2] * dt),
+            y * (1.0 + rate[1] * dt),
+        )
+    return lambda rate, x, y, dt: (x * (1.0 + rate * dt), y * (1.0 + rate * dt))

@@ -1,0 +1,81 @@
+"""How P(f_n) of uniform states falls: exponentially, as a normal distribution, or between.
+
+The part of the forces beyond f is compared with exp(−(λ f)^b): b = 1 is the exponential tail that
+measured contact forces were said to have, b = 2 the Gaussian one that the force network ensemble
+has in two dimensions where the whole stress is prescribed (Tighe, Snoeijer, Vlugt, van Hecke, Soft
+Matter 6, 2908 (2010)).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from granforce.paper.tables import FORCES
+
+# What uniform states of large packings are drawn for, in words.
+PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress prescribed"}
+# Tails are fitted from here on, in ⟨f_n⟩, to the last bin with so many forces.
+_FROM, _ENOUGH = 2.0, 10
+# Fewer bins tell no power: a range of 1 ⟨f_n⟩.
+_FEWEST = 8
+_POWERS = np.linspace(0.3, 4.0, 371)
+
+
+class Tail(NamedTuple):
+    """The best exp(−(λ f)^b) for the part of forces beyond f."""
+
+    power: float  # b
+    low: float  # range of f that was fitted, ⟨f_n⟩
+    high: float
+    off: float  # root mean square of ln P about it
+    off_exponential: float  # and about the best one of b = 1
+    off_gaussian: float  # and of b = 2
+
+
+def counts(table):
+    """{words: {μ: [counts of f_n in the bins that end at FORCES, of each packing]}}."""
+    found = {}
+    for k, counted in table.tails.items():
+        row = table.rows[k]
+        known = found.setdefault(PRESCRIBED[row["part"]], {})
+        known.setdefault(row["mu"], []).append(counted)
+    return {word: dict(sorted(known.items())) for word, known in found.items()}
+
+
+def densities(packings):
+    """[(f, P)] of the counts of some packings, where there are forces."""
+    counted, width = np.sum(packings, axis=0), FORCES[0]
+    parts = counted / (counted.sum() * width)
+    return [(f - width / 2, p) for f, p in zip(FORCES, parts, strict=True) if p]
+
+
+def fitted(packings):
+    """The Tail of the counts of some packings, None where too few forces are large."""
+    counted = np.sum(packings, axis=0)
+    begins = FORCES - FORCES[0]
+    chosen = (begins >= _FROM) & (counted >= _ENOUGH)
+    if chosen.sum() < _FEWEST:
+        return None
+    f, beyond = begins[chosen], counted[::-1].cumsum()[::-1][chosen]
+    # ln P = −(λ f)^b + ln P₀, a line in f^b: what is left about the best line of each b.
+    x, y = f ** _POWERS[:, None], np.log(beyond / counted.sum())
+    x, y = x - x.mean(axis=1, keepdims=True), y - y.mean()
+    left = y @ y - (x @ y) ** 2 / (x * x).sum(axis=1)
+    off = np.sqrt(np.maximum(left, 0.0) / len(f))
+    best, one, two = int(np.argmin(off)), *(np.argmin(np.abs(_POWERS - b)) for b in (1.0, 2.0))
+    ends = float(f[0]), float(f[-1])
+    return Tail(float(_POWERS[best]), *ends, *(float(off[k]) for k in (best, one, two)))
+
+
+def told(table):
+    """All fits in words."""
+    fits = (
+        (f"{word}, μ = {mu:g}", fitted(packings))
+        for word, known in counts(table).items()
+        for mu, packings in known.items()
+    )
+    return "; ".join(
+        f"{case}: b = {tail.power:.2f} from {tail.low:g} to {tail.high:g} ⟨f_n⟩"
+        for case, tail in fits
+        if tail is not None
+    )
