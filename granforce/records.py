@@ -6,10 +6,12 @@ Signs: **n** points from grain i to grain j, **t** = (−n_y, n_x); the force on
 f_n n + f_t t, and f_n ≥ 0 presses.
 """
 
+from __future__ import annotations
+
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +25,7 @@ LARGEST_WHOLE = 2**53
 
 # What arrays hold; their shapes stand in comments and docstrings.
 Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+Integers = npt.NDArray[np.integer[Any]]
 Mask = npt.NDArray[np.bool_]
 
 Progress = Callable[[float, float | None], object]  # progress(done, total), as work goes on
@@ -57,9 +59,29 @@ class Contacts(NamedTuple):
     arm_i: Floats  # (N_c,) lever arm a_i from the centre of i to the contact point
     arm_j: Floats  # (N_c,) lever arm a_j
 
-    def picked(self, rows: Integers | Mask) -> Self:
+    def picked(self, rows: Integers | Mask) -> Contacts:
         """The contacts of these rows: a mask (N_c,), or positions (k,)."""
-        return self._make(field[rows] for field in self)
+        return Contacts(
+            i=self.i[rows],
+            j=self.j[rows],
+            normal=self.normal[rows],
+            length=self.length[rows],
+            gap=self.gap[rows],
+            arm_i=self.arm_i[rows],
+            arm_j=self.arm_j[rows],
+        )
+
+    def joined(self, others: Contacts) -> Contacts:
+        """These contacts, then the others."""
+        return Contacts(
+            i=np.concatenate([self.i, others.i]),
+            j=np.concatenate([self.j, others.j]),
+            normal=np.concatenate([self.normal, others.normal]),
+            length=np.concatenate([self.length, others.length]),
+            gap=np.concatenate([self.gap, others.gap]),
+            arm_i=np.concatenate([self.arm_i, others.arm_i]),
+            arm_j=np.concatenate([self.arm_j, others.arm_j]),
+        )
 
 
 class Cell(NamedTuple):

@@ -15,6 +15,10 @@ from granforce.system.files import written
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
 GREY = "#999999"
 MARKERS = ("o", "s", "^", "d", "v", "+", "x", "*")
+# Of tables: what a figure needs by name. Of lines: x, y and, with bars, how far they reach.
+Rows = Iterable[Mapping[str, Any]]
+Points = Sequence[Any]
+
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
 FRAME_INCHES = (4.2, 3.5)

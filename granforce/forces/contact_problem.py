@@ -25,6 +25,7 @@ from granforce.tolerances import BALANCED, ROUNDING
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble
+    from granforce.forces.knowledge import Polygons
 
 # Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
 # slows no step, only bounds them.
@@ -190,7 +191,7 @@ def _new_system(ensemble: Ensemble) -> certified_values.System:
     bounding = ensemble.pressure_row if ensemble.has_pressure_row else None
     if known is not None:
         value = np.where(known.wholly[:, None], [1.0, 0.0], known.value)
-        A, b, _ = knowledge.extended(A, b + _instead(ensemble), T, known, mu, value)
+        A, b, _ = knowledge.extended(A, b + _instead(ensemble, known), T, known, mu, value)
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
     if ensemble.member is not None:

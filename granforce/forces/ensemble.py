@@ -3,6 +3,8 @@
 Unknowns x = (f_n1, f_t1, f_n2, …), or (f_n1, f_n2, …) at μ = 0 where no contact can carry f_t.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -434,7 +436,7 @@ def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
 
 def left_open_in(packing: Packing) -> Mask:
     """Mask (N,) of grains whose balance is left open: nothing is known of the load on them."""
-    return np.isnan(packing.load).any(axis=1)
+    return np.any(np.isnan(packing.load), axis=1)
 
 
 def _frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:

@@ -42,12 +42,12 @@ class Polygons(NamedTuple):
     @property
     def informed(self) -> Mask:
         """(N_c,) bool: contacts of which something is known."""
-        return (np.isfinite(self.low) | np.isfinite(self.high)).any(axis=1)
+        return np.any(np.isfinite(self.low) | np.isfinite(self.high), axis=1)
 
     @property
     def wholly(self) -> Mask:
         """(N_c,) bool: contacts whose force is known altogether."""
-        return self.pinned.all(axis=1)
+        return np.all(self.pinned, axis=1)
 
 
 def bounds_of(known: Known | None, count: int) -> Floats:
@@ -124,7 +124,7 @@ def polygons(bounds: Floats, mu: float, scale: float, index: Integers) -> Polygo
     there[:, 1] &= mu > 0
     there &= ~pinned[..., None]
     contact, component, above = np.nonzero(there)
-    sign = 2.0 * above - 1.0
+    sign = np.where(above, 1.0, -1.0)
     limit = sign * np.stack([low, high], axis=-1)[contact, component, above]
     return Polygons(low, high, pinned, value, contact, component, sign, limit)
 
@@ -200,7 +200,8 @@ def extended(
 
 def pins(known: Polygons, mu: float) -> tuple[Integers, Integers]:
     """Contact and component of each pinned unknown; without friction f_t is none."""
-    return np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
+    contact, component = np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
+    return contact, component
 
 
 def contradiction(

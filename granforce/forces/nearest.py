@@ -129,14 +129,16 @@ def starting_network(ensemble: Ensemble) -> Floats:
     """
     if ensemble.admits(ensemble.original):
         return ensemble.original
-    found: Floats | None = nearest(ensemble, ensemble.original).forces
+    found = nearest(ensemble, ensemble.original).forces
+    if ensemble.admits(found):
+        return found
+    member = ensemble.member
+    if member is not None:
+        return member
+    found = some_network(ensemble, ensemble.original)
     if not ensemble.admits(found):
-        found = ensemble.member
-    if found is None:
-        found = some_network(ensemble, ensemble.original)
-        if not ensemble.admits(found):
-            A, b, _ = ensemble.scaled_form
-            raise certificates.why_unsolved(A, b, slack=ensemble.slack)
+        A, b, _ = ensemble.scaled_form
+        raise certificates.why_unsolved(A, b, slack=ensemble.slack)
     return found
 
 

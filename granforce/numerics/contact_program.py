@@ -123,10 +123,12 @@ def make_iterate(problem: Problem, width: int) -> Iterate:
     """An Iterate of trivial programs that take any step."""
     n, rows, m = len(problem.start), len(problem.b), len(problem.b_border)
     return Iterate(
-        side_by_side(np.append(problem.start, 1.0), width),
-        room(n + 1, width, value=1.0),
-        *(room(length, width) for length in (n + 1, rows, m)),
-        np.full(width, -1),
+        y=side_by_side(np.append(problem.start, 1.0), width),
+        z=room(n + 1, width, value=1.0),
+        c=room(n + 1, width),
+        v=room(rows, width),
+        v_border=room(m, width),
+        loaded=np.full(width, -1),
     )
 
 
@@ -134,15 +136,28 @@ def make_workspace(problem: Problem, width: int) -> Workspace:
     """The Workspace of `width` programs side by side."""
     n, rows, m = len(problem.start), len(problem.b), len(problem.b_border)
     forces, sides = len(problem.w), len(problem.side)
-    lengths = (3 * forces // 2, n + 1, n + 1, n + 1, rows, m, rows, m, sides, forces)
     return Workspace(
-        contact_matrix.make_factors(problem.network, width),
-        cancelling.flag(),
-        np.full(rows, contact_matrix.NO_PIVOT),
-        *(room(length, width) for length in lengths),
-        side_by_side(problem.w, width),
-        *(room(1, width) for _ in range(6)),
-        room(1, width, value=1.0),
+        factors=contact_matrix.make_factors(problem.network, width),
+        stop=cancelling.flag(),
+        least=np.full(rows, contact_matrix.NO_PIVOT),
+        K=room(3 * forces // 2, width),
+        h=room(n + 1, width),
+        dy=room(n + 1, width),
+        turn=room(n + 1, width),
+        r=room(rows, width),
+        r_border=room(m, width),
+        dv=room(rows, width),
+        dv_border=room(m, width),
+        rest=room(sides, width),
+        push=room(forces, width),
+        k=side_by_side(problem.w, width),
+        product=room(1, width),
+        unbalance=room(1, width),
+        slackness=room(1, width),
+        primal=room(1, width),
+        dual=room(1, width),
+        target=room(1, width),
+        going=room(1, width, value=1.0),
     )
 
 

@@ -66,13 +66,14 @@ def bounded(
     lp.a_matrix_.index_ = A.indices.astype(np.int32)
     lp.a_matrix_.value_ = A.data
     model = highspy.Highs()
-    for name, value in {
+    options: dict[str, bool | int | float | str] = {
         "output_flag": False,
         "threads": 1,
         "solver": solver,
         "primal_feasibility_tolerance": PROGRAM,
         "dual_feasibility_tolerance": PROGRAM,
-    }.items():
+    }
+    for name, value in options.items():
         model.setOptionValue(name, value)
     model.passModel(lp)
     return model

@@ -203,6 +203,7 @@ def multipliers(
     """
     if len(balance) == A.shape[0]:
         return balance
+    assert z is not None  # it is left out only where the multipliers are of all rows
     pairs = len(problem.w)
     sides = -z[pairs:]
     known = np.concatenate([balance, sides])

@@ -15,7 +15,7 @@ F_crit ≤ limit load. They are not equal: sliding contacts do not dilate (the l
 associated), so grains can set off although an equilibrium exists.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -60,7 +60,7 @@ class CriticalForce(NamedTuple):
     violation: float  # ⟨f_n⟩, by Ensemble.violation
     moving: exact_step.Outcome | None  # the end under `high`; None where that was not tried
     converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
-    counts: dict  # COUNTS
+    counts: dict[str, float]  # COUNTS
     seconds: float  # of following flows, shared among those side by side
 
 
@@ -172,7 +172,7 @@ def _raised(
     protocol: Protocol,
 ) -> Asking[CriticalForce]:
     """Work for `exact_step.follow`: the CriticalForce of a contact."""
-    counts = dict.fromkeys((*COUNTS, "seconds"), 0)
+    counts: dict[str, float] = dict.fromkeys((*COUNTS, "seconds"), 0)
     forces, low, high = start, 0.0, limit
     while True:
         low, high, forces, moving = yield from _bracket(
@@ -210,7 +210,7 @@ def _bracket(
     high: float,
     forces: Floats,
     protocol: Protocol,
-    counts: dict[str, int],
+    counts: dict[str, float],
 ) -> Asking[tuple[float, float, Floats, exact_step.Outcome | None]]:
     """Loads raised from `low` until rest and motion are `precision` apart, or rest reaches `high`.
 
@@ -229,7 +229,7 @@ def _bracket(
     return low, high, forces, moving
 
 
-def _relaxed(asked: exact_step.Push, counts: dict[str, int]) -> Asking[exact_step.Outcome]:
+def _relaxed(asked: exact_step.Push, counts: dict[str, float]) -> Asking[exact_step.Outcome]:
     """The outcome of what is asked, counted."""
     outcome = yield asked
     counts["flow_steps"] += outcome.steps

@@ -40,7 +40,7 @@ def distances(packing: Packing, contact: int) -> Floats:
 def shells(packing: Packing) -> Floats:
     """Edges of shells half a mean diameter wide, out to half the distance between images."""
     width = float(packing.r.mean())
-    return width * np.arange(int(_side(packing) / 2 / width) + 1)
+    return width * np.arange(int(_side(packing) / 2 / width) + 1, dtype=np.float64)
 
 
 def _side(packing: Packing) -> float:

@@ -313,7 +313,7 @@ def _go_on(
         except IndexError:
             return None
         try:
-            _start(step, flows, lane, work.send(sent))
+            _start(step, flows, lane, next(work) if sent is None else work.send(sent))
         except StopIteration as ended:
             finished(number, ended.value)
             carried = sent = None
@@ -328,15 +328,40 @@ def _make_flows(step: Step, width: int) -> Flows:
     def motion() -> Motion:
         return Motion(room(rows, width), room(m, width))
 
+    def one() -> Floats:
+        return room(1, width, value=1.0)
+
+    def count() -> Integers:
+        return np.zeros(width, dtype=np.int64)
+
     return Flows(
-        contact_matrix.make_factors(step.network, width, symmetric=False),
-        motion(),
-        *(room(2 * contacts, width) for _ in range(2)),
-        *(room(contacts, width) for _ in range(2)),
-        *(motion() for _ in range(5)),
-        *(room(1, width, value=1.0) for _ in range(9)),
-        *(np.zeros(width, dtype=np.int64) for _ in range(5)),
-        *(np.zeros(width, dtype=bool) for _ in range(2)),
+        factors=contact_matrix.make_factors(step.network, width, symmetric=False),
+        load=motion(),
+        forces=room(2 * contacts, width),
+        following=room(2 * contacts, width),
+        state=room(contacts, width),
+        before=room(contacts, width),
+        velocity=motion(),
+        base=motion(),
+        kept=motion(),
+        rest=motion(),
+        direction=motion(),
+        pace=one(),
+        length=one(),
+        least=one(),
+        merit=one(),
+        changed=one(),
+        heaviest=one(),
+        breach=one(),
+        lately=one(),
+        steady=one(),
+        newton=count(),
+        steps=count(),
+        most=count(),
+        iterations=count(),
+        found=count(),
+        going=np.zeros(width, dtype=bool),
+        ended=np.zeros(width, dtype=bool),
     )
 
 

@@ -17,8 +17,8 @@ class Kind(NamedTuple):
     version: int  # raised when the algorithm gives other numbers: older entries are not used
     title: str  # in words
     unit: str  # what progress counts: progress(done, total), but of a packing (step, message)
-    parameters: Callable  # (…) → the plain parameters that name one; InputError for what is wrong
-    compute: Callable  # (store, parameters, *, workers, progress, …) → its dataset
+    parameters: Callable[..., Parameters]  # (…) → the plain parameters that name one; InputError for what is wrong
+    compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset
     holds_states: bool = False
 
 
@@ -26,7 +26,7 @@ class Cell(NamedTuple):
     """One dataset of a study."""
 
     kind: Kind
-    parameters: dict  # that name it in the store
+    parameters: Parameters  # that name it in the store
 
 
 @cancelling.cancellable

@@ -34,7 +34,7 @@ class Entry(NamedTuple):
 
     name: str  # folder in the store: <kind>-<key>
     kind: str
-    params: dict  # as they entered the key: floats to 9 significant digits
+    params: Parameters  # as they entered the key: floats to 9 significant digits
     version: int | str  # of the algorithm
     bytes: int  # on disk
     created: str  # UTC, ISO 8601
@@ -145,7 +145,7 @@ def _create_root(path):
     os.replace(temporary, path / "zarr.json")
 
 
-class Store(Mapping):
+class Store(Mapping[str, xr.Dataset]):
     """A folder of entries as a mapping from entry name to lazily opened xr.Dataset.
 
     Made by `open_store`. Entries whose metadata cannot be read are left out.

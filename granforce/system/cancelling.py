@@ -184,7 +184,7 @@ def apart(
             check()
 
 
-def in_child(function, *arguments):
+def in_child(function: Callable[..., T], *arguments: Any) -> T:
     """function(*arguments), which holds the interpreter, in a process that is killed if need be.
 
     The function must stand in a module of its own that imports little, as the child does so, too.

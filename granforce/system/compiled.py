@@ -36,7 +36,7 @@ def tell_when_compiling(say: Callable[[], object]) -> None:
     """Call say() once, as soon as a kernel is compiled that is not kept from an earlier run."""
     from numba.core import event
 
-    class Listener(event.Listener):
+    class Listener(event.Listener):  # type: ignore[misc]  # numba says no types
         def on_start(self, happening: Any) -> None:
             event.unregister("numba:compile", self)
             say()
