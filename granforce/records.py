@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.integer[Any]]
 Mask = npt.NDArray[np.bool_]
 
+Rows = Sequence[dict[str, Any]]  # a table: a line is plain values by name
 Progress = Callable[[float, float | None], object]  # progress(done, total), as work goes on
 Cancel = Callable[[], bool]  # asked again and again whether to end
 

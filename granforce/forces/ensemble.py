@@ -56,9 +56,7 @@ class Ensemble:
     force_scale: float  # ⟨f_n⟩ weighted with ℓ: 2 P0 V / Σ ℓ where the pressure is prescribed
     original: Floats  # (N_c, 2) the packing's own network on these contacts
     frozen: Integers  # contacts held at their original forces, as positions in packing.contacts
-    skipped: dict[
-        str, int
-    ]  # counts of what was left out: rattlers, unloaded contacts, tangential unknowns
+    skipped: dict[str, int]  # what was left out: rattlers, unloaded contacts, tangential unknowns
     prescribed: str  # "pressure", "stress" (with the pressure) or "none"
     known: knowledge.Polygons | None  # bounds on single forces, in ⟨f_n⟩; None without any
     found: Floats | None = None  # (N_c, 2) a network met while these contacts were sorted out
@@ -106,7 +104,7 @@ class Ensemble:
         """A without the columns of components that are pinned."""
         if self.known is None:
             return self.A
-        return self.A.tocsc()[:, ~self.to_vector(self.known.pinned)]
+        return self.A.tocsc()[:, ~self.to_vector(self.known.pinned).astype(np.bool_)]
 
     @property
     def coordination(self) -> float:

@@ -155,7 +155,7 @@ def departure(values: npt.ArrayLike) -> float:
     return float((majorant[1:] - reached[:-1]).max(initial=0.0))
 
 
-def chance_departure(number: int, level: float = LEVEL) -> float:
+def chance_departure(number: float, level: float = LEVEL) -> float:
     """The departure that so many values of a falling density exceed in 1 − level of cases.
 
     The uniform density comes nearest to rising, so it is the null; √n times its departure has a

@@ -62,9 +62,7 @@ class Photoelastic(NamedTuple):
     ids: Floats  # (N,) their names in the files; −1, −2, … for the walls
     walls: tuple[str, ...]  # names of the walls, which are the last bodies of the packing
     findings: list[Finding]  # of repair.Finding: what was mended, and where
-    report: dict[
-        str, Any
-    ]  # plain numbers and words: the account of what was found and what was done
+    report: dict[str, Any]  # what was found and what was done, in plain numbers and words
 
     def _repr_html_(self) -> str:
         """The import as notebooks show it."""
@@ -86,7 +84,7 @@ def open_frames(positions: Source | Frames, adjacency: Source | None = None) -> 
 
 
 def read_pegs(
-    positions: Source,
+    positions: Source | Frames,
     adjacency: Source | None = None,
     *,
     mu: float,
@@ -355,7 +353,9 @@ def _packing(
     return make_packing(x, r, np.full(2, np.inf), contacts, np.concatenate(forces), mu, load=load)
 
 
-def _measurement(listed: _Listed, candidates: int, walls: Bodies | None) -> tuple[Floats, Floats, Floats, Mask]:
+def _measurement(
+    listed: _Listed, candidates: int, walls: Bodies | None
+) -> tuple[Floats, Floats, Floats, Mask]:
     """Measured forces (N_c, 2), errors that are known, factors of the variance, what was added."""
     nothing = np.full((candidates, 2), np.nan)
     measured, factor = [listed.forces, nothing], [listed.factor, np.ones(candidates)]
