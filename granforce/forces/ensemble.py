@@ -619,12 +619,9 @@ def _carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
     if trusted:
         idle = known[:, 0] <= SEEN_CARRYING * full.force_scale
         dead = idle & _cannot_balance(full, idle)
-        open_ones = idle & ~dead
-        if open_ones.any():
-            pulled = _nearest_to(full, known, open_ones)
-            idle &= (pulled[:, 0] <= SEEN_CARRYING * full.force_scale) | (not full.admits(pulled))
-    carrying = ~(dead | _proven_idle(full, idle & ~dead, trusted))
-    return carrying, known if trusted else None
+        idle = _not_pulled(full, known, idle & ~dead)
+    at_hand = known if trusted else None
+    return ~(dead | _proven_idle(full, idle, at_hand)), at_hand
 
 
 def _tell_contradiction(full: Ensemble) -> None:
@@ -638,10 +635,20 @@ def _tell_contradiction(full: Ensemble) -> None:
         raise NotJammedError(message)
 
 
-def _nearest_to(full: Ensemble, known: Floats, pulled: Mask) -> Floats:
-    target = known.copy()
-    target[pulled, 0] += full.force_scale
-    return nearest(full, target).forces
+def _not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
+    """Those of the idle contacts that press in none of the networks that are pulled towards them.
+
+    Every network is pulled towards forces on all that have not pressed before.
+    """
+    while idle.any():
+        target = known.copy()
+        target[idle, 0] += full.force_scale
+        pulled = nearest(full, target).forces
+        pressing = idle & (pulled[:, 0] > SEEN_CARRYING * full.force_scale)
+        if not pressing.any() or not full.admits(pulled):
+            break
+        idle = idle & ~pressing
+    return idle
 
 
 def _cannot_balance(full: Ensemble, idle: Mask) -> Mask:
@@ -699,20 +706,28 @@ def _shown_idle(
     return idle
 
 
-def _proven_idle(full: Ensemble, idle: Mask, trusted: bool) -> Mask:
-    """Those of the idle contacts whose sum, and so each, can only be 0 over S."""
+def _proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
+    """Those of the idle contacts whose sum, and so each, can only be 0 over S.
+
+    known (N_c, 2): a network of S, or None.
+    """
     if not idle.any():
         return idle
     A, b, T = full.scaled_form
     # Without any load or pressure, S is a cone: what carries in it carries in a bounded part too.
-    upper = np.inf if b.any() else 1.0
-    model = programs.standard_form(A, b, upper=upper, solver="ipm")
-    model.setOptionValue("run_crossover", "off")  # no vertex is wanted
+    limits = [np.inf if b.any() else 1.0]
+    if known is not None:
+        # So it does in an S without end, however near to a network of S: a part of the way to any
+        # other one is in S as well.
+        limits.append(1.0 + float(full.coordinates(known).max()))
     normal_rows = sparse.csr_matrix(T)[:: full.per_contact]
-    shown = _shown_idle(model, A, b, normal_rows, idle)
-    if shown is not None:
-        return shown
-    if trusted:
+    for limit in limits:
+        model = programs.standard_form(A, b, upper=limit, solver="ipm")
+        model.setOptionValue("run_crossover", "off")  # no vertex is wanted
+        shown = _shown_idle(model, A, b, normal_rows, idle)
+        if shown is not None:
+            return shown
+    if known is not None:
         return idle  # feasible within BALANCED but not exactly: no more is known to carry
     raise certificates.why_unsolved(A, b, _unbalanced_message(full), slack=full.slack)
 
