@@ -722,8 +722,14 @@ def _perturbed(
         save(store, PERTURBED_CONTACT, named[contact], parts[contact])
         tell(len(parts), len(chosen))
 
-    options = {"limit_loads": loads.load, "workers": workers, "finished": ended}
-    critical_forces(S, missing, **options, **_named_protocol(parameters))
+    critical_forces(
+        S,
+        missing,
+        limit_loads=loads.load,
+        workers=workers,
+        finished=ended,
+        **_named_protocol(parameters),
+    )
     return [parts[c] for c in chosen]
 
 
