@@ -301,8 +301,8 @@ def test_views_that_make_no_sense_are_left_out(library, wait_for):
 def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
     """The command line reads the words back as the parameters of the cell."""
     from app.selection import command, select
-    from granforce.cli import commands
     from granforce.cli import parser as cli
+    from granforce.study import cells, kinds
 
     wanted = select(31, 0.25, 3, packed, relax="accelerated", states=9, seed=2)
     wanted = wanted._replace(packing=wanted.packing | {"sweeps": 60})
@@ -312,8 +312,8 @@ def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
         found.append(parameters)
         raise Cancelled
 
-    monkeypatch.setattr(commands.kinds, "get_packing", lambda *given, **options: (None, True))
-    monkeypatch.setattr(commands.study, "get", note)
+    monkeypatch.setattr(kinds, "get_packing", lambda *given, **options: (None, True))
+    monkeypatch.setattr(cells, "get", note)
     assert cli.main(command(wanted).split()[1:]) == 130
     expected = wanted.parameters()
     assert found[0] | {"keep": None} == expected | {"keep": None}
