@@ -55,6 +55,7 @@ def get(
     found = load(store, kind, parameters)
     if found is not None:
         return found, True
+    store.refuse_unwritable()
     dataset = kind.compute(store, parameters, workers=workers, progress=progress, **options)
     save(store, kind, parameters, dataset, dtypes=dtypes if kind.holds_states else None)
     return dataset, False

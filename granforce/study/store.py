@@ -7,6 +7,7 @@ version, so an entry is never changed: it is there and whole, or it is not there
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -225,6 +226,13 @@ class Store(Mapping[str, xr.Dataset]):
             if not (self.path / name).is_dir() or entries.checked(self.path / name)[1]:
                 self._publish(name, variables, attrs)
         return name
+
+    def refuse_unwritable(self) -> None:
+        """Raise InputError where nothing can be saved, before anything is computed for it."""
+        with self._writing():
+            own = os.access in os.supports_effective_ids
+            if self.path.is_dir() and not os.access(self.path, os.W_OK, effective_ids=own):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     def entry(self, name: str) -> Entry | None:
         """The `Entry` of this name, or None if there is none that can be read; reads no arrays."""
