@@ -19,6 +19,8 @@ from granforce.tolerances import PROGRAM
 OPTIMAL = highspy.HighsModelStatus.kOptimal
 _PRIMAL_SIMPLEX = 4  # HiGHS's number
 
+# Usual are less than 100; where {y ≥ 0 : A y = b} is empty they may go on for ever.
+MOST_INTERIOR_STEPS = 1000
 # How a program is tried again where it ended without an optimum.
 _OTHER_WAYS = (
     {"solver": "simplex"},
@@ -70,6 +72,7 @@ def bounded(
         "output_flag": False,
         "threads": 1,
         "solver": solver,
+        "ipm_iteration_limit": MOST_INTERIOR_STEPS,
         "primal_feasibility_tolerance": PROGRAM,
         "dual_feasibility_tolerance": PROGRAM,
     }
