@@ -4,6 +4,8 @@ import ast
 import tomllib
 from pathlib import Path
 
+import granforce
+
 ROOT = Path(__file__).resolve().parents[1]
 HOUSE = ROOT / "granforce"
 MOST_FILES = 8  # beside the rooms
@@ -56,3 +58,13 @@ def test_every_kernel_is_under_a_rule():
     for module in ruled:
         path = ROOT / module.replace(".", "/")
         assert path.is_dir() or path.with_suffix(".py").exists(), f"{module} has gone"
+
+
+def test_type_checkers_are_told_the_public_names():
+    told = {
+        alias.name: node.module.removeprefix("granforce").strip(".")
+        for node in ast.parse((HOUSE / "__init__.pyi").read_text()).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert told == granforce._HOME

@@ -75,7 +75,7 @@ def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int)
     true = frame.truth(found)[S.index]
     inner, listed = np.isfinite(true[:, 0]), np.isfinite(m[:, 0])
     here = inner & listed
-    mean = drawn.draws.flat.mean(axis=0)
+    mean = drawn.drawn.flat.mean(axis=0)
     row = {}
     for k, part in enumerate(("f_n", "f_t")):
         for name, forces in (("raw", m), ("likeliest", drawn.forces), ("mean", mean)):

@@ -5,7 +5,7 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ _PRODUCT = 54
 # Dense matrices multiplied on one core: the most that double precision gets here.
 _DENSE = """
 import time
+from collections.abc import Callable
 import numpy as np
 a = np.random.default_rng(0).random((1200, 1200))
 best = 1e9
@@ -103,7 +104,7 @@ def starts(
     for mu in frictions:
         note(f"starts: N = {n}, μ = {mu:g}")
         S = ensemble(pack(n, mu, 1))
-        ways = {
+        ways: dict[str, Callable[..., Any]] = {
             "PIQP": lambda given, S=S: [nearest_piqp(S, start) for start in given],
             "one at a time": lambda given, S=S: [nearest(S, start) for start in given],
             f"{LANES} lanes": lambda given, S=S: nearest_of_many(S, given),
@@ -144,7 +145,7 @@ def pushes(
         S = ensemble(pack(n, mu, 1))
         some = S.index[:: max(1, len(S.index) // count)][:count]
         loads = limit_loads(S, some)
-        ways = {
+        ways: dict[str, Callable[..., Any]] = {
             "one at a time": lambda which, given, S=S: [
                 critical_force(S, contact, limit_load=load)
                 for contact, load in zip(which, given, strict=True)

@@ -147,7 +147,12 @@ def uniform_growth(
         setup = time.process_time() - begin
         begin = time.process_time()
         sample = sample_uniform(S, effective, seed=seed, effective=effective)
-        row = {"n": n * k * k, "h": made.dimension, "walls": made.count, "states": len(sample.flat)}
+        row: dict[str, Any] = {
+            "n": n * k * k,
+            "h": made.dimension,
+            "walls": made.count,
+            "states": len(sample.flat),
+        }
         row |= {"effective": sample.effective, "reached": sample.reached}
         row |= {"seconds": time.process_time() - begin, "peak_MB": _peak(), "setup_seconds": setup}
         if made.count <= MOST_DENSE_WALLS:

@@ -12,7 +12,7 @@ standard error of every force, of those that were not measured too.
 import copy
 import time
 from functools import partial
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -73,14 +73,21 @@ class Inference(NamedTuple):
     seconds: float  # wall time, draws included
 
     @property
+    def drawn(self) -> Draws:
+        """The draws; AttributeError where none were asked for."""
+        if self.draws is None:
+            raise AttributeError("no states were drawn: ask for some by `states`")
+        return self.draws
+
+    @property
     def mean(self) -> Floats:
         """(N_c, 2) mean of the draws, force."""
-        return cast("Draws", self.draws).flat.mean(axis=0)
+        return self.drawn.flat.mean(axis=0)
 
     @property
     def error(self) -> Floats:
         """(N_c, 2) standard error of every force: the standard deviation of the draws."""
-        return cast("Draws", self.draws).flat.std(axis=0)
+        return self.drawn.flat.std(axis=0)
 
     def _repr_html_(self) -> str:
         """The inference as notebooks show it."""

@@ -14,12 +14,11 @@ What was not measured counts as 0 with an error of `unmeasured` ⟨f_n⟩, in ei
 """
 
 import time
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce.explore.infer import Draws, Inference, judged, told
+from granforce.explore.infer import Inference, judged, told
 from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import checked, fitted_many, likeliest
@@ -48,7 +47,7 @@ class Remeasured(Inference):
     @property
     def error(self) -> Floats:
         """(N_c, 2) standard error of every force: root mean square of draws less that."""
-        return np.sqrt(np.mean((cast("Draws", self.draws).flat - self.forces) ** 2, axis=0))
+        return np.sqrt(np.mean((self.drawn.flat - self.forces) ** 2, axis=0))
 
 
 @cancelling.cancellable

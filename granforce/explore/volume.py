@@ -13,6 +13,7 @@ from the narrowest distribution and one up from uniform states: were chains too 
 where they came from, both would differ.
 """
 
+import math
 import time
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -61,7 +62,7 @@ class Volume(NamedTuple):
         """V^(1/h)/√(2πe): width per dimension of the normal distribution of the same entropy."""
         if not self.dimension:
             return 0.0
-        return float(np.exp(self.log_volume / self.dimension) / np.sqrt(2 * np.pi * np.e))
+        return float(np.exp(self.log_volume / self.dimension) / np.sqrt(2 * np.pi * math.e))
 
     def _repr_html_(self) -> str:
         """The volume as notebooks show it."""

@@ -211,7 +211,7 @@ def infer_frame(
         values[S.index] = of
     grains = len(found.packing.r) - len(found.walls)
     stress = regional_stress(S.contacts, found.packing.x, grains, drawn.forces)
-    off = regional_stress(S.contacts, found.packing.x, grains, drawn.draws.flat) - stress
+    off = regional_stress(S.contacts, found.packing.x, grains, drawn.drawn.flat) - stress
     dataset = packing_dataset(found.packing).merge(
         labelled(
             {

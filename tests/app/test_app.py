@@ -301,8 +301,8 @@ def test_views_that_make_no_sense_are_left_out(library, wait_for):
 def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
     """The command line reads the words back as the parameters of the cell."""
     from app.selection import command, select
-    from granforce.cli import commands
     from granforce.cli import parser as cli
+    from granforce.study import cells, kinds
 
     wanted = select(31, 0.25, 3, packed, relax="accelerated", states=9, seed=2)
     wanted = wanted._replace(packing=wanted.packing | {"sweeps": 60})
@@ -312,8 +312,8 @@ def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
         found.append(parameters)
         raise Cancelled
 
-    monkeypatch.setattr(commands.kinds, "get_packing", lambda *given, **options: (None, True))
-    monkeypatch.setattr(commands.study, "get", note)
+    monkeypatch.setattr(kinds, "get_packing", lambda *given, **options: (None, True))
+    monkeypatch.setattr(cells, "get", note)
     assert cli.main(command(wanted).split()[1:]) == 130
     expected = wanted.parameters()
     assert found[0] | {"keep": None} == expected | {"keep": None}
@@ -612,8 +612,8 @@ def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
     from app.jobs import Job, Pool
     from app.selection import selected
 
-    made, walk, begin = [], kinds.walk, threading.Barrier(2)
-    monkeypatch.setattr(kinds, "walk", lambda *a, **k: made.append(1) or walk(*a, **k))
+    made, walk, begin = [], kinds.states.walk, threading.Barrier(2)
+    monkeypatch.setattr(kinds.states, "walk", lambda *a, **k: made.append(1) or walk(*a, **k))
     work = compute.states(library, selected("walk", cell_parameters(0.2)))
     pool = Pool(2, "test")
     jobs = [Job(once_both_are_there(begin, work), pool) for _ in range(2)]
@@ -626,8 +626,8 @@ def test_a_packing_that_two_pages_need_is_made_once(library, monkeypatch):
     from app.jobs import Job, Pool
     from app.selection import select
 
-    made, pack, begin = [], kinds.pack, threading.Barrier(2)
-    monkeypatch.setattr(kinds, "pack", lambda *a, **k: made.append(1) or pack(*a, **k))
+    made, pack, begin = [], kinds.packings.pack, threading.Barrier(2)
+    monkeypatch.setattr(kinds.packings, "pack", lambda *a, **k: made.append(1) or pack(*a, **k))
     pool, jobs = Pool(2, "test"), []
     for states in (3, 4):
         work = compute.states(library, select(DISKS, 0.2, 7, states=states))

@@ -8,7 +8,8 @@ from pathlib import Path
 import command_lines
 import pytest
 
-from granforce.cli.parser import LONGEST, main
+from granforce.cli.options import LONGEST
+from granforce.cli.parser import main
 
 PACKING = Path(__file__).parents[1] / "reference" / "n100_mu0.1_s11.npz"
 LINES = command_lines.lines()

@@ -1,0 +1,56 @@
+"""The public names and their homes, for type checkers: `__init__.py` finds them on first use."""
+
+from granforce import figures as figures
+from granforce import measures as measures
+from granforce.explore.bodies import body as body
+from granforce.explore.bodies import fall as fall
+from granforce.explore.carrying import carrying as carrying
+from granforce.explore.infer import infer as infer
+from granforce.explore.informative import informative as informative
+from granforce.explore.intervals import intervals as intervals
+from granforce.explore.intervals import limit_loads as limit_loads
+from granforce.explore.outline import outline as outline
+from granforce.explore.pull import pull as pull
+from granforce.explore.pull import reach as reach
+from granforce.explore.random_walk import walk as walk
+from granforce.explore.remeasured import remeasured as remeasured
+from granforce.explore.stress_outline import stress_outline as stress_outline
+from granforce.explore.stress_outline import stress_plane as stress_plane
+from granforce.explore.uniform import sample_uniform as sample_uniform
+from granforce.explore.volume import volume as volume
+from granforce.forces.ensemble import Ensemble as Ensemble
+from granforce.forces.ensemble import ensemble as ensemble
+from granforce.forces.gauss_seidel import gauss_seidel as gauss_seidel
+from granforce.forces.knowledge import Known as Known
+from granforce.forces.nearest import nearest as nearest
+from granforce.forces.nearest import nearest_of_many as nearest_of_many
+from granforce.forces.nearest_piqp import nearest_piqp as nearest_piqp
+from granforce.packing.closing import margin as margin
+from granforce.packing.compaction import pack as pack
+from granforce.packing.importers import load_packing as load_packing
+from granforce.packing.importers import read_known as read_known
+from granforce.packing.importers import read_lammps as read_lammps
+from granforce.packing.importers import read_mercury as read_mercury
+from granforce.packing.importers import read_pegs as read_pegs
+from granforce.packing.importers import read_table as read_table
+from granforce.packing.importers import read_yade as read_yade
+from granforce.packing.importers import report as report
+from granforce.packing.importers import save_packing as save_packing
+from granforce.packing.importers import synthetic_frame as synthetic_frame
+from granforce.packing.scenes import scene as scene
+from granforce.perturb.critical_force import critical_force as critical_force
+from granforce.perturb.critical_force import critical_forces as critical_forces
+from granforce.perturb.critical_force import response as response
+from granforce.records import Cancelled as Cancelled
+from granforce.records import Contacts as Contacts
+from granforce.records import InputError as InputError
+from granforce.records import NotJammedError as NotJammedError
+from granforce.records import Packing as Packing
+from granforce.records import UndecidedError as UndecidedError
+from granforce.records import make_contacts as make_contacts
+from granforce.records import make_packing as make_packing
+from granforce.study.series import frames_of as frames_of
+from granforce.study.series import infer_series as infer_series
+from granforce.study.store import open_store as open_store
+
+__all__: list[str]

@@ -1,0 +1,175 @@
+"""What the options ask for: parameters, conditions, and the dataset, found or computed."""
+
+import argparse
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granforce import measures
+from granforce.packing import importers
+from granforce.records import InputError, whole
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.cells import Kind
+from granforce.study.keys import Parameters
+from granforce.study.store import Store, open_store
+from granforce.system.files import check_file, written
+from granforce.system.terminal import Bar, Steps
+
+
+def radii(text: str, n: int) -> str | list[float]:
+    if ":" in text:
+        return text
+    try:
+        radii = [float(line) for line in Path(text).read_text().split()]
+    except OSError as error:
+        raise InputError(f"radii file {text} cannot be read: {error.strerror or error}") from None
+    except ValueError as error:
+        raise InputError(f"radii file {text}: {error}") from None
+    if len(radii) != n:
+        raise InputError(f"radii file {text} holds {len(radii)} radii for {n} disks (-n)")
+    return radii
+
+
+def numbers(option: str, text: str | None, cast: Callable[[str], Any]) -> list[Any] | None:
+    """The numbers of an option, separated by commas; None where it was not given."""
+    if text is None:
+        return None
+    try:
+        return [cast(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option} {text[:40]!r}: give numbers separated by commas") from None
+
+
+def check_outputs(*paths: str | None) -> None:
+    """Files that cannot be written are told before anything is computed."""
+    for path in paths:
+        if path is not None:
+            check_file(path)
+
+
+def packing_parameters(arguments: argparse.Namespace, mu: float, seed: int) -> Parameters:
+    return kinds.PACKING.parameters(
+        arguments.n,
+        mu,
+        seed,
+        radii=radii(arguments.radii, arguments.n),
+        pressure=arguments.pressure,
+        dt=arguments.dt,
+        box_mass=arguments.box_mass,
+        sweeps=arguments.sweeps,
+        accuracy=arguments.step_accuracy,
+        box=arguments.box,
+    )
+
+
+def required_mu(arguments: argparse.Namespace) -> float:
+    if arguments.mu is None:
+        raise InputError("give the friction coefficient: --mu 0.1")
+    return arguments.mu
+
+
+def prepared(
+    arguments: argparse.Namespace, name: Callable[[Parameters], Parameters], *outputs: str | None
+) -> tuple[Store, Parameters]:
+    """The store, with the packing in it, and the parameters that name(packing's) gives.
+
+    Everything that can be told from the command line alone is told before a packing is made.
+    """
+    whole(arguments.workers, "--workers", 1)
+    if arguments.packing is None:
+        packing = None
+        named = packing_parameters(arguments, required_mu(arguments), arguments.seed)
+    else:
+        packing = importers.load_packing(arguments.packing)
+        named = kinds.imported_parameters(packing)
+    parameters = name(named)
+    check_outputs(*outputs)
+    store = open_store(arguments.cache)
+    if packing is None:
+        with Steps("compaction", "step") as progress:
+            kinds.get_packing(store, named, progress=progress)
+    else:
+        kinds.keep_packing(store, named, packing)
+    return store, parameters
+
+
+def get(
+    store: Store,
+    kind: Kind,
+    parameters: Parameters,
+    arguments: argparse.Namespace,
+    watching: Any = None,
+) -> tuple[xr.Dataset, bool]:
+    """The dataset of a kind, computed or found, and whether it was found.
+
+    watching(bar): what the kind's compute calls with what it finds, which tells of it on the bar.
+    """
+    with Bar(kind.title, kind.unit) as progress:
+        watch = {} if watching is None else {"watch": watching(progress)}
+        told = {"workers": arguments.workers, "progress": progress, **watch}
+        return study.get(store, kind, parameters, **told)
+
+
+def telling_eta(bar: Any) -> Callable[[Any], None]:
+    """watch(Found) of a walk: η1 of all states until now stands beside the bar."""
+    growth, lock = measures.Growth(), threading.Lock()
+
+    def watch(found: Any) -> None:
+        with lock:
+            bar.note(f"η1 = {growth.add(found.forces)[0]:.4f}")
+
+    return watch
+
+
+def conditions(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the options say of conditions, as parameters of kinds."""
+    asked = {
+        "prescribed": arguments.prescribe,
+        "stress": numbers("--stress", arguments.stress, float),
+    }
+    return asked | known_forces(arguments)
+
+
+def known_forces(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The same of known forces."""
+    given = getattr(arguments, "known", None)
+    return {} if given is None else {"known": importers.read_known(given)}
+
+
+def walked(
+    arguments: argparse.Namespace, *outputs: str | None
+) -> tuple[Store, Parameters, xr.Dataset, bool]:
+    asked = conditions(arguments)
+
+    def name(packing: Parameters) -> Parameters:
+        return kinds.WALK.parameters(
+            packing,
+            arguments.states,
+            arguments.walk_seed,
+            mu=arguments.ensemble_mu,
+            relax=arguments.relax,
+            chains=arguments.chains,
+            **asked,
+        )
+
+    store, parameters = prepared(arguments, name, *outputs)
+    dataset, cached = get(store, kinds.WALK, parameters, arguments, telling_eta)
+    return store, parameters, dataset, cached
+
+
+def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:
+    """Columns {name: array} as a table; whole numbers stay whole."""
+    with written(path) as file:
+        np.savetxt(
+            file,
+            np.column_stack(list(columns.values())),
+            fmt=["%d" if v.dtype.kind == "i" else "%.17g" for v in columns.values()],
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+        )

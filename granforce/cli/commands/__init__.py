@@ -1,0 +1,26 @@
+"""The commands, by what they are about: each takes its arguments, and may return an exit code."""
+
+from granforce.cli.commands.exact import intervals, limit_loads, perturb, stress
+from granforce.cli.commands.inference import infer
+from granforce.cli.commands.packings import import_, pack
+from granforce.cli.commands.service import app, bench, cache, study_
+from granforce.cli.commands.states import measure, scan, uniform, volume, walk
+
+__all__ = [
+    "app",
+    "bench",
+    "cache",
+    "import_",
+    "infer",
+    "intervals",
+    "limit_loads",
+    "measure",
+    "pack",
+    "perturb",
+    "scan",
+    "stress",
+    "study_",
+    "uniform",
+    "volume",
+    "walk",
+]

@@ -1,0 +1,154 @@
+"""Exact answers: intervals, limit loads, stresses, and what one contact takes."""
+
+import argparse
+import json
+
+import numpy as np
+
+from granforce.cli.asked import conditions, get, known_forces, numbers, prepared, write_csv
+from granforce.perturb.critical_force import COUNTS
+from granforce.study import kinds
+from granforce.study.keys import Parameters
+from granforce.study.store import Store
+from granforce.system.terminal import report
+
+
+def perturb(arguments: argparse.Namespace) -> None:
+    """Critical forces and first motions of contacts, computed or found; report them."""
+    chosen = numbers("--contacts", arguments.contacts, int)
+    asked = conditions(arguments)
+
+    def name(packing: Parameters) -> Parameters:
+        return kinds.PERTURBATION.parameters(
+            packing,
+            mu=arguments.ensemble_mu,
+            contacts=chosen,
+            random=None if arguments.all or chosen is not None else arguments.random,
+            seed=arguments.draw_seed,
+            precision=arguments.precision,
+            **asked,
+        )
+
+    store, parameters = prepared(arguments, name, arguments.csv)
+    dataset, cached = get(store, kinds.PERTURBATION, parameters, arguments)
+    scale = dataset["force_scale"].item()
+    load, limit = (dataset[name].values / scale for name in ("critical_low", "limit_load"))
+    lines = {
+        "contacts": len(load),
+        "critical_force": dataset["critical_force"].item(),
+        "critical_force_deciles": np.quantile(load, np.linspace(0, 1, 11)).tolist(),
+        "limit_load": float(limit.mean()),
+        **{name: dataset[name].item() for name in ("decay_exponent", "decay_low", "decay_high")},
+        "fit_range": json.loads(dataset.attrs["fit_range"]),
+        "decay_exponent_of_other_ranges": dataset["fit_exponent"].values.tolist(),
+        **{name: int(dataset[name].sum()) for name in COUNTS},
+        **{name: dataset[name].item() for name in ("rattlers", "unloaded_contacts")},
+        "largest_residual": float(dataset["load_residual"].max()),
+        "largest_breach": float(dataset["motion_breach"].max()),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    if arguments.csv is not None:
+        names = ("limit_load", "critical_low", "critical_high", "pair_opening")
+        names += ("opened", "slid", "kept", *COUNTS)
+        columns = {"contact": dataset["backbone"].values}
+        write_csv(arguments.csv, columns | {name: dataset[name].values for name in names})
+    report(lines, arguments.json)
+
+
+def _exact(arguments: argparse.Namespace) -> tuple[Store, Parameters]:
+    contacts = numbers("--contacts", arguments.contacts, int)
+    edges = numbers("--slice", arguments.slice, float)
+    asked = conditions(arguments)
+
+    def name(packing: Parameters) -> Parameters:
+        return kinds.INTERVALS.parameters(
+            packing, mu=arguments.ensemble_mu, contacts=contacts, slice_=edges, **asked
+        )
+
+    return prepared(arguments, name, arguments.csv)
+
+
+def intervals(arguments: argparse.Namespace) -> None:
+    """Exact intervals, computed or found; report them."""
+    store, parameters = _exact(arguments)
+    dataset, cached = get(store, kinds.INTERVALS, parameters, arguments)
+    scale = dataset["force_scale"].item()
+    extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    position = dataset["position"].values
+    cluster = dataset["cluster"].values
+    histogram = np.histogram(position[np.isfinite(position)], bins=10, range=(0, 1))[0]
+    lines = {
+        "contacts": len(extent),
+        "dimension": dataset["dimension"].item(),
+        "coordination": dataset["coordination"].item(),
+        "exact_eta3": dataset["eta3"].item(),
+        "mean_extent_of_f_n": float(extent.mean() / scale),
+        "largest_extent_of_f_n": float(extent.max() / scale),
+        "correlation": dataset["correlation"].item(),
+        "determined_contacts": int(np.sum(cluster < 0)),
+        "undetermined_clusters": int(cluster.max(initial=-1)) + 1,
+        "position_of_f_n_in_tenths": histogram.tolist(),
+        **json.loads(dataset.attrs["counts"]),
+        "largest_duality_gap": dataset["max_gap"].item(),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    if arguments.csv is not None:
+        columns = {"contact": dataset["backbone"].values}
+        for name, side in (("min", "low"), ("max", "high")):
+            columns |= {f"f_n_{name}": dataset[side].values[:, 0]}
+            columns |= {f"f_t_{name}": dataset[side].values[:, 1]}
+        write_csv(arguments.csv, columns | {"cluster": cluster})
+    report(lines, arguments.json)
+
+
+def limit_loads(arguments: argparse.Namespace) -> None:
+    """Limit loads, computed or found; report them."""
+    store, parameters = _exact(arguments)
+    dataset, cached = get(store, kinds.LIMIT_LOADS, parameters, arguments)
+    load = dataset["limit_load"].values / dataset["force_scale"].item()
+    lines = {
+        "contacts": len(load),
+        "mean_limit_load": float(load.mean()),
+        "least_limit_load": float(load.min()),
+        "largest_limit_load": float(load.max()),
+        **json.loads(dataset.attrs["counts"]),
+        "largest_duality_gap": dataset["max_gap"].item(),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    if arguments.csv is not None:
+        names = {"contact": "backbone", "limit_load": "limit_load"}
+        write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
+    report(lines, arguments.json)
+
+
+def stress(arguments: argparse.Namespace) -> None:
+    """The outline of stresses, computed or found; report it."""
+    known = known_forces(arguments)
+
+    def name(packing: Parameters) -> Parameters:
+        return kinds.STRESS.parameters(
+            packing, mu=arguments.ensemble_mu, angles=arguments.angles, **known
+        )
+
+    store, parameters = prepared(arguments, name, arguments.csv)
+    dataset, cached = get(store, kinds.STRESS, parameters, arguments)
+    own = dataset["stress_own"].values
+    lines = {
+        "dimension": dataset["dimension"].item(),
+        "largest_shear_over_pressure": dataset["friction"].item(),
+        "certainly_not_above": dataset["friction_bound"].item(),
+        "own_shear_over_pressure": float(np.hypot(*own)),
+        "own_normal_difference": float(own[0]),
+        "own_shear_stress": float(own[1]),
+        **json.loads(dataset.attrs["counts"]),
+        "largest_duality_gap": float(dataset["stress_gap"].max()),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    if arguments.csv is not None:
+        names = {"angle": "stress_angle", "largest": "stress_support"}
+        write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
+    report(lines, arguments.json)

@@ -1,0 +1,93 @@
+"""Forces that were measured."""
+
+import argparse
+
+import numpy as np
+
+from granforce.cli import frames
+from granforce.cli.asked import conditions, prepared, write_csv
+from granforce.cli.commands.packings import flaws_and_walls
+from granforce.packing import importers
+from granforce.records import InputError
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.keys import Parameters
+from granforce.system.terminal import Bar, report
+from granforce.tolerances import CARRYING
+
+INFERENCE_LINES = (
+    *("worst_r_hat", "least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held"),
+    *("setup_seconds", "sampling_seconds"),
+)
+
+
+def infer(arguments: argparse.Namespace) -> int | None:
+    """The likeliest network of measured forces, with error bars if wanted; report it."""
+    if arguments.frames is not None:
+        return frames.infer_frames(arguments, flaws_and_walls(arguments))
+    if arguments.files or arguments.measured is None:
+        raise InputError(
+            "give --measured FILE.csv and a packing, or files of frames with --frames all"
+        )
+    asked, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
+    measured = importers.read_measurement(arguments.measured)
+
+    def name(packing: Parameters) -> Parameters:
+        return kinds.INFERENCE.parameters(
+            packing,
+            measured,
+            states,
+            arguments.sample_seed,
+            mu=arguments.ensemble_mu,
+            chains=arguments.chains,
+            unmeasured=arguments.unmeasured,
+            again=arguments.again,
+            certain=arguments.certain,
+            **asked,
+        )
+
+    store, parameters = prepared(arguments, name, arguments.csv)
+    with Bar(kinds.INFERENCE.title, kinds.INFERENCE.unit) as progress:
+        dataset, cached = study.get(
+            *(store, kinds.INFERENCE, parameters),
+            workers=arguments.workers,
+            progress=progress,
+            measured=measured,
+        )
+    scale, given = dataset["force_scale"].item(), measured.forces + measured.sigma
+    change = np.abs(dataset["inferred"].values - dataset["measured"].values)
+    lines = {
+        "entry": study.entry_name(store, kinds.INFERENCE, parameters),
+        "contacts": len(change),
+        "measured_components": int(np.isfinite(change).sum()),
+        "measured_where_nothing_can_carry": int(
+            np.isfinite(given).sum() - np.isfinite(change).sum()
+        ),
+        "chi_square": dataset["chi_square"].item(),
+        "freedom": dataset["freedom"].item(),
+        "mean_change_of_f_n": float(np.nanmean(change[:, 0]) / scale),
+        "suspects": dataset["suspect"].values.tolist(),
+    }
+    columns = {"contact": dataset["backbone"].values}
+    for k, part in enumerate(("f_n", "f_t")):
+        columns |= {part: dataset["inferred"].values[:, k]}
+        columns |= {f"deviation_{part}": dataset["deviation"].values[:, k]}
+    if arguments.certain:
+        least = dataset["least_normal"].values / scale
+        sure = np.flatnonzero(least > CARRYING)
+        order = sure[np.argsort(-least[sure], kind="stable")]
+        lines |= {"unmeasured_contacts": int(np.isfinite(least).sum())}
+        lines |= {"carry_for_certain": columns["contact"][order].tolist()}
+        columns |= {"least_f_n": dataset["least_normal"].values}
+    if states:
+        error = dataset["standard_error"].values
+        lines |= {"states": dataset.sizes["state"], "mean_standard_error": error.mean() / scale}
+        lines |= {name: dataset[name].item() for name in INFERENCE_LINES}
+        lines |= {"reached": bool(dataset["reached"].item())}
+        for k, part in enumerate(("f_n", "f_t")):
+            columns |= {f"mean_{part}": dataset["expected"].values[:, k]}
+            columns |= {f"error_{part}": error[:, k]}
+    if arguments.csv is not None:
+        write_csv(arguments.csv, columns)
+    report(lines | {"seconds": dataset["seconds"].item(), "cached": cached}, arguments.json)
+    return None

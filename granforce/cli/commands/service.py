@@ -1,0 +1,99 @@
+"""The study, the page, the benchmark and the store."""
+
+import argparse
+import json
+import re
+import runpy
+import socket
+import sys
+from pathlib import Path
+
+from granforce.records import InputError, whole
+from granforce.study.store import open_store
+from granforce.system.terminal import print_list, report
+
+
+def study_(arguments: argparse.Namespace) -> int:
+    """The study of the paper. Returns 1 if a cell failed."""
+    from granforce.paper.main import main
+
+    return main(arguments)
+
+
+def app(arguments: argparse.Namespace) -> None:
+    """The page, served by `panel serve` in this process until it is interrupted."""
+    port = whole(arguments.port, "--port", 0, 65_535)
+    for origin in arguments.allow_websocket_origin:
+        if not re.fullmatch(r"[^\s:/,]+(:\d{1,5})?", origin):
+            raise InputError(
+                f"--allow-websocket-origin {origin[:40]!r}: give a name and a port, such as "
+                "lab.example.org:5006"
+            )
+    _check_address(arguments.address, port)
+    words = ["panel", "serve", str(_page()), "--port", str(port), "--address", arguments.address]
+    for origin in arguments.allow_websocket_origin:
+        words += ["--allow-websocket-origin", origin]
+    words += [] if arguments.no_show else ["--show"]
+    words += ["--warm"] if arguments.warm else []
+    sys.argv = words
+    runpy.run_module("panel", run_name="__main__", alter_sys=True)
+
+
+def _page() -> Path:
+    """The page's folder: inside the installed package, beside it in a checkout."""
+    package = Path(__file__).resolve().parents[2]
+    for folder in (package / "app", package.parent / "app"):
+        if (folder / "main.py").is_file():
+            return folder
+    raise InputError(f"the page is not installed: {package} has no folder app; install the wheel")
+
+
+def _check_address(address: str, port: int) -> None:
+    """InputError where nothing can listen there, or something listens already."""
+    if not address.strip():
+        raise InputError("--address is empty; give a name or a number, such as localhost")
+    try:
+        family, kind, _, _, place = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(place)
+    except (OSError, ValueError) as error:  # ValueError: what cannot be a name at all
+        reason = getattr(error, "strerror", None) or "no such name"
+        raise InputError(
+            f"cannot listen at {address[:40]!r}, port {port}: {reason}; choose another with "
+            "--address and --port"
+        ) from None
+
+
+def bench(arguments: argparse.Namespace) -> None:
+    """The benchmark's report."""
+    from granforce.bench import main
+
+    main(arguments.out, arguments.quick, arguments.json)
+
+
+def cache(arguments: argparse.Namespace) -> int:
+    """List, measure, clear or verify a store. Returns 1 if an entry is damaged."""
+    store = open_store(arguments.cache)
+    if arguments.action == "clear":
+        lines = {"removed": store.clear(arguments.kind), "temporaries": store.clean()}
+        report(lines, arguments.json)
+    elif arguments.action == "size":
+        entries = store.find(arguments.kind)
+        size = sum(entry.bytes for entry in entries)
+        report({"path": str(store.path), "entries": len(entries), "bytes": size}, arguments.json)
+    elif arguments.action == "verify":
+        verdicts = [
+            v._asdict()
+            for v in store.verify()
+            if not arguments.kind or v.name.startswith(f"{arguments.kind}-")
+        ]
+        print_list(verdicts, ("name", "ok", "reason"), arguments.json)
+        return 0 if all(verdict["ok"] for verdict in verdicts) else 1
+    else:
+        entries = [
+            {**entry._asdict(), "params": json.dumps(entry.params)}
+            for entry in store.find(arguments.kind)
+        ]
+        print_list(entries, ("name", "bytes", "created", "params"), arguments.json)
+    return 0

@@ -1,0 +1,193 @@
+"""States of S: walks, uniform samples, their measures, and the volume."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+
+from granforce.cli.asked import (
+    conditions,
+    get,
+    numbers,
+    packing_parameters,
+    prepared,
+    walked,
+    write_csv,
+)
+from granforce.records import Rows, check_memory, whole
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study import scan as scans
+from granforce.study.keys import Parameters
+from granforce.study.store import open_store
+from granforce.system.terminal import Bar, report, table
+
+
+def walk(arguments: argparse.Namespace) -> None:
+    """Random walk, made or found; report how it went."""
+    store, parameters, dataset, cached = walked(arguments)
+    lines = {
+        "entry": study.entry_name(store, kinds.WALK, parameters),
+        **{name: dataset[name].item() for name in (*study.ROW, *study.ROW_COUNTS)},
+        "mean_iterations": float(dataset["sweeps"].mean()),
+        "largest_residual": float(dataset["residual"].max()),
+        "largest_violation": float(dataset["violation"].max()),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    report(lines, arguments.json)
+
+
+UNIFORM_LINES = (
+    *("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "worst_r_hat"),
+    *("least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held", "skipped"),
+    *("rattlers", "unloaded_contacts"),
+)
+
+
+def uniform(arguments: argparse.Namespace) -> int:
+    """Uniform sample, drawn or found; report it. Returns 1 if it is not worth what was wanted."""
+    asked = conditions(arguments)
+
+    def name(packing: Parameters) -> Parameters:
+        return kinds.UNIFORM.parameters(
+            packing,
+            arguments.states,
+            arguments.sample_seed,
+            mu=arguments.ensemble_mu,
+            chains=arguments.chains,
+            effective=arguments.effective,
+            **asked,
+        )
+
+    store, parameters = prepared(arguments, name)
+    dataset, cached = get(store, kinds.UNIFORM, parameters, arguments)
+    reached = bool(dataset["reached"].item())
+    lines = {
+        "entry": study.entry_name(store, kinds.UNIFORM, parameters),
+        "states": dataset.sizes["state"],
+        **{name: dataset[name].item() for name in UNIFORM_LINES},
+        "reached": reached,
+        "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
+        "original_distance": dataset["original_distance"].item(),
+        "largest_residual": float(dataset["residual"].max()),
+        "largest_violation": float(dataset["violation"].max()),
+        "setup_seconds": dataset["setup_seconds"].item(),
+        "sampling_seconds": dataset["sampling_seconds"].item(),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    report(lines, arguments.json)
+    return 1 if arguments.effective is not None and not reached else 0
+
+
+def volume(arguments: argparse.Namespace) -> int:
+    """The volume of S, measured or found; report it. Returns 1 if it is not as sure as wanted."""
+    asked = conditions(arguments)
+
+    def name(packing: Parameters) -> Parameters:
+        accuracy, seed = arguments.accuracy, arguments.volume_seed
+        return kinds.VOLUME.parameters(packing, accuracy, seed, mu=arguments.ensemble_mu, **asked)
+
+    store, parameters = prepared(arguments, name)
+    dataset, cached = get(store, kinds.VOLUME, parameters, arguments)
+    down, up = dataset["log_volume_ladders"].values
+    reached = bool(dataset["reached"].item())
+    lines = {
+        "entry": study.entry_name(store, kinds.VOLUME, parameters),
+        "dimension": dataset["dimension"].item(),
+        "ln_volume": dataset["log_volume"].item(),
+        "standard_error": dataset["log_volume_error"].item(),
+        "ln_volume_on_the_way_down": float(down),
+        "ln_volume_on_the_way_up": float(up),
+        "ln_volume_per_grain": dataset["log_volume_per_grain"].item(),
+        "extent_over_mean_normal_force": dataset["extent"].item(),
+        "reached": reached,
+        **json.loads(dataset.attrs["counts"]),
+        "seconds": dataset["seconds"].item(),
+        "cached": cached,
+    }
+    report(lines, arguments.json)
+    return 0 if reached else 1
+
+
+def measure(arguments: argparse.Namespace) -> None:
+    """Measures of a walk, made or found."""
+    _, parameters, dataset, _ = walked(arguments, arguments.contacts)
+    scale = dataset["force_scale"].item()
+    extent = (dataset["high"] - dataset["low"]).values[:, 0]
+    names = ("coordination", "packing_fraction", "dimension", "eta1", "eta2", "eta3")
+    lines = {
+        "mu": parameters["mu"],
+        "states": parameters["states"],
+        **{name: dataset[name].item() for name in names},
+        "mean_normal_force": scale,
+        "mean_extent_of_f_n": float(extent.mean() / scale),
+        "largest_extent_of_f_n": float(extent.max() / scale),
+        "correlation": dataset["correlation"].item(),
+        "correlation_low": dataset["correlation_low"].item(),
+        "correlation_high": dataset["correlation_high"].item(),
+        "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
+        "original_distance": dataset["original_distance"].item(),
+    }
+    if arguments.contacts is not None:
+        columns = {"contact": dataset["backbone"].values}
+        for name, source in (("f_n", "original"), ("f_n_min", "low"), ("f_n_max", "high")):
+            columns[name] = dataset[source].values[:, 0]
+        write_csv(arguments.contacts, columns)
+    report(lines, arguments.json)
+
+
+def scan(arguments: argparse.Namespace) -> int:
+    """Cells over processes into a store; print their table. Returns 1 if a cell failed."""
+    mus = numbers("--mu", arguments.mu, float) or []
+    seeds = whole(arguments.seeds, "--seeds", 1)
+    whole(arguments.workers, "--workers", 1)
+    check_memory(scans.CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
+    cells = [
+        kinds.WALK.parameters(
+            packing_parameters(arguments, mu, seed),
+            arguments.states,
+            arguments.walk_seed,
+            mu=arguments.ensemble_mu,
+            relax=arguments.relax,
+            chains=arguments.chains,
+            keep=arguments.keep,
+        )
+        for mu in mus
+        for seed in range(1, seeds + 1)
+    ]
+    store = open_store(arguments.out or arguments.cache)
+    with Bar("scan", "cell") as progress:
+        rows, failed = scans.scan(
+            store.path,
+            cells,
+            workers=arguments.workers,
+            scheduler=arguments.scheduler,
+            dtypes={"states": "float32"} if arguments.float32 else None,
+            progress=progress,
+        )
+    _report_scan(rows, failed, arguments.json)
+    return 1 if failed else 0
+
+
+def _report_scan(rows: Rows, failed: Sequence[tuple[Parameters, str]], as_json: bool) -> None:
+    found = sum(line["cached"] for line in rows)
+    summary = {"cells": len(rows) + len(failed), "found": found, "failed": len(failed)}
+    if as_json:
+        errors = [{"cell": cell, "error": message} for cell, message in failed]
+        report({"rows": rows, "errors": errors, **summary}, as_json)
+        return
+    heads = {"packing_fraction": "φ", "coordination": "z", "dimension": "h", "mu": "μ"}
+    heads |= {"eta1": "η1", "eta2": "η2", "eta3": "η3"}
+    names = ("mu", "seed", *("packing_fraction", "coordination", "dimension"))
+    names += ("eta1", "eta2", "eta3", "acceptance", "rejected", "unconverged", "skipped", "cached")
+    table(rows, names, heads)
+    for cell, message in failed:
+        where = f"μ = {cell['packing']['mu']}, seed {cell['packing']['seed']}"
+        print(f"granforce: cell {where}: {message}", file=sys.stderr)
+    print(
+        f"{summary['cells']} cells: {found} found in the store, "
+        f"{len(rows) - found} computed, {len(failed)} failed",
+        file=sys.stderr,
+    )

@@ -1,0 +1,207 @@
+"""Options that several commands have in common."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import NoReturn, TypeAlias
+
+LONGEST = 600  # characters of a message
+EXAMPLE = argparse.RawDescriptionHelpFormatter
+# What subcommands are added to.
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
+
+
+def refused(reason: str) -> int:
+    line = " ".join(str(reason).split())
+    if len(line) > LONGEST:  # a name of thousands of characters, say
+        line = f"{line[: LONGEST // 2]} … {line[-LONGEST // 2 :]}"
+    print(f"granforce: {line}", file=sys.stderr)
+    return 2
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that tells what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(refused(f"{message}; see {self.prog} --help"))
+
+
+def subcommand(
+    commands: Commands, name: str, run: str, summary: str, example: str, *, reports: bool = True
+) -> argparse.ArgumentParser:
+    command = commands.add_parser(
+        name,
+        help=summary,
+        description=summary[0].upper() + summary[1:] + ".",
+        epilog=f"Example:\n  {example}",
+        formatter_class=EXAMPLE,
+        allow_abbrev=False,
+    )
+    command.set_defaults(run=run)
+    if reports:
+        command.add_argument("--json", action="store_true", help="print the report as JSON")
+    return command
+
+
+def add_store(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--cache",
+        metavar="FOLDER",
+        help="store of results (default: $GRANFORCE_CACHE, else the user's cache folder)",
+    )
+
+
+def add_packing(command: argparse.ArgumentParser, several: bool = False) -> None:
+    group = command.add_argument_group("the packing")
+    group.add_argument("-n", type=int, default=400, help="number of disks (default 400)")
+    if not several:
+        group.add_argument("--mu", type=float, help="friction coefficient μ")
+        group.add_argument("--seed", type=int, default=1, help="random seed (default 1)")
+    group.add_argument(
+        "--radii",
+        default="uniform:0.5,1",
+        help="uniform:LOW,HIGH or bidisperse:SMALL,LARGE,FRACTION_LARGE, or a file with a radius "
+        "per line (default uniform:0.5,1)",
+    )
+    group.add_argument("--pressure", type=float, default=1.0, help="pressure P0 (default 1)")
+    group.add_argument("--dt", type=float, default=0.1, help="longest time step (default 0.1)")
+    group.add_argument("--box-mass", type=float, default=100.0, help="box inertia (default 100)")
+    group.add_argument("--sweeps", type=int, default=600, help="most sweeps per step (default 600)")
+    group.add_argument(
+        "--step-accuracy",
+        type=float,
+        default=0.01,
+        help="breach of the contact laws that ends a step, relative to the fastest grain "
+        "(default 0.01)",
+    )
+    group.add_argument(
+        "--box",
+        choices=("square", "isotropic"),
+        default="square",
+        help="square, or a cell whose sides and tilt follow until the stress is isotropic, so that "
+        "the packing is jammed against shear too (default square)",
+    )
+
+
+def add_any_packing(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
+    add_packing(command)
+
+
+def add_conditions(command: argparse.ArgumentParser, known: bool = True) -> None:
+    group = command.add_argument_group(
+        "what the forces have to satisfy, beside balance and friction"
+    )
+    group.add_argument(
+        "--prescribe",
+        choices=["pressure", "stress", "none"],
+        default="pressure",
+        help="the pressure (default), the whole stress, or nothing (with --slice)",
+    )
+    group.add_argument(
+        "--stress",
+        metavar="XX,YY,XY",
+        help="the stress that --prescribe stress asks for (default: that of the packing's forces)",
+    )
+    if known:
+        add_known(group)
+
+
+def add_known(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--known",
+        metavar="FILE.csv",
+        help="forces that are known: columns contact, and f_n, f_t (exactly) or f_n_min, f_n_max, "
+        "f_t_min, f_t_max (bounds); empty fields say nothing",
+    )
+
+
+def add_walk_options(command: argparse.ArgumentParser) -> None:
+    group = command.add_argument_group("the random walk")
+    group.add_argument("--states", type=int, default=1000, help="accepted states (default 1000)")
+    group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
+    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument(
+        "--relax",
+        choices=["gauss_seidel", "gauss_seidel_only", "nearest", "accelerated"],
+        default="accelerated",
+        help="the nearest admissible network, by our own solver (default) or by PIQP, or the "
+        "paper's contact dynamics with an exact finish or (slower, to 1e-6) without",
+    )
+    group.add_argument("--chains", type=int, default=1, help="independent chains (default 1)")
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+
+
+def add_source(command: argparse.ArgumentParser) -> None:
+    add_any_packing(command)
+    add_walk_options(command)
+    add_conditions(command)
+    add_store(command)
+
+
+def add_scheduler(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="run on the workers of this dask scheduler, such as tcp://head:8786, which see the "
+        "same store, in place of processes on this machine",
+    )
+
+
+def add_exact(command: argparse.ArgumentParser) -> None:
+    add_any_packing(command)
+    group = command.add_argument_group("the ensemble")
+    group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
+    group.add_argument("--contacts", help="only these contacts, numbers separated by commas")
+    group.add_argument(
+        "--slice",
+        metavar="X0,X1,Y0,Y1",
+        help="freeze the forces on contacts outside this part of the box, such as 0.2,0.8,0,1",
+    )
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    group.add_argument("--csv", metavar="FILE.csv", help="write the result per contact")
+    add_conditions(command)
+    add_store(command)
+
+
+def add_reading(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--reach",
+        type=float,
+        default=0.5,
+        help="largest gap of contacts that may have been missed, in mean radii (default 0.5; 0: "
+        "none are added)",
+    )
+    group.add_argument("--scale", type=float, default=1.0, help="factor on the radii (default 1)")
+    group.add_argument(
+        "--error", type=float, help="standard error of a force (default: as the data suggest)"
+    )
+    group.add_argument(
+        "--reverse", action="store_true", help="tangential forces have the other sign"
+    )
+
+
+def add_flaws_and_walls(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--repair",
+        type=float,
+        metavar="PART",
+        help="mend up to this part of the data (default 0.1); what was mended is told",
+    )
+    group.add_argument("--strict", action="store_true", help="mend nothing: the first flaw ends it")
+    group.add_argument(
+        "--walls",
+        metavar="SHAPE",
+        help="walls that count: box, annulus or circle, found from the grains at them or with "
+        "numbers (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); open: left open "
+        "(default: where a *_solved.mat has the directions of their contacts)",
+    )
+    group.add_argument(
+        "--wall-force",
+        metavar="'WALL: FX FY SIGMA'",
+        action="append",
+        default=[],
+        help="force of the grains on a wall of a box (left, right, bottom, top: by x and y), as a "
+        "load cell measured it; may be given several times",
+    )

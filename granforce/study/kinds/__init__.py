@@ -1,0 +1,58 @@
+"""The kinds of results that are kept, one record each: what names one, and how it is computed.
+
+A kind is added by one more record in the file of its family, and by its name here; stores, scans,
+the command line and the page take it from `KINDS`.
+"""
+
+from granforce.study.kinds.bounds import (
+    INTERVALS,
+    LIMIT_LOADS,
+    OUTLINE,
+    STRESS,
+)
+from granforce.study.kinds.packings import (
+    PACKING,
+    get_packing,
+    imported_parameters,
+    keep_packing,
+)
+from granforce.study.kinds.perturbations import (
+    PERTURBATION,
+    PERTURBED_CONTACT,
+)
+from granforce.study.kinds.states import (
+    INFERENCE,
+    INFORMATIVE,
+    RELAXATIONS,
+    UNIFORM,
+    VOLUME,
+    WALK,
+)
+
+__all__ = [
+    "INFERENCE",
+    "INFORMATIVE",
+    "INTERVALS",
+    "KINDS",
+    "LIMIT_LOADS",
+    "OUTLINE",
+    "PACKING",
+    "PERTURBATION",
+    "PERTURBED_CONTACT",
+    "RELAXATIONS",
+    "STRESS",
+    "UNIFORM",
+    "VOLUME",
+    "WALK",
+    "get_packing",
+    "imported_parameters",
+    "keep_packing",
+]
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        *(PACKING, WALK, UNIFORM, INFERENCE, INTERVALS, LIMIT_LOADS, OUTLINE, STRESS),
+        *(PERTURBATION, PERTURBED_CONTACT, INFORMATIVE, VOLUME),
+    )
+}

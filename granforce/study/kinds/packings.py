@@ -1,0 +1,150 @@
+"""Packings that are kept, and the ensembles of their forces: what names them in a store."""
+
+import hashlib
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.packing.compaction import Glimpse, check_box, draw_radii, pack
+from granforce.records import (
+    InputError,
+    Packing,
+    Progress,
+    check_memory,
+    friction,
+    positive,
+    random_seed,
+    whole,
+)
+from granforce.study import slices
+from granforce.study.cells import Kind, get, save
+from granforce.study.conditions import conditions
+from granforce.study.conditions import of as conditions_of
+from granforce.study.keys import Parameters
+from granforce.study.schema import dataset_packing, packing_dataset
+from granforce.study.store import Store
+from granforce.system import cancelling
+
+# Memory that a packing needs at the least for each disk: the lists of pairs, and one factor of its
+# balance.
+DISK_BYTES = 2000
+
+
+def _packing_parameters(
+    n: int,
+    mu: Any,
+    seed: int,
+    *,
+    radii: Any = "uniform:0.5,1",
+    pressure: float = 1.0,
+    dt: float = 0.1,
+    box_mass: float = 100.0,
+    sweeps: int = 600,
+    accuracy: float = 0.01,
+    box: str = "square",
+) -> Parameters:
+    """The parameters that name a packing in the store; as for `pack`.
+
+    Raises InputError for what `pack` would refuse, and for more disks than fit into memory.
+    """
+    n = whole(n, "the number of disks", most=None)
+    if n < 3:
+        raise InputError(f"a packing needs at least 3 disks, got {n!s:.40}")
+    check_memory(DISK_BYTES * n, f"a packing of {n!s:.40} disks")
+    drawn = draw_radii(radii, n, np.random.default_rng(0))
+    return {
+        "n": n,
+        "mu": friction(mu),
+        "seed": random_seed(seed),
+        "radii": radii if isinstance(radii, str) else drawn.tolist(),
+        "pressure": positive(pressure, "pressure"),
+        "dt": positive(dt, "dt"),
+        "box_mass": positive(box_mass, "box_mass"),
+        "sweeps": whole(sweeps, "sweeps", 1),
+        "accuracy": positive(accuracy, "accuracy"),
+        # Only where it is not square: keys of packings in square boxes stay what they were.
+        **({} if check_box(box) == "square" else {"box": box}),
+    }
+
+
+def imported_parameters(packing: Packing) -> Parameters:
+    """The parameters that name a packing made elsewhere: a hash of its arrays."""
+    arrays = (packing.x, packing.r, packing.box, packing.forces, packing.load, *packing.contacts)
+    # The tilt only where there is one: keys of packings in straight cells stay what they were.
+    tilt = [packing.tilt] if packing.tilt else []
+    digest = hash_of(*arrays, np.array([packing.mu, packing.pressure, *tilt]))
+    return {"imported": digest, "mu": packing.mu}
+
+
+def hash_of(*arrays: Any) -> str:
+    """A hash of arrays."""
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _packing(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    max_steps: int = 100_000,
+    watch: Callable[[Glimpse], object] | None = None,
+) -> xr.Dataset:
+    if "imported" in parameters:
+        raise InputError("the imported packing is not in this store: import it again")
+    told: dict[str, Any] = {"progress": progress, "watch": watch}
+    return packing_dataset(pack(**parameters, max_steps=max_steps, **told))
+
+
+def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:
+    """The Packing of these parameters, found or made, and whether it was found; as `cells.get`."""
+    dataset, cached = get(store, PACKING, parameters, **options)
+    return dataset_packing(dataset), cached
+
+
+def keep_packing(store: Store, parameters: Parameters, packing: Packing) -> str:
+    """Save a packing under its parameters; returns the entry's name."""
+    return save(store, PACKING, parameters, packing_dataset(packing))
+
+
+def cones_of(packing: Parameters, mu: Any, **asked: Any) -> Parameters:
+    """What names an ensemble: its packing, friction coefficient (that of it, if none), conditions.
+
+    asked: prescribed, stress and known, as for `conditions`.
+    """
+    cones = {"packing": packing, "mu": packing["mu"] if mu is None else friction(mu)}
+    return cones | conditions(**asked)
+
+
+def ensemble_of(store: Store, parameters: Parameters) -> Ensemble:
+    """The ensemble of a named packing and friction, with the forces outside a slice frozen."""
+    packing, _ = get_packing(store, parameters["packing"])
+    slice_ = parameters.get("slice")
+    frozen = None if slice_ is None else slices.outside(packing, slice_)
+    return ensemble(packing, parameters["mu"], frozen=frozen, **conditions_of(parameters))
+
+
+def chosen_contacts(contacts: Iterable[int] | None) -> list[int] | None:
+    """Numbers of contacts, sorted, each once; None for all that carry."""
+    if contacts is None:
+        return None
+    chosen = sorted({whole(c, "the number of a contact") for c in contacts})
+    if not chosen:
+        raise InputError("name at least one contact, or leave the contacts out for all")
+    return chosen
+
+
+def check_complete(result: Any, what: str) -> None:
+    """Only finished results are kept: Cancelled or InputError for others."""
+    cancelling.check(what)
+    if not result.converged:
+        raise InputError(f"{what} not certified: largest duality gap {result.max_gap:.1e} ⟨f_n⟩")
+
+
+PACKING = Kind("packing", 2, "compaction", "step", _packing_parameters, _packing)

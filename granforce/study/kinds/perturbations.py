@@ -1,0 +1,174 @@
+"""Contacts that were pushed: one by one, and many as one result."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granforce.explore.intervals import limit_load_bounds
+from granforce.forces.ensemble import Ensemble
+from granforce.perturb.critical_force import (
+    MOST_STEPS,
+    RISE,
+    CriticalForce,
+    critical_force,
+    critical_forces,
+)
+from granforce.records import (
+    InputError,
+    Integers,
+    Progress,
+    positive,
+    random_seed,
+    whole,
+)
+from granforce.study.cells import Kind, load, save
+from granforce.study.keys import Parameters
+from granforce.study.kinds.packings import check_complete, chosen_contacts, cones_of, ensemble_of
+from granforce.study.responses import contact_dataset, perturbation_dataset
+from granforce.study.store import Store
+
+# What names how loads on a contact are raised.
+PROTOCOL = ("precision", "rise", "max_steps")
+
+
+def _perturbation_parameters(
+    packing: Parameters,
+    *,
+    mu: Any = None,
+    contacts: Iterable[int] | None = None,
+    random: int | None = None,
+    seed: int = 0,
+    precision: float = 0.01,
+    rise: float = RISE,
+    max_steps: int = MOST_STEPS,
+    **asked: Any,
+) -> Parameters:
+    """The parameters that name the local perturbation of contacts of one packing.
+
+    mu: friction coefficient of the ensemble, by default the packing's. contacts: numbers in the
+    packing's contact list, by default all that carry; or random: so many of those that carry, the
+    first in an order drawn from seed. precision, rise, max_steps: as for `critical_force`. asked:
+    prescribed and stress.
+    """
+    if asked.get("known") is not None:
+        raise InputError(
+            "grains that move change their forces, whatever is known of them: perturb the packing "
+            "without known forces (its limit loads can be had with them)"
+        )
+    if contacts is not None and random is not None:
+        raise InputError("name the contacts to perturb, or how many at random, not both")
+    return {
+        **cones_of(packing, mu, **asked),
+        "contacts": chosen_contacts(contacts),
+        "random": None if random is None else whole(random, "the number of random contacts", 1),
+        "seed": None if random is None else random_seed(seed),
+        **_protocol(precision, rise, max_steps),
+    }
+
+
+def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
+    """What names how loads are raised; `rise` and `max_steps` only where they are not the usual."""
+    named = {"precision": positive(precision, "precision")}
+    if rise != RISE:
+        named["rise"] = positive(rise, "rise")
+        if named["rise"] >= 1:
+            raise InputError(f"rise must be below 1, got {rise:g}")
+    if max_steps != MOST_STEPS:
+        named["max_steps"] = whole(max_steps, "max_steps", 1)
+    return named
+
+
+def _perturbation(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
+    """Dataset of critical forces, first motions and α; each contact is kept as it ends."""
+    S = ensemble_of(store, parameters)
+    chosen = S.index if parameters["contacts"] is None else np.array(parameters["contacts"])
+    if parameters["random"] is not None:
+        # The order is drawn among the positions of contacts in S.
+        order = np.random.default_rng(parameters["seed"]).permutation(S.positions(chosen))
+        chosen = S.index[np.sort(order[: parameters["random"]])]
+    if not len(chosen):
+        raise InputError("no contact to perturb")
+    parts = _perturbed(store, S, chosen, parameters, workers, progress)
+    return perturbation_dataset(S, parts)
+
+
+def _perturbed(
+    store: Store,
+    S: Ensemble,
+    chosen: Integers,
+    parameters: Parameters,
+    workers: int,
+    progress: Progress | None,
+) -> list[xr.Dataset]:
+    """Datasets of the single contacts, in order; those of the store are found."""
+    shared = ("packing", "mu", *PROTOCOL, "prescribed", "stress")
+    common = {name: parameters[name] for name in shared if name in parameters}
+    named = {c: PERTURBED_CONTACT.parameters(contact=int(c), **common) for c in chosen}
+    parts = {c: load(store, PERTURBED_CONTACT, named[c]) for c in chosen}
+    parts = {c: dataset for c, dataset in parts.items() if dataset is not None}
+    missing = [c for c in chosen if c not in parts]
+    if not missing:
+        return [parts[c] for c in chosen]
+    loads = limit_load_bounds(S, missing, workers=workers)
+    check_complete(loads, "limit loads")
+    tell = progress or (lambda done, total: None)
+
+    def ended(k: int, critical: CriticalForce) -> None:
+        contact = missing[k]
+        parts[contact] = contact_dataset(S, critical, parameters["precision"])
+        save(store, PERTURBED_CONTACT, named[contact], parts[contact])
+        tell(len(parts), len(chosen))
+
+    critical_forces(
+        S,
+        missing,
+        limit_loads=loads.load,
+        workers=workers,
+        finished=ended,
+        **_named_protocol(parameters),
+    )
+    return [parts[c] for c in chosen]
+
+
+def _named_protocol(parameters: Parameters) -> dict[str, Any]:
+    return {name: parameters[name] for name in PROTOCOL if name in parameters}
+
+
+def _perturbed_contact_parameters(
+    packing: Parameters,
+    contact: Any,
+    *,
+    mu: Any = None,
+    precision: float = 0.01,
+    rise: float = RISE,
+    max_steps: int = MOST_STEPS,
+    **asked: Any,
+) -> Parameters:
+    """The parameters that name one perturbed contact (its number in the packing)."""
+    return {
+        **cones_of(packing, mu, **asked),
+        "contact": whole(contact, "the number of a contact"),
+        **_protocol(precision, rise, max_steps),
+    }
+
+
+def _perturbed_contact(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
+    """Dataset of one perturbed contact."""
+    S = ensemble_of(store, parameters)
+    critical = critical_force(S, parameters["contact"], **_named_protocol(parameters))
+    return contact_dataset(S, critical, parameters["precision"])
+
+
+PERTURBATION = Kind(
+    *("perturbation", 1, "local perturbation", "contact"), _perturbation_parameters, _perturbation
+)
+PERTURBED_CONTACT = Kind(
+    *("perturbed_contact", PERTURBATION.version, "perturbed contact", "load"),
+    *(_perturbed_contact_parameters, _perturbed_contact),
+)

@@ -1,0 +1,329 @@
+"""States of S that are kept: walks, uniform samples, its volume, and what was inferred."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import xarray as xr
+
+from granforce.explore import remeasured
+from granforce.explore.carrying import carrying
+from granforce.explore.infer import infer
+from granforce.explore.informative import informative
+from granforce.explore.random_walk import walk
+from granforce.explore.uniform import sample_uniform
+from granforce.explore.volume import volume
+from granforce.forces.ensemble import Ensemble
+from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.likeliest import UNMEASURED
+from granforce.forces.nearest import nearest
+from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.records import (
+    InputError,
+    Progress,
+    check_memory,
+    positive,
+    random_seed,
+    whole,
+)
+from granforce.study.bounds import (
+    informative_dataset,
+    volume_dataset,
+)
+from granforce.study.cells import Kind
+from granforce.study.keys import Parameters
+from granforce.study.kinds.packings import cones_of, ensemble_of, hash_of
+from granforce.study.samples import inference_dataset, uniform_dataset, walk_dataset
+from granforce.study.store import Store
+from granforce.system import cancelling
+from granforce.tolerances import EQUILIBRIUM
+
+# Memory that a walk needs at the least for each state and disk: f_n and f_t of one and a half
+# contacts, as they are made and as they are handed over.
+STATE_BYTES = 48
+RELAXATIONS: dict[str, dict[str, Any]] = {
+    "gauss_seidel": {"relax": gauss_seidel},
+    "gauss_seidel_only": {"relax": gauss_seidel, "rest": None, "tolerance": EQUILIBRIUM},
+    "nearest": {"relax": nearest_piqp},
+    "accelerated": {"relax": nearest},
+}
+
+
+def _walk_parameters(
+    packing: Parameters,
+    states: Any,
+    seed: int = 0,
+    *,
+    mu: Any = None,
+    relax: str = "accelerated",
+    chains: int = 1,
+    keep: int | None = None,
+    residual: float | None = None,
+    attempts: int | None = None,
+    skip: bool = True,
+    **asked: Any,
+) -> Parameters:
+    """The parameters that name a walk: those of its packing, and how it goes.
+
+    mu: friction coefficient of the ensemble, by default the packing's. keep: number of evenly
+    spaced states that are stored (measures always come from all). residual: in ⟨f_n⟩, at which
+    sweeps alone (relax="gauss_seidel_only") end, by default EQUILIBRIUM. attempts: after so many
+    per state the walk is kept with the states it has; by default too few states are an error.
+    skip: whether nothing is relaxed where S is one point. asked: the conditions.
+    """
+    if relax not in RELAXATIONS:
+        raise InputError(f"unknown relaxation {relax!r}: take one of {', '.join(RELAXATIONS)}")
+    size = _size(packing, states, seed, chains, keep)
+    if size["chains"] > size["states"]:
+        raise InputError("there must be at least as many states as chains")
+    if keep is not None and keep >= size["states"]:
+        size["keep"] = None
+    cones = cones_of(packing, mu, **asked)
+    if relax.startswith("gauss_seidel") and {"prescribed", "known"} & cones.keys():
+        raise InputError(
+            "contact dynamics keeps the pressure and Coulomb's law only: with other conditions "
+            "take the nearest network"
+        )
+    named = {**cones, **size, "relax": relax}
+    if residual is not None:
+        if relax != "gauss_seidel_only":
+            raise InputError("only the sweeps of 'gauss_seidel_only' end at a residual of choice")
+        named["residual"] = positive(residual, "residual")
+    if attempts is not None:
+        named["attempts"] = whole(attempts, "attempts per state", 1)
+    if not skip:
+        named["skip"] = False
+    return named
+
+
+def _size(
+    packing: Parameters, states: Any, seed: Any, chains: Any, keep: int | None, least: float = 1
+) -> Parameters:
+    """What walks and samples have in common; InputError where `least` states are too many."""
+    states = whole(states, "the number of states", 1, most=None)
+    chains = whole(chains, "the number of chains", 1)
+    most = max(states, chains, least)
+    check_memory(STATE_BYTES * most * packing.get("n", 1), f"{most!s:.40} states")
+    return {
+        "states": states,
+        "seed": random_seed(seed),
+        "chains": chains,
+        "keep": None if keep is None else whole(keep, "the number of states kept", 1),
+    }
+
+
+def _walk(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    watch: Any = None,
+    begun: Callable[[Ensemble], object] | None = None,
+) -> xr.Dataset:
+    """Dataset of a walk with all its measures; begun(S) is called before its first step."""
+    S = ensemble_of(store, parameters)
+    options: dict[str, Any] = dict(RELAXATIONS[parameters["relax"]])
+    if "residual" in parameters:
+        options["tolerance"] = parameters["residual"]
+    if "attempts" in parameters:
+        share = -(-parameters["states"] // parameters["chains"])
+        options |= {"max_attempts": parameters["attempts"] * share, "whole": False}
+    options["skip"] = parameters.get("skip", True)
+    if begun is not None:
+        begun(S)
+    begin = time.perf_counter()
+    done = walk(
+        S,
+        parameters["states"],
+        parameters["seed"],
+        chains=parameters["chains"],
+        workers=workers,
+        progress=progress,
+        watch=watch,
+        **options,
+    )
+    seconds = time.perf_counter() - begin
+    return walk_dataset(S, done, keep=parameters["keep"], seconds=seconds)
+
+
+def _uniform_parameters(
+    packing: Parameters,
+    states: Any,
+    seed: int = 0,
+    *,
+    mu: Any = None,
+    chains: int = 4,
+    effective: float | None = None,
+    keep: int | None = None,
+    **asked: Any,
+) -> Parameters:
+    """The parameters that name a uniform sample: those of its packing, and how it is drawn.
+
+    mu, keep, asked: as of a walk; states, chains, effective: as for `sample_uniform`.
+    """
+    if effective is not None:
+        effective = positive(effective, "effective sample size")
+    size = _size(packing, states, seed, chains, keep, effective or 1)
+    return {**cones_of(packing, mu, **asked), **size, "effective": effective}
+
+
+def _uniform(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
+    """Dataset of a uniform sample with all its measures.
+
+    A sample that did not reach the wanted effective size is kept too, and says so in `reached`.
+    """
+    S = ensemble_of(store, parameters)
+    begin = time.perf_counter()
+    drawn = sample_uniform(
+        S,
+        parameters["states"],
+        parameters["chains"],
+        parameters["seed"],
+        workers=workers,
+        effective=parameters["effective"],
+        progress=progress,
+    )
+    cancelling.check("uniform sample")
+    seconds = time.perf_counter() - begin
+    return uniform_dataset(S, drawn, keep=parameters["keep"], seconds=seconds)
+
+
+def _volume_parameters(
+    packing: Parameters, accuracy: float = 0.05, seed: int = 0, *, mu: Any = None, **asked: Any
+) -> Parameters:
+    """The parameters that name a volume of S.
+
+    accuracy, seed: as for `volume`. mu: friction coefficient of the ensemble, by default the
+    packing's. asked: the conditions.
+    """
+    named = {"accuracy": positive(accuracy, "accuracy"), "seed": random_seed(seed)}
+    return {**cones_of(packing, mu, **asked), **named}
+
+
+def _volume(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
+    """Dataset of the volume of S; one whose error is larger than wanted says so in `reached`."""
+    S = ensemble_of(store, parameters)
+    options = {name: parameters[name] for name in ("accuracy", "seed")}
+    found = volume(S, **options, workers=workers, progress=progress)
+    return volume_dataset(S, found)
+
+
+def _inference_parameters(
+    packing: Parameters,
+    measured: Any,
+    states: Any = 0,
+    seed: int = 0,
+    *,
+    unmeasured: float | None = None,
+    again: bool = False,
+    certain: bool = False,
+    mu: Any = None,
+    chains: int = 4,
+    keep: int | None = None,
+    **asked: Any,
+) -> Parameters:
+    """The parameters that name an inference: its packing, its measurement, and its draws.
+
+    measured: a Measurement, which is named by a hash of its arrays; mu, keep: as of a walk; states,
+    chains, unmeasured: as for `infer`. again: draws are those of `remeasured`, for networks made by
+    dynamics. certain: whether contacts that were not measured are tried
+    for carrying in every network. asked: the conditions.
+    """
+    size = _size(packing, max(1, states), seed, chains, keep) | {"states": whole(states, "states")}
+    if unmeasured is None:
+        unmeasured = remeasured.UNMEASURED if again else UNMEASURED
+    named = {"measured": hash_of(*measured), "unmeasured": positive(unmeasured, "unmeasured")}
+    named |= {"again": True} if again else {}
+    return {**cones_of(packing, mu, **asked), **size, **named, "certain": bool(certain)}
+
+
+def _inference(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    measured: Any = None,
+) -> xr.Dataset:
+    """Dataset of the likeliest network of a measurement, and of draws around it.
+
+    measured: the Measurement that the parameters name.
+    """
+    if measured is None:
+        raise InputError("the measurement is not in this store: infer again")
+    begin = time.perf_counter()
+    S = ensemble_of(store, parameters)
+    forces, sigma = (values[S.index] for values in measured.on(len(S.packing.contacts.i)))
+    again = parameters.get("again") and parameters["states"]
+    found = (remeasured.remeasured if again else infer)(
+        *(S, forces, sigma),
+        states=parameters["states"],
+        seed=parameters["seed"],
+        chains=parameters["chains"],
+        unmeasured=parameters["unmeasured"],
+        workers=workers,
+        progress=progress,
+    )
+    sure = None
+    if parameters["certain"]:
+        options = {"unmeasured": parameters["unmeasured"], "workers": workers}
+        sure = carrying(S, forces, sigma, progress=progress, **options)
+        cancelling.check("inference")
+    options = {"keep": parameters["keep"], "seconds": time.perf_counter() - begin}
+    return inference_dataset(S, found, forces, sigma, sure, **options)
+
+
+def _informative_parameters(
+    packing: Parameters,
+    k: int = 10,
+    check: int = 10,
+    states: int = 400,
+    seed: int = 0,
+    *,
+    mu: Any = None,
+    **asked: Any,
+) -> Parameters:
+    """The parameters that name a ranking of contacts by what measuring them would tell.
+
+    mu: friction coefficient of the ensemble, by default the packing's. k, check, states, seed: as
+    for `informative`. asked: the conditions.
+    """
+    size = _size(packing, states, seed, 1, None)
+    counts = {"k": whole(k, "k", 1), "check": whole(check, "check")}
+    drawn = {name: size[name] for name in ("states", "seed")}
+    return {**cones_of(packing, mu, **asked), **counts, **drawn}
+
+
+def _informative(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    watch: Any = None,
+) -> xr.Dataset:
+    """Dataset of the most informative contacts; watch as for `informative`."""
+    S = ensemble_of(store, parameters)
+    begin = time.perf_counter()
+    options = {name: parameters[name] for name in ("k", "check", "states", "seed")}
+    found = informative(S, **options, workers=workers, watch=watch, progress=progress)
+    cancelling.check("which measurement next")
+    return informative_dataset(S, found, seconds=time.perf_counter() - begin)
+
+
+WALK = Kind("walk", 1, "random walk", "state", _walk_parameters, _walk, holds_states=True)
+UNIFORM = Kind(
+    "uniform", 3, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True
+)
+INFERENCE = Kind(
+    *("inference", 2, "inference", "draw", _inference_parameters, _inference), holds_states=True
+)
+VOLUME = Kind("volume", 1, "volume of S", "path", _volume_parameters, _volume)
+INFORMATIVE = Kind(
+    *("informative", 2, "which measurement next", "contact"), _informative_parameters, _informative
+)
