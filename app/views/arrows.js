@@ -1,6 +1,16 @@
 // The small scene itself: disks, walls, the force on each disk at each contact as an arrow within its
 // cone, and, for a disk that is looked at, its forces put one after the other: they close.
 
+const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
+const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
+const NAMED = 3 // contacts up to which the forces on a single disk have their names beside them
+
+/** Whether a scene is so much higher than wide that it needs a picture like that. */
+function tall({ name, x, box }) {
+  const extent = (k) => { const all = x.filter((_, n) => n % 2 === k); return Math.max(...all) - Math.min(...all) }
+  return name !== "own" && !box[0] && extent(1) > 4 * extent(0) && extent(0) > 0
+}
+
 class Arrows {
   constructor(root, told) {
     this.told = told // told(what, …): of a hand on it
@@ -35,8 +45,9 @@ class Arrows {
     if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight
-    const room = box[0] ? 0.12 : 0.1
-    this.unit = Math.min(width / ((right - left) * (1 + 2 * room)), height / ((high - low) * (1 + 2 * room)))
+    const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
+    const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
+    this.unit = Math.min(width / across, height / up)
     this.unit = Math.min(this.unit, 0.27 * Math.min(width, height) / Math.max(...r))
     this.x0 = width / 2 - (this.unit * (left + right)) / 2
     this.y0 = height / 2 + (this.unit * (low + high)) / 2
@@ -61,6 +72,8 @@ class Arrows {
   /** Both ends of every contact: {contact, disk, at, inward: force on the disk of f_n = 1, across}. */
   ends() {
     const { scene } = this.body, disks = scene.r.length, found = []
+    if (this.endsOf === scene) return this.found
+    Object.assign(this, { endsOf: scene, found, places: [] })
     for (let c = 0; c < scene.i.length; c++) {
       const [nx, ny] = [scene.normal[2 * c], scene.normal[2 * c + 1]]
       for (const [disk, sign, arm] of [[scene.i[c], -1, scene.arm_i[c]], [scene.j[c], 1, scene.arm_j[c]]]) {
@@ -82,12 +95,15 @@ class Arrows {
     g.setTransform(ratio, 0, 0, ratio, 0, 0)
     g.clearRect(0, 0, width, height)
     this.look = look
+    this.shafts = [] // of arrows, where no number is to be
     this.drawWalls(look.wall ?? [])
     this.drawDisks()
     const F = body.empty ? null : body.forces()
     if (F) for (const end of this.ends()) this.drawEnd(end, F)
     if (look.fall) this.drawFall(look.fall)
     this.drawLoads()
+    if (body.scene.r.length > 1) this.drawNumbers()
+    else if (F && body.count <= NAMED) this.drawNames(F)
     if (look.cursor) this.drawCursor(this.px(...look.cursor))
     if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
@@ -124,10 +140,11 @@ class Arrows {
 
   drawDisks() {
     const { context: g, body, look } = this, { x, r, box } = body.scene
-    const shifts = box[0] ? [-1, 0, 1] : [0]
+    const shifts = box[0] ? [-1, 0, 1] : [0], { clientWidth: wide, clientHeight: high } = this.canvas
     for (let d = 0; d < r.length; d++) {
       for (const a of shifts) for (const b of shifts) {
         const [px, py] = this.px(x[2 * d] + a * box[0], x[2 * d + 1] + b * box[1]), R = r[d] * this.unit
+        if (px < -R || py < -R || px > wide + R || py > high + R) continue
         g.beginPath()
         g.arc(px, py, R, 0, 7)
         g.globalAlpha = a || b ? 0.3 : 1
@@ -137,14 +154,50 @@ class Arrows {
         g.lineWidth = 1.5
         g.stroke()
         g.globalAlpha = 1
-        if (a || b || r.length < 2) continue
-        g.fillStyle = look.ink
-        g.font = "12px sans-serif"
-        g.textAlign = "center"
-        g.textBaseline = "middle"
-        g.fillText(String(d + 1), px - 0.42 * R, py - 0.42 * R)
       }
     }
+  }
+
+  /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
+  drawNumbers() {
+    const { context: g, body, look } = this, { x, r } = body.scene
+    this.ends() // a new scene forgets the places of the one before
+    g.fillStyle = look.ink
+    g.font = "12px sans-serif"
+    g.textAlign = "center"
+    g.textBaseline = "middle"
+    for (let d = 0; d < r.length; d++) {
+      const [px, py] = this.px(x[2 * d], x[2 * d + 1]), R = 0.72 * r[d] * this.unit
+      const place = (k) => (k ? [px + R * Math.cos((k * Math.PI) / 6 + 3.4), py + R * Math.sin((k * Math.PI) / 6 + 3.4)] : [px, py])
+      const clear = (k) => Math.min(Infinity, ...this.shafts.map(([a, b]) => distance(a, b, ...place(k))))
+      if (!(clear(this.places[d] ?? 1) > CLEAR)) {
+        const room = NUMBERS.map(clear)
+        this.places[d] = room.indexOf(Math.max(...room))
+      }
+      g.fillText(String(d + 1), ...place(this.places[d] ?? 1))
+    }
+  }
+
+  /** Beside the only disk: what each wall does, in numbers, and the weight. */
+  drawNames(F) {
+    const { context: g, body, look } = this, { scene } = body
+    g.font = "13px sans-serif"
+    g.textBaseline = "middle"
+    const write = (x, y, lines, align) => {
+      g.textAlign = align
+      lines.forEach((line, k) => {
+        g.fillStyle = k ? look.cold : look.ink
+        g.fillText(line, x, y + 17 * (k - (lines.length - 1) / 2))
+      })
+    }
+    for (const { contact, at, inward, across } of this.ends()) {
+      const [px, py] = this.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
+      const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
+      const lines = [scene.names[contact].replace("at the ", "force of the "), `normal force ${number(n)}`, `tangential force ${number(Math.abs(t))}${way}`]
+      write(px + 22 * ux, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
+    }
+    const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = this.px(scene.x[0], scene.x[1])
+    if (load > 1e-9) write(cx, cy - 13, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
   }
 
   drawEnd({ contact, disk, at, inward, across }, F) {
@@ -181,6 +234,7 @@ class Arrows {
     const cut = size > most
     if (cut) { dx *= most / size; dy *= most / size; size = most }
     const head = Math.min(11, 0.5 * size + 2), [ux, uy] = [dx / size, dy / size]
+    this.shafts.push([[px, py], [px + dx, py + dy]])
     g.strokeStyle = g.fillStyle = colour
     g.lineWidth = thick
     g.lineCap = "butt"

@@ -3,7 +3,9 @@
 
 const TURN = 0.008 // radians a pixel
 // Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
-const BESIDE = [[46, 46], [95, 46], [110, 46], [30, 30], [60, 50]]
+const BESIDE = [[46, 46], [95, 46], [140, 50], [30, 30], [60, 50]]
+const ON = 34 // pixels of an arrow where S goes on without an end
+const TICKS = 70 // pixels between two numbers of an axis, at least
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
 class Space {
@@ -42,12 +44,31 @@ class Space {
   /** Place of u in the plane of the screen, in units of force, and its depth. */
   flat(u) {
     const { body } = this
-    if (body.h > 3) {
-      const F = body.forces(u)
-      return [F[this.shadow[0]], F[this.shadow[1]], 0]
-    }
-    if (body.h < 3) return [u[0] ?? 0, u[1] ?? 0, 0]
+    if (body.h > 3) return this.onAxes.map(({ row, rest }) => dot(row, u) + rest)
+    if (body.h < 3) return [this.sign * (u[0] ?? 0), u[1] ?? 0, 0]
     return this.view.map((row) => dot(row, u))
+  }
+
+  /** Both forces of the shadow, as rows of u: found once, as many points are drawn. */
+  get onAxes() {
+    const { body, shadow, axes } = this
+    if (axes?.body !== body || axes.origin !== body.origin || axes.shadow.join() !== shadow.join()) {
+      const rows = shadow.map((k) => ({ row: body.axes.map((axis) => axis[k]), rest: body.origin[k] }))
+      this.axes = { body, origin: body.origin, shadow, rows }
+    }
+    return this.axes.rows
+  }
+
+  /** Of a line, which way it is drawn: normal forces that change become larger to the right. */
+  get sign() { return this.body.h === 1 ? Math.sign(this.body.axes[0][this.measured(null)]) || 1 : 1 }
+
+  /** Of a line, the force on its axis: that of this contact if it changes, else the one that changes most. */
+  measured(contact) {
+    const axis = this.body.axes[0], most = (part) => {
+      const size = Array.from({ length: this.body.count }, (_, c) => Math.abs(axis[2 * c + part])), c = size.findIndex((v) => v > 0.999 * Math.max(...size)) // the first of equals
+      return size[c] > 1e-9 ? 2 * c + part : null
+    }
+    return contact !== null && Math.abs(axis[2 * contact]) > 1e-9 ? 2 * contact : most(0) ?? most(1)
   }
 
   /** u whose place moves by so much in the plane of the screen. */
@@ -59,7 +80,7 @@ class Space {
       const part = solve(M, [dx, dy]) ?? [dx / (M[0][0] || 1), 0]
       return u.map((v, k) => v + part[0] * a[k] + part[1] * b[k])
     }
-    if (body.h < 3) return u.map((v, k) => v + [dx, dy][k])
+    if (body.h < 3) return u.map((v, k) => v + [this.sign * dx, dy][k])
     return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
   }
 
@@ -128,7 +149,8 @@ class Space {
     g.clearRect(0, 0, w, h)
     this.labels = []
     if (body.scene.idle) return this.write(w / 2, h / 2, "nothing presses yet", look.ink, 14)
-    if (body.empty) return this.write(w / 2, h / 2, "S is empty: no forces hold this", look.warm, 14)
+    g.lineJoin = "round" // no spikes where sides meet
+    if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     const moves = this.frame(this.sceneDrawn !== body.scene)
     this.sceneDrawn = body.scene
     if (body.h > 3) this.drawShadow()
@@ -146,7 +168,7 @@ class Space {
     g.strokeStyle = look.paper
     g.lineWidth = 2
     g.stroke()
-    if (!body.h) this.write(w / 2, h / 2 + 28, "one point: everything is determined", look.ink, 13)
+    if (!body.h || (body.whole && body.corners.length === 1)) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
     return moves
   }
 
@@ -194,8 +216,9 @@ class Space {
   }
 
   drawSegment() {
-    const { context: g, body, look } = this
-    const ends = body.corners.map(({ u }) => this.px(this.flat(u)))
+    const { context: g, body, look, canvas } = this
+    const ends = body.corners.map(({ u }) => this.px(this.flat(u))), y0 = ends[0][1]
+    this.drawAxis(y0, Math.min(canvas.clientHeight - 46, y0 + 80))
     g.strokeStyle = look.cold
     g.lineWidth = 7
     g.lineCap = "butt"
@@ -203,15 +226,77 @@ class Space {
     g.moveTo(...ends[0])
     g.lineTo(...(ends[1] ?? ends[0]))
     g.stroke()
-    const order = ends.map((_, k) => k).sort((a, b) => ends[a][0] - ends[b][0])
-    body.sides.forEach((side) => {
-      const k = side.corners[0], [x, y] = ends[k], below = order.indexOf(k) ? -1 : 1, lit = this.lit(side)
-      g.fillStyle = side.cap ? look.paper : lit ? look.hand : look.cold
-      if (!side.cap) g.fillRect(x - 3, y - 13, 6, 26)
-      const text = side.cap ? "no end this way" : this.told("words", side), narrow = g.measureText(text).width > 2 * BESIDE[1][0]
-      this.write(x, y + below * 34, narrow ? text.replace(/ and (?=at |between )/, "\nand ") : text, lit ? look.hand : look.ink)
+    g.font = "13px sans-serif"
+    let before = null // words of the other end
+    for (const side of ends.length > 1 ? body.sides : []) {
+      const [x, y] = ends[side.corners[0]], lit = this.lit(side), words = side.cap ? "no end this way" : this.told("words", side)
+      const text = g.measureText(words).width > 0.45 * canvas.clientWidth ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
+      const wide = Math.max(...text.split("\n").map((line) => g.measureText(line).width)), high = text.includes("\n") ? 40 : 30
+      const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12
+      if (side.cap) this.drawOn([x, y], 7)
+      else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
+      this.write(x, y - high - (close ? 34 : 0), text, lit ? look.hand : look.ink)
       this.labels.push({ side, x, y, reach: 30 })
-    })
+      before = { x, wide }
+    }
+  }
+
+  /** Below a line at y0, at y: the axis of a force, with its values where the line ends and at the point. */
+  drawAxis(y0, y) {
+    const { context: g, body, look, canvas } = this, index = this.measured(look.contact)
+    if (index === null) return
+    const slope = body.axes[0][index], rest = body.origin[index], [left, right] = [24, canvas.clientWidth - 24]
+    const place = (v) => this.px([(this.sign * (v - rest)) / slope, 0])[0]
+    const pixels = Math.abs(place(1) - place(0)), step = nice(TICKS / pixels)
+    const marked = [...body.corners.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
+      .map(([u, colour]) => [u[0] * slope + rest, colour]).map(([v, colour]) => ({ v, x: place(v), colour }))
+    g.strokeStyle = look.edge
+    g.lineWidth = 1
+    g.beginPath()
+    g.moveTo(left, y)
+    g.lineTo(right, y)
+    const free = (x, k = marked.length) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > 40)
+    const ticks = []
+    for (let k = 0; k * step * pixels < canvas.clientWidth + Math.abs(place(0)); k++) {
+      const x = place(k * step)
+      if (x < left || x > right) continue
+      g.moveTo(x, y - 4)
+      g.lineTo(x, y + 4)
+      if (free(x)) ticks.push([x, String(Number((k * step).toPrecision(6)))])
+    }
+    g.stroke()
+    for (const [x, text] of ticks) this.write(x, y + 14, text, look.ink, 11)
+    g.lineWidth = 1
+    g.setLineDash([2, 4])
+    for (const { x, colour } of marked) {
+      g.strokeStyle = colour
+      g.beginPath()
+      g.moveTo(x, y0)
+      g.lineTo(x, y)
+      g.stroke()
+    }
+    g.setLineDash([])
+    marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) this.write(x, y + 14, number(v), colour, 12) })
+    const name = forceName(body.scene, index)
+    this.write(canvas.clientWidth / 2, y + 33, slope * this.sign > 0 ? `${name} →` : `← ${name}`, look.ink)
+  }
+
+  /** An arrow from this place in which S goes on without an end, with the mean of its rays. */
+  drawOn([x, y], thick) {
+    const { context: g, body, look } = this, flat = body.rays.map((ray) => this.flat(ray))
+    const way = [0, 1].map((k) => flat.reduce((sum, ray) => sum + ray[k], 0)), size = Math.hypot(...way)
+    if (size < 1e-6) return // it goes on away from the eye
+    const [ux, uy] = [way[0] / size, -way[1] / size], head = 8 + thick
+    g.strokeStyle = g.fillStyle = look.cold
+    g.lineWidth = thick
+    g.beginPath()
+    g.moveTo(x, y)
+    g.lineTo(x + (ON - head) * ux, y + (ON - head) * uy)
+    g.stroke()
+    g.beginPath()
+    g.moveTo(x + ON * ux, y + ON * uy)
+    for (const side of [0.6, -0.6]) g.lineTo(x + (ON - head) * ux - side * head * uy, y + (ON - head) * uy + side * head * ux)
+    g.fill()
   }
 
   lit(side) {
@@ -241,13 +326,17 @@ class Space {
       g.lineTo(...b)
       g.stroke()
       g.setLineDash([])
+      if (side.cap) for (const part of [0, 0.5, 1]) this.drawOn([0, 1].map((d) => a[d] + part * (b[d] - a[d])), 2)
       const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], long = Math.hypot(a[0] - b[0], a[1] - b[1]) || 1
       const normal = [(a[1] - b[1]) / long, (b[0] - a[0]) / long] // outwards
       const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
       const text = side.cap ? "no end this way" : this.told("words", side)
       g.font = "13px sans-serif"
-      const words = g.measureText(text).width > long - 8 ? text.replace(/ (at|between) /, "\n$1 ") : text
-      if (long > 14 || lit) this.besides(x, y, ux, uy, words, lit)
+      const upright = Math.abs(uy) < 0.64 // words beside it, in short lines
+      const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
+      const words = short ? text : text.replace(/ (at|between) /, "\n$1 ").replace(upright ? /^(disk \d+) / : /^$/, "$1\n")
+      const on = side.cap ? ON : 0
+      if (long > 14 || lit) this.besides(x + on * ux, y + on * uy, ux, uy, words, lit)
       this.labels.push({ side, a, b, reach: 14 })
     }
   }
@@ -296,6 +385,7 @@ class Space {
       g.stroke()
       g.setLineDash([])
       g.globalAlpha = 1
+      if (side.cap) for (const k of side.corners) this.drawOn(places[k], 2)
       if (front && lit) {
         const [x, y] = [0, 1].map((d) => side.corners.reduce((s, k) => s + places[k][d], 0) / side.corners.length)
         this.write(x, y - 12, side.cap ? "no end this way" : this.told("words", side), look.ink)
@@ -424,6 +514,12 @@ class Space {
     this.told("begin")
     this.told("go", this.moving(this.body.u, 0.04 * this.half * dx, 0.04 * this.half * dy))
   }
+}
+
+/** The least of 1, 2, 5, 10, … times a power of ten that is not below this. */
+function nice(least) {
+  const ten = 10 ** Math.floor(Math.log10(least))
+  return ten * ([1, 2, 5].find((k) => k * ten >= least) ?? 10)
 }
 
 function within(points, px, py) {

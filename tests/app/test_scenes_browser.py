@@ -203,7 +203,7 @@ def test_what_falls_is_proved_by_a_motion(look):
 
 def test_a_push_shrinks_s_until_nothing_balances(look):
     page = look("?scene=pyramid")
-    desk(page).get_by_role("button", name="Push a disk").click()
+    desk(page).get_by_role("button", name="Test push").click()
     box = desk(page).locator("canvas.packing").bounding_box()
     x, y = ask(page, "small.arrows.px(small.body.scene.x[4], small.body.scene.x[5] + 0.3)")
     page.mouse.move(box["x"] + x, box["y"] + y)
@@ -214,7 +214,7 @@ def test_a_push_shrinks_s_until_nothing_balances(look):
     page.mouse.move(box["x"] + x + 400, box["y"] + y, steps=3)
     until(page, "small.body.empty")
     page.mouse.up()
-    desk(page).get_by_role("button", name="Push a disk").click()
+    desk(page).get_by_role("button", name="Test push").click()
     until(page, "!small.body.empty")
 
 
@@ -228,7 +228,7 @@ def test_six_disks_are_packed_and_their_body_turns(look):
     page.mouse.move(box["x"] + 120, box["y"] + 60, steps=4)
     page.mouse.up()
     assert ask(page, "small.space.view") != view
-    desk(page).get_by_role("button", name="Fill S").click()
+    desk(page).get_by_role("button", name="Random points").click()
     assert ask(page, "Math.min(...small.space.dots.map(u => small.body.least(u)))") > -1e-9
 
 
@@ -260,7 +260,7 @@ def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
     page = look("?scene=column")
     assert "one shadow of S" in desk(page).locator(".says").inner_text()
     desk(page).get_by_role("combobox", name="force shown upwards").select_option(
-        "fₜ between 1 and 2"
+        "tangential force between 1 and 2"
     )
     until(page, "small.space.shadow.join() === '0,1' && !small.space.outline.stale")
     S = gf.ensemble(gf.scene("column"))
@@ -279,11 +279,11 @@ def test_what_has_no_end_is_not_filled_and_the_page_says_why(look, name, mu):
     page = look(f"?scene={name}&mu={mu}")
     until(page, "!small.body.bounded")
     if not ask(page, "small.now.filled"):
-        desk(page).get_by_role("button", name="Fill S").click()
-    desk(page).get_by_text("Nothing can fill it evenly").wait_for()
+        desk(page).get_by_role("button", name="Random points").click()
+    desk(page).get_by_text("evenly spread random points are impossible").wait_for()
     assert ask(page, "small.space.dots.length") == 0
     forces = ask(page, "[...small.body.forces()]")
-    desk(page).get_by_role("button", name="Walk").click()
+    desk(page).get_by_role("button", name="Random walk").click()
     page.wait_for_function(
         "([e, F]) => e.small.body.forces().some((v, k) => Math.abs(v - F[k]) > 1e-6)",
         arg=[desk(page).element_handle(), forces],
@@ -359,7 +359,7 @@ def test_a_scene_is_built_by_hand_and_its_link_carries_it(look, tmp_path):
     disks = "new URLSearchParams(location.search).get('built')?.split('|')[0].split(';').length"
     page.wait_for_function(f"() => {disks} === 3")
     with page.expect_download() as file:
-        desk(page).get_by_role("button", name="Save NPZ").click()
+        desk(page).get_by_role("button", name="Download data").click()
     file.value.save_as(tmp_path / "own.npz")
     assert gf.ensemble(gf.load_packing(tmp_path / "own.npz")).dimension == 3
     page.reload()
@@ -382,7 +382,7 @@ def test_a_scene_is_built_under_pressure_and_its_link_carries_it(look, tmp_path)
     until(page, "small.body.scene.pressing.length === 1 && small.body.h === 1")
     page.wait_for_function("() => location.search.includes('%7Cp1')")
     with page.expect_download() as file:
-        desk(page).get_by_role("button", name="Save NPZ").click()
+        desk(page).get_by_role("button", name="Download data").click()
     file.value.save_as(tmp_path / "own.npz")
     packing = gf.load_packing(tmp_path / "own.npz")
     S = gf.ensemble(packing)
@@ -393,7 +393,7 @@ def test_a_scene_is_built_under_pressure_and_its_link_carries_it(look, tmp_path)
     low, high = gf.body(S).intervals
     seen = np.array(ask(page, "small.body.scene.names.map((_, c) => small.body.interval(2 * c))"))
     np.testing.assert_allclose(seen, np.column_stack([low[:, 0], high[:, 0]]), atol=1e-7)
-    desk(page).get_by_role("radio", name="Let a wall press").click()
+    desk(page).get_by_role("radio", name="Make a wall press").click()
     box = desk(page).locator("canvas.packing").bounding_box()
     across, down = ask(page, "small.arrows.px(0.6, 3.73)")
     page.mouse.click(box["x"] + across, box["y"] + down)
@@ -418,7 +418,7 @@ def test_a_scene_is_built_and_pushed_by_keyboard(look):
     assert ask(page, "small.builder.held") is None
     page.goto(page.url.split("?")[0] + "?scene=pyramid")
     drawn(page)
-    desk(page).get_by_role("button", name="Push a disk").click()
+    desk(page).get_by_role("button", name="Test push").click()
     for _ in range(3):
         page.keyboard.press("n")
     page.keyboard.press("ArrowRight")
