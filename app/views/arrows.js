@@ -193,8 +193,10 @@ class Arrows {
     for (const { contact, at, inward, across } of this.ends()) {
       const [px, py] = this.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
       const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
-      const lines = [scene.names[contact].replace("at the ", "force of the "), `normal force ${number(n)}`, `tangential force ${number(Math.abs(t))}${way}`]
-      write(px + 22 * ux, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
+      const rubs = ["tangential force", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.canvas.clientWidth - x : x
+      const both = g.measureText(rubs.join(" ")).width < room - 4 ? [rubs.join(" ")] : rubs
+      const lines = [scene.names[contact].replace("at the ", "force of the "), `normal force ${number(n)}`, ...both]
+      write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
     }
     const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = this.px(scene.x[0], scene.x[1])
     if (load > 1e-9) write(cx, cy - 13, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")

@@ -87,7 +87,7 @@ class Space {
   /** Half the width and height that S may take, which leaves room for words. */
   get room() {
     const { clientWidth: w, clientHeight: h } = this.canvas, [x, y] = BESIDE[Math.min(this.body.h, 4)]
-    return [w / 2 - Math.min(x, 0.25 * w), h / 2 - Math.min(y, 0.2 * h)]
+    return [w / 2 - Math.min(x, 0.33 * w), h / 2 - Math.min(y, 0.2 * h)]
   }
 
   /** Pixels of a unit of force. */
@@ -347,6 +347,7 @@ class Space {
     const wide = Math.max(...lines.map((line) => g.measureText(line).width)), along = Math.abs(uy) >= 0.64
     const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
     if (!this.free(at, along ? wide * Math.abs(uy) : wide, along ? wide * Math.abs(ux) + high : 2 * high) && !lit) return
+    if (!along) at[0] = Math.min(Math.max(at[0], wide / 2 + 4), this.canvas.clientWidth - wide / 2 - 4)
     g.save()
     g.translate(...at)
     if (along) g.rotate(Math.atan(-ux / uy))
@@ -356,7 +357,7 @@ class Space {
 
   /** Whether nothing is written yet where these words shall be; then they have their place. */
   free([x, y], wide, high) {
-    if (this.taken.some((t) => Math.abs(t.x - x) < 0.4 * (t.wide + wide) && Math.abs(t.y - y) < 0.35 * (t.high + high))) return false
+    if (this.taken.some((t) => Math.abs(t.x - x) < 0.48 * (t.wide + wide) && Math.abs(t.y - y) < 0.45 * (t.high + high))) return false
     this.taken.push({ x, y, wide, high })
     return true
   }
