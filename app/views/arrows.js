@@ -15,7 +15,7 @@ class Arrows {
   constructor(root, told) {
     this.told = told // told(what, …): of a hand on it
     this.canvas = root
-    this.context = root.getContext("2d")
+    this.easel = new Easel(root)
     this.hover = null
     this.held = null
     const at = (event) => {
@@ -28,9 +28,12 @@ class Arrows {
     for (const name of ["pointerup", "pointercancel"]) root.addEventListener(name, () => { this.held = null; told("release") })
   }
 
+  get context() { return this.easel.g }
+
   /** Fit disks and walls into the canvas. */
   fit(body, same = false) {
     this.body = body
+    this.easel.measure()
     const mean = body.sumAt(body.u) / body.count
     this.forceUnit = (0.75 * Math.max(...body.scene.r)) / (Math.max(Math.abs(mean), 1e-6) || 1)
     if (same) return // where it is built, nothing moves but what the hand moves
@@ -44,7 +47,7 @@ class Arrows {
     for (const { from } of this.pressing()) { xs.push(from[0]); ys.push(from[1]) }
     if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
-    const width = this.canvas.clientWidth, height = this.canvas.clientHeight
+    const { wide: width, high: height } = this.easel
     const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
     const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
     this.unit = Math.min(width / across, height / up)
@@ -54,7 +57,7 @@ class Arrows {
   }
 
   /** What is in the middle of the canvas. */
-  get middle() { return this.back(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2) }
+  get middle() { return this.back(this.easel.wide / 2, this.easel.high / 2) }
 
   px(x, y) { return [this.x0 + this.unit * x, this.y0 - this.unit * y] }
   back(px, py) { return [(px - this.x0) / this.unit, (this.y0 - py) / this.unit] }
@@ -86,18 +89,14 @@ class Arrows {
   }
 
   draw(look) {
-    const { context: g, canvas, body } = this, ratio = window.devicePixelRatio || 1
-    const width = canvas.clientWidth, height = canvas.clientHeight
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio)
-      canvas.height = Math.round(height * ratio)
-    }
-    g.setTransform(ratio, 0, 0, ratio, 0, 0)
-    g.clearRect(0, 0, width, height)
+    const { body } = this
     this.look = look
     this.shafts = [] // of arrows, where no number is to be
-    this.drawWalls(look.wall ?? [])
-    this.drawDisks()
+    const wall = look.wall ?? []
+    this.easel.begin(look.paper, [body.scene, this.unit, this.x0, this.y0, look.disk, wall.join()], () => {
+      this.drawWalls(wall)
+      this.drawDisks()
+    })
     const F = body.empty ? null : body.forces()
     if (F) for (const end of this.ends()) this.drawEnd(end, F)
     if (look.fall) this.drawFall(look.fall)
@@ -140,7 +139,7 @@ class Arrows {
 
   drawDisks() {
     const { context: g, body, look } = this, { x, r, box } = body.scene
-    const shifts = box[0] ? [-1, 0, 1] : [0], { clientWidth: wide, clientHeight: high } = this.canvas
+    const shifts = box[0] ? [-1, 0, 1] : [0], { wide, high } = this.easel
     for (let d = 0; d < r.length; d++) {
       for (const a of shifts) for (const b of shifts) {
         const [px, py] = this.px(x[2 * d] + a * box[0], x[2 * d + 1] + b * box[1]), R = r[d] * this.unit
@@ -193,7 +192,7 @@ class Arrows {
     for (const { contact, at, inward, across } of this.ends()) {
       const [px, py] = this.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
       const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
-      const rubs = ["tangential force", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.canvas.clientWidth - x : x
+      const rubs = ["tangential force", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.easel.wide - x : x
       const both = g.measureText(rubs.join(" ")).width < room - 4 ? [rubs.join(" ")] : rubs
       const lines = [scene.names[contact].replace("at the ", "force of the "), `normal force ${number(n)}`, ...both]
       write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
@@ -231,7 +230,7 @@ class Arrows {
   arrow(px, py, force, colour, thick) {
     const { context: g } = this, unit = this.unit * this.forceUnit
     let [dx, dy] = [force[0] * unit, -force[1] * unit], size = Math.hypot(dx, dy)
-    const most = 0.45 * Math.min(this.canvas.clientWidth, this.canvas.clientHeight)
+    const most = 0.45 * Math.min(this.easel.wide, this.easel.high)
     if (size < 1.5) return
     const cut = size > most
     if (cut) { dx *= most / size; dy *= most / size; size = most }
@@ -302,9 +301,9 @@ class Arrows {
     }
     let [sx, sy] = [0, 0], corners = [[0, 0]]
     for (const [x, y] of forces) corners.push([(sx += x), (sy += y)])
-    const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.canvas.clientWidth)
+    const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.easel.wide)
     const span = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys), 1e-9)
-    const unit = (side - 34) / span, left = this.canvas.clientWidth - side - 8, top = 8
+    const unit = (side - 34) / span, left = this.easel.wide - side - 8, top = 8
     g.fillStyle = look.paper
     g.strokeStyle = look.edge
     g.lineWidth = 1

@@ -62,7 +62,7 @@ export function render({ model, view }) {
 
   function colours(dark = model.dark) {
     return {
-      ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#181b20" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",
+      ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#121212" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",
       fill: dark ? "rgba(150,172,200,0.25)" : "rgba(139,160,187,0.3)", lit: dark ? "rgba(150,172,200,0.45)" : "rgba(139,160,187,0.55)",
       cold: dark ? "#5fa2e8" : "#1464c8", warm: "#e8710a", hand: dark ? "#ff5ca8" : "#b5236b", weight: dark ? "#aab4c2" : "#4a5563",
       cone: dark ? "rgba(95,162,232,0.16)" : "rgba(20,100,200,0.12)", coneLit: dark ? "rgba(255,92,168,0.3)" : "rgba(181,35,107,0.22)",
@@ -85,8 +85,8 @@ export function render({ model, view }) {
     }
     arrows.draw(look)
     if (space.draw(body, look, now.path)) soon()
-    bars.draw(body, now.contacts, now.bounds)
     root.painted = (root.painted ?? 0) + 1
+    if (!going.frame || root.painted % 2) bars.draw(body, now.contacts, now.bounds) // numbers on a walk: every second frame
   }
 
   const soon = () => { waiting ||= requestAnimationFrame(paint) }
@@ -344,7 +344,7 @@ export function render({ model, view }) {
     if (Number.isFinite(value) && value >= 0) chooseMu(value)
     else { say("μ is a number from 0 on"); follow() }
   })
-  part("play").addEventListener("click", () => going.toggle(body))
+  part("play").addEventListener("click", () => { going.toggle(body); soon() })
   part("fill").addEventListener("click", () => {
     now.filled = !now.filled
     if (now.filled) space.fill()

@@ -12,7 +12,7 @@ class Space {
   constructor(canvas, told) {
     this.told = told
     this.canvas = canvas
-    this.context = canvas.getContext("2d")
+    this.easel = new Easel(canvas)
     this.view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     this.turn(0.6, -0.5)
     this.half = 0
@@ -31,6 +31,8 @@ class Space {
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { this.held = null })
     canvas.addEventListener("keydown", (event) => this.key(event))
   }
+
+  get context() { return this.easel.g }
 
   turn(a, b) {
     const about = ([x, y, z], a, b) => {
@@ -86,7 +88,7 @@ class Space {
 
   /** Half the width and height that S may take, which leaves room for words. */
   get room() {
-    const { clientWidth: w, clientHeight: h } = this.canvas, [x, y] = BESIDE[Math.min(this.body.h, 4)]
+    const { wide: w, high: h } = this.easel, [x, y] = BESIDE[Math.min(this.body.h, 4)]
     return [w / 2 - Math.min(x, 0.33 * w), h / 2 - Math.min(y, 0.2 * h)]
   }
 
@@ -100,15 +102,15 @@ class Space {
   }
 
   px([x, y]) {
-    const { clientWidth: w, clientHeight: h } = this.canvas, { unit } = this
+    const { wide: w, high: h } = this.easel, { unit } = this
     return [w / 2 + (x - this.centre[0]) * unit, h / 2 - (y - this.centre[1]) * unit]
   }
 
   /** The part of the plane that is seen follows S, so that it is seen to grow: not all the time. */
   frame(at_once) {
     const { body } = this
-    const points = (body.whole ? body.corners.map(({ u }) => u) : [...this.dots, body.u]).map((u) => this.flat(u))
-    if (!body.whole) points.push(...this.corners())
+    const points = (body.whole ? body.corners.map(({ u }) => u) : [body.u]).map((u) => this.flat(u))
+    if (!body.whole) points.push(...this.corners(), ...this.dotted)
     if (!points.length) return false
     const [xs, ys] = [0, 1].map((k) => points.map((p) => p[k]))
     const middle = [xs, ys].map((v) => (Math.max(...v) + Math.min(...v)) / 2)
@@ -121,6 +123,16 @@ class Space {
     this.half += 0.18 * (Math.max(wanted, 0.05 * body.scaleOf()) - this.half)
     this.centre = this.centre.map((v, k) => v + 0.18 * (middle[k] - v))
     return moves
+  }
+
+  /** Two corners of the rectangle around all random points; found once. */
+  get dotted() {
+    const { dots, onAxes } = this
+    if (this.around?.dots !== dots || this.around.onAxes !== onAxes) {
+      const flat = dots.map((u) => this.flat(u)), side = (k) => flat.map((p) => p[k])
+      this.around = { dots, onAxes, ends: flat.length ? [Math.min, Math.max].map((end) => [0, 1].map((k) => end(...side(k)))) : [] }
+    }
+    return this.around.ends
   }
 
   fill() {
@@ -139,22 +151,18 @@ class Space {
   draw(body, look, path) {
     this.body = body
     this.look = look
-    const { context: g, canvas } = this, ratio = window.devicePixelRatio || 1
-    const { clientWidth: w, clientHeight: h } = canvas
-    if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
-      canvas.width = Math.round(w * ratio)
-      canvas.height = Math.round(h * ratio)
-    }
-    g.setTransform(ratio, 0, 0, ratio, 0, 0)
-    g.clearRect(0, 0, w, h)
     this.labels = []
+    const moves = !body.scene.idle && !body.empty && this.frame(this.sceneDrawn !== body.scene)
+    this.easel.begin(look.paper, this.standing(), () => {
+      if (body.empty || body.scene.idle) return
+      if (body.h > 3) this.drawShadow()
+      if (look.dots) this.drawDots()
+    })
+    const { context: g } = this, { wide: w, high: h } = this.easel
     if (body.scene.idle) return this.write(w / 2, h / 2, "nothing presses yet", look.ink, 14)
     g.lineJoin = "round" // no spikes where sides meet
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
-    const moves = this.frame(this.sceneDrawn !== body.scene)
     this.sceneDrawn = body.scene
-    if (body.h > 3) this.drawShadow()
-    if (look.dots) this.drawDots()
     if (body.h === 1) this.drawSegment()
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) this.drawSolid()
@@ -172,18 +180,24 @@ class Space {
     return moves
   }
 
+  /** What decides how that looks which stands still while a point goes through S. */
+  standing() {
+    const { body, look, dots, outline, centre, half, shadow, view } = this
+    return [body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
+  }
+
   write(x, y, text, colour, size = 13, align = "center") {
-    const { context: g, canvas } = this
+    const { context: g, easel } = this
     g.font = `${size}px sans-serif`
     g.textAlign = align === "middle" ? "center" : align
     g.textBaseline = "middle"
     const words = text.split("\n"), wide = g.measureText(text).width
-    if (words.length === 1 && align === "center" && wide > canvas.clientWidth - 12) { // in two lines
+    if (words.length === 1 && align === "center" && wide > easel.wide - 12) { // in two lines
       const middle = text.indexOf(" ", text.length / 2)
       if (middle > 0) words.splice(0, 1, text.slice(0, middle), text.slice(middle + 1))
     }
     const half = Math.max(...words.map((line) => g.measureText(line).width)) / 2
-    if (align === "center") x = Math.min(Math.max(x, half + 5), canvas.clientWidth - half - 5)
+    if (align === "center") x = Math.min(Math.max(x, half + 5), easel.wide - half - 5)
     y -= 0.6 * size * (words.length - 1)
     g.lineWidth = 3
     g.strokeStyle = this.look.paper
@@ -216,9 +230,9 @@ class Space {
   }
 
   drawSegment() {
-    const { context: g, body, look, canvas } = this
+    const { context: g, body, look, easel } = this
     const ends = body.corners.map(({ u }) => this.px(this.flat(u))), y0 = ends[0][1]
-    this.drawAxis(y0, Math.min(canvas.clientHeight - 46, y0 + 80))
+    this.drawAxis(y0, Math.min(easel.high - 46, y0 + 80))
     g.strokeStyle = look.cold
     g.lineWidth = 7
     g.lineCap = "butt"
@@ -230,7 +244,7 @@ class Space {
     let before = null // words of the other end
     for (const side of ends.length > 1 ? body.sides : []) {
       const [x, y] = ends[side.corners[0]], lit = this.lit(side), words = side.cap ? "no end this way" : this.told("words", side)
-      const text = g.measureText(words).width > 0.45 * canvas.clientWidth ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
+      const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
       const wide = Math.max(...text.split("\n").map((line) => g.measureText(line).width)), high = text.includes("\n") ? 40 : 30
       const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12
       if (side.cap) this.drawOn([x, y], 7)
@@ -243,9 +257,9 @@ class Space {
 
   /** Below a line at y0, at y: the axis of a force, with its values where the line ends and at the point. */
   drawAxis(y0, y) {
-    const { context: g, body, look, canvas } = this, index = this.measured(look.contact)
+    const { context: g, body, look, easel } = this, index = this.measured(look.contact)
     if (index === null) return
-    const slope = body.axes[0][index], rest = body.origin[index], [left, right] = [24, canvas.clientWidth - 24]
+    const slope = body.axes[0][index], rest = body.origin[index], [left, right] = [24, easel.wide - 24]
     const place = (v) => this.px([(this.sign * (v - rest)) / slope, 0])[0]
     const pixels = Math.abs(place(1) - place(0)), step = nice(TICKS / pixels)
     const marked = [...body.corners.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
@@ -257,7 +271,7 @@ class Space {
     g.lineTo(right, y)
     const free = (x, k = marked.length) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > 40)
     const ticks = []
-    for (let k = 0; k * step * pixels < canvas.clientWidth + Math.abs(place(0)); k++) {
+    for (let k = 0; k * step * pixels < easel.wide + Math.abs(place(0)); k++) {
       const x = place(k * step)
       if (x < left || x > right) continue
       g.moveTo(x, y - 4)
@@ -278,7 +292,7 @@ class Space {
     g.setLineDash([])
     marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) this.write(x, y + 14, number(v), colour, 12) })
     const name = forceName(body.scene, index)
-    this.write(canvas.clientWidth / 2, y + 33, slope * this.sign > 0 ? `${name} →` : `← ${name}`, look.ink)
+    this.write(easel.wide / 2, y + 33, slope * this.sign > 0 ? `${name} →` : `← ${name}`, look.ink)
   }
 
   /** An arrow from this place in which S goes on without an end, with the mean of its rays. */
@@ -347,7 +361,7 @@ class Space {
     const wide = Math.max(...lines.map((line) => g.measureText(line).width)), along = Math.abs(uy) >= 0.64
     const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
     if (!this.free(at, along ? wide * Math.abs(uy) : wide, along ? wide * Math.abs(ux) + high : 2 * high) && !lit) return
-    if (!along) at[0] = Math.min(Math.max(at[0], wide / 2 + 4), this.canvas.clientWidth - wide / 2 - 4)
+    if (!along) at[0] = Math.min(Math.max(at[0], wide / 2 + 4), this.easel.wide - wide / 2 - 4)
     g.save()
     g.translate(...at)
     if (along) g.rotate(Math.atan(-ux / uy))
@@ -439,7 +453,7 @@ class Space {
   }
 
   drawShadow() {
-    const { context: g, look, canvas } = this, { clientWidth: w, clientHeight: h } = canvas
+    const { context: g, look } = this, { wide: w, high: h } = this.easel
     g.strokeStyle = look.edge
     g.lineWidth = 1
     g.strokeRect(30, 8, w - 40, h - 40)
