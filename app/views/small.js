@@ -30,7 +30,7 @@ export function render({ model, view }) {
     </section>
     <div class="board">
     <div class="pair">
-      <figure><figcaption>blue: the force on a disk at a contact, within its wedge (friction cone); grey: weight, or what presses</figcaption>
+      <figure><figcaption>blue: forces at contacts, within wedges (friction cones); grey: weight, press</figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
       <figure><figcaption class="what"></figcaption>
         <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one network of forces. Arrow keys move the point"></canvas>
