@@ -159,22 +159,27 @@ class Arrows {
 
   /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
   drawNumbers() {
-    const { context: g, body, look } = this, { x, r } = body.scene
+    const { context: g, body, look } = this, { r } = body.scene
     this.ends() // a new scene forgets the places of the one before
     g.fillStyle = look.ink
     g.font = "12px sans-serif"
     g.textAlign = "center"
     g.textBaseline = "middle"
     for (let d = 0; d < r.length; d++) {
-      const [px, py] = this.px(x[2 * d], x[2 * d + 1]), R = 0.72 * r[d] * this.unit
-      const place = (k) => (k ? [px + R * Math.cos((k * Math.PI) / 6 + 3.4), py + R * Math.sin((k * Math.PI) / 6 + 3.4)] : [px, py])
-      const clear = (k) => Math.min(Infinity, ...this.shafts.map(([a, b]) => distance(a, b, ...place(k))))
-      if (!(clear(this.places[d] ?? 1) > CLEAR)) {
+      const clear = (k) => { const at = this.numberAt(d, k); return Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...at))) }
+      if (clear((this.places[d] ??= 1)) < CLEAR) {
         const room = NUMBERS.map(clear)
         this.places[d] = room.indexOf(Math.max(...room))
       }
-      g.fillText(String(d + 1), ...place(this.places[d] ?? 1))
+      g.fillText(String(d + 1), ...this.numberAt(d, this.places[d]))
     }
+  }
+
+  /** Place k of a disk's number: 0 its middle, else around that. */
+  numberAt(d, k) {
+    const { x, r } = this.body.scene, [px, py] = this.px(x[2 * d], x[2 * d + 1])
+    const R = k ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
+    return [px + R * Math.cos(angle), py + R * Math.sin(angle)]
   }
 
   /** Beside the only disk: what each wall does, in numbers, and the weight. */
