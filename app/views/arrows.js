@@ -12,10 +12,10 @@ function tall({ name, x, box }) {
 }
 
 class Arrows {
-  constructor(root, told) {
+  constructor(root, told, ratio) {
     this.told = told // told(what, …): of a hand on it
     this.canvas = root
-    this.easel = new Easel(root)
+    this.easel = new Easel(root, ratio)
     this.hover = null
     this.held = null
     const at = (event) => {

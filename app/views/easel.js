@@ -2,8 +2,10 @@
 // own that is copied; nothing shines through, which halves what a browser without a graphics card does.
 
 class Easel {
-  constructor(canvas) {
+  /** ratio: pixels of the canvas for one of the page. */
+  constructor(canvas, ratio = window.devicePixelRatio || 1) {
     this.canvas = canvas
+    this.ratio = ratio
     this.still = document.createElement("canvas")
     this.g = canvas.getContext("2d", { alpha: false })
     this.measure()
@@ -15,7 +17,7 @@ class Easel {
   /** A frame with what stands still; that is painted by `paint` where a value of `key` is another one. */
   begin(paper, key, paint) {
     this.measure()
-    const ratio = window.devicePixelRatio || 1, size = [this.wide, this.high].map((v) => Math.max(1, Math.round(v * ratio)))
+    const { ratio } = this, size = [this.wide, this.high].map((v) => Math.max(1, Math.round(v * ratio)))
     const whole = [paper, ...size, ...key], own = this.g
     if (!this.key || whole.some((value, k) => value !== this.key[k])) {
       this.key = whole

@@ -60,15 +60,7 @@ export function render({ model, view }) {
 
   // What is seen
 
-  function colours(dark = model.dark) {
-    return {
-      ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#121212" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",
-      fill: dark ? "rgba(150,172,200,0.25)" : "rgba(139,160,187,0.3)", lit: dark ? "rgba(150,172,200,0.45)" : "rgba(139,160,187,0.55)",
-      cold: dark ? "#5fa2e8" : "#1464c8", warm: "#e8710a", hand: dark ? "#ff5ca8" : "#b5236b", weight: dark ? "#aab4c2" : "#4a5563",
-      cone: dark ? "rgba(95,162,232,0.16)" : "rgba(20,100,200,0.12)", coneLit: dark ? "rgba(255,92,168,0.3)" : "rgba(181,35,107,0.22)",
-      coneFull: "rgba(232,113,10,0.28)", shade: dark ? "rgba(95,162,232,0.2)" : "rgba(20,100,200,0.14)", state: dark ? "#8fbfee" : "#3d8bd4",
-    }
-  }
+  const colours = (dark = model.dark) => palette(dark)
 
   const dress = () => { root.style.colorScheme = model.dark ? "dark" : "light" } // for the browser's own controls
 
@@ -235,7 +227,7 @@ export function render({ model, view }) {
     if (now.filled) space.fill()
     if (!body.whole && space.dots.length) body.u = body.u.map((_, k) => space.dots.reduce((s, u) => s + u[k], 0) / space.dots.length)
     part("name").value = scene.name
-    root.classList.toggle("explained", Boolean(scene.box[0]))
+    root.classList.toggle("explained", Boolean(scene.box[0]) || scene.name === "own")
     root.classList.toggle("tall", tall(scene))
     follow()
     say(root.opened ? "" : model.note)
@@ -370,12 +362,7 @@ export function render({ model, view }) {
   part("save").addEventListener("click", () => ask(model, view, { save: { mu, load: [...body.load] } }))
   part("lesson").querySelector("article").innerHTML = lesson()
   for (const button of root.querySelectorAll(".print")) {
-    button.addEventListener("click", () => {
-      arrows.draw({ ...colours(false), ...now }) // paper is white
-      space.draw(body, { ...colours(false), ...now, dots: 0 }, [])
-      printed([part("packing"), part("space")].map((canvas) => canvas.toDataURL()), button.classList.contains("answered"))
-      soon()
-    })
+    button.addEventListener("click", () => printed(pictures(), button.classList.contains("answered")))
   }
   part("lesson").addEventListener("toggle", () => {
     part("board").classList.toggle("reading", part("lesson").open && !part("lesson").hidden)
@@ -387,6 +374,20 @@ export function render({ model, view }) {
     const row = event.target.closest("[data-contact]")
     if (row) { choose(Number(row.dataset.contact)); soon() }
   })
+
+  /** The disk and S as they are, for white paper: nothing chosen, and with words that can be read at their size. */
+  function pictures() {
+    const look = { ...colours(false), ...now, contact: null, disk: null, side: null, contacts: new Set(), dots: 0 }
+    return [Arrows, Space].map((Picture) => {
+      const canvas = root.appendChild(document.createElement("canvas"))
+      canvas.style.cssText = "position: absolute; visibility: hidden; width: 400px; height: 230px; border: 0"
+      const picture = new Picture(canvas, heard, 3)
+      if (picture.fit) { picture.fit(body); picture.draw(look) }
+      else picture.draw(body, look, [])
+      canvas.remove()
+      return canvas.toDataURL()
+    })
+  }
 
   function download(text) {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)), link = document.createElement("a")

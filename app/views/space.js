@@ -3,16 +3,15 @@
 
 const TURN = 0.008 // radians a pixel
 // Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
-const BESIDE = [[46, 46], [95, 46], [140, 50], [30, 30], [60, 50]]
+const BESIDE = [[46, 46], [95, 46], [140, 50], [30, 30], [60, 64]]
 const ON = 34 // pixels of an arrow where S goes on without an end
-const TICKS = 70 // pixels between two numbers of an axis, at least
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
 class Space {
-  constructor(canvas, told) {
+  constructor(canvas, told, ratio) {
     this.told = told
     this.canvas = canvas
-    this.easel = new Easel(canvas)
+    this.easel = new Easel(canvas, ratio)
     this.view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     this.turn(0.6, -0.5)
     this.half = 0
@@ -51,6 +50,9 @@ class Space {
     return this.view.map((row) => dot(row, u))
   }
 
+  /** Which way a line is drawn. */
+  get sign() { return signOf(this.body) }
+
   /** Both forces of the shadow, as rows of u: found once, as many points are drawn. */
   get onAxes() {
     const { body, shadow, axes } = this
@@ -59,18 +61,6 @@ class Space {
       this.axes = { body, origin: body.origin, shadow, rows }
     }
     return this.axes.rows
-  }
-
-  /** Of a line, which way it is drawn: normal forces that change become larger to the right. */
-  get sign() { return this.body.h === 1 ? Math.sign(this.body.axes[0][this.measured(null)]) || 1 : 1 }
-
-  /** Of a line, the force on its axis: that of this contact if it changes, else the one that changes most. */
-  measured(contact) {
-    const axis = this.body.axes[0], most = (part) => {
-      const size = Array.from({ length: this.body.count }, (_, c) => Math.abs(axis[2 * c + part])), c = size.findIndex((v) => v > 0.999 * Math.max(...size)) // the first of equals
-      return size[c] > 1e-9 ? 2 * c + part : null
-    }
-    return contact !== null && Math.abs(axis[2 * contact]) > 1e-9 ? 2 * contact : most(0) ?? most(1)
   }
 
   /** u whose place moves by so much in the plane of the screen. */
@@ -155,7 +145,7 @@ class Space {
     const moves = !body.scene.idle && !body.empty && this.frame(this.sceneDrawn !== body.scene)
     this.easel.begin(look.paper, this.standing(), () => {
       if (body.empty || body.scene.idle) return
-      if (body.h > 3) this.drawShadow()
+      if (body.h > 3) drawShadow(this)
       if (look.dots) this.drawDots()
     })
     const { context: g } = this, { wide: w, high: h } = this.easel
@@ -163,10 +153,10 @@ class Space {
     g.lineJoin = "round" // no spikes where sides meet
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
-    if (body.h === 1) this.drawSegment()
+    if (body.h === 1) drawSegment(this)
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) this.drawSolid()
-    if (body.whole && body.h > 1 && look.contact !== null) this.drawInterval(look.contact)
+    if (body.whole && body.h > 1 && look.contact !== null) drawInterval(this, look.contact)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
     g.beginPath()
@@ -227,72 +217,6 @@ class Space {
     path.forEach((u, k) => (k ? g.lineTo(...this.px(this.flat(u))) : g.moveTo(...this.px(this.flat(u)))))
     g.stroke()
     g.globalAlpha = 1
-  }
-
-  drawSegment() {
-    const { context: g, body, look, easel } = this
-    const ends = body.corners.map(({ u }) => this.px(this.flat(u))), y0 = ends[0][1]
-    this.drawAxis(y0, Math.min(easel.high - 46, y0 + 80))
-    g.strokeStyle = look.cold
-    g.lineWidth = 7
-    g.lineCap = "butt"
-    g.beginPath()
-    g.moveTo(...ends[0])
-    g.lineTo(...(ends[1] ?? ends[0]))
-    g.stroke()
-    g.font = "13px sans-serif"
-    let before = null // words of the other end
-    for (const side of ends.length > 1 ? body.sides : []) {
-      const [x, y] = ends[side.corners[0]], lit = this.lit(side), words = side.cap ? "no end this way" : this.told("words", side)
-      const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
-      const wide = Math.max(...text.split("\n").map((line) => g.measureText(line).width)), high = text.includes("\n") ? 40 : 30
-      const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12
-      if (side.cap) this.drawOn([x, y], 7)
-      else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
-      this.write(x, y - high - (close ? 34 : 0), text, lit ? look.hand : look.ink)
-      this.labels.push({ side, x, y, reach: 30 })
-      before = { x, wide }
-    }
-  }
-
-  /** Below a line at y0, at y: the axis of a force, with its values where the line ends and at the point. */
-  drawAxis(y0, y) {
-    const { context: g, body, look, easel } = this, index = this.measured(look.contact)
-    if (index === null) return
-    const slope = body.axes[0][index], rest = body.origin[index], [left, right] = [24, easel.wide - 24]
-    const place = (v) => this.px([(this.sign * (v - rest)) / slope, 0])[0]
-    const pixels = Math.abs(place(1) - place(0)), step = nice(TICKS / pixels)
-    const marked = [...body.corners.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
-      .map(([u, colour]) => [u[0] * slope + rest, colour]).map(([v, colour]) => ({ v, x: place(v), colour }))
-    g.strokeStyle = look.edge
-    g.lineWidth = 1
-    g.beginPath()
-    g.moveTo(left, y)
-    g.lineTo(right, y)
-    const free = (x, k = marked.length) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > 40)
-    const ticks = []
-    for (let k = 0; k * step * pixels < easel.wide + Math.abs(place(0)); k++) {
-      const x = place(k * step)
-      if (x < left || x > right) continue
-      g.moveTo(x, y - 4)
-      g.lineTo(x, y + 4)
-      if (free(x)) ticks.push([x, String(Number((k * step).toPrecision(6)))])
-    }
-    g.stroke()
-    for (const [x, text] of ticks) this.write(x, y + 14, text, look.ink, 11)
-    g.lineWidth = 1
-    g.setLineDash([2, 4])
-    for (const { x, colour } of marked) {
-      g.strokeStyle = colour
-      g.beginPath()
-      g.moveTo(x, y0)
-      g.lineTo(x, y)
-      g.stroke()
-    }
-    g.setLineDash([])
-    marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) this.write(x, y + 14, number(v), colour, 12) })
-    const name = forceName(body.scene, index)
-    this.write(easel.wide / 2, y + 33, slope * this.sign > 0 ? `${name} →` : `← ${name}`, look.ink)
   }
 
   /** An arrow from this place in which S goes on without an end, with the mean of its rays. */
@@ -408,80 +332,9 @@ class Space {
     }
   }
 
-  /** The exact interval of a contact's f_n: the shadow of S on that axis. */
-  drawInterval(contact) {
-    const { context: g, body, look } = this, slope = body.axes.map((axis) => axis[2 * contact])
-    const size = Math.hypot(...slope)
-    if (size < 1e-9) return
-    const along = slope.map((v) => v / size), m = body.middle
-    const [dx, dy] = this.flat(along), flat = Math.hypot(dx, dy)
-    if (flat < 0.2) return
-    const from = this.flat(m), side = [dy / flat, -dx / flat]
-    const below = side[1] > 0 ? side.map((v) => -v) : side
-    const reach = Math.max(...body.corners.map(({ u }) => { const p = this.flat(u); return dot([p[0] - from[0], p[1] - from[1]], below) }))
-    const off = reach + 0.14 * this.half
-    const foot = (u) => {
-      const s = dot(along, u.map((v, k) => v - m[k]))
-      return [from[0] + s * dx + off * below[0], from[1] + s * dy + off * below[1]]
-    }
-    const order = [...body.corners].sort((a, b) => dot(along, a.u) - dot(along, b.u)), ends = [order[0], order.at(-1)]
-    g.strokeStyle = look.hand
-    g.lineWidth = 1
-    g.setLineDash([2, 4])
-    for (const { u } of [...ends, { u: body.u }]) {
-      g.beginPath()
-      g.moveTo(...this.px(this.flat(u)))
-      g.lineTo(...this.px(foot(u)))
-      g.stroke()
-    }
-    g.setLineDash([])
-    g.lineWidth = 4
-    g.beginPath()
-    g.moveTo(...this.px(foot(ends[0].u)))
-    g.lineTo(...this.px(foot(ends[1].u)))
-    g.stroke()
-    const interval = body.interval(2 * contact)
-    ends.forEach(({ u }, k) => {
-      const [x, y] = this.px(foot(u))
-      this.write(x, y + 12, Number.isFinite(interval[k]) ? interval[k].toFixed(2) : "∞", look.hand, 11)
-    })
-  }
-
   corners() {
     const { points } = this.outline
     return Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1]])
-  }
-
-  drawShadow() {
-    const { context: g, look } = this, { wide: w, high: h } = this.easel
-    g.strokeStyle = look.edge
-    g.lineWidth = 1
-    g.strokeRect(30, 8, w - 40, h - 40)
-    const corners = this.corners().map((p) => this.px(p)), { stale } = this.outline
-    if (corners.length) {
-      g.beginPath()
-      corners.forEach((p, n) => (n ? g.lineTo(...p) : g.moveTo(...p)))
-      g.closePath()
-      g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
-      g.fillStyle = look.shade
-      g.fill()
-      g.strokeStyle = look.cold
-      g.lineWidth = 2.5
-      g.setLineDash(stale ? [4, 4] : [])
-      g.stroke()
-      g.setLineDash([])
-      g.globalAlpha = 1
-    }
-    const ends = [0, 1].map((k) => { const all = this.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
-    for (const v of ends[0]) this.write(this.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)
-    for (const v of ends[1]) this.write(52, this.px([0, v])[1], v.toFixed(2), look.cold, 11)
-    const [a, b] = this.shadow.map((k) => this.told("name", k))
-    this.write(w / 2, h - 16, `→ ${a}`, look.ink)
-    g.save()
-    g.translate(15, h / 2)
-    g.rotate(-Math.PI / 2)
-    this.write(0, 0, `→ ${b}`, look.ink, 13, "middle")
-    g.restore()
   }
 
   // The hand
@@ -529,12 +382,6 @@ class Space {
     this.told("begin")
     this.told("go", this.moving(this.body.u, 0.04 * this.half * dx, 0.04 * this.half * dy))
   }
-}
-
-/** The least of 1, 2, 5, 10, … times a power of ten that is not below this. */
-function nice(least) {
-  const ten = 10 ** Math.floor(Math.log10(least))
-  return ten * ([1, 2, 5].find((k) => k * ten >= least) ?? 10)
 }
 
 function within(points, px, py) {
