@@ -91,6 +91,7 @@ class Arrows {
   draw(look) {
     const { body } = this
     this.look = look
+    this.easel.measure()
     this.shafts = [] // of arrows, where no number is to be
     const wall = look.wall ?? []
     this.easel.begin(look.paper, [body.scene, this.unit, this.x0, this.y0, look.disk, wall.join()], () => {

@@ -11,12 +11,11 @@ class Easel {
     this.measure()
   }
 
-  /** Size in CSS pixels; asked for once a frame, as the answer may need a layout. */
+  /** Size in CSS pixels; to be asked for once a frame, before it, as the answer may need a layout. */
   measure() { ({ clientWidth: this.wide, clientHeight: this.high } = this.canvas) }
 
   /** A frame with what stands still; that is painted by `paint` where a value of `key` is another one. */
   begin(paper, key, paint) {
-    this.measure()
     const { ratio } = this, size = [this.wide, this.high].map((v) => Math.max(1, Math.round(v * ratio)))
     const whole = [paper, ...size, ...key], own = this.g
     if (!this.key || whole.some((value, k) => value !== this.key[k])) {

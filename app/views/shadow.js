@@ -11,7 +11,7 @@ function drawInterval(space, contact) {
   const from = space.flat(m), side = [dy / flat, -dx / flat]
   const below = side[1] > 0 ? side.map((v) => -v) : side
   const reach = Math.max(...body.corners.map(({ u }) => { const p = space.flat(u); return dot([p[0] - from[0], p[1] - from[1]], below) }))
-  const off = reach + 0.14 * space.half
+  const off = reach + Math.max(0.14 * space.half, (body.h === 2 ? 46 : 0) / space.unit) // beyond the words at the sides
   const foot = (u) => {
     const s = dot(along, u.map((v, k) => v - m[k]))
     return [from[0] + s * dx + off * below[0], from[1] + s * dy + off * below[1]]

@@ -33,7 +33,7 @@ export function render({ model, view }) {
       <figure><figcaption>blue: forces at contacts, within wedges (friction cones); grey: weight, press</figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
       <figure><figcaption class="what"></figcaption>
-        <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one network of forces. Arrow keys move the point"></canvas>
+        <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one set of forces. Arrow keys move the point"></canvas>
         <div class="plane" hidden><label>across <select aria-label="force shown across"></select></label>
           <label>up <select aria-label="force shown upwards"></select></label></div></figure>
       <div class="sums"><p class="special"></p><p class="count"></p><div class="bars" role="list"></div></div>

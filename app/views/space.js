@@ -142,6 +142,7 @@ class Space {
     this.body = body
     this.look = look
     this.labels = []
+    this.easel.measure()
     const moves = !body.scene.idle && !body.empty && this.frame(this.sceneDrawn !== body.scene)
     this.easel.begin(look.paper, this.standing(), () => {
       if (body.empty || body.scene.idle) return
@@ -304,7 +305,7 @@ class Space {
     const { context: g, body, look } = this
     const places = body.corners.map(({ u }) => this.px(this.flat(u)))
     const towards = (side) => -dot(this.view[2], side.slope) // sides' slopes point inwards
-    const sides = [...body.sides].sort((a, b) => towards(a) - towards(b))
+    const sides = [...body.sides].sort((a, b) => towards(a) - towards(b)), words = []
     for (const side of sides) {
       const front = towards(side) > 0, lit = this.lit(side)
       g.beginPath()
@@ -325,11 +326,9 @@ class Space {
       g.setLineDash([])
       g.globalAlpha = 1
       if (side.cap) for (const k of side.corners) this.drawOn(places[k], 2)
-      if (front && lit) {
-        const [x, y] = [0, 1].map((d) => side.corners.reduce((s, k) => s + places[k][d], 0) / side.corners.length)
-        this.write(x, y - 12, side.cap ? "no end this way" : this.told("words", side), look.ink)
-      }
+      if (front && lit) words.push(side.cap ? "no end this way" : this.told("words", side))
     }
+    words.forEach((line, k) => this.write(this.easel.wide / 2, 18 + 17 * k, line, look.ink)) // clear of the body
   }
 
   corners() {

@@ -473,6 +473,9 @@ def test_the_lesson_has_three_questions_and_is_printed(look):
     desk(page).locator(".lesson > summary").click()
     questions = desk(page).locator(".lesson article details")
     assert questions.count() == 3
+    packing = desk(page).locator("canvas.packing").bounding_box()  # the lesson is read beside it
+    article = desk(page).locator(".lesson article").bounding_box()
+    assert article["x"] > packing["x"] + packing["width"] and article["y"] < 400
     assert not questions.first.evaluate("e => e.open")
     questions.first.locator("summary").click()
     assert questions.first.get_by_text("0.707").is_visible()
@@ -480,6 +483,7 @@ def test_the_lesson_has_three_questions_and_is_printed(look):
     desk(page).get_by_role("button", name="Print", exact=True).click()
     page.wait_for_function("() => document.querySelector('iframe')?.contentDocument.title")
     assert "The groove" in page.frames[-1].content()
+    assert page.frames[-1].locator("img").count() == 2  # the disk, and S
 
 
 @pytest.mark.parametrize("mu", [0.6, 0.414, 0.415])
