@@ -1,6 +1,7 @@
 """granforce: how undetermined are the contact forces in a packing of rigid frictional disks?"""
 
 import importlib
+from typing import Any
 
 from granforce.system.compiled import find_a_place
 
@@ -65,7 +66,7 @@ _HOME = {
 __all__ = list(_HOME)
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'granforce' has no attribute {name!r}")
     if not _HOME[name]:

@@ -416,13 +416,13 @@ TERMS = {
 }
 
 
-def title(key):
+def title(key: str) -> str:
     """A term as it is named: "friction coefficient μ"."""
     word, symbol, _ = TERMS[key]
     return f"{word} {symbol}".strip()
 
 
-def markdown():
+def markdown() -> str:
     """The terms that have a symbol, as a Markdown table."""
     lines = ["| symbol | is called | means |", "|---|---|---|"]
     for word, symbol, sentence in TERMS.values():

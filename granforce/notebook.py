@@ -3,11 +3,18 @@
 Plain arrays and numbers in, text out: every room may use this, and it needs no plotting library.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
 from html import escape
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from granforce.glossary import TERMS
+
+if TYPE_CHECKING:  # records show themselves by this file, which they must not need to run
+    from granforce.records import Floats, Packing
 
 SIDE = 420  # of the picture, pixels
 LINE = 16  # height of a line of words below it, pixels
@@ -20,7 +27,7 @@ WIDTHS = 12  # classes of width; contacts of one width and colour are one path
 COLOURS = ("#0072b2", "#4d8fb5", "#8a8a8a", "#cf8a4d", "#d55e00")
 
 
-def table(title, lines):
+def table(title: str, lines: Mapping[str, Any]) -> str:
     """A small HTML table: lines {name: value}, numbers rounded to four digits.
 
     What a name means is told under the pointer, where the glossary has it.
@@ -33,7 +40,7 @@ def table(title, lines):
     return f"<table><caption>{escape(title)}</caption>{rows}</table>"
 
 
-def _hint(name):
+def _hint(name: str) -> str:
     """The glossary's sentence for a name that ends with one of its symbols, as an attribute."""
     for term in TERMS.values():
         if name == term.word or (term.symbol and name.split()[-1] == term.symbol):
@@ -41,7 +48,7 @@ def _hint(name):
     return ""
 
 
-def _text(value):
+def _text(value: Any) -> str:
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (float, np.floating)):
@@ -49,14 +56,14 @@ def _text(value):
     return str(value)
 
 
-def packing_svg(packing):
+def packing_svg(packing: Packing) -> str:
     """A packing to scale: disks, force chains (width f_n, colour f_t/(μ f_n)), and its numbers."""
     low, sides = _window(packing)
     scale = SIDE / max(sides)
     width, height = sides * scale
     x = packing.cell.wrapped(packing.x)
 
-    def place(points):
+    def place(points: Floats) -> Floats:
         """Centres in pixels from the upper left corner."""
         return (points - low) * [scale, -scale] + [0, height]
 
@@ -77,7 +84,7 @@ def packing_svg(packing):
     )
 
 
-def _window(packing):
+def _window(packing: Packing) -> tuple[Floats, Floats]:
     """Lower left corner (2,) and sides (2,) of what is drawn: the cell, or the disks where open."""
     if not len(packing.r):
         return np.zeros(2), np.ones(2)
@@ -89,7 +96,7 @@ def _window(packing):
     return low, np.where(closed, opposite, high) - low
 
 
-def _cut(packing, place, drawn):
+def _cut(packing: Packing, place: Callable[[Floats], Floats], drawn: list[str]) -> list[str]:
     """What is drawn, cut at the sides of a tilted cell, and those sides."""
     if not packing.tilt:
         return drawn
@@ -104,7 +111,9 @@ def _cut(packing, place, drawn):
     ]
 
 
-def _disks(packing, place, x, scale):
+def _disks(
+    packing: Packing, place: Callable[[Floats], Floats], x: Floats, scale: float
+) -> Iterator[str]:
     if not len(x) or len(x) > MOST_DRAWN:
         return
     yield '<g fill="#eeeeee" stroke="#aaaaaa" stroke-width="0.5">'
@@ -116,7 +125,9 @@ def _disks(packing, place, x, scale):
     yield "</g>"
 
 
-def _chains(packing, place, x, scale):
+def _chains(
+    packing: Packing, place: Callable[[Floats], Floats], x: Floats, scale: float
+) -> Iterator[str]:
     """Contacts that press, as lines between centres: one path for each width and colour."""
     contacts, (normal, tangential) = packing.contacts, packing.forces.T
     pressing = np.flatnonzero(normal > 0)
@@ -131,7 +142,7 @@ def _chains(packing, place, x, scale):
     colour = np.minimum(colour, len(COLOURS) - 1)
     begin = x[contacts.i[pressing]]
     end = begin + contacts.length[pressing, None] * contacts.normal[pressing]
-    paths = {}
+    paths: dict[tuple[int, int], list[str]] = {}
     cell = packing.cell
     ends = cell.across(begin), cell.across(end)
     for moved, rows in cell.images(np.minimum(*ends), np.maximum(*ends)):
@@ -148,7 +159,7 @@ def _chains(packing, place, x, scale):
     yield "</g>"
 
 
-def _words(packing):
+def _words(packing: Packing) -> list[str]:
     """The numbers of a packing in two lines."""
     normal = packing.forces[:, 0]
     pressing = normal[normal > 0]

@@ -6,17 +6,31 @@ Signs: **n** points from grain i to grain j, **t** = (−n_y, n_x); the force on
 f_n n + f_t t, and f_n ≥ 0 presses.
 """
 
+from __future__ import annotations
+
 import itertools
 import os
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce import notebook
 from granforce.tolerances import LARGEST_UNIT, MU_DIGITS, RIGID_OVERLAP
 
 # Whole numbers up to here are exact in kernels, in JSON and in floats alike.
 LARGEST_WHOLE = 2**53
+
+
+# What arrays hold; their shapes stand in comments and docstrings.
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.integer[Any]]
+Mask = npt.NDArray[np.bool_]
+
+Rows = Sequence[dict[str, Any]]  # a table: a line is plain values by name
+Progress = Callable[[float, float | None], object]  # progress(done, total), as work goes on
+Cancel = Callable[[], bool]  # asked again and again whether to end
 
 
 class InputError(ValueError):
@@ -38,70 +52,96 @@ class Cancelled(Exception):
 class Contacts(NamedTuple):
     """Geometry of N_c contacts."""
 
-    i: np.ndarray  # (N_c,) int64, first grain
-    j: np.ndarray  # (N_c,) int64, second grain
-    normal: np.ndarray  # (N_c, 2) unit vector n from i to j
-    length: np.ndarray  # (N_c,) centre distance ℓ
-    gap: np.ndarray  # (N_c,) ℓ − r_i − r_j, negative where grains overlap
-    arm_i: np.ndarray  # (N_c,) lever arm a_i from the centre of i to the contact point
-    arm_j: np.ndarray  # (N_c,) lever arm a_j
+    i: Integers  # (N_c,) first grain
+    j: Integers  # (N_c,) second grain
+    normal: Floats  # (N_c, 2) unit vector n from i to j
+    length: Floats  # (N_c,) centre distance ℓ
+    gap: Floats  # (N_c,) ℓ − r_i − r_j, negative where grains overlap
+    arm_i: Floats  # (N_c,) lever arm a_i from the centre of i to the contact point
+    arm_j: Floats  # (N_c,) lever arm a_j
+
+    def picked(self, rows: Integers | Mask) -> Contacts:
+        """The contacts of these rows: a mask (N_c,), or positions (k,)."""
+        return Contacts(
+            i=self.i[rows],
+            j=self.j[rows],
+            normal=self.normal[rows],
+            length=self.length[rows],
+            gap=self.gap[rows],
+            arm_i=self.arm_i[rows],
+            arm_j=self.arm_j[rows],
+        )
+
+    def joined(self, others: Contacts) -> Contacts:
+        """These contacts, then the others."""
+        return Contacts(
+            i=np.concatenate([self.i, others.i]),
+            j=np.concatenate([self.j, others.j]),
+            normal=np.concatenate([self.normal, others.normal]),
+            length=np.concatenate([self.length, others.length]),
+            gap=np.concatenate([self.gap, others.gap]),
+            arm_i=np.concatenate([self.arm_i, others.arm_i]),
+            arm_j=np.concatenate([self.arm_j, others.arm_j]),
+        )
 
 
 class Cell(NamedTuple):
     """The periodic cell, spanned by a = (L_x, 0) and b = (tilt, L_y); tilt is LAMMPS' ``xy``."""
 
-    box: np.ndarray  # (2,) L_x, L_y, length; inf in an open direction
+    box: Floats  # (2,) L_x, L_y, length; inf in an open direction
     tilt: float  # x component of b, length; 0 where a direction is open
 
     @property
-    def vectors(self):
+    def vectors(self) -> Floats:
         """a and b as rows (2, 2), zero along open directions: images are at x + shift @ vectors."""
         sides = np.where(np.isfinite(self.box), self.box, 0.0)
         return np.array([[sides[0], 0.0], [self.tilt, sides[1]]])
 
     @property
-    def heights(self):
+    def heights(self) -> Floats:
         """Distances (2,) between the sides that face each other along a and b; inf where open."""
         if not self.tilt:
             return self.box
         return self.box * [self.box[1] / np.hypot(self.tilt, self.box[1]), 1.0]
 
     @property
-    def corners(self):
+    def corners(self) -> Floats:
         """Corners (5, 2) of the parallelogram, back to the first; needs both sides periodic."""
         return np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)]) @ self.vectors
 
     @property
-    def extent(self):
+    def extent(self) -> Floats:
         """Lower left and upper right corner (2, 2) around the parallelogram; inf where open."""
         lean = np.array([self.tilt, 0.0])
         return np.array([np.minimum(lean, 0.0), self.box + np.maximum(lean, 0.0)])
 
     @property
-    def shortest(self):
+    def shortest(self) -> float:
         """Distance of a point from its nearest own image; inf without one."""
         return float(np.linalg.norm(self.reduced[0]) if self.tilt else self.box.min())
 
     @property
-    def reduced(self):
+    def reduced(self) -> Floats:
         """The two shortest vectors (2, 2) that span the lattice, the shortest first (Gauss)."""
         short, long = sorted(self.vectors, key=np.linalg.norm)
         while (times := np.round(short @ long / max(short @ short, np.finfo(float).tiny))) != 0:
             short, long = sorted((short, long - times * short), key=np.linalg.norm)
         return np.array([short, long])
 
-    def parts(self, x):
+    def parts(self, x: Floats) -> Floats:
         """Points (…, 2) as parts of a and b, from 0 to 1 inside; needs both directions periodic."""
         up = x[..., 1] / self.box[1]
         return np.stack([(x[..., 0] - self.tilt * up) / self.box[0], up], axis=-1)
 
-    def across(self, x):
+    def across(self, x: Floats) -> Floats:
         """Distances (…, 2) of points from the sides b and a; x and y themselves where straight."""
         if not self.tilt:
             return np.array(x, dtype=np.float64)
         return self.parts(x) * self.heights
 
-    def images(self, low, high, margin=0.0):
+    def images(
+        self, low: Floats, high: Floats, margin: float = 0.0
+    ) -> Iterator[tuple[Floats, Integers]]:
         """Which images of what reaches from low to high (k, 2), told as `across`, are in the cell.
 
         margin: width of a strip around the cell that counts as well. Yields vectors (2,) of whole
@@ -117,7 +157,7 @@ class Cell(NamedTuple):
             seen = (high + moved > -margin) & (low + moved < side + margin)
             yield step @ self.vectors, np.flatnonzero(np.all(seen | ~periodic, axis=1))
 
-    def wrapped(self, x):
+    def wrapped(self, x: npt.ArrayLike) -> Floats:
         """Points (…, 2) at their image in the parallelogram of a and b, as they are along open."""
         found = np.array(x, dtype=np.float64)
         lean = np.zeros(found.shape[:-1])
@@ -132,7 +172,7 @@ class Cell(NamedTuple):
             found[..., 0] = _remainder(found[..., 0] - lean, self.box[0]) + lean
         return found
 
-    def nearest(self, branch):
+    def nearest(self, branch: npt.ArrayLike) -> Floats:
         """The shortest image (…, 2) of vectors between two points."""
         branch = np.array(branch, dtype=np.float64)
         if not self.tilt:
@@ -149,7 +189,7 @@ class Cell(NamedTuple):
         return np.take_along_axis(images, pick[..., None, None], axis=-2)[..., 0, :]
 
 
-def _remainder(values, side):
+def _remainder(values: Floats, side: float) -> Floats:
     """Numbers modulo a side, in [0, side): a tiny negative number plus the side rounds to it."""
     left = np.mod(values, side)
     return np.where(left >= side, 0.0, left)
@@ -158,35 +198,33 @@ def _remainder(values, side):
 class Packing(NamedTuple):
     """N disks, their contacts, and one force network on them."""
 
-    x: np.ndarray  # (N, 2) centres, length
-    r: np.ndarray  # (N,) radii, length
-    box: np.ndarray  # (2,) sides L_x, L_y of the periodic cell; inf in an open direction
+    x: Floats  # (N, 2) centres, length
+    r: Floats  # (N,) radii, length
+    box: Floats  # (2,) sides L_x, L_y of the periodic cell; inf in an open direction
     contacts: Contacts
-    forces: np.ndarray  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force
+    forces: Floats  # (N_c, 2) f_n, f_t of the packing's own ("original") network, force
     mu: float  # friction coefficient μ
     pressure: float  # P0, force per length; nan where no pressure is prescribed
-    load: (
-        np.ndarray
-    )  # (N, 3) external force and torque on each grain; NaN: its balance is left open
-    info: dict  # how it was made: seed, steps, skipped work, … (plain numbers and strings)
+    load: Floats  # (N, 3) external force and torque on each grain; NaN: its balance is left open
+    info: dict[str, Any]  # how it was made: seed, steps, skipped work, … (plain values)
     tilt: float = 0.0  # of the cell, between ∓L_x/2, length; 0 where a direction is open
 
     @property
-    def cell(self):
+    def cell(self) -> Cell:
         """The periodic cell."""
         return Cell(self.box, self.tilt)
 
     @property
-    def volume(self):
+    def volume(self) -> float:
         """Area V of the cell (length², infinite if open)."""
         return float(np.prod(self.box))
 
     @property
-    def packing_fraction(self):
+    def packing_fraction(self) -> float:
         """φ = Σ π r² / V, rattlers included."""
         return float(np.pi * np.sum(self.r**2) / self.volume)
 
-    def _repr_svg_(self):
+    def _repr_svg_(self) -> str:
         """The packing as notebooks show it."""
         return notebook.packing_svg(self)
 
@@ -194,7 +232,7 @@ class Packing(NamedTuple):
 class Relaxation(NamedTuple):
     """What a relaxation solver reached."""
 
-    forces: np.ndarray  # (N_c, 2)
+    forces: Floats  # (N_c, 2)
     iterations: int  # sweeps or iterations used
     residual: float  # unbalance in ⟨f_n⟩, by Ensemble.residual
     violation: float  # cone violation in ⟨f_n⟩, by Ensemble.violation
@@ -202,7 +240,7 @@ class Relaxation(NamedTuple):
     seconds: float  # wall time
 
 
-def float_array(values, shape, name):
+def float_array(values: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Floats:
     """Cast to a contiguous float64 array of the given shape (−1: any) and check it is finite.
 
     Raises InputError naming the array.
@@ -220,7 +258,7 @@ def float_array(values, shape, name):
     return array
 
 
-def friction(mu):
+def friction(mu: Any) -> float:
     """μ as a float on the storage grid (9 significant digits); InputError unless finite and ≥ 0."""
     try:
         value = float(mu)
@@ -231,7 +269,7 @@ def friction(mu):
     return float(f"{value:.{MU_DIGITS}g}")
 
 
-def positive(value, name):
+def positive(value: Any, name: str) -> float:
     """The value as a finite float > 0; InputError otherwise."""
     try:
         number = float(value)
@@ -242,7 +280,7 @@ def positive(value, name):
     return number
 
 
-def whole(value, name, least=0, most=LARGEST_WHOLE):
+def whole(value: Any, name: str, least: int = 0, most: int | None = LARGEST_WHOLE) -> int:
     """The value as an int from least to most (None: any size); InputError otherwise."""
     try:
         number = int(value)
@@ -258,7 +296,7 @@ def whole(value, name, least=0, most=LARGEST_WHOLE):
     return number
 
 
-def are_whole(values, most=LARGEST_WHOLE):
+def are_whole(values: npt.ArrayLike, most: int = LARGEST_WHOLE) -> Mask:
     """Mask of values (…) that are whole numbers from 0 to `most`: those that a cast to int keeps.
 
     To be asked before every cast: what int64 cannot hold becomes another number in silence.
@@ -271,12 +309,12 @@ def are_whole(values, most=LARGEST_WHOLE):
         return np.zeros(values.shape, dtype=bool)
 
 
-def random_seed(value, name="seed"):
+def random_seed(value: Any, name: str = "seed") -> int:
     """The value as an int ≥ 0 of any size; InputError otherwise."""
     return whole(value, name, most=None)
 
 
-def check_memory(needed, what):
+def check_memory(needed: float, what: str) -> None:
     """InputError where what needs more bytes than this machine has memory."""
     try:
         there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
@@ -289,7 +327,7 @@ def check_memory(needed, what):
         )
 
 
-def moderate(value, name):
+def moderate(value: Any, name: str) -> float:
     """The value as a float > 0 whose powers stay finite; InputError otherwise."""
     number = positive(value, name)
     if not 1 / LARGEST_UNIT <= number <= LARGEST_UNIT:
@@ -300,7 +338,9 @@ def moderate(value, name):
     return number
 
 
-def make_contacts(i, j, normal, length, r):
+def make_contacts(
+    i: npt.ArrayLike, j: npt.ArrayLike, normal: npt.ArrayLike, length: npt.ArrayLike, r: Floats
+) -> Contacts:
     """Contacts from array-likes, cast once: grains i, j and centre distances (N_c,), normals.
 
     Lever arms are the radii r where no contact overlaps by more than RIGID_OVERLAP (rigid disks),
@@ -331,7 +371,18 @@ def make_contacts(i, j, normal, length, r):
     return Contacts(i, j, normal / norm[:, None], length, gap, r[i] + inward, r[j] + inward)
 
 
-def make_packing(x, r, box, contacts, forces, mu, pressure=np.nan, load=None, info=None, tilt=0.0):
+def make_packing(
+    x: npt.ArrayLike,
+    r: npt.ArrayLike,
+    box: npt.ArrayLike,
+    contacts: Contacts,
+    forces: npt.ArrayLike,
+    mu: Any,
+    pressure: float = np.nan,
+    load: npt.ArrayLike | None = None,
+    info: Mapping[str, Any] | None = None,
+    tilt: float = 0.0,
+) -> Packing:
     """A Packing from array-likes, cast and validated once; see the fields of Packing.
 
     A tilt beyond ±L_x/2 becomes the one between them that spans the same lattice.
@@ -355,7 +406,7 @@ def make_packing(x, r, box, contacts, forces, mu, pressure=np.nan, load=None, in
     )
 
 
-def make_cell(box, tilt=0.0):
+def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
     """A Cell of sides (2,) > 0, inf where open, whose tilt is taken between ±L_x/2.
 
     Raises InputError for anything else, and for a tilted cell that is open in a direction.
@@ -376,7 +427,7 @@ def make_cell(box, tilt=0.0):
     return Cell(box, float(tilt - box[0] * np.round(tilt / box[0])) if tilt else 0.0)
 
 
-def _check_own_images(cell, diameter):
+def _check_own_images(cell: Cell, diameter: float) -> None:
     if not cell.tilt and np.any(cell.box <= diameter):
         raise InputError(
             f"box sides must be two numbers above the largest diameter, got {cell.box}"
@@ -395,7 +446,7 @@ def _check_own_images(cell, diameter):
         )
 
 
-def _loads(load, count):
+def _loads(load: npt.ArrayLike, count: int) -> Floats:
     """Loads (N, 3) whose rows are finite, or NaN as a whole."""
     load = np.array(load, dtype=np.float64, order="C")
     left_open = np.isnan(load).all(axis=-1) if load.ndim == 2 else np.zeros(len(load), dtype=bool)
@@ -403,7 +454,7 @@ def _loads(load, count):
     return load
 
 
-def _check_repeated(contacts):
+def _check_repeated(contacts: Contacts) -> None:
     """Two grains touch twice only through different images, whose normals differ by 60° or more."""
     low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
     normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)

@@ -23,9 +23,10 @@ STRIP = 0.08  # height of a line of scales below the grains, in widths of the fr
 
 
 def network(frame, **options):
-    """Figure of the frame, and {one of WORDS: renderers} of what it may show; options: ranges."""
+    """Figure of the frame, and {one of WORDS: renderers} of what it may show; options: of it."""
+    name, title = f"frame{frame.report['frame']}", frame.source.split(": ")[-1]
     fig = figure(
-        "photoelastic_network", f"{frame.source.split(': ')[-1]}, frame {frame.report['frame']}",
+        name, f"{title}, frame {frame.report['frame']}",
         "x (unit of the file)", "y (unit of the file)", match_aspect=True, aspect_ratio=0.85,
         sizing_mode="scale_width", **options,
     )  # fmt: skip

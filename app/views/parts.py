@@ -30,6 +30,10 @@ link.click()
 setTimeout(() => URL.revokeObjectURL(link.href), 1000)
 """
 SAVED = f"(async () => {{{SAVE}}})()"
+NEWEST = """
+const fig = [...button.document._all_models.values()].findLast(one => one.tags.includes(mark))
+const name = fig.toolbar.tools.find(one => one.filename).filename;
+"""
 
 # Panel builds the views of a new child before React mounts them; told of another size of the
 # window in between, Bokeh measures plots that have no layout yet, fails, and leaves all as it was.
@@ -131,15 +135,19 @@ def savable(fig, name):
     return fig
 
 
-def saving(fig, name):
-    """A button each that saves the figure as PNG and as SVG, for all to see."""
+def saving(mark):
+    """A button each that saves the newest figure with this tag as PNG and as SVG, for all to see.
+
+    Buttons outlive figures: a widget that leaves the page while it is still being drawn there ends
+    in an error of React's.
+    """
     buttons = []
     for kind in ("png", "svg"):
         button = pmui.Button(
             label=f"Picture ({kind.upper()})", variant="outlined", size="small", margin=(4, 5),
             sx=PLAIN,
         )  # fmt: skip
-        button.js_on_click(args={"fig": fig, "name": name, "kind": kind}, code=SAVED)
+        button.js_on_click(args={"button": button, "mark": mark, "kind": kind}, code=NEWEST + SAVED)
         buttons.append(button)
     return buttons
 

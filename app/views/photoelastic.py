@@ -23,6 +23,7 @@ SHOWN = {
     "beside": "Both",
     "deviation": "Difference in σ",
 }
+SAVED = "photoelastic_saved"  # of the picture that the buttons save
 TOLD = 12  # contacts that are listed
 PLAYED_MS = 700  # a frame of a series
 WIDE = {"sizing_mode": "stretch_width", "margin": 0}
@@ -37,7 +38,6 @@ class Frames:
         self.files, self.task, self.options = files, task, options
         self.known = {first.report["frame"]: first}
         self.frame, self.playing = first, 0
-        self.body = pn.Column(**WIDE)
         self.choice = choice(SHOWN, "inferred")
         self.choice.param.watch(lambda event: together(self._dress), "value")
         self.pictures = pn.Row(styles={"flex-wrap": "wrap"}, **WIDE)
@@ -54,11 +54,24 @@ class Frames:
             show_loop_controls=False, **WIDE,
         )  # fmt: skip
         self.player.param.watch(lambda event: self._turn(event.new), "value")
+        self.found, self.listed, self.stresses = note(), note(), note()
+        self.compared = pn.pane.Bokeh(**WIDE)
         self._fill(first)
 
     def panel(self):
         """All of it, from above."""
-        return [self.player, self.body]
+        return [
+            self.player,
+            self.found,
+            self.choice,
+            self.pictures,
+            pn.FlexBox(*saving(SAVED), self.open, **WIDE),
+            note(OPENED),
+            self.listed,
+            self.compared,
+            self.stresses,
+            self.save,
+        ]
 
     def _turn(self, number):
         """Another frame: as it is known, or inferred first, while the player waits."""
@@ -88,19 +101,12 @@ class Frames:
             for line in photoelastic.account(frame.report)
         )
         head = f"<p><b>{html.escape(frame.source)}</b>, frame {frame.report['frame']}</p>"
-        self.picture, self.layers = chains.network(frame)
+        self.picture, self.layers = chains.network(frame, tags=[SAVED])
         self.pictures[:] = self._panes()
-        self.body[:] = [
-            note(head + told + found(frame.report)),
-            self.choice,
-            self.pictures,
-            pn.FlexBox(*saving(self.picture, f"frame{frame.report['frame']}"), self.open, **WIDE),
-            note(OPENED),
-            note(listed(frame)),
-            pn.pane.Bokeh(compared(frame), **WIDE),
-            note(stresses(frame)),
-            self.save,
-        ]
+        self.found.object = head + told + found(frame.report)
+        self.listed.object = listed(frame)
+        self.compared.object = compared(frame)
+        self.stresses.object = stresses(frame)
 
     def _panes(self):
         """What is chosen, in one picture or, side by side, in two: dressed before they are seen."""

@@ -5,7 +5,7 @@ import html
 import numpy as np
 from bokeh.models import ColumnDataSource, FixedTicker
 
-from granforce import statistics
+from granforce.measures import statistics
 
 from .. import studied
 from .hints import term

@@ -5,6 +5,9 @@
 """
 
 import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
 
 from granforce.bench.conditions import knowledge
 from granforce.bench.frames import frames
@@ -48,7 +51,7 @@ __all__ = [
 ]
 
 # Part → what it measures, and its heading.
-PARTS = {
+PARTS: dict[str, tuple[Callable[..., list[dict[str, Any]]], str]] = {
     "contact_updates": (contact_updates, "One contact update of Gauss–Seidel"),
     "relaxation": (relaxation, "One relaxation to 1e-9 ⟨f_n⟩, from the same kicked starts"),
     "scaling": (scaling, "One relaxation against the number of disks"),
@@ -72,7 +75,13 @@ PARTS = {
 }
 
 
-def run(folder=None, quick=True, *, parts=None, show=print):
+def run(
+    folder: str | Path | None = None,
+    quick: bool = True,
+    *,
+    parts: Sequence[str] | None = None,
+    show: Callable[[str], object] = print,
+) -> dict[str, Any]:
     """Measure all parts (or those named) and return {"environment": …, part: rows}.
 
     folder: where bench.json is written, after every part so that nothing is lost, and the figures
@@ -80,7 +89,7 @@ def run(folder=None, quick=True, *, parts=None, show=print):
     show: what is called with each finished table.
     """
     folder = None if folder is None else make_folder(folder)
-    results = {"environment": environment(), "quick": bool(quick), "seconds": {}}
+    results: dict[str, Any] = {"environment": environment(), "quick": bool(quick), "seconds": {}}
     for name in parts or PARTS:
         measure, heading = PARTS[name]
         begin = time.perf_counter()
@@ -96,7 +105,7 @@ def run(folder=None, quick=True, *, parts=None, show=print):
     return results
 
 
-def _draw(folder, results):
+def _draw(folder: Path, results: dict[str, Any]) -> None:
     from granforce import figures
 
     for name, backend in (("bench.html", "bokeh"), ("bench.png", "matplotlib")):
@@ -105,7 +114,7 @@ def _draw(folder, results):
             figures.save(figure, folder / name)
 
 
-def main(out=None, quick=False, as_json=False):
+def main(out: str | Path | None = None, quick: bool = False, as_json: bool = False) -> int:
     """The command `granforce bench`: tables or JSON on stdout, progress on stderr; returns 0."""
     results = run(out, quick, show=(lambda text: None) if as_json else print)
     if as_json:
@@ -115,6 +124,6 @@ def main(out=None, quick=False, as_json=False):
     return 0
 
 
-def _versions(results):
+def _versions(results: dict[str, Any]) -> dict[str, str]:
     libraries = results["environment"]["libraries"]
     return {"libraries": " ".join(f"{name} {v}" for name, v in libraries.items() if v)}

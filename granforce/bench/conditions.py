@@ -4,7 +4,9 @@ Both sides of each comparison get the same programs, and rows tell how far their
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -15,17 +17,29 @@ from granforce.bench.report import note
 from granforce.explore.intervals import intervals
 from granforce.explore.pull import pull
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.knowledge import Known
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack
+from granforce.records import Floats, Integers
 
 # Part of the contacts that are known, and how well; values of a pull, in parts of its interval.
 KNOWN_PART, KNOWN_WITHIN = 0.1, 0.1
 VALUES = np.linspace(0.05, 0.95, 8)
 
+T = TypeVar("T")
 
-def knowledge(quick=True, *, n=None, mu=0.1, seed=1, every=None, pulled=3, repeats=3):
+
+def knowledge(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    mu: float = 0.1,
+    seed: int = 1,
+    every: int | None = None,
+    pulled: int = 3,
+    repeats: int = 3,
+) -> list[dict[str, Any]]:
     """Rows: seconds of the same programs by granforce and by the baseline, and their errors.
 
     Bounds are those of every so-many-th contact. ratio: seconds of the baseline, HiGHS or PIQP,
@@ -52,7 +66,7 @@ def knowledge(quick=True, *, n=None, mu=0.1, seed=1, every=None, pulled=3, repea
     return [{"n": n, "mu": mu, **row} for row in rows]
 
 
-def _known(S, rng):
+def _known(S: Ensemble, rng: np.random.Generator) -> Known:
     """Normal forces of some contacts, within a tenth of the packing's own."""
     count = max(1, round(KNOWN_PART * len(S.index)))
     places = np.sort(rng.choice(len(S.index), count, replace=False))
@@ -62,7 +76,7 @@ def _known(S, rng):
     return Known(S.index[places], own - reach, own + reach)
 
 
-def _bounds(task, S, contacts):
+def _bounds(task: str, S: Ensemble, contacts: Integers) -> list[dict[str, Any]]:
     note(f"knowledge: {task}")
     intervals(S, contacts[:1])  # compiles
     S = replace(S)  # nothing is prepared
@@ -78,25 +92,25 @@ def _bounds(task, S, contacts):
     ]
 
 
-def _pulls(S, contacts, repeats):
+def _pulls(S: Ensemble, contacts: Integers, repeats: int) -> list[dict[str, Any]]:
     note("knowledge: pulls")
     found = intervals(S, contacts)
     ends = zip(contacts, found.lower[:, 0], found.upper[:, 0], strict=True)
     asked = [(int(c), low + VALUES * (high - low)) for c, low, high in ends]
 
-    def ours():
+    def ours() -> Floats:
         return np.concatenate([pull(S, c, values, S.original).states for c, values in asked])
 
-    def theirs():
+    def theirs() -> Floats:
         return np.array([_pulled_by_piqp(S, c, v) for c, values in asked for v in values])
 
-    def squares(states):
+    def squares(states: Floats) -> Floats:
         return np.sum((states - S.original) ** 2, axis=(1, 2))
 
     return _beside("pulls", S, ours, theirs, squares, repeats)
 
 
-def _pulled_by_piqp(S, contact, value):
+def _pulled_by_piqp(S: Ensemble, contact: int, value: float) -> Floats:
     """The network nearest to the original with this f_n."""
     A, b, T = S.scaled_form
     normal = T.tocsr()[S.per_contact * S.positions([contact])]
@@ -112,25 +126,34 @@ def _pulled_by_piqp(S, contact, value):
     return S.to_forces(T @ np.maximum(solver.result.x, 0.0) * S.force_scale)
 
 
-def _inferences(S, rng, seed, repeats):
+def _inferences(
+    S: Ensemble, rng: np.random.Generator, seed: int, repeats: int
+) -> list[dict[str, Any]]:
     note("knowledge: inference")
     sigma = np.array(ERRORS) * S.force_scale
     truth = sample_uniform(S, 8, seed=seed).flat[-1]
     m = truth + sigma * rng.standard_normal(truth.shape)
 
-    def ours():
+    def ours() -> Floats:
         return contact_program(S, m, sigma)[None]
 
-    def theirs():
+    def theirs() -> Floats:
         return piqp(S, m, sigma)[None]
 
-    def squares(states):
+    def squares(states: Floats) -> Floats:
         return np.sum(((states - m) / sigma) ** 2, axis=(1, 2))
 
     return _beside("inference, everything measured", S, ours, theirs, squares, repeats)
 
 
-def _beside(task, S, ours, theirs, squares, repeats):
+def _beside(
+    task: str,
+    S: Ensemble,
+    ours: Callable[[], Floats],
+    theirs: Callable[[], Floats],
+    squares: Callable[[Floats], Floats],
+    repeats: int,
+) -> list[dict[str, Any]]:
     """Rows of two ways to find the same networks, after one run that compiles."""
     ours()
     taken, found = zip(*(_timed(ours) for _ in range(repeats)), strict=True)
@@ -148,11 +171,11 @@ def _beside(task, S, ours, theirs, squares, repeats):
     return rows
 
 
-def _told(method, seconds, baseline):
+def _told(method: str, seconds: float, baseline: float) -> dict[str, Any]:
     return {"method": method, "seconds": seconds, "ratio": baseline / seconds}
 
 
-def _timed(action, *arguments):
+def _timed(action: Callable[..., T], *arguments: Any) -> tuple[float, T]:
     begin = time.perf_counter()
     result = action(*arguments)
     return time.perf_counter() - begin, result

@@ -2,23 +2,26 @@
 
 import importlib.util
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing
+from granforce.records import Floats
 
 
-def read_reference(path):
+def read_reference(path: str | Path) -> tuple[Ensemble, Any]:
     """The Ensemble of a reference file (NPZ) and its arrays."""
     return ensemble(load_packing(path)), np.load(path)
 
 
-def plain_loop(ensemble, contacts=None):
+def plain_loop(ensemble: Ensemble, contacts: Any = None) -> tuple[Floats, ...]:
     """Bounds (k, 2), (k, 2) by one HiGHS model, each program starting from the last basis.
 
     contacts: numbers in the packing, default all. One thread, primal simplex, nothing skipped;
@@ -40,7 +43,7 @@ def plain_loop(ensemble, contacts=None):
     return tuple(forces)
 
 
-def linprog_loop(ensemble):
+def linprog_loop(ensemble: Ensemble) -> tuple[Floats, ...]:
     """All bounds by scipy's linprog, one call a bound; shapes as in `plain_loop`."""
     A, T = ensemble.cone_form
     b = ensemble.b / ensemble.force_scale
@@ -51,7 +54,7 @@ def linprog_loop(ensemble):
     return tuple(ensemble.to_forces(np.array(value) * ensemble.force_scale))
 
 
-def cobra_loop(ensemble):
+def cobra_loop(ensemble: Ensemble) -> tuple[Floats, ...]:
     """All bounds by cobra's flux variability analysis, contacts as reactions on grains."""
     from cobra import Metabolite, Model, Reaction
     from cobra.flux_analysis import flux_variability_analysis
@@ -83,7 +86,7 @@ def cobra_loop(ensemble):
     return tuple(ensemble.to_forces(value * ensemble.force_scale))
 
 
-def run(quick=True, folder=Path("tests/reference")):
+def run(quick: bool = True, folder: Path = Path("tests/reference")) -> dict[str, Any]:
     """Times (s), ratios and errors (⟨f_n⟩) as {file: {method: …}}; prints them as a table.
 
     quick: only the 100-disk files; otherwise 400 disks at μ = 0.1 as well (two minutes).
@@ -105,7 +108,7 @@ def run(quick=True, folder=Path("tests/reference")):
     return results
 
 
-def _ours(system, data, workers):
+def _ours(system: Ensemble, data: Any, workers: int) -> dict[str, Any]:
     begin = time.perf_counter()
     found = intervals(system, workers=workers)
     seconds = time.perf_counter() - begin
@@ -113,19 +116,19 @@ def _ours(system, data, workers):
     return {"seconds": seconds, "error": error, "gap": found.max_gap, "counts": found.counts}
 
 
-def _timed(method, system, data):
+def _timed(method: Callable[..., Any], system: Ensemble, data: Any) -> dict[str, Any]:
     begin = time.perf_counter()
     lower, upper = method(system)
     seconds = time.perf_counter() - begin
     return {"seconds": seconds, "error": _error(system, data, lower, upper)}
 
 
-def _error(system, data, lower, upper):
+def _error(system: Ensemble, data: Any, lower: Floats, upper: Floats) -> float:
     off = np.abs(lower - data["lo"][system.index]), np.abs(upper - data["hi"][system.index])
     return float(np.max(off) / system.force_scale)
 
 
-def _show(name, rows):
+def _show(name: str, rows: dict[str, Any]) -> None:
     print(f"\n{name}\n{'method':24}{'time/s':>9}{'ratio':>8}{'error':>10}{'gap':>10}  counts")
     plain = rows["plain loop"]["seconds"]
     for method, row in rows.items():

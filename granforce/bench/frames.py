@@ -1,13 +1,17 @@
 """Photoelastic frames of known forces: how far measured and inferred forces are from the truth."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from granforce.bench.report import note
 from granforce.explore.remeasured import remeasured
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.compaction import pack
 from granforce.packing.importers.pegs import read_pegs
 from granforce.packing.importers.synthetic import synthetic_frame
+from granforce.records import Floats, Mask, Packing
 
 # σ in ⟨f_n⟩, part of contacts missed, and the friction taken over the true one.
 CASES = (
@@ -22,7 +26,14 @@ _REGIONS = 3
 _SPOILT, _BY = 5, 3.0
 
 
-def frames(quick=True, *, n=None, packings=None, cases=CASES, mu=MU):
+def frames(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    packings: int | None = None,
+    cases: Sequence[tuple[float, ...]] = CASES,
+    mu: float = MU,
+) -> list[dict[str, Any]]:
     """Rows: mean distance from the truth in ⟨f_n⟩ (f_n and f_t of listed contacts), and coverage.
 
     raw: as measured; likeliest: of `remeasured`, and of all contacts; mean: of its draws; stress:
@@ -37,7 +48,7 @@ def frames(quick=True, *, n=None, packings=None, cases=CASES, mu=MU):
         seeds = range(1, packings + 1)
         found = [_one(pack(n, mu, seed), sigma, missed, wrong, seed) for seed in seeds]
         note(f"frames: σ = {sigma:g}, missed {missed:g}, μ × {wrong:g}")
-        row = {"n": n, "sigma": sigma, "missed": missed, "mu_over_true": wrong}
+        row: dict[str, Any] = {"n": n, "sigma": sigma, "missed": missed, "mu_over_true": wrong}
         for name in found[0]:
             values = np.array([one[name] for one in found], dtype=float)
             row[name] = float(np.nanmean(values)) if np.isfinite(values).any() else None
@@ -45,9 +56,14 @@ def frames(quick=True, *, n=None, packings=None, cases=CASES, mu=MU):
     return rows
 
 
-def _one(packing, sigma, missed, wrong, seed):
+def _one(packing: Packing, sigma: float, missed: float, wrong: float, seed: int) -> dict[str, Any]:
     frame = synthetic_frame(packing, noise=sigma, missed=missed, seed=seed)
-    options = {"mu": wrong * packing.mu, "reach": REACH, "error": sigma * frame.unit, "repair": 0.5}
+    options: dict[str, Any] = {
+        "mu": wrong * packing.mu,
+        "reach": REACH,
+        "error": sigma * frame.unit,
+        "repair": 0.5,
+    }
     found = read_pegs(frame, **options)
     S, unit = ensemble(found.packing), frame.unit
     m, s = found.measured[S.index], found.sigma[S.index]
@@ -78,7 +94,7 @@ def _one(packing, sigma, missed, wrong, seed):
     return row | _spoilt(S, m, s, here, unit, seed)
 
 
-def _stress_error(S, forces, true):
+def _stress_error(S: Ensemble, forces: Floats, true: Floats) -> float:
     """Mean |Δp| over the mean p of the regions, p ∝ Σ f_n ℓ of the contacts in a region."""
     c = S.contacts
     x = S.packing.x[c.i] + 0.5 * c.length[:, None] * c.normal
@@ -91,7 +107,9 @@ def _stress_error(S, forces, true):
     return np.abs(of - exact).mean() / exact.mean()
 
 
-def _spoilt(S, m, s, here, unit, seed):
+def _spoilt(
+    S: Ensemble, m: Floats, s: Floats, here: Mask, unit: float, seed: int
+) -> dict[str, Any]:
     """How well contacts that are made wrong are told."""
     rng = np.random.default_rng(seed)
     chosen = rng.choice(np.flatnonzero(here), _SPOILT, replace=False)

@@ -1,6 +1,8 @@
 """Inference: the likeliest network by the contact program, by PIQP and by HiGHS, in one run."""
 
 import time
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import highspy
 import numpy as np
@@ -8,16 +10,24 @@ from scipy import sparse
 
 from granforce.bench.report import note
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.likeliest import checked, fitted
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack
+from granforce.records import Floats
 
 # Errors of f_n and f_t in ⟨f_n⟩, and seconds after which HiGHS is not waited for.
 ERRORS, PATIENCE = (0.2, 0.1), 120.0
 
 
-def inference(quick=True, *, n=None, frictions=None, seed=1, repeats=3):
+def inference(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] | None = None,
+    seed: int = 1,
+    repeats: int = 3,
+) -> list[dict[str, Any]]:
     """Rows: seconds of one inference (the least of some), and how far it is from the first's.
 
     A uniform state of S measured with ERRORS, everything measured; ratio: over the contact program;
@@ -31,7 +41,7 @@ def inference(quick=True, *, n=None, frictions=None, seed=1, repeats=3):
         sigma = np.array(ERRORS) * S.force_scale
         truth = sample_uniform(S, 8, seed=seed).flat[-1]
         m = truth + sigma * rng.standard_normal(truth.shape)
-        first = None
+        first: Any = None
         for name, solve in METHODS.items():
             seconds, forces = _timed(solve, S, m, sigma, repeats)
             first = first or (seconds, forces)
@@ -46,7 +56,9 @@ def inference(quick=True, *, n=None, frictions=None, seed=1, repeats=3):
     return rows
 
 
-def _timed(solve, S, m, sigma, repeats):
+def _timed(
+    solve: Callable[..., Floats | None], S: Ensemble, m: Floats, sigma: Floats, repeats: int
+) -> tuple[float, Floats | None]:
     """The least seconds of some runs, after one that compiles, and the forces; None in time."""
     taken, forces = [], None
     for _ in range(repeats + 1):
@@ -59,12 +71,12 @@ def _timed(solve, S, m, sigma, repeats):
     return min(taken), forces
 
 
-def contact_program(S, m, sigma):
+def contact_program(S: Ensemble, m: Floats, sigma: Floats) -> Floats:
     """As `granforce.infer` finds it."""
     return fitted(S, *checked(S, m, sigma))
 
 
-def _program(S, m, sigma):
+def _program(S: Ensemble, m: Floats, sigma: Floats) -> tuple[Any, ...]:
     """½ y·Q y + c·y over A y = b, y ≥ 0: (Q, c, A, b, T), the largest weight 1."""
     A, b, T = S.scaled_form
     weight = np.tile(sigma.min() / sigma, len(m))[: T.shape[0]] ** 2
@@ -73,7 +85,7 @@ def _program(S, m, sigma):
     return sparse.csc_matrix(T.T @ weighted), -(weighted.T @ target), A, b, T
 
 
-def piqp(S, m, sigma):
+def piqp(S: Ensemble, m: Floats, sigma: Floats) -> Floats:
     """By PIQP's sparse interior-point method."""
     Q, c, A, b, T = _program(S, m, sigma)
     solver = programs.quadratic_solver(400)
@@ -82,7 +94,7 @@ def piqp(S, m, sigma):
     return S.to_forces(T @ np.maximum(solver.result.x, 0.0)) * S.force_scale
 
 
-def highs(S, m, sigma):
+def highs(S: Ensemble, m: Floats, sigma: Floats) -> Floats | None:
     """By the active-set method of HiGHS; None where it does not end in time."""
     Q, c, A, b, T = _program(S, m, sigma)
     model = programs.standard_form(A, b)

@@ -5,6 +5,8 @@ import resource
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics import contact_matrix, contact_program
+from granforce.numerics.contact_program import Problem
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_force, critical_forces
@@ -36,7 +39,9 @@ print(2 * 1200**3 / best / 1e9)
 """
 
 
-def kernel(quick=True, *, n=100, mu=0.1, tiles=None):
+def kernel(
+    quick: bool = True, *, n: int = 100, mu: float = 0.1, tiles: Sequence[int] | None = None
+) -> list[dict[str, Any]]:
     """Rows: Gflop/s of one factorisation alone and in lanes, and its part of a dense product's."""
     dense = _dense_product()
     base = ensemble(pack(n, mu, 1))
@@ -61,14 +66,14 @@ def kernel(quick=True, *, n=100, mu=0.1, tiles=None):
     return rows
 
 
-def _dense_product():
+def _dense_product() -> float:
     single = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     called = [sys.executable, "-c", _DENSE]
     done = subprocess.run(called, env=os.environ | single, capture_output=True, check=True)
     return float(done.stdout)
 
 
-def _factorisation(problem, lanes):
+def _factorisation(problem: Problem, lanes: Any) -> float:
     """Seconds of the fastest of many factorisations."""
     work = contact_program.make_workspace(problem, len(lanes))
     best = np.inf
@@ -82,7 +87,13 @@ def _factorisation(problem, lanes):
     return best
 
 
-def starts(quick=True, *, n=None, frictions=FRICTIONS, repeats=None):
+def starts(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] = FRICTIONS,
+    repeats: int | None = None,
+) -> list[dict[str, Any]]:
     """Rows: milliseconds per nearest network by PIQP, one at a time, and 16 chains in lanes.
 
     The same starts for all, interleaved, so that a machine that slows down slows down all of them.
@@ -97,7 +108,8 @@ def starts(quick=True, *, n=None, frictions=FRICTIONS, repeats=None):
             "one at a time": lambda given, S=S: [nearest(S, start) for start in given],
             f"{LANES} lanes": lambda given, S=S: nearest_of_many(S, given),
         }
-        spent, worst = {name: [] for name in ways}, 0.0
+        spent: dict[str, list[float]] = {name: [] for name in ways}
+        worst = 0.0
         for turn in range(repeats + 1):
             given = kicked(S, 2 * LANES, turn)
             found = {}
@@ -114,7 +126,13 @@ def starts(quick=True, *, n=None, frictions=FRICTIONS, repeats=None):
     return rows
 
 
-def pushes(quick=True, *, n=None, frictions=(0.1, 1), contacts=None):
+def pushes(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] = (0.1, 1),
+    contacts: int | None = None,
+) -> list[dict[str, Any]]:
     """Rows: processor seconds of critical forces, one contact after the other and side by side.
 
     The same loads on the same contacts, whose limit loads are known; F_crit may not differ.
@@ -151,7 +169,9 @@ def pushes(quick=True, *, n=None, frictions=(0.1, 1), contacts=None):
     return rows
 
 
-def growth(quick=True, *, n=100, mu=0.1, tiles=None):
+def growth(
+    quick: bool = True, *, n: int = 100, mu: float = 0.1, tiles: Sequence[int] | None = None
+) -> list[dict[str, Any]]:
     """Rows: seconds of set-up, one relaxation and one exact bound against N, and exponents."""
     base = ensemble(pack(n, mu, 1))
     intervals(base, base.index[:1])  # compiles

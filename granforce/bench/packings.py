@@ -1,6 +1,8 @@
 """Compaction: run time against the overlap of the dynamics, against μ, and against N."""
 
 import time
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +14,15 @@ from granforce.records import NotJammedError
 FRICTIONS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 
 
-def compaction(quick=True, *, n=None, mu=0.1, steps=None, accuracies=None, seeds=None):
+def compaction(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    mu: float = 0.1,
+    steps: Sequence[float] | None = None,
+    accuracies: Sequence[float] | None = None,
+    seeds: int | None = None,
+) -> list[dict[str, Any]]:
     """Rows: run time and mean overlap of the dynamics, and φ, z, h of the packing it gave.
 
     One row per longest time step Δt and accuracy of a step; means over seeds. Mean overlap against
@@ -31,14 +41,26 @@ def compaction(quick=True, *, n=None, mu=0.1, steps=None, accuracies=None, seeds
     ]
 
 
-def compaction_frictions(quick=True, *, n=None, frictions=None, seeds=None):
+def compaction_frictions(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] | None = None,
+    seeds: int | None = None,
+) -> list[dict[str, Any]]:
     """Rows: time to a certified packing at each μ; means, and the slowest of the seeds."""
     n = n or (100 if quick else 400)
     frictions = frictions or (FRICTIONS[::3] if quick else FRICTIONS)
     return [_row(n, mu, seeds or (2 if quick else 5)) for mu in frictions]
 
 
-def compaction_growth(quick=True, *, mu=0.1, sizes=None, seeds=None):
+def compaction_growth(
+    quick: bool = True,
+    *,
+    mu: float = 0.1,
+    sizes: Sequence[int] | None = None,
+    seeds: int | None = None,
+) -> list[dict[str, Any]]:
     """Rows: time to a certified packing at growing N, and the exponent of time with N."""
     sizes = sizes or ((50, 100, 200) if quick else (100, 400, 1600, 6400))
     seeds = seeds or (2 if quick else 3)
@@ -48,7 +70,7 @@ def compaction_growth(quick=True, *, mu=0.1, sizes=None, seeds=None):
     return [*rows, {"n": "fit", "mu": mu, "exponent": exponent(jammed)}]
 
 
-def _row(n, mu, seeds, **options):
+def _row(n: int, mu: float, seeds: int, **options: Any) -> dict[str, Any]:
     told = "".join(f", {name} {value:g}" for name, value in options.items())
     note(f"compaction: N = {n}, μ = {mu:g}{told}")
     made = [_packed(n, mu, seed, **options) for seed in range(1, seeds + 1)]
@@ -61,7 +83,7 @@ def _row(n, mu, seeds, **options):
     return row
 
 
-def _packed(n, mu, seed, **options):
+def _packed(n: int, mu: float, seed: int, **options: Any) -> dict[str, Any]:
     begin = time.perf_counter()
     try:
         packing = pack(n, mu, seed, **options)

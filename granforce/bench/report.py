@@ -3,20 +3,24 @@
 import os
 import platform
 import sys
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from granforce.records import Rows
 
 LIBRARIES = ("granforce", "numpy", "scipy", "numba", "highspy", "piqp", "siconos")
 
 
-def note(message):
+def note(message: str) -> None:
     """One line of progress on stderr."""
     print(message, file=sys.stderr, flush=True)
 
 
-def environment():
+def environment() -> dict[str, Any]:
     """What the times were measured on: processor, cores, Python and library versions."""
     return {
         "cpu": _cpu(),
@@ -27,7 +31,7 @@ def environment():
     }
 
 
-def _cpu():
+def _cpu() -> str:
     information = Path("/proc/cpuinfo")
     if information.exists():
         for line in information.read_text().splitlines():
@@ -36,21 +40,22 @@ def _cpu():
     return platform.processor() or platform.machine()
 
 
-def _version(name):
+def _version(name: str) -> str | None:
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return None
 
 
-def exponent(points):
+def exponent(points: Sequence[tuple[float, float]]) -> float | None:
     """Slope of log y over log x of points (x, y), or None for fewer than two."""
     if len(points) < 2:
         return None
-    return float(np.polyfit(*np.log(points).T, 1)[0])
+    x, y = np.log(points).T
+    return float(np.polyfit(x, y, 1)[0])
 
 
-def table(title, rows):
+def table(title: str, rows: Rows) -> str:
     """Rows (dicts) as an aligned text table; columns are those that hold anything."""
     names = [name for name in dict.fromkeys(k for row in rows for k in row)]
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
@@ -63,7 +68,7 @@ def table(title, rows):
     return "\n".join([title, "-" * len(title), *lines, ""])
 
 
-def _cell(value):
+def _cell(value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -7,14 +7,17 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from granforce.bench.report import note
 from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.gauss_seidel import _from_rest
 from granforce.numerics.lanes import ONE
+from granforce.records import Floats
 
 # Environment variable naming a Python that can import Siconos, which has no package on PyPI.
 INTERPRETER = "GRANFORCE_SICONOS_PYTHON"
@@ -26,7 +29,7 @@ REPEATS = 3
 
 
 @functools.cache
-def interpreter():
+def interpreter() -> str | None:
     """The first Python that can import Siconos, or None."""
     for python in (os.environ.get(INTERPRETER), sys.executable, "/usr/bin/python3"):
         if python and _imports(python):
@@ -34,7 +37,7 @@ def interpreter():
     return None
 
 
-def _imports(python):
+def _imports(python: str) -> bool:
     test = [python, "-I", "-c", "import siconos.numerics, scipy.sparse"]
     try:
         return subprocess.run(test, capture_output=True, timeout=60).returncode == 0
@@ -42,7 +45,7 @@ def _imports(python):
         return False
 
 
-def against_siconos(S, start, tolerance):
+def against_siconos(S: Ensemble, start: Floats, tolerance: float) -> dict[str, Any] | None:
     """Time per contact update of both on a box of fixed size, and how far their forces differ.
 
     Siconos sweeps from the given forces until its error is below the tolerance; ours then does as
@@ -68,7 +71,7 @@ def against_siconos(S, start, tolerance):
     }
 
 
-def _siconos(python, S, start, tolerance):
+def _siconos(python: str, S: Ensemble, start: Floats, tolerance: float) -> dict[str, Any]:
     r = S.packing.r[S.grains]
     mass = np.pi * r**2
     # Rows of A are forces and torque/r of a grain: what they change velocities by in unit time.
@@ -87,7 +90,7 @@ def _siconos(python, S, start, tolerance):
             return dict(found)
 
 
-def _ours(S, start, sweeps):
+def _ours(S: Ensemble, start: Floats, sweeps: int) -> tuple[Floats, float]:
     problem, velocity, _, _ = _from_rest(S)
     problem = problem._replace(box_compliance=0.0)
     velocity[:] = 0.0

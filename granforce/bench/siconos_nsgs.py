@@ -12,7 +12,7 @@ import siconos.numerics as sn
 from scipy import sparse
 
 
-def main(problem, result, tolerance):
+def main(problem: str, result: str, tolerance: str) -> None:
     with np.load(problem) as given:
         W = sparse.csc_matrix((given["data"], given["indices"], given["indptr"]))
         r, mu = given["start"].copy(), np.full(W.shape[0] // 2, float(given["mu"]))

@@ -2,23 +2,26 @@
 
 import tempfile
 import time
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from granforce.bench.report import note
 from granforce.bench.solvers import kicked
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.nearest import nearest
 from granforce.packing import compaction
 from granforce.packing.compaction import pack
+from granforce.records import Packing
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
 
 
-def skips(quick=True, *, n=None, mu=0.1):
+def skips(quick: bool = True, *, n: int | None = None, mu: float = 0.1) -> list[dict[str, Any]]:
     """Rows: what is skipped, how often, seconds with the skip and without, and their ratio."""
     n = n or (100 if quick else 400)
     note(f"skips: N = {n}, μ = {mu:g}")
@@ -35,7 +38,7 @@ def skips(quick=True, *, n=None, mu=0.1):
     return [{"n": n, "mu": mu, **row} for row in rows]
 
 
-def _row(what, count, seconds, without):
+def _row(what: str, count: int, seconds: float, without: float) -> dict[str, Any]:
     ratio = without / seconds
     return {
         "skipped": what,
@@ -46,7 +49,7 @@ def _row(what, count, seconds, without):
     }
 
 
-def _seconds(action, repeats=5):
+def _seconds(action: Callable[[], object], repeats: int = 5) -> float:
     """Median run time of an action, done once before."""
     action()
     times = []
@@ -57,7 +60,7 @@ def _seconds(action, repeats=5):
     return float(np.median(times))
 
 
-def _rattlers(packing, S):
+def _rattlers(packing: Packing, S: Ensemble) -> dict[str, Any]:
     """A relaxation of all contacts of all grains, as in an import that has not been looked at."""
     whole = ensemble(packing, prune=False)
     start = kicked(whole, 1, 0)[0]
@@ -67,7 +70,7 @@ def _rattlers(packing, S):
     return _row("rattlers and unloaded contacts, one relaxation", count, few, every)
 
 
-def _tangential(packing):
+def _tangential(packing: Packing) -> dict[str, Any]:
     """The balance of a frictionless packing with the unknowns f_t kept (at μ = 1e-6) or not."""
     without = ensemble(packing, mu=1e-6)
     S = ensemble(packing)
@@ -77,7 +80,7 @@ def _tangential(packing):
     return _row(told, S.skipped["tangential_unknowns"], few, every)
 
 
-def _finish(S):
+def _finish(S: Ensemble) -> dict[str, Any]:
     """Sweeps that the exact finish of Gauss–Seidel saves, to the same tolerance 1e-6."""
     start = kicked(S, 1, 0)[0]
     short = gauss_seidel(S, start, tolerance=1e-6)
@@ -88,7 +91,7 @@ def _finish(S):
     return _row(told, long.iterations - short.iterations, few, every)
 
 
-def _neighbour_lists(n, mu):
+def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:
     """Compaction with its neighbour list, and with one made anew in every step."""
     pack(n, mu, 1)  # compiled, in memory
     seconds, rebuilds, usual = [], [], compaction.MOVED
@@ -103,7 +106,7 @@ def _neighbour_lists(n, mu):
     return _row("new neighbour lists, one compaction", rebuilds[1] - rebuilds[0], *seconds)
 
 
-def _programs(S):
+def _programs(S: Ensemble) -> dict[str, Any]:
     found = intervals(S)
     few = _seconds(lambda: intervals(S), 1)
     every = _seconds(lambda: intervals(S, skip=False), 1)
@@ -111,7 +114,7 @@ def _programs(S):
     return _row("programs for a least f_n seen to be 0", count, few, every)
 
 
-def _cells(n, mu):
+def _cells(n: int, mu: float) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(folder)
         named = kinds.WALK.parameters(kinds.PACKING.parameters(n, mu, 1), 50)

@@ -1,18 +1,20 @@
 """Relaxation solvers side by side: same starts, time and what was reached, and how it scales."""
 
 import time
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from granforce.bench.report import exponent, note
 from granforce.bench.siconos import ABSENT, TOLERANCES, against_siconos
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.gauss_seidel import SideBySide, gauss_seidel
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
-from granforce.records import make_contacts, make_packing
+from granforce.records import Floats, Packing, Relaxation, Rows, make_contacts, make_packing
 
 BASELINE = "Gauss–Seidel alone"
 # Residual (in ⟨f_n⟩) all solvers are asked for.
@@ -22,7 +24,7 @@ LONGEST = 300_000
 FRICTIONS = (0.01, 0.1, 0.3, 1.0, 10.0)
 
 
-def solvers(sweeps=LONGEST):
+def solvers(sweeps: int = LONGEST) -> dict[str, tuple[Callable[..., Relaxation], dict[str, Any]]]:
     """Name → (solver, options) of all that are compared."""
     return {
         BASELINE: (gauss_seidel, {"rest": None, "tolerance": GOAL, "max_iterations": sweeps}),
@@ -35,7 +37,14 @@ def solvers(sweeps=LONGEST):
     }
 
 
-def relaxation(quick=True, *, n=None, frictions=FRICTIONS, repeats=None, sweeps=None):
+def relaxation(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] = FRICTIONS,
+    repeats: int | None = None,
+    sweeps: int | None = None,
+) -> list[dict[str, Any]]:
     """Rows (dicts) per μ and solver: median time of one relaxation, residual, ratio to BASELINE.
 
     All solvers get the same starts, the packing's own network kicked as in the random walk. Where
@@ -59,7 +68,7 @@ def relaxation(quick=True, *, n=None, frictions=FRICTIONS, repeats=None, sweeps=
     return rows
 
 
-def kicked(S, count, seed):
+def kicked(S: Ensemble, count: int, seed: int) -> list[Floats]:
     """Starts of the random walk from the original network, a list of (N_c, 2)."""
     rng = np.random.default_rng(seed)
     amplitude = np.mean(S.original[:, 0])
@@ -69,12 +78,17 @@ def kicked(S, count, seed):
     return list(S.original + kicks)
 
 
-def _run(S, starts, solver, options):
+def _run(
+    S: Ensemble,
+    starts: Sequence[Floats],
+    solver: Callable[..., Relaxation],
+    options: dict[str, Any],
+) -> list[Relaxation]:
     solver(S, starts[0], **{**options, "max_iterations": 2})  # compiles, makes plans
     return [solver(S, start, **options) for start in starts]
 
 
-def _summary(run):
+def _summary(run: list[Relaxation]) -> dict[str, Any]:
     reached = [r.residual <= GOAL for r in run]
     return {
         "seconds": float(np.median([r.seconds for r in run])),
@@ -89,7 +103,7 @@ def _summary(run):
     }
 
 
-def _verdict(run, reached):
+def _verdict(run: list[Relaxation], reached: list[bool]) -> str:
     short = [r for r, ok in zip(run, reached, strict=True) if not ok and not r.converged]
     moving = [r for r, ok in zip(run, reached, strict=True) if not ok and r.converged]
     parts = []
@@ -101,20 +115,22 @@ def _verdict(run, reached):
     return "; ".join(parts)
 
 
-def _ratio(baseline, run):
+def _ratio(baseline: list[Relaxation], run: list[Relaxation]) -> dict[str, Any]:
     ratio = np.median([r.seconds for r in baseline]) / np.median([r.seconds for r in run])
     bound = any(r.residual > GOAL for r in baseline) and all(r.residual <= GOAL for r in run)
     return {"ratio": float(ratio), "ratio_is_lower_bound": bool(bound)}
 
 
-def contact_updates(quick=True, *, n=None, mu=0.1, sweeps=2000):
+def contact_updates(
+    quick: bool = True, *, n: int | None = None, mu: float = 0.1, sweeps: int = 2000
+) -> list[dict[str, Any]]:
     """Rows: nanoseconds per contact update of our sweep, alone and against Siconos.
 
     Both start from the same forces in a box of fixed size and do the same number of sweeps.
     """
     n = n or (100 if quick else 400)
     S = ensemble(pack(n, mu, 1))
-    options = {"rest": None, "tolerance": 0.0, "max_iterations": sweeps}
+    options: dict[str, Any] = {"rest": None, "tolerance": 0.0, "max_iterations": sweeps}
     runs = _run(S, kicked(S, 5, 0), gauss_seidel, options)
     each = float(np.median([1e9 * r.seconds / (r.iterations * len(S.index)) for r in runs]))
     row = {"n": n, "mu": mu}
@@ -143,7 +159,7 @@ def contact_updates(quick=True, *, n=None, mu=0.1, sweeps=2000):
     return rows
 
 
-def tile(S, k):
+def tile(S: Ensemble, k: int) -> Packing:
     """The packing of an ensemble repeated k × k times: N k² disks, exactly as balanced.
 
     Only the ensemble's contacts are kept; build the new ensemble with ``prune=False``.
@@ -178,7 +194,15 @@ def tile(S, k):
     )
 
 
-def scaling(quick=True, *, n=100, mu=0.1, tiles=None, repeats=3, patience=None):
+def scaling(
+    quick: bool = True,
+    *,
+    n: int = 100,
+    mu: float = 0.1,
+    tiles: Sequence[int] | None = None,
+    repeats: int = 3,
+    patience: float | None = None,
+) -> list[dict[str, Any]]:
     """Rows: time per relaxation against N by tiling, and the exponent of time with N per solver.
 
     A solver is left out at sizes above the one where it first needed `patience` seconds. The
@@ -210,7 +234,7 @@ def scaling(quick=True, *, n=100, mu=0.1, tiles=None, repeats=3, patience=None):
     return rows + _exponents(rows, mu)
 
 
-def _exponents(rows, mu):
+def _exponents(rows: Rows, mu: float) -> list[dict[str, Any]]:
     fits = []
     for name in solvers():
         points = [

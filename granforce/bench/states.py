@@ -4,8 +4,10 @@ import contextlib
 import multiprocessing
 import sys
 import time
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,15 +15,15 @@ from granforce import measures
 from granforce.bench.report import note
 from granforce.explore.intervals import intervals as exact_intervals
 from granforce.explore.random_walk import walk
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.packing.compaction import pack
-from granforce.records import NotJammedError
+from granforce.records import Floats, NotJammedError, Packing
 from granforce.tolerances import EQUILIBRIUM
 
-WALKS = {
+WALKS: dict[str, dict[str, Any]] = {
     "Gauss–Seidel alone": {
         "relax": gauss_seidel,
         "rest": None,
@@ -40,7 +42,14 @@ ATTEMPTS = 4
 REFERENCES = Path("tests/reference")
 
 
-def walks(quick=True, *, n=None, packings=None, states=None, frictions=FRICTIONS):
+def walks(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    packings: int | None = None,
+    states: int | None = None,
+    frictions: Sequence[float] = FRICTIONS,
+) -> list[dict[str, Any]]:
     """Rows: η1, η2, η3 and distance from the centre, mean ± standard error over packings.
 
     Every solver walks on the same packings with the same seeds. The distance is
@@ -53,7 +62,7 @@ def walks(quick=True, *, n=None, packings=None, states=None, frictions=FRICTIONS
     states = states or (50 if quick else 60)
     rows = []
     for mu in frictions:
-        found = {name: [] for name in WALKS}
+        found: dict[Any, list[Any]] = {name: [] for name in WALKS}
         for seed in range(1, packings + 1):
             note(f"walks: N = {n}, μ = {mu:g}, packing {seed} of {packings}")
             S = ensemble(pack(n, mu, seed))
@@ -65,7 +74,7 @@ def walks(quick=True, *, n=None, packings=None, states=None, frictions=FRICTIONS
     return rows
 
 
-def _walked(S, states, seed):
+def _walked(S: Ensemble, states: int, seed: int) -> dict[str, dict[str, float]]:
     """Measures by solver on one packing; an empty dict for a walk that failed."""
     done, seconds = {}, {}
     for name, options in WALKS.items():
@@ -77,7 +86,7 @@ def _walked(S, states, seed):
         return {name: {} for name in WALKS}
     centre = np.mean([measures.mean_network(w.states) for w in done.values()], axis=0)
     size = np.linalg.norm(centre)
-    found = {name: {} for name in WALKS}
+    found: dict[Any, dict[Any, Any]] = {name: {} for name in WALKS}
     for name, one in done.items():
         found[name] = {
             "eta1": measures.eta1(one.states),
@@ -91,9 +100,9 @@ def _walked(S, states, seed):
     return found
 
 
-def _over_packings(values):
+def _over_packings(values: Sequence[dict[str, float]]) -> dict[str, Any]:
     kept = [one for one in values if one]
-    row = {"failed": len(values) - len(kept)}
+    row: dict[str, Any] = {"failed": len(values) - len(kept)}
     for key in kept[0] if kept else ():
         numbers = np.array([one[key] for one in kept])
         row[key] = float(numbers.mean())
@@ -102,7 +111,13 @@ def _over_packings(values):
     return row
 
 
-def batches(quick=True, *, n=None, states=None, frictions=FRICTIONS):
+def batches(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    states: int | None = None,
+    frictions: Sequence[float] = FRICTIONS,
+) -> list[dict[str, Any]]:
     """Rows: states per second of two chains on one thread and on two, by default relaxation.
 
     Chains share what depends on the geometry alone (matrices, the plan of the factorisation);
@@ -118,7 +133,7 @@ def batches(quick=True, *, n=None, states=None, frictions=FRICTIONS):
         begin = time.perf_counter()
         walk(S, 1, 0)
         setup = time.perf_counter() - begin
-        seconds = {1: [], 2: []}
+        seconds: dict[Any, list[Any]] = {1: [], 2: []}
         for _ in range(3):
             for workers, times in seconds.items():
                 begin = time.perf_counter()
@@ -131,14 +146,14 @@ def batches(quick=True, *, n=None, states=None, frictions=FRICTIONS):
     return rows
 
 
-def _ceiling(S, states):
+def _ceiling(S: Ensemble, states: int) -> float:
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         alone = pool.submit(_speed, S.packing, states).result()
         together = [pool.submit(_speed, S.packing, states) for _ in range(2)]
         return sum(one.result() for one in together) / alone
 
 
-def _speed(packing, states):
+def _speed(packing: Packing, states: int) -> float:
     """States per second of one chain in this process."""
     S = ensemble(packing)
     walk(S, 2, 0)
@@ -147,7 +162,13 @@ def _speed(packing, states):
     return states / (time.perf_counter() - begin)
 
 
-def intervals(quick=True, *, n=None, frictions=None, states=None):
+def intervals(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] | None = None,
+    states: Sequence[int] | None = None,
+) -> list[dict[str, Any]]:
     """Rows: η3 and mean ΔF_n seen by walks of growing length against the exact intervals.
 
     Exact bounds come with their own run time, so that the cost of either can be compared.
@@ -174,13 +195,15 @@ def intervals(quick=True, *, n=None, frictions=None, states=None):
     return rows
 
 
-def _extents(S, lower, upper):
+def _extents(S: Ensemble, lower: Floats, upper: Floats) -> tuple[float, float]:
     """η3 and the mean length of the intervals of f_n, in ⟨f_n⟩."""
     extent = measures.normal_extent(lower, upper).mean() / S.force_scale
     return measures.eta3(lower, upper), float(extent)
 
 
-def _growing(S, name, counts, eta3, extent):
+def _growing(
+    S: Ensemble, name: str, counts: Sequence[int], eta3: float, extent: float
+) -> Iterator[dict[str, Any]]:
     times, begin = [], time.perf_counter()
     done = walk(
         S,
@@ -202,7 +225,7 @@ def _growing(S, name, counts, eta3, extent):
         }
 
 
-def interval_methods(quick=True, *, folder=REFERENCES):
+def interval_methods(quick: bool = True, *, folder: Path = REFERENCES) -> list[dict[str, Any]]:
     """Exact intervals against other tools, by `granforce.bench.exact` (needs its packings).
 
     Rows with time, ratio to a plain loop over programs, and error against the reference bounds

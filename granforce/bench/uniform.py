@@ -5,9 +5,10 @@ hopsy (pip install hopsy) is optional: it brings GLPK, and is used for nothing e
 
 import resource
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -25,9 +26,10 @@ from granforce.explore.uniform import (
     warm_up,
 )
 from granforce.explore.walls import walls
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
+from granforce.records import Floats
 
 # Dimension up to which hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79, is waited
 # for. Beyond it hopsy gets our rounding only.
@@ -42,7 +44,14 @@ _TIMED = 2
 ROOMS = {"16 rows at a time": 0.0, "rows within 1 GiB": 1.0, "all rows kept": 1e3}
 
 
-def uniform(quick=True, *, n=None, frictions=None, seed=1, rounded=None):
+def uniform(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] | None = None,
+    seed: int = 1,
+    rounded: int | None = None,
+) -> list[dict[str, Any]]:
     """Rows: seconds of processor time per effective state (bulk, minimum over components).
 
     Four chains in one thread, warm-up included; set-up (centre, factor, rows of K) apart.
@@ -74,17 +83,20 @@ def uniform(quick=True, *, n=None, frictions=None, seed=1, rounded=None):
 
 class _Run(NamedTuple):
     method: str
-    states: np.ndarray | None  # (chains, k, N_c, 2), None where it could not be run
+    states: Floats | None  # (chains, k, N_c, 2), None where it could not be run
     mixing: Mixing | None
     seconds: float  # processor time of the steps
     setup: float  # processor time of what had to be done before, the walls left out
     note: str = ""
 
 
-def _row(start, S, first, run, setup):
-    if run.states is None:
+def _row(
+    start: dict[str, Any], S: Ensemble, first: _Run, run: _Run, setup: float
+) -> dict[str, Any]:
+    if run.mixing is None or first.mixing is None:
         return start | {"method": run.method, "note": run.note}
-    cost, least = (one.seconds / one.mixing.least_bulk for one in (run, first))
+    cost = run.seconds / run.mixing.least_bulk
+    least = first.seconds / first.mixing.least_bulk
     row = start | {"method": run.method, "seconds_per_state": cost, "ratio": cost / least}
     row |= {"effective": run.mixing.least_bulk, "r_hat": run.mixing.worst_r_hat}
     row |= {"seconds": run.seconds, "setup_seconds": setup + run.setup}
@@ -93,7 +105,7 @@ def _row(start, S, first, run, setup):
     return row
 
 
-def _ours(S, made, kept, method, seed):
+def _ours(S: Ensemble, made: Any, kept: Any, method: str, seed: int) -> _Run:
     note(f"uniform: h = {made.dimension}, {method}")
     for count in (1, STATES // 4):  # the first time it is compiled
         begin = time.process_time()
@@ -105,7 +117,15 @@ def _ours(S, made, kept, method, seed):
     return _Run(method, states, mixing(states, varying(S, made)), seconds, 0.0)
 
 
-def uniform_growth(quick=True, *, n=None, mu=0.1, tiles=None, effective=100, seed=1):
+def uniform_growth(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    mu: float = 0.1,
+    tiles: Sequence[int] | None = None,
+    effective: int = 100,
+    seed: int = 1,
+) -> list[dict[str, Any]]:
     """Rows: what an effective state takes against the number of disks, one packing repeated.
 
     reached: `effective` states (bulk and tail, of every component) were drawn, in `seconds` of
@@ -147,11 +167,11 @@ def uniform_growth(quick=True, *, n=None, mu=0.1, tiles=None, effective=100, see
     return rows + [{"n": "fit", "rows": place, "exponent": fit} for place, fit in fits.items()]
 
 
-def _peak():
+def _peak() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
-def _going_on(sample, part):
+def _going_on(sample: Any, part: float) -> Any:
     """Seconds of processor time per state, rows of K in a part of the memory meant for them."""
     made, ends, rows = sample.walls, sample.ends, some_rows(sample.walls, part)
     if len(rows.owner) == made.count:
@@ -164,7 +184,7 @@ def _going_on(sample, part):
     return seconds / (_TIMED * len(ends))
 
 
-def _null_space(S, made):
+def _null_space(S: Ensemble, made: Any) -> float:
     """Seconds of processor time of the QR that gives the same K by a dense null space."""
     weighted = S.scaled_form[0].tocsc()[:, made.moving].toarray() * made.centre[made.moving]
     begin = time.process_time()
@@ -172,7 +192,7 @@ def _null_space(S, made):
     return time.process_time() - begin
 
 
-def _two_cores(made, kept, seed):
+def _two_cores(made: Any, kept: Any, seed: int) -> float:
     wall = []
     ends, reach, _ = warm_up(made, 2, seed, stores=[kept])
     for workers in (1, 2):
@@ -184,7 +204,7 @@ def _two_cores(made, kept, seed):
     return wall[0] / wall[1]
 
 
-def _hopsy(S, made, kept, rounded):
+def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
     """Coordinate hit-and-run by hopsy, its best walk, on our rounding and, up to `rounded`, its.
 
     It wants coordinates: those of an orthonormal basis of what K projects on.
@@ -219,7 +239,7 @@ def _hopsy(S, made, kept, rounded):
     return runs
 
 
-def _agreement(S, one, two):
+def _agreement(S: Ensemble, one: Any, two: Any) -> list[float]:
     """Root mean square z-scores of the means and second moments of all components that vary."""
     varies = ~np.isnan(one.mixing.bulk)
     centre = one.states.mean(axis=(0, 1))

@@ -1,30 +1,36 @@
 """What each command of the command line does; `cli` parses the words."""
 
+import argparse
 import json
 import re
 import runpy
 import socket
 import sys
 import threading
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from granforce import measures
 from granforce.cli import frames
 from granforce.packing import importers, scenes
 from granforce.perturb.critical_force import COUNTS
-from granforce.records import InputError, check_memory, whole
+from granforce.records import InputError, Rows, check_memory, whole
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study import scan as scans
-from granforce.study.store import open_store
+from granforce.study.cells import Kind
+from granforce.study.keys import Parameters
+from granforce.study.store import Store, open_store
 from granforce.system.files import check_file, written
 from granforce.system.terminal import Bar, Steps, print_list, report, table
 from granforce.tolerances import CARRYING
 
 
-def _radii(text, n):
+def _radii(text: str, n: int) -> str | list[float]:
     if ":" in text:
         return text
     try:
@@ -38,7 +44,7 @@ def _radii(text, n):
     return radii
 
 
-def _numbers(option, text, cast):
+def _numbers(option: str, text: str | None, cast: Callable[[str], Any]) -> list[Any] | None:
     """The numbers of an option, separated by commas; None where it was not given."""
     if text is None:
         return None
@@ -48,14 +54,14 @@ def _numbers(option, text, cast):
         raise InputError(f"{option} {text[:40]!r}: give numbers separated by commas") from None
 
 
-def _outputs(*paths):
+def _outputs(*paths: str | None) -> None:
     """Files that cannot be written are told before anything is computed."""
     for path in paths:
         if path is not None:
             check_file(path)
 
 
-def _packing_parameters(arguments, mu, seed):
+def _packing_parameters(arguments: argparse.Namespace, mu: float, seed: int) -> Parameters:
     return kinds.PACKING.parameters(
         arguments.n,
         mu,
@@ -70,13 +76,13 @@ def _packing_parameters(arguments, mu, seed):
     )
 
 
-def _required_mu(arguments):
+def _required_mu(arguments: argparse.Namespace) -> float:
     if arguments.mu is None:
         raise InputError("give the friction coefficient: --mu 0.1")
     return arguments.mu
 
 
-def pack(arguments):
+def pack(arguments: argparse.Namespace) -> None:
     """Make or find a packing, or a scene; report it."""
     if arguments.scene is not None:
         return _scene(arguments)
@@ -96,7 +102,7 @@ def pack(arguments):
     report(lines, arguments.json)
 
 
-def _scene(arguments):
+def _scene(arguments: argparse.Namespace) -> None:
     _outputs(arguments.out)
     packing = scenes.scene(arguments.scene, arguments.mu)
     if arguments.out is not None:
@@ -104,7 +110,9 @@ def _scene(arguments):
     report({"scene": arguments.scene, **importers.report(packing)}, arguments.json)
 
 
-def _prepared(arguments, name, *outputs):
+def _prepared(
+    arguments: argparse.Namespace, name: Callable[[Parameters], Parameters], *outputs: str | None
+) -> tuple[Store, Parameters]:
     """The store, with the packing in it, and the parameters that name(packing's) gives.
 
     Everything that can be told from the command line alone is told before a packing is made.
@@ -127,7 +135,13 @@ def _prepared(arguments, name, *outputs):
     return store, parameters
 
 
-def _get(store, kind, parameters, arguments, watching=None):
+def _get(
+    store: Store,
+    kind: Kind,
+    parameters: Parameters,
+    arguments: argparse.Namespace,
+    watching: Any = None,
+) -> tuple[xr.Dataset, bool]:
     """The dataset of a kind, computed or found, and whether it was found.
 
     watching(bar): what the kind's compute calls with what it finds, which tells of it on the bar.
@@ -138,18 +152,18 @@ def _get(store, kind, parameters, arguments, watching=None):
         return study.get(store, kind, parameters, **told)
 
 
-def _telling_eta(bar):
+def _telling_eta(bar: Any) -> Callable[[Any], None]:
     """watch(Found) of a walk: η1 of all states until now stands beside the bar."""
     growth, lock = measures.Growth(), threading.Lock()
 
-    def watch(found):
+    def watch(found: Any) -> None:
         with lock:
             bar.note(f"η1 = {growth.add(found.forces)[0]:.4f}")
 
     return watch
 
 
-def _conditions(arguments):
+def _conditions(arguments: argparse.Namespace) -> dict[str, Any]:
     """What the options say of conditions, as parameters of kinds."""
     asked = {
         "prescribed": arguments.prescribe,
@@ -158,16 +172,18 @@ def _conditions(arguments):
     return asked | _known(arguments)
 
 
-def _known(arguments):
+def _known(arguments: argparse.Namespace) -> dict[str, Any]:
     """The same of known forces."""
     given = getattr(arguments, "known", None)
     return {} if given is None else {"known": importers.read_known(given)}
 
 
-def _walked(arguments, *outputs):
+def _walked(
+    arguments: argparse.Namespace, *outputs: str | None
+) -> tuple[Store, Parameters, xr.Dataset, bool]:
     asked = _conditions(arguments)
 
-    def name(packing):
+    def name(packing: Parameters) -> Parameters:
         return kinds.WALK.parameters(
             packing,
             arguments.states,
@@ -183,7 +199,7 @@ def _walked(arguments, *outputs):
     return store, parameters, dataset, cached
 
 
-def walk(arguments):
+def walk(arguments: argparse.Namespace) -> None:
     """Random walk, made or found; report how it went."""
     store, parameters, dataset, cached = _walked(arguments)
     lines = {
@@ -205,11 +221,11 @@ UNIFORM_LINES = (
 )
 
 
-def uniform(arguments):
+def uniform(arguments: argparse.Namespace) -> int:
     """Uniform sample, drawn or found; report it. Returns 1 if it is not worth what was wanted."""
     asked = _conditions(arguments)
 
-    def name(packing):
+    def name(packing: Parameters) -> Parameters:
         return kinds.UNIFORM.parameters(
             packing,
             arguments.states,
@@ -241,11 +257,11 @@ def uniform(arguments):
     return 1 if arguments.effective is not None and not reached else 0
 
 
-def volume(arguments):
+def volume(arguments: argparse.Namespace) -> int:
     """The volume of S, measured or found; report it. Returns 1 if it is not as sure as wanted."""
     asked = _conditions(arguments)
 
-    def name(packing):
+    def name(packing: Parameters) -> Parameters:
         accuracy, seed = arguments.accuracy, arguments.volume_seed
         return kinds.VOLUME.parameters(packing, accuracy, seed, mu=arguments.ensemble_mu, **asked)
 
@@ -277,7 +293,7 @@ INFERENCE_LINES = (
 )
 
 
-def infer(arguments):
+def infer(arguments: argparse.Namespace) -> int | None:
     """The likeliest network of measured forces, with error bars if wanted; report it."""
     if arguments.frames is not None:
         return frames.infer_frames(arguments, _flaws_and_walls(arguments))
@@ -288,7 +304,7 @@ def infer(arguments):
     asked, states = _conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = importers.read_measurement(arguments.measured)
 
-    def name(packing):
+    def name(packing: Parameters) -> Parameters:
         return kinds.INFERENCE.parameters(
             packing,
             measured,
@@ -346,9 +362,10 @@ def infer(arguments):
     if arguments.csv is not None:
         _write_csv(arguments.csv, columns)
     report(lines | {"seconds": dataset["seconds"].item(), "cached": cached}, arguments.json)
+    return None
 
 
-def measure(arguments):
+def measure(arguments: argparse.Namespace) -> None:
     """Measures of a walk, made or found."""
     _, parameters, dataset, _ = _walked(arguments, arguments.contacts)
     scale = dataset["force_scale"].item()
@@ -375,7 +392,7 @@ def measure(arguments):
     report(lines, arguments.json)
 
 
-def _write_csv(path, columns):
+def _write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:
     """Columns {name: array} as a table; whole numbers stay whole."""
     with written(path) as file:
         np.savetxt(
@@ -388,12 +405,12 @@ def _write_csv(path, columns):
         )
 
 
-def perturb(arguments):
+def perturb(arguments: argparse.Namespace) -> None:
     """Critical forces and first motions of contacts, computed or found; report them."""
     chosen = _numbers("--contacts", arguments.contacts, int)
     asked = _conditions(arguments)
 
-    def name(packing):
+    def name(packing: Parameters) -> Parameters:
         return kinds.PERTURBATION.parameters(
             packing,
             mu=arguments.ensemble_mu,
@@ -431,12 +448,12 @@ def perturb(arguments):
     report(lines, arguments.json)
 
 
-def _exact(arguments):
+def _exact(arguments: argparse.Namespace) -> tuple[Store, Parameters]:
     contacts = _numbers("--contacts", arguments.contacts, int)
     edges = _numbers("--slice", arguments.slice, float)
     asked = _conditions(arguments)
 
-    def name(packing):
+    def name(packing: Parameters) -> Parameters:
         return kinds.INTERVALS.parameters(
             packing, mu=arguments.ensemble_mu, contacts=contacts, slice_=edges, **asked
         )
@@ -444,7 +461,7 @@ def _exact(arguments):
     return _prepared(arguments, name, arguments.csv)
 
 
-def intervals(arguments):
+def intervals(arguments: argparse.Namespace) -> None:
     """Exact intervals, computed or found; report them."""
     store, parameters = _exact(arguments)
     dataset, cached = _get(store, kinds.INTERVALS, parameters, arguments)
@@ -478,7 +495,7 @@ def intervals(arguments):
     report(lines, arguments.json)
 
 
-def limit_loads(arguments):
+def limit_loads(arguments: argparse.Namespace) -> None:
     """Limit loads, computed or found; report them."""
     store, parameters = _exact(arguments)
     dataset, cached = _get(store, kinds.LIMIT_LOADS, parameters, arguments)
@@ -499,11 +516,11 @@ def limit_loads(arguments):
     report(lines, arguments.json)
 
 
-def stress(arguments):
+def stress(arguments: argparse.Namespace) -> None:
     """The outline of stresses, computed or found; report it."""
     known = _known(arguments)
 
-    def name(packing):
+    def name(packing: Parameters) -> Parameters:
         return kinds.STRESS.parameters(
             packing, mu=arguments.ensemble_mu, angles=arguments.angles, **known
         )
@@ -529,7 +546,7 @@ def stress(arguments):
     report(lines, arguments.json)
 
 
-def import_(arguments):
+def import_(arguments: argparse.Namespace) -> None:
     """Read a packing from elsewhere; report and save it."""
     _outputs(arguments.out)
     if arguments.format == "pegs":
@@ -564,7 +581,7 @@ def import_(arguments):
     report(lines, arguments.json)
 
 
-def _import_pegs(arguments):
+def _import_pegs(arguments: argparse.Namespace) -> None:
     """Read a photoelastic frame; report and save it, and what was measured."""
     _outputs(arguments.measured)
     found = importers.read_pegs(
@@ -583,7 +600,7 @@ def _import_pegs(arguments):
     report(found.report, arguments.json)
 
 
-def _flaws_and_walls(arguments):
+def _flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:
     """What the options say of flaws and walls, as `importers.read_pegs` takes it."""
     if arguments.strict and arguments.repair is not None:
         raise InputError("--strict mends nothing: leave out --repair")
@@ -597,9 +614,9 @@ def _flaws_and_walls(arguments):
     }
 
 
-def scan(arguments):
+def scan(arguments: argparse.Namespace) -> int:
     """Cells over processes into a store; print their table. Returns 1 if a cell failed."""
-    mus = _numbers("--mu", arguments.mu, float)
+    mus = _numbers("--mu", arguments.mu, float) or []
     seeds = whole(arguments.seeds, "--seeds", 1)
     whole(arguments.workers, "--workers", 1)
     check_memory(scans.CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
@@ -630,7 +647,7 @@ def scan(arguments):
     return 1 if failed else 0
 
 
-def _report_scan(rows, failed, as_json):
+def _report_scan(rows: Rows, failed: Sequence[tuple[Parameters, str]], as_json: bool) -> None:
     found = sum(line["cached"] for line in rows)
     summary = {"cells": len(rows) + len(failed), "found": found, "failed": len(failed)}
     if as_json:
@@ -652,14 +669,14 @@ def _report_scan(rows, failed, as_json):
     )
 
 
-def study_(arguments):
+def study_(arguments: argparse.Namespace) -> int:
     """The study of the paper. Returns 1 if a cell failed."""
     from granforce.paper.main import main
 
     return main(arguments)
 
 
-def app(arguments):
+def app(arguments: argparse.Namespace) -> None:
     """The page, served by `panel serve` in this process until it is interrupted."""
     port = whole(arguments.port, "--port", 0, 65_535)
     for origin in arguments.allow_websocket_origin:
@@ -678,7 +695,7 @@ def app(arguments):
     runpy.run_module("panel", run_name="__main__", alter_sys=True)
 
 
-def _page():
+def _page() -> Path:
     """The page's folder: inside the installed package, beside it in a checkout."""
     package = Path(__file__).resolve().parents[1]
     for folder in (package / "app", package.parent / "app"):
@@ -687,7 +704,7 @@ def _page():
     raise InputError(f"the page is not installed: {package} has no folder app; install the wheel")
 
 
-def _check_address(address, port):
+def _check_address(address: str, port: int) -> None:
     """InputError where nothing can listen there, or something listens already."""
     if not address.strip():
         raise InputError("--address is empty; give a name or a number, such as localhost")
@@ -704,14 +721,14 @@ def _check_address(address, port):
         ) from None
 
 
-def bench(arguments):
+def bench(arguments: argparse.Namespace) -> None:
     """The benchmark's report."""
     from granforce.bench import main
 
     main(arguments.out, arguments.quick, arguments.json)
 
 
-def cache(arguments):
+def cache(arguments: argparse.Namespace) -> int:
     """List, measure, clear or verify a store. Returns 1 if an entry is damaged."""
     store = open_store(arguments.cache)
     if arguments.action == "clear":

@@ -1,16 +1,22 @@
 """`granforce infer --frames`: many photoelastic frames, over processes, in one dataset."""
 
+import argparse
 import sys
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
+from granforce.packing.importers.repair import KINDS
 from granforce.records import InputError, whole
 from granforce.study import series
+from granforce.study.series import Frame
 from granforce.study.store import open_store
 from granforce.system.terminal import Bar, print_list
 
 
-def infer_frames(arguments, options):
+def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     """Import and infer the frames that were asked for; print a line of each. 1 if one failed."""
     if arguments.mu is None:
         raise InputError("give the friction coefficient: --mu 0.5")
@@ -46,7 +52,7 @@ def infer_frames(arguments, options):
     return 1 if failed else 0
 
 
-def _chosen(frames, text):
+def _chosen(frames: Sequence[Frame], text: str) -> Sequence[Frame]:
     """The frames that were asked for, by number."""
     if text == "all":
         return frames
@@ -60,13 +66,13 @@ def _chosen(frames, text):
     return [frame for frame in frames if frame.number in numbers]
 
 
-def _rows(dataset):
+def _rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """A line for each frame; forces in its mean measured normal force."""
     rows = []
     for k, number in enumerate(dataset["frame"].values.tolist()):
         one, unit = dataset.isel(frame=k), float(dataset["unit"][k])
         account = dict(zip(dataset["kind"].values, one["account"].values, strict=True))
-        mended = sum(int(account[kind]) for kind in series.KINDS if kind != "beyond_friction")
+        mended = sum(int(account[kind]) for kind in KINDS if kind != "beyond_friction")
         moved = np.abs(one["change"].values) > 3 * one["change_error"].values
         rows.append(
             {

@@ -1,8 +1,12 @@
 """The command line: `granforce COMMAND --help` tells each command with an example."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 import warnings
+from collections.abc import Sequence
+from typing import NoReturn, TypeAlias
 
 # Only the standard library up here: --help must not wait for numba, xarray and HiGHS.
 
@@ -10,8 +14,11 @@ LONGEST = 600  # characters of a message
 
 EXAMPLE = argparse.RawDescriptionHelpFormatter
 
+# What subcommands are added to.
+Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
-def main(argv=None):
+
+def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0, 1 (some cells failed), 2 (bad input) or 130 (Ctrl-C)."""
     arguments = _parser().parse_args(argv)
     from granforce.records import Cancelled, InputError
@@ -25,7 +32,7 @@ def main(argv=None):
         tell_when_compiling(_say_compiling)
         return getattr(commands, arguments.run)(arguments) or 0
     except InputError as error:
-        return _refused(error)
+        return _refused(str(error))
     except MemoryError as error:
         return _refused(f"not enough memory: {str(error) or 'ask for less'}")
     except (KeyboardInterrupt, Cancelled):
@@ -38,12 +45,12 @@ def main(argv=None):
         warnings.formatwarning = usual
 
 
-def _say_compiling():
+def _say_compiling() -> None:
     # As a line of progress, which later ones may follow on the same row.
     print("\rgranforce: compiling, once per machine …", file=sys.stderr)
 
 
-def _refused(reason):
+def _refused(reason: str) -> int:
     line = " ".join(str(reason).split())
     if len(line) > LONGEST:  # a name of thousands of characters, say
         line = f"{line[: LONGEST // 2]} … {line[-LONGEST // 2 :]}"
@@ -54,11 +61,11 @@ def _refused(reason):
 class _Parser(argparse.ArgumentParser):
     """A parser that tells what is wrong in one line."""
 
-    def error(self, message):
+    def error(self, message: str) -> NoReturn:
         self.exit(_refused(f"{message}; see {self.prog} --help"))
 
 
-def _parser():
+def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="granforce",
         description="Explore how undetermined the forces in a packing of rigid disks are.",
@@ -86,7 +93,9 @@ def _parser():
     return parser
 
 
-def _command(commands, name, run, summary, example, *, reports=True):
+def _command(
+    commands: Commands, name: str, run: str, summary: str, example: str, *, reports: bool = True
+) -> argparse.ArgumentParser:
     command = commands.add_parser(
         name,
         help=summary,
@@ -101,7 +110,7 @@ def _command(commands, name, run, summary, example, *, reports=True):
     return command
 
 
-def _add_store(command):
+def _add_store(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--cache",
         metavar="FOLDER",
@@ -109,7 +118,7 @@ def _add_store(command):
     )
 
 
-def _add_packing(command, several=False):
+def _add_packing(command: argparse.ArgumentParser, several: bool = False) -> None:
     group = command.add_argument_group("the packing")
     group.add_argument("-n", type=int, default=400, help="number of disks (default 400)")
     if not several:
@@ -141,12 +150,12 @@ def _add_packing(command, several=False):
     )
 
 
-def _add_any_packing(command):
+def _add_any_packing(command: argparse.ArgumentParser) -> None:
     command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
     _add_packing(command)
 
 
-def _add_conditions(command, known=True):
+def _add_conditions(command: argparse.ArgumentParser, known: bool = True) -> None:
     group = command.add_argument_group(
         "what the forces have to satisfy, beside balance and friction"
     )
@@ -165,7 +174,7 @@ def _add_conditions(command, known=True):
         _add_known(group)
 
 
-def _add_known(group):
+def _add_known(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--known",
         metavar="FILE.csv",
@@ -174,7 +183,7 @@ def _add_known(group):
     )
 
 
-def _add_walk_options(command):
+def _add_walk_options(command: argparse.ArgumentParser) -> None:
     group = command.add_argument_group("the random walk")
     group.add_argument("--states", type=int, default=1000, help="accepted states (default 1000)")
     group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
@@ -190,7 +199,7 @@ def _add_walk_options(command):
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
 
 
-def _add_pack(commands):
+def _add_pack(commands: Commands) -> None:
     command = _command(
         commands,
         "pack",
@@ -211,7 +220,7 @@ def _add_pack(commands):
     command.add_argument("--out", metavar="FILE.npz", help="also save the packing to this file")
 
 
-def _add_walk(commands):
+def _add_walk(commands: Commands) -> None:
     command = _command(
         commands,
         "walk",
@@ -222,14 +231,14 @@ def _add_walk(commands):
     _add_source(command)
 
 
-def _add_source(command):
+def _add_source(command: argparse.ArgumentParser) -> None:
     _add_any_packing(command)
     _add_walk_options(command)
     _add_conditions(command)
     _add_store(command)
 
 
-def _add_uniform(commands):
+def _add_uniform(commands: Commands) -> None:
     command = _command(
         commands,
         "uniform",
@@ -251,7 +260,7 @@ def _add_uniform(commands):
     _add_store(command)
 
 
-def _add_volume(commands):
+def _add_volume(commands: Commands) -> None:
     command = _command(
         commands,
         "volume",
@@ -274,7 +283,7 @@ def _add_volume(commands):
     _add_store(command)
 
 
-def _add_infer(commands):
+def _add_infer(commands: Commands) -> None:
     command = _command(
         commands,
         "infer",
@@ -334,7 +343,7 @@ def _add_infer(commands):
     _add_scheduler(command)
 
 
-def _add_measure(commands):
+def _add_measure(commands: Commands) -> None:
     command = _command(
         commands,
         "measure",
@@ -348,7 +357,7 @@ def _add_measure(commands):
     )
 
 
-def _add_scan(commands):
+def _add_scan(commands: Commands) -> None:
     command = _command(
         commands,
         "scan",
@@ -367,7 +376,7 @@ def _add_scan(commands):
     _add_scheduler(command)
 
 
-def _add_study(commands):
+def _add_study(commands: Commands) -> None:
     command = _command(
         commands,
         "study",
@@ -428,7 +437,7 @@ def _add_study(commands):
     _add_scheduler(command)
 
 
-def _add_scheduler(command):
+def _add_scheduler(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--scheduler",
         metavar="ADDRESS",
@@ -437,7 +446,7 @@ def _add_scheduler(command):
     )
 
 
-def _add_exact(command):
+def _add_exact(command: argparse.ArgumentParser) -> None:
     _add_any_packing(command)
     group = command.add_argument_group("the ensemble")
     group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
@@ -453,7 +462,7 @@ def _add_exact(command):
     _add_store(command)
 
 
-def _add_intervals(commands):
+def _add_intervals(commands: Commands) -> None:
     command = _command(
         commands,
         "intervals",
@@ -464,7 +473,7 @@ def _add_intervals(commands):
     _add_exact(command)
 
 
-def _add_limit_loads(commands):
+def _add_limit_loads(commands: Commands) -> None:
     command = _command(
         commands,
         "limit-loads",
@@ -475,7 +484,7 @@ def _add_limit_loads(commands):
     _add_exact(command)
 
 
-def _add_stress(commands):
+def _add_stress(commands: Commands) -> None:
     command = _command(
         commands,
         "stress",
@@ -493,7 +502,7 @@ def _add_stress(commands):
     _add_store(command)
 
 
-def _add_perturb(commands):
+def _add_perturb(commands: Commands) -> None:
     command = _command(
         commands,
         "perturb",
@@ -518,7 +527,7 @@ def _add_perturb(commands):
     _add_store(command)
 
 
-def _add_app(commands):
+def _add_app(commands: Commands) -> None:
     command = _command(
         commands,
         "app",
@@ -542,7 +551,7 @@ def _add_app(commands):
     command.add_argument("--warm", action="store_true", help="be ready before the first visitor")
 
 
-def _add_import(commands):
+def _add_import(commands: Commands) -> None:
     command = _command(
         commands,
         "import",
@@ -584,7 +593,7 @@ def _add_import(commands):
     )
 
 
-def _add_reading(group):
+def _add_reading(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--reach",
         type=float,
@@ -601,7 +610,7 @@ def _add_reading(group):
     )
 
 
-def _add_flaws_and_walls(group):
+def _add_flaws_and_walls(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--repair",
         type=float,
@@ -626,7 +635,7 @@ def _add_flaws_and_walls(group):
     )
 
 
-def _add_bench(commands):
+def _add_bench(commands: Commands) -> None:
     command = _command(
         commands,
         "bench",
@@ -638,7 +647,7 @@ def _add_bench(commands):
     command.add_argument("--out", metavar="FOLDER", help="write the rows as JSON to this folder")
 
 
-def _add_cache(commands):
+def _add_cache(commands: Commands) -> None:
     command = _command(
         commands,
         "cache",

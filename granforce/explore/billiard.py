@@ -6,13 +6,20 @@ walls, and a row of K, which is kept (`Rows`) or asked for: a path then stops wh
 on, bit for bit as if the row had been there, once it is.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from granforce.numerics import lanes
 from granforce.numerics.lanes import compiled, within
+from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.explore.walls import Walls
 
 # Walls are padded to a multiple of this, so that the search for the next one runs in lanes.
 LANES = 64
@@ -27,25 +34,25 @@ _PATH, _HITS, _TURNS, _REFUSED, _FLYING = range(5)
 class Rows(NamedTuple):
     """Rows of K that are kept."""
 
-    values: np.ndarray  # (places, walls)
-    place: np.ndarray  # (walls,) where each row is, −1 where it is not
-    owner: np.ndarray  # (places,) wall of each place, −1 where it is free
-    used: np.ndarray  # (places,) bool, since the hand came by last
-    hand: np.ndarray  # (1,) the next place that may be given away
+    values: Floats  # (places, walls)
+    place: Integers  # (walls,) where each row is, −1 where it is not
+    owner: Integers  # (places,) wall of each place, −1 where it is free
+    used: Mask  # (places,) bool, since the hand came by last
+    hand: Integers  # (1,) the next place that may be given away
 
 
 class Flight(NamedTuple):
     """Where one chain is."""
 
-    s: np.ndarray  # (walls,) slacks
-    w: np.ndarray  # (walls,) their speeds
-    start: np.ndarray  # (walls,) slacks where the path began
-    rate: np.ndarray  # (walls,) one over the time to each wall
-    left: np.ndarray  # (1,) time that is left of the path
-    count: np.ndarray  # (5,) path, its hits; turns and paths not taken in all; whether in flight
+    s: Floats  # (walls,) slacks
+    w: Floats  # (walls,) their speeds
+    start: Floats  # (walls,) slacks where the path began
+    rate: Floats  # (walls,) one over the time to each wall
+    left: Floats  # (1,) time that is left of the path
+    count: Integers  # type: ignore[assignment]  # (5,) path, its hits; turns and paths not taken in all; whether in flight
 
 
-def all_rows(walls):
+def all_rows(walls: Walls) -> Rows | None:
     """The Rows of all walls where they fit into MEMORY, None where not."""
     count = walls.count
     if 8 * count**2 > MEMORY:
@@ -57,12 +64,12 @@ def all_rows(walls):
     return rows
 
 
-def some_rows(walls, part):
+def some_rows(walls: Walls, part: float) -> Rows:
     """Rows with room in a part of MEMORY, none of them there yet."""
     return _room(walls.count, max(2 * lanes.LANES, int(part * MEMORY / (8 * max(1, walls.count)))))
 
 
-def _room(count, places):
+def _room(count: int, places: int) -> Rows:
     places = min(max(1, places), max(1, count))
     return Rows(
         np.zeros((places, count)),
@@ -73,7 +80,7 @@ def _room(count, places):
     )
 
 
-def make_rows(walls, rows, wanted):
+def make_rows(walls: Walls, rows: Rows, wanted: Sequence[int] | Integers) -> None:
     """Put the rows of so many walls where others were not used for long."""
     new = walls.rows(np.asarray(wanted))
     for wall, row in zip(wanted, new, strict=True):
@@ -88,18 +95,26 @@ def make_rows(walls, rows, wanted):
         rows.hand[0] = (here + 1) % len(rows.owner)
 
 
-def make_flight(slacks):
+def make_flight(slacks: Floats) -> Flight:
     """A Flight that begins at slacks (walls,)."""
-    room = (np.empty_like(slacks) for _ in range(3))
-    return Flight(slacks.copy(), *room, np.zeros(1), np.zeros(5, dtype=np.int64))
+    return Flight(
+        s=slacks.copy(),
+        w=np.empty_like(slacks),
+        start=np.empty_like(slacks),
+        rate=np.empty_like(slacks),
+        left=np.zeros(1),
+        count=np.zeros(5, dtype=np.int64),
+    )
 
 
-def counted(flight):
+def counted(flight: Flight) -> tuple[int, int]:
     """Turns and paths not taken."""
     return flight.count[_TURNS], flight.count[_REFUSED]
 
 
-def follow(walls, rows, flights, on):
+def follow(
+    walls: Walls, rows: Rows, flights: Sequence[Flight], on: Callable[[int, Flight], int]
+) -> None:
     """Carry flights to the end of their paths; on(number, flight) → the wall that it waits at.
 
     Where rows are missing, those of the walls that are next for each flight are made side by side.
@@ -113,8 +128,8 @@ def follow(walls, rows, flights, on):
         wanted = [met[number] for number in waiting]
         for flight in waiting.values():
             soon = np.where(rows.place < 0, flight.rate, -1.0)
-            ahead = np.argpartition(-soon, each)[:each] if each else []
-            wanted += [int(wall) for wall in ahead if soon[wall] > 0]
+            ahead = np.argpartition(-soon, each)[:each].tolist() if each else []
+            wanted += [wall for wall in ahead if soon[wall] > 0]
         wanted = list(dict.fromkeys(wanted))[: max(lanes.LANES, len(waiting))]
         if wanted:
             make_rows(walls, rows, wanted)

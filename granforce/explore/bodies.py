@@ -8,16 +8,18 @@ has no end in some direction, the half-spaces are cut far outside; the corners t
 along which it goes on, which are certified (A d = 0, d ≥ 0).
 """
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial import HalfspaceIntersection
 
 from granforce import notebook
 from granforce.explore.walls import inner_point, null_space
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import certificates
-from granforce.records import InputError
+from granforce.records import Floats, InputError, Integers, Packing
 from granforce.tolerances import BALANCED, FLAT
 
 MOST_DIMENSIONS = 3
@@ -34,31 +36,33 @@ OPENS, SLIDES_BACK, SLIDES = 0, -1, 1  # f_n = 0, f_t = −μ f_n, f_t = μ f_n
 class Side(NamedTuple):
     """A side of S: an end (h = 1), an edge of the polygon (2) or a face of the body (3)."""
 
-    corners: np.ndarray  # (k,) positions in Body.corners; at h = 3 in order around the face
-    stops: tuple  # ((contact, OPENS, SLIDES or SLIDES_BACK), …), contact by its number in packing
-    normal: np.ndarray  # (h,) unit vector out of S
+    corners: Integers  # (k,) positions in Body.corners; at h = 3 in order around the face
+    stops: tuple[
+        tuple[int, int], ...
+    ]  # ((contact, OPENS, SLIDES or SLIDES_BACK), …), contact by its number in packing
+    normal: Floats  # (h,) unit vector out of S
 
 
 class Body(NamedTuple):
     """S as a point, a segment, a polygon or a body, in h orthonormal coordinates u."""
 
-    origin: np.ndarray  # (N_c, 2) the network at u = 0, force
-    axes: np.ndarray  # (h, N_c, 2) networks of length 1: F = origin + u · axes
-    corners: np.ndarray  # (V, h) force
-    rays: np.ndarray  # (R, h) unit vectors along which S has no end; none where it is bounded
-    sides: tuple  # of Side
+    origin: Floats  # (N_c, 2) the network at u = 0, force
+    axes: Floats  # (h, N_c, 2) networks of length 1: F = origin + u · axes
+    corners: Floats  # (V, h) force
+    rays: Floats  # (R, h) unit vectors along which S has no end; none where it is bounded
+    sides: tuple[Side, ...]  # of Side
 
     @property
-    def bounded(self):
+    def bounded(self) -> bool:
         """Whether S has an end everywhere."""
         return not len(self.rays)
 
-    def forces(self, u):
+    def forces(self, u: Floats) -> Floats:
         """Networks (…, N_c, 2) at points u (…, h)."""
         return self.origin + np.tensordot(u, self.axes, axes=1)
 
     @property
-    def intervals(self):
+    def intervals(self) -> tuple[Floats, Floats]:
         """Least and largest f_n, f_t (N_c, 2) of the contacts; ±inf where there is no end."""
         low, high = self.forces(self.corners).min(axis=0), self.forces(self.corners).max(axis=0)
         for along in np.tensordot(self.rays, self.axes, axes=1):
@@ -66,13 +70,13 @@ class Body(NamedTuple):
             low = np.where(along < -FLAT, -np.inf, low)
         return low, high
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The body as notebooks show it."""
         lines = {"dimension h": len(self.axes), "corners": len(self.corners)}
         return notebook.table("S, whole", lines | {"has an end everywhere": self.bounded})
 
 
-def body(S):
+def body(S: Ensemble) -> Body:
     """The Body of an Ensemble S of at most MOST_DIMENSIONS dimensions.
 
     Raises InputError where there are more, or forces are known.
@@ -98,7 +102,7 @@ def body(S):
     return Body(S.to_forces(scale * (T @ y)), axes, scale * corners, rays, sides)
 
 
-def fall(packing, mu=None):
+def fall(packing: Packing, mu: float | None = None) -> Floats | None:
     """The motion (N, 3) of the grains, velocity and r ω, that proves that nothing balances.
 
     Loads do work in it, and no admissible force on a contact takes any: Aᵀu ≥ 0 in cone coordinates
@@ -118,7 +122,7 @@ def fall(packing, mu=None):
     return motion / (np.abs(motion).max() or 1.0)
 
 
-def _balanced(A, b, y, moving):
+def _balanced(A: sparse.csr_matrix, b: Floats, y: Floats, moving: Integers) -> Floats:
     """y with what its program left unbalanced spread over what moves."""
     y = y.copy()
     for _ in range(3):
@@ -128,7 +132,9 @@ def _balanced(A, b, y, moving):
     return y
 
 
-def _corners(slopes, inner, A, moving):
+def _corners(
+    slopes: Floats, inner: Floats, A: sparse.csr_matrix, moving: Integers
+) -> tuple[Floats, Floats, dict[Any, Any]]:
     """Corners (V, h) and rays (R, h) of {u : inner + slopes u ≥ 0}, and {row: corners in it}."""
     h = slopes.shape[1]
     size = np.linalg.norm(slopes, axis=1)
@@ -152,7 +158,7 @@ def _corners(slopes, inner, A, moving):
     return np.reshape(corners, (-1, h)), np.reshape(rays, (-1, h)), members
 
 
-def _meetings(slope, rest):
+def _meetings(slope: Floats, rest: Floats) -> Floats:
     """Points (V, h) where sides rest + slope u ≥ 0 around u = 0 meet."""
     if slope.shape[1] == 1:
         up, down = slope[:, 0] > 0, slope[:, 0] < 0
@@ -167,21 +173,24 @@ def _meetings(slope, rest):
     return found[first]
 
 
-def _solved(slope, rest, member):
+def _solved(slope: Floats, rest: Floats, member: Any) -> Floats:
     """The corner where these sides meet, to rounding."""
     return np.linalg.lstsq(slope[member], -rest[member], rcond=None)[0]
 
 
-def _along(slope, member, total):
+def _along(slope: Floats, member: Any, total: Floats) -> Floats:
     """The direction that stays in all of these sides and goes outwards."""
     direction = np.linalg.svd(slope[member])[2][-1] if member.any() else np.ones(len(total))
     return direction * np.sign(direction @ total) / np.linalg.norm(direction)
 
 
-def _sides(S, slopes, moving, corners, members):
+def _sides(
+    S: Ensemble, slopes: Floats, moving: Integers, corners: Floats, members: Any
+) -> tuple[Side, ...]:
     """Sides of rows that meet the body in one of full size, those of one place together."""
     h = slopes.shape[1]
-    stops, places = {}, {}
+    stops: dict[tuple[int, ...], list[tuple[int, int]]] = {}
+    places: dict[tuple[int, ...], int] = {}
     for row, inside in members.items():
         if len(inside) >= max(1, h - 1):
             stops.setdefault(tuple(inside.tolist()), []).append(_stop(S, int(moving[row])))
@@ -196,14 +205,14 @@ def _sides(S, slopes, moving, corners, members):
     return tuple(sides)
 
 
-def _stop(S, column):
+def _stop(S: Ensemble, column: int) -> tuple[int, int]:
     """(contact, what stops there) of a cone coordinate that is 0."""
     if S.mu == 0:
         return int(S.index[column]), OPENS
     return int(S.index[column // 2]), SLIDES if column % 2 else SLIDES_BACK
 
 
-def _joined(labels):
+def _joined(labels: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
     """Stops, a contact that slides both ways being one that opens."""
     both = {}
     for contact, what in labels:
@@ -211,7 +220,7 @@ def _joined(labels):
     return sorted(both.items())
 
 
-def _around(points, normal):
+def _around(points: Floats, normal: Floats) -> Integers:
     """The order of points (k, 3) of a plane around their middle."""
     across = np.linalg.svd(normal[None])[2][1:]
     flat = (points - points.mean(axis=0)) @ across.T

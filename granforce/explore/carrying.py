@@ -1,17 +1,19 @@
 """Which contacts carry for certain: in every network that agrees with a measurement."""
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce import notebook
 from granforce.explore.intervals import bound_of
 from granforce.forces import knowledge
 from granforce.forces.contact_problem import make_system
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, checked, likeliest
 from granforce.numerics.certified_values import Solver
-from granforce.records import positive
+from granforce.records import Cancel, Floats, Integers, Mask, Progress, positive
 from granforce.system import cancelling
 from granforce.tolerances import CARRYING, INTERVAL_GAP
 
@@ -26,13 +28,13 @@ _AT_ONCE = 64
 class Carrying(NamedTuple):
     """The least f_n of k contacts over all networks that agree with a measurement."""
 
-    contacts: np.ndarray  # (k,) their numbers in the packing
-    least: np.ndarray  # (k,) certified lower bound of f_n, force
-    carries: np.ndarray  # (k,) bool: it is above 0, so they carry for certain
+    contacts: Integers  # (k,) their numbers in the packing
+    least: Floats  # (k,) certified lower bound of f_n, force
+    carries: Mask  # (k,) bool: it is above 0, so they carry for certain
     widened: int  # measured components whose bounds had to give, as no network agreed
-    counts: dict  # programs solved, and skipped as f_n = 0 was seen in some network
+    counts: dict[str, int]  # programs solved, and skipped as f_n = 0 was seen in some network
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The result as notebooks show it."""
         lines = {"contacts": len(self.contacts), "carry for certain": int(self.carries.sum())}
         return notebook.table("Contacts that carry", lines | self.counts)
@@ -40,17 +42,17 @@ class Carrying(NamedTuple):
 
 @cancelling.cancellable
 def carrying(
-    ensemble,
-    measured,
-    sigma,
-    contacts=None,
+    ensemble: Ensemble,
+    measured: npt.ArrayLike,
+    sigma: npt.ArrayLike,
+    contacts: npt.ArrayLike | None = None,
     *,
-    within=3.0,
-    unmeasured=UNMEASURED,
-    workers=1,
-    progress=None,
-    cancel=None,
-):
+    within: float = 3.0,
+    unmeasured: float = UNMEASURED,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Carrying:
     """Least f_n of contacts over the networks within so many σ of a measurement; a Carrying.
 
     measured, sigma, unmeasured: as for `infer`. contacts: numbers in the packing, by default all
@@ -87,15 +89,18 @@ def carrying(
     )
 
 
-def _least(ensemble, places, forces, workers, progress):
+def _least(
+    ensemble: Ensemble, places: Integers, forces: Floats, workers: int, progress: Progress | None
+) -> tuple[Floats, dict[str, int]]:
     """Certified lower bounds (k,) of f_n, in ⟨f_n⟩, and counts."""
     seen = forces[:, 0] / ensemble.force_scale
 
-    def note(key, y):
+    def note(key: Any, y: Floats) -> None:
         np.minimum(seen, y[: 2 * len(seen)].reshape(-1, 2).mean(axis=1), out=seen)
 
     solver = Solver(make_system(ensemble), workers=workers, seen=note)
-    least, done = {}, 0
+    least: dict[Any, tuple[float, float]] = {}
+    done = 0
     waiting = [int(c) for c in places]
     while waiting:
         waiting = [c for c in waiting if seen[c] > INTERVAL_GAP]

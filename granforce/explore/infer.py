@@ -11,16 +11,19 @@ standard error of every force, of those that were not measured too.
 
 import copy
 import time
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce import notebook
 from granforce.explore import billiard, uniform
 from granforce.explore.mixing import Mixing, mixing
-from granforce.explore.walls import walls
-from granforce.forces.likeliest import UNMEASURED, checked, likeliest
-from granforce.records import whole
+from granforce.explore.walls import Walls, walls
+from granforce.forces.ensemble import Ensemble
+from granforce.forces.likeliest import UNMEASURED, Likeliest, checked, likeliest
+from granforce.records import Cancel, Floats, Integers, Progress, whole
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
@@ -36,47 +39,50 @@ _AT_ONCE = 8
 _DROPPED, _ROUND = 20, 20
 
 
+Kind = TypeVar("Kind", bound="Inference")
+
+
 class Draws(NamedTuple):
     """States of S drawn with the weight exp(−χ²/2), by chain, and whether they can be trusted."""
 
-    states: np.ndarray  # (chains, k, N_c, 2) admissible networks, force
-    residual: np.ndarray  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
-    violation: np.ndarray  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
+    states: Floats  # (chains, k, N_c, 2) admissible networks, force
+    residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
+    violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component
     reached: bool  # all in S, and R̂ ≤ MIXED
-    counts: dict  # turns, refused paths, dropped states, held coordinates
+    counts: dict[str, Any]  # turns, refused paths, dropped states, held coordinates
     setup_seconds: float  # wall time of the walls and of the rows of K that are kept
     sampling_seconds: float  # wall time of the draws, those dropped included
 
-    effective = uniform.UniformSample.effective
-    flat = uniform.UniformSample.flat
-    chain = uniform.UniformSample.chain
+    effective = uniform.UniformSample.effective  # type: ignore[misc]
+    flat = uniform.UniformSample.flat  # type: ignore[misc]
+    chain = uniform.UniformSample.chain  # type: ignore[misc]
 
 
 class Inference(NamedTuple):
     """The network that a measurement speaks for, and how sure it is."""
 
-    forces: np.ndarray  # (N_c, 2) the admissible network with the least χ², force
+    forces: Floats  # (N_c, 2) the admissible network with the least χ², force
     chi_square: float  # its Σ ((f − m)/σ)²
     freedom: int  # degrees of freedom: what was measured less what the network could adapt to
-    deviation: np.ndarray  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
-    suspects: np.ndarray  # (s,) contacts, as numbers in the packing, beyond 3 σ, largest first
+    deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
+    suspects: Integers  # (s,) contacts, as numbers in the packing, beyond 3 σ, largest first
     residual: float  # in ⟨f_n⟩, by Ensemble.residual
     violation: float  # in ⟨f_n⟩, by Ensemble.violation
     draws: Draws | None  # None where none were asked for
     seconds: float  # wall time, draws included
 
     @property
-    def mean(self):
+    def mean(self) -> Floats:
         """(N_c, 2) mean of the draws, force."""
-        return self.draws.flat.mean(axis=0)
+        return cast("Draws", self.draws).flat.mean(axis=0)
 
     @property
-    def error(self):
+    def error(self) -> Floats:
         """(N_c, 2) standard error of every force: the standard deviation of the draws."""
-        return self.draws.flat.std(axis=0)
+        return cast("Draws", self.draws).flat.std(axis=0)
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The inference as notebooks show it."""
         lines = {
             "measured components": int(np.isfinite(self.deviation).sum()),
@@ -92,18 +98,18 @@ class Inference(NamedTuple):
 
 @cancelling.cancellable
 def infer(
-    ensemble,
-    measured,
-    sigma,
+    ensemble: Ensemble,
+    measured: npt.ArrayLike,
+    sigma: npt.ArrayLike,
     *,
-    states=0,
-    seed=0,
-    unmeasured=UNMEASURED,
-    chains=4,
-    workers=1,
-    progress=None,
-    cancel=None,
-):
+    states: int = 0,
+    seed: int = 0,
+    unmeasured: float = UNMEASURED,
+    chains: int = 4,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Inference:
     """The admissible network with the least Σ ((f − m)/σ)², and draws around it; an Inference.
 
     measured, sigma: m and σ (N_c of S, 2), force; NaN where a component was not measured. σ may be
@@ -130,7 +136,9 @@ def infer(
     return told(Inference, ensemble, best, draws, begin)
 
 
-def told(kind, ensemble, best, draws, begin):
+def told(
+    kind: type[Kind], ensemble: Ensemble, best: Likeliest, draws: Draws | None, begin: float
+) -> Kind:
     """The Inference, or one of its kind, of a likeliest network and draws, and what it took."""
     far = np.nan_to_num(np.abs(best.deviation)).max(axis=1, initial=0.0)
     beyond = np.flatnonzero(far > SUSPECT)
@@ -144,21 +152,37 @@ def told(kind, ensemble, best, draws, begin):
     )
 
 
-def judged(ensemble, found, worth, mixed, counts, *seconds):
+def judged(
+    ensemble: Ensemble,
+    found: Floats,
+    worth: Mixing,
+    mixed: bool,
+    counts: dict[str, Any],
+    *seconds: float,
+) -> Draws:
     """The Draws of states (chains, k, N_c, 2), by the judges of the ensemble and their mixing."""
     residual, violation = ensemble.residual(found), ensemble.violation(found)
     inside = residual.max() <= BALANCED and violation.max() <= ADMISSIBLE
     return Draws(found, residual, violation, worth, bool(inside and mixed), counts, *seconds)
 
 
-def _fit(ensemble, m, s, unmeasured):
+def _fit(ensemble: Ensemble, m: Floats, s: Floats, unmeasured: float) -> tuple[Floats, Floats]:
     """W and m (N_c, 2) in ⟨f_n⟩: χ² = Σ W (f − m)²."""
     unit = ensemble.force_scale
     sigma = np.where(np.isnan(m), unmeasured, s / unit)
     return sigma**-2.0, np.nan_to_num(m / unit)
 
 
-def _draws(ensemble, weight, m, states, chains, seed, workers, progress):
+def _draws(
+    ensemble: Ensemble,
+    weight: Floats,
+    m: Floats,
+    states: int,
+    chains: int,
+    seed: int,
+    workers: int,
+    progress: Progress | None,
+) -> Draws:
     begin = time.perf_counter()
     made = walls(ensemble, weight, m)
     rows = uniform.stores(made, billiard.all_rows(made), chains, workers)
@@ -167,9 +191,7 @@ def _draws(ensemble, weight, m, states, chains, seed, workers, progress):
     parts, counts, have, target = [], {"turns": 0, "refused": 0}, -_DROPPED, -(-states // chains)
     while have < target:
         count = min(_ROUND, target - have) if have >= 0 else -have
-        ends, moves = uniform.shared(
-            rows, ends, lambda kept, group, count=count: step(made, group, count, kept)
-        )
+        ends, moves = uniform.shared(rows, ends, partial(_stepped, made, count))
         for name in counts:
             counts[name] += sum(getattr(one, name) for one in moves)
         if have >= 0:
@@ -185,7 +207,15 @@ def _draws(ensemble, weight, m, states, chains, seed, workers, progress):
     return judged(ensemble, found, worth, mixed, counts, ready - begin, drawn - ready)
 
 
-def step(made, ends, count, rows=None):
+def _stepped(
+    made: Walls, count: int, rows: billiard.Rows, ends: list[uniform.ChainState]
+) -> tuple[list[uniform.ChainState], list[uniform.Moves]]:
+    return step(made, ends, count, rows)
+
+
+def step(
+    made: Walls, ends: list[uniform.ChainState], count: int, rows: billiard.Rows | None = None
+) -> tuple[list[uniform.ChainState], list[uniform.Moves]]:
     """The next `count` states of some chains, as `uniform.step` gives them.
 
     Two steps take turns (Gibbs). To every wall's 1 + B (f − f°) a normal error of variance 1 is
@@ -199,12 +229,13 @@ def step(made, ends, count, rows=None):
     rows = billiard.some_rows(made, 1.0) if rows is None else rows
     limit, times = uniform.MOST_TURNS * (made.dimension + 1), np.array([_TIME])
 
-    def on(drawn, flight, out):
+    def on(drawn: Any, flight: billiard.Flight, out: Floats) -> int:
         speeds, middles = drawn
         return billiard.fly(rows, speeds, times, middles, flight, limit, out, cancelling.flag())
 
     pulls = np.broadcast_to(made.pull, (len(ends), made.pull.size))
-    found, counts = [], 0
+    found: list[Floats] = []
+    counts: Any = 0
     for path in range(count * _PATHS):
         if path % _AT_ONCE == 0:
             drawn = [_drawn(made, end.rng, min(_AT_ONCE, count * _PATHS - path)) for end in ends]
@@ -222,7 +253,7 @@ def step(made, ends, count, rows=None):
     return ends, [uniform.moves(made, *one) for one in zip(slacks, counts, strict=True)]
 
 
-def _drawn(made, rng, count):
+def _drawn(made: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
     """Speeds (count, walls) of covariance K, and errors (count, walls) of companions."""
     push, error = (np.empty((count, made.count)) for _ in range(2))
     pull = np.empty((count, made.root.size))

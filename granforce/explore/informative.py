@@ -1,5 +1,6 @@
 """Which measurement next: where one more known force would tell most about all others."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,8 @@ import numpy as np
 from granforce import measures, notebook
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import sample_uniform
-from granforce.records import InputError, whole
+from granforce.forces.ensemble import Ensemble
+from granforce.records import Cancel, Floats, InputError, Integers, Progress, whole
 from granforce.system import cancelling
 from granforce.tolerances import FLAT
 
@@ -15,12 +17,12 @@ from granforce.tolerances import FLAT
 class Informative(NamedTuple):
     """Contacts whose normal force would be worth measuring, the best first."""
 
-    contacts: np.ndarray  # (k,) their numbers in the packing
-    expected: np.ndarray  # (k,) part by which the mean error of f_n falls, by covariance
+    contacts: Integers  # (k,) their numbers in the packing
+    expected: Floats  # (k,) part by which the mean error of f_n falls, by covariance
     before: float  # exact mean interval of f_n as it is, in ⟨f_n⟩; NaN where not computed
-    after: np.ndarray  # (k,) the same once f_n of that contact is known; NaN where not computed
+    after: Floats  # (k,) the same once f_n of that contact is known; NaN where not computed
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The contacts as notebooks show them."""
         lines = {"mean interval of fₙ / ⟨fₙ⟩ now": self.before}
         for contact, after in zip(self.contacts, self.after, strict=True):
@@ -30,17 +32,17 @@ class Informative(NamedTuple):
 
 @cancelling.cancellable
 def informative(
-    ensemble,
-    k=10,
+    ensemble: Ensemble,
+    k: int = 10,
     *,
-    states=400,
-    seed=0,
-    check=10,
-    workers=1,
-    watch=None,
-    progress=None,
-    cancel=None,
-):
+    states: int = 400,
+    seed: int = 0,
+    check: int = 10,
+    workers: int = 1,
+    watch: Callable[..., object] | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Informative:
     """The k contacts whose f_n, once known, would shorten the mean interval most; an Informative.
 
     From `states` uniform states: were forces normally distributed, a known f_n of contact c would
@@ -76,7 +78,7 @@ def informative(
     return Informative(ensemble.index[order], expected[order], before, after[place])
 
 
-def _expected(normal):
+def _expected(normal: Floats) -> Floats:
     """(N_c,) part by which the mean deviation of f_n (states, N_c) falls once one is known."""
     off = normal - normal.mean(axis=0)
     spread = off.std(axis=0)
@@ -86,7 +88,7 @@ def _expected(normal):
     return np.where(spread > FLAT, 1 - left @ spread / max(spread.sum(), FLAT), 0.0)
 
 
-def _mean_interval(ensemble, workers):
+def _mean_interval(ensemble: Ensemble, workers: int) -> float:
     """Mean exact interval of f_n, in ⟨f_n⟩."""
     bounds = intervals(ensemble, workers=workers)
     cancelling.check("exact bounds")

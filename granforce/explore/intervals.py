@@ -11,36 +11,46 @@ shared machine):
     interior point, eight lanes                                            4 s,  16 steps each
 """
 
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce import measures, notebook
 from granforce.forces.contact_problem import make_system
-from granforce.forces.ensemble import LARGEST_RANK
+from granforce.forces.ensemble import LARGEST_RANK, Ensemble
 from granforce.forces.nearest import starting_network
-from granforce.numerics.certified_values import Solver
+from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
-from granforce.records import InputError, float_array
+from granforce.records import Cancel, Floats, InputError, Integers, Mask, Progress, float_array
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING, INTERVAL_GAP
+
+Key = tuple[int, int, int]  # contact, component and side of a bound
+Bounds = dict[Key, tuple[float, float]]  # value attained, and the value that bounds it
 
 
 class Intervals(NamedTuple):
     """Bounds over S of the forces on k contacts; column 0 is f_n, column 1 is f_t."""
 
-    contacts: np.ndarray  # (k,) their numbers in the packing
-    lower: np.ndarray  # (k, 2) least value, force; NaN where cancelled before, or not certified
-    upper: np.ndarray  # (k, 2) largest value, force; NaN likewise
-    gap: np.ndarray  # (k, 2, 2) duality gap of [component, lower or upper] in ⟨f_n⟩
-    backbone: np.ndarray  # (k,) bool, largest f_n > 0
+    contacts: Integers  # (k,) their numbers in the packing
+    lower: Floats  # (k, 2) least value, force; NaN where cancelled before, or not certified
+    upper: Floats  # (k, 2) largest value, force; NaN likewise
+    gap: Floats  # (k, 2, 2) duality gap of [component, lower or upper] in ⟨f_n⟩
+    backbone: Mask  # (k,) bool, largest f_n > 0
     max_gap: float  # largest gap among the bounds that were reached
     converged: bool  # every bound was reached with a gap ≤ INTERVAL_GAP
-    counts: dict  # programs solved, skipped (by reason), solved again by HiGHS; iterations
+    counts: dict[
+        str, int
+    ]  # programs solved, skipped (by reason), solved again by HiGHS; iterations
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The bounds as notebooks show them."""
-        lines = {"contacts": len(self.contacts), "all bounds certified": self.converged}
+        lines: dict[str, Any] = {
+            "contacts": len(self.contacts),
+            "all bounds certified": self.converged,
+        }
         if self.converged and len(self.contacts):
             extent = measures.normal_extent(self.lower, self.upper)
             lines |= {"exact η3": measures.eta3(self.lower, self.upper), "mean ΔFₙ": extent.mean()}
@@ -61,27 +71,27 @@ class Bound(NamedTuple):
 class LimitLoads(NamedTuple):
     """Largest force pairs that S can carry on k contacts."""
 
-    contacts: np.ndarray  # (k,) their numbers in the packing
-    load: np.ndarray  # (k,) limit load F, force; NaN where cancelled before, or not certified
-    gap: np.ndarray  # (k,) duality gap in ⟨f_n⟩
+    contacts: Integers  # (k,) their numbers in the packing
+    load: Floats  # (k,) limit load F, force; NaN where cancelled before, or not certified
+    gap: Floats  # (k,) duality gap in ⟨f_n⟩
     max_gap: float
     converged: bool  # every load was reached with a gap ≤ INTERVAL_GAP
-    counts: dict  # programs, again, iterations
+    counts: dict[str, int]  # programs, again, iterations
 
 
 @cancelling.cancellable
 def intervals(
-    ensemble,
-    contacts=None,
+    ensemble: Ensemble,
+    contacts: npt.ArrayLike | None = None,
     *,
-    workers=1,
-    states=None,
-    skip=True,
-    widths=None,
-    watch=None,
-    progress=None,
-    cancel=None,
-):
+    workers: int = 1,
+    states: Floats | None = None,
+    skip: bool = True,
+    widths: Floats | None = None,
+    watch: Callable[[Bound], object] | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Intervals:
     """Least and largest f_n and f_t over S on contacts (numbers in the packing; default all of S).
 
     workers: threads; the result does not depend on their number. states (…, N_c, 2): known
@@ -105,14 +115,14 @@ def intervals(
     known = _Seen(ensemble, states)
     report = _counting(progress, total)
     found = _watched(ensemble, watch)
-    system, options = make_system(ensemble), {"workers": workers, "report": report, "found": found}
+    system = make_system(ensemble)
 
-    def seen(key, y):
+    def seen(key: Key, y: Floats) -> None:
         # What lower bounds attain counts as seen nowhere: the others alone tell which are needed.
         if key[1:] != (0, 0):
             known.add(y)
 
-    solver = Solver(system, seen=seen, **options)
+    solver = Solver(system, workers=workers, seen=seen, report=report, found=found)
     pinned = _pinned(ensemble, upper + tangential + lower)
     report(len(pinned))
     if is_a_point(ensemble, system):
@@ -122,11 +132,11 @@ def intervals(
     for key, value in pinned.items():
         found(key, *value)
 
-    def zero(key):
+    def zero(key: Key) -> bool:
         """Whether f_n = 0 was seen there."""
         return skip and key not in pinned and known.least[key[0]] <= INTERVAL_GAP
 
-    def solve(keys):
+    def solve(keys: Sequence[Key]) -> Bounds:
         keys = [key for key in keys if key not in pinned]
         return solver.solve(keys, [bound_of(ensemble, *key) for key in keys])
 
@@ -147,7 +157,7 @@ def intervals(
     return _intervals(ensemble, places, bounds, counts)
 
 
-def _widest_first(ensemble, places, widths):
+def _widest_first(ensemble: Ensemble, places: Integers, widths: Floats | None) -> Integers:
     """The places (k,) by their width (N_c,), the largest first; as they are without one."""
     if widths is None:
         return places
@@ -155,10 +165,12 @@ def _widest_first(ensemble, places, widths):
     return places[np.argsort(-widths[places], kind="stable")]
 
 
-def _watched(ensemble, watch):
+def _watched(
+    ensemble: Ensemble, watch: Callable[[Bound], object] | None
+) -> Callable[[Key, float, float], None]:
     """found(key, attained, bound) for a Solver, which calls watch with what is certified."""
 
-    def found(key, attained, bound):
+    def found(key: Key, attained: float, bound: float) -> None:
         if watch and abs(attained - bound) <= INTERVAL_GAP:
             contact, component, side = key
             value = (-attained if side else attained) * ensemble.force_scale
@@ -167,7 +179,7 @@ def _watched(ensemble, watch):
     return found
 
 
-def _pinned(ensemble, keys):
+def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
     """{key: (value attained, value that bounds it)} of those whose component is known exactly."""
     if ensemble.known is None:
         return {}
@@ -180,13 +192,13 @@ def _pinned(ensemble, keys):
     return found
 
 
-def is_a_point(ensemble, system):
+def is_a_point(ensemble: Ensemble, system: System) -> bool:
     """Whether balance leaves no freedom; asked where S has no inside, or something is known."""
     asked = ensemble.known is not None or not system.middle.reached
     return asked and ensemble.A.shape[0] <= LARGEST_RANK and ensemble.dimension == 0
 
 
-def determined(ensemble, keys):
+def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
     """{key: (value attained, value that bounds it)} where the equations leave no freedom.
 
     For each there are rows λ with Aᵀλ = 1 there and 0 elsewhere, hence x = b·λ, in all of S. What
@@ -202,7 +214,10 @@ def determined(ensemble, keys):
     rows = cancelling.apart(np.linalg.pinv, A)
     left = np.abs(np.eye(len(free)) - rows @ A).sum(axis=1) * np.abs(x).max(initial=0.0)
     follows = rows @ b
-    place = {(k // ensemble.per_contact, k % ensemble.per_contact): n for n, k in enumerate(free)}
+    place = {
+        (k // ensemble.per_contact, k % ensemble.per_contact): n
+        for n, k in enumerate(free.tolist())
+    }
     found = _pinned(ensemble, keys)
     for c, component, side in (key for key in keys if key not in found):
         n = place[c, component]
@@ -211,7 +226,9 @@ def determined(ensemble, keys):
     return found
 
 
-def _intervals(ensemble, places, bounds, counts):
+def _intervals(
+    ensemble: Ensemble, places: Integers, bounds: Bounds, counts: dict[str, int]
+) -> Intervals:
     value = np.full((len(places), 2, 2), np.nan)
     gap = np.full_like(value, np.nan)
     row = {int(c): k for k, c in enumerate(places)}
@@ -229,13 +246,22 @@ def _intervals(ensemble, places, bounds, counts):
 
 
 @cancelling.cancellable
-def limit_loads(ensemble, contacts=None, **options):
+def limit_loads(
+    ensemble: Ensemble, contacts: npt.ArrayLike | None = None, **options: Any
+) -> Floats:
     """Limit loads F (k,), force, of the given contacts; see `limit_load_bounds`."""
     return limit_load_bounds(ensemble, contacts, **options).load
 
 
 @cancelling.cancellable
-def limit_load_bounds(ensemble, contacts=None, *, workers=1, progress=None, cancel=None):
+def limit_load_bounds(
+    ensemble: Ensemble,
+    contacts: npt.ArrayLike | None = None,
+    *,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> LimitLoads:
     """Largest F ≥ 0 of a pair +F n on grain j and −F n on grain i for which S is not empty.
 
     One program per contact (numbers in the packing; default all of S), for the static limit load of
@@ -256,13 +282,13 @@ def limit_load_bounds(ensemble, contacts=None, *, workers=1, progress=None, canc
     return LimitLoads(ensemble.index[keys], load, gap, *_judged(gap), solver.counts)
 
 
-def _judged(gap):
+def _judged(gap: Floats) -> tuple[float, bool]:
     """Largest gap reached, and whether all were reached and are small."""
     reached = gap[~np.isnan(gap)]
     return float(reached.max(initial=0.0)), bool(np.all(gap <= INTERVAL_GAP))
 
 
-def _positions(ensemble, contacts):
+def _positions(ensemble: Ensemble, contacts: npt.ArrayLike | None) -> Integers:
     """Positions (k,) in the ensemble of contacts by their numbers in the packing, or of all."""
     if contacts is None:
         return np.arange(len(ensemble.index))
@@ -272,14 +298,14 @@ def _positions(ensemble, contacts):
     return ensemble.positions(contacts)
 
 
-def bound_of(ensemble, contact, component, side):
+def bound_of(ensemble: Ensemble, contact: int, component: int, side: int) -> Program:
     """The program of one bound: minimise f, or −f for the upper side."""
     half = -0.5 if side else 0.5
     columns, unit = [2 * contact, 2 * contact + 1], ensemble.mu if component else 1.0
     return Program(columns, [half * unit, (-half if component else half) * unit], -1)
 
 
-def _limit_load(contact):
+def _limit_load(contact: int) -> Program:
     """The program of one limit load: maximise F, where f_n + F and f_t act on the grains."""
     return Program([], [], contact)
 
@@ -287,7 +313,7 @@ def _limit_load(contact):
 class _Seen:
     """The smallest f_n (N_c,) of any known state of S, in ⟨f_n⟩."""
 
-    def __init__(self, ensemble, states):
+    def __init__(self, ensemble: Ensemble, states: Floats | None) -> None:
         self.least = np.full(len(ensemble.index), np.inf)
         if states is not None:
             states = np.asarray(states, dtype=np.float64).reshape(-1, len(self.least), 2)
@@ -297,17 +323,17 @@ class _Seen:
             normal = states[admitted, :, 0] / ensemble.force_scale
             self.least = np.minimum(self.least, normal.min(axis=0, initial=np.inf))
 
-    def add(self, y):
+    def add(self, y: Floats) -> None:
         """Take note of one more state, in cone coordinates (2 N_c,)."""
         pairs = y[: 2 * len(self.least)].reshape(-1, 2)
         np.minimum(self.least, pairs.mean(axis=1), out=self.least)
 
 
-def _counting(progress, total):
+def _counting(progress: Progress | None, total: int) -> Callable[[int], None]:
     """report(count) for a Solver, which calls progress(done, total)."""
     done = 0
 
-    def report(count):
+    def report(count: int) -> None:
         nonlocal done
         done += count
         if progress:

@@ -5,12 +5,14 @@ Rank-normalised split R̂ and effective sample sizes as in Vehtari et al., Bayes
 numbers, one component after the other: of thousands that takes longer than to draw them.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import fft, stats
 from scipy.special import ndtri
 
+from granforce.records import Floats, Mask
 from granforce.system import cancelling
 
 # Split chains of fewer draws say nothing.
@@ -24,27 +26,27 @@ _AT_ONCE = 128
 class Mixing(NamedTuple):
     """Diagnostics of each component; NaN where it cannot vary or there are too few draws."""
 
-    r_hat: np.ndarray  # (…) split R̂, near 1 where all halves of all chains agree
-    bulk: np.ndarray  # (…) effective sample size for the middle of the distribution
-    tail: np.ndarray  # (…) effective sample size for its 5 % and 95 % quantiles
+    r_hat: Floats  # (…) split R̂, near 1 where all halves of all chains agree
+    bulk: Floats  # (…) effective sample size for the middle of the distribution
+    tail: Floats  # (…) effective sample size for its 5 % and 95 % quantiles
 
     @property
-    def worst_r_hat(self):
+    def worst_r_hat(self) -> float:
         """Largest R̂, NaN where none is known."""
         return _over(np.max, self.r_hat)
 
     @property
-    def least_bulk(self):
+    def least_bulk(self) -> float:
         """Smallest bulk effective sample size, NaN where none is known."""
         return _over(np.min, self.bulk)
 
     @property
-    def least_tail(self):
+    def least_tail(self) -> float:
         """Smallest tail effective sample size, NaN where none is known."""
         return _over(np.min, self.tail)
 
 
-def mixing(draws, varies):
+def mixing(draws: Floats, varies: Mask) -> Mixing:
     """Mixing of draws (chains, draws, …); varies (…): which components vary in the target at all.
 
     A component that should vary, and does not in any chain, has R̂ = ∞ and is worth nothing.
@@ -63,7 +65,7 @@ def mixing(draws, varies):
     return Mixing(*full)
 
 
-def _judged(x):
+def _judged(x: Floats) -> Floats:
     """R̂, bulk and tail effective sample size (3, k) of draws x (chains, draws, k)."""
     halves = _halves(x)
     folded = np.abs(halves - np.median(halves, axis=(1, 2), keepdims=True))
@@ -74,19 +76,19 @@ def _judged(x):
     return np.stack([r_hat, _effective(scores), np.minimum(*tails)])
 
 
-def _halves(x):
+def _halves(x: Floats) -> Floats:
     """(k, 2 chains, half of the draws) of (chains, draws, k); an odd one in the middle is left."""
     half = x.shape[1] // 2
     return np.ascontiguousarray(np.moveaxis(np.concatenate([x[:, :half], x[:, -half:]]), 2, 0))
 
 
-def _scores(x):
+def _scores(x: Floats) -> Floats:
     """Normal scores of the ranks of each component's draws, by Blom."""
     flat = x.reshape(len(x), -1)
     return ndtri((stats.rankdata(flat, axis=1) - 0.375) / (flat.shape[1] + 0.25)).reshape(x.shape)
 
 
-def _spread_ratio(x):
+def _spread_ratio(x: Floats) -> Floats:
     """√ of all variance over that within chains."""
     n = x.shape[2]
     between = n * x.mean(axis=2).var(axis=1, ddof=1)
@@ -95,7 +97,7 @@ def _spread_ratio(x):
         return np.sqrt((between / within + n - 1) / n)
 
 
-def _effective(x):
+def _effective(x: Floats) -> Floats:
     """Effective sample size (k,) by Geyer's initial monotone sequence of pairs of correlations."""
     components, chains, n = x.shape
     off = x - x.mean(axis=2, keepdims=True)
@@ -122,6 +124,6 @@ def _effective(x):
     return np.where(np.ptp(x, axis=(1, 2)) < np.finfo(float).resolution, size, found)
 
 
-def _over(choose, values):
+def _over(choose: Callable[[Floats], Any], values: Floats) -> float:
     known = values[~np.isnan(values)]
     return float(choose(known)) if known.size else float("nan")

@@ -8,14 +8,16 @@ them is still too far, so that the polygons close on each other from both sides 
 Math. Math. Phys. 32, 114, 1992).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce.forces.contact_problem import cone_costs, forces_of, known_part, make_system
+from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
-from granforce.records import InputError, float_array
+from granforce.records import Cancel, Floats, InputError, Mask, Progress, float_array
 from granforce.system import cancelling
 
 _FIRST = 16  # directions to begin with
@@ -30,23 +32,31 @@ _FLOOR = 1e-7
 class Outline(NamedTuple):
     """The projection of S on two axes, in ⟨f_n⟩ times the axes' length; polygons run left about."""
 
-    inner: np.ndarray  # (k, 2) corners of a polygon inside: projections of states of S
-    outer: np.ndarray  # (m, 2) corners of a polygon outside: of certified half planes
+    inner: Floats  # (k, 2) corners of a polygon inside: projections of states of S
+    outer: Floats  # (m, 2) corners of a polygon outside: of certified half planes
     gap: float  # largest distance of a corner of the outer polygon from the inner one
     converged: bool  # the gap is within the tolerance
-    counts: dict  # directions asked for; programs, again, iterations as in `Intervals`
+    counts: dict[str, int]  # directions asked for; programs, again, iterations as in `Intervals`
 
 
 class _Support(NamedTuple):
     """Directions d and what is known of them, in order of their angles."""
 
-    d: np.ndarray  # (n, 2) unit vectors
-    point: np.ndarray  # (n, 2) projection of a state that goes farthest along d
-    bound: np.ndarray  # (n,) d·x ≤ bound for all x of the projection
+    d: Floats  # (n, 2) unit vectors
+    point: Floats  # (n, 2) projection of a state that goes farthest along d
+    bound: Floats  # (n,) d·x ≤ bound for all x of the projection
 
 
 @cancelling.cancellable
-def outline(ensemble, axes, *, tolerance=1e-3, workers=1, progress=None, cancel=None):
+def outline(
+    ensemble: Ensemble,
+    axes: Floats,
+    *,
+    tolerance: float = 1e-3,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Outline:
     """The outline of S on the axes (2, N_c, 2): points (axes[0]·F, axes[1]·F)/⟨f_n⟩ over S.
 
     tolerance: largest distance of the outer polygon from the inner one, relative to the extent of
@@ -85,7 +95,9 @@ def outline(ensemble, axes, *, tolerance=1e-3, workers=1, progress=None, cancel=
     return Outline(inner, outer, gap, converged, _counts(solver, len(support.d)))
 
 
-def supports(ensemble, axes, angles, *, workers=1):
+def supports(
+    ensemble: Ensemble, axes: Floats, angles: npt.ArrayLike, *, workers: int = 1
+) -> tuple[Floats, Floats]:
     """Largest cos θ u1·F + sin θ u2·F over S, F in ⟨f_n⟩, and duality gaps: (k,) for angles (k,).
 
     axes (2, N_c, 2): u1, u2. NaN where cancelled.
@@ -96,19 +108,20 @@ def supports(ensemble, axes, angles, *, workers=1):
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     found = _solve(solver, plane, directions, 0)
     if found is None:
-        return np.full((2, len(directions)), np.nan)
+        nothing = np.full(len(directions), np.nan)
+        return nothing, nothing.copy()
     reached = (found.point * found.d).sum(axis=1)
     return reached, np.abs(found.bound - reached)
 
 
-def extremes(ensemble, axes, directions):
+def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:
     """Networks of S (k, N_c, 2), force, that go farthest along directions (k, 2) of the axes.
 
     axes (2, N_c, 2). Raises Cancelled, and InputError where a program fails.
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
     across = cone_costs(ensemble, axes).T
-    points = {}
+    points: dict[int, Floats] = {}
     tasks = _tasks(across, directions)
     bounds = Solver(make_system(ensemble)).solve(list(range(len(tasks))), tasks, points)
     cancelling.check("outline")
@@ -117,18 +130,18 @@ def extremes(ensemble, axes, directions):
     return np.stack([forces_of(ensemble, points[key]) for key in range(len(tasks))])
 
 
-def _counts(solver, directions):
+def _counts(solver: Solver, directions: int) -> dict[str, int]:
     return {"directions": directions, **solver.counts}
 
 
-def _solve(solver, plane, directions, first):
+def _solve(solver: Solver, plane: Any, directions: Floats, first: int) -> _Support | None:
     """_Support of new directions (k, 2), whose keys begin at first; None where cancelled.
 
     plane: the axes in cone coordinates (n, 2), and what known forces add (2,).
     """
     across, origin = plane
     keys = list(range(first, first + len(directions)))
-    points = {}
+    points: dict[int, Floats] = {}
     bounds = solver.solve(keys, _tasks(across, directions), points)
     if len(bounds) < len(keys) or cancelling.cancelled():
         return None
@@ -139,20 +152,20 @@ def _solve(solver, plane, directions, first):
     return _Support(directions, y[:, : len(across)] @ across + origin, bound + directions @ origin)
 
 
-def _tasks(across, directions):
+def _tasks(across: Floats, directions: Floats) -> list[Program]:
     """The programs that go farthest along directions (k, 2) of the axes `across` (n, 2)."""
     costs = -(across @ directions.T)
     columns = list(range(len(costs)))
     return [Program(columns, cost.tolist(), -1) for cost in costs.T]
 
 
-def _merged(support, new):
+def _merged(support: _Support, new: _Support) -> _Support:
     both = _Support(*(np.concatenate(pair) for pair in zip(support, new, strict=True)))
     order = np.argsort(np.arctan2(both.d[:, 1], both.d[:, 0]), kind="stable")
     return _Support(*(field[order] for field in both))
 
 
-def _corners(support):
+def _corners(support: _Support) -> tuple[Floats, Floats]:
     """Corners (n, 2) of neighbouring half planes, and their distances (n,) from the edges inside.
 
     Corner and edge k are those of directions k and k + 1.
@@ -171,7 +184,7 @@ def _corners(support):
     return corner, np.linalg.norm(corner - begin - along[:, None] * edge, axis=1)
 
 
-def _normals(support, wide):
+def _normals(support: _Support, wide: Mask) -> Floats:
     """Outward normals of the inner edges (mask wide), or the middle between their directions."""
     d, after = support.d[wide], np.roll(support.d, -1, axis=0)[wide]
     edge = (np.roll(support.point, -1, axis=0) - support.point)[wide]
@@ -186,13 +199,13 @@ def _normals(support, wide):
     return new[_cross(d, after) > 2 * _CLOSEST]
 
 
-def _cross(a, b):
+def _cross(a: Floats, b: Floats) -> Floats:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-def _hull(points):
+def _hull(points: Floats) -> Floats:
     """Corners of the convex hull of points (n, 2), left about (Andrew's monotone chain)."""
-    chain = []
+    chain: list[Any] = []
     for ordered in (np.unique(points, axis=0), np.unique(points, axis=0)[::-1]):
         begin = len(chain)
         for x, y in ordered.tolist():

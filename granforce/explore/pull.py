@@ -4,9 +4,10 @@ The contact's f_n is pinned, and its f_t is whatever is nearest: a contact progr
 there is a segment. All values are solved side by side (`numerics.contact_program`).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce.explore.intervals import bound_of, determined, is_a_point
 from granforce.forces.contact_problem import (
@@ -15,12 +16,21 @@ from granforce.forces.contact_problem import (
     make_system,
     problem_of,
 )
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import Search, some_network, starting_network
 from granforce.forces.nearest_piqp import restored
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import LANES
-from granforce.records import InputError, UndecidedError, float_array
+from granforce.records import (
+    Cancel,
+    Floats,
+    InputError,
+    Integers,
+    Mask,
+    UndecidedError,
+    float_array,
+)
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, BALANCED, INTERVAL_GAP
 
@@ -38,12 +48,12 @@ class Pull(NamedTuple):
     """Networks with given f_n on one contact."""
 
     contact: int  # its number in the packing
-    values: np.ndarray  # (k,) its f_n in the states, force
-    states: np.ndarray  # (k, N_c, 2) admissible networks, force
-    residual: np.ndarray  # (k,) in ⟨f_n⟩, by Ensemble.residual
-    violation: np.ndarray  # (k,) in ⟨f_n⟩, by Ensemble.violation
-    opened: np.ndarray  # (k, N_c) bool, contacts without force
-    sliding: np.ndarray  # (k, N_c) int, sign of f_t where |f_t| = μ f_n > 0, 0 elsewhere
+    values: Floats  # (k,) its f_n in the states, force
+    states: Floats  # (k, N_c, 2) admissible networks, force
+    residual: Floats  # (k,) in ⟨f_n⟩, by Ensemble.residual
+    violation: Floats  # (k,) in ⟨f_n⟩, by Ensemble.violation
+    opened: Mask  # (k, N_c) bool, contacts without force
+    sliding: Integers  # (k, N_c) int, sign of f_t where |f_t| = μ f_n > 0, 0 elsewhere
 
 
 class Reach(NamedTuple):
@@ -52,14 +62,21 @@ class Reach(NamedTuple):
     contact: int  # its number in the packing
     lower: float  # exact least f_n over S, force
     upper: float  # exact largest f_n over S, force
-    gap: np.ndarray  # (2,) duality gaps in ⟨f_n⟩
-    states: np.ndarray  # (2, N_c, 2) a network at either end, force
-    opened: np.ndarray  # (2, N_c) bool, contacts without force in every network at that end
-    sliding: np.ndarray  # (2, N_c) int, sign of f_t where every network there has |f_t| = μ f_n
+    gap: Floats  # (2,) duality gaps in ⟨f_n⟩
+    states: Floats  # (2, N_c, 2) a network at either end, force
+    opened: Mask  # (2, N_c) bool, contacts without force in every network at that end
+    sliding: Integers  # (2, N_c) int, sign of f_t where every network there has |f_t| = μ f_n
 
 
 @cancelling.cancellable
-def pull(ensemble, contact, values, state=None, *, cancel=None):
+def pull(
+    ensemble: Ensemble,
+    contact: int,
+    values: npt.ArrayLike,
+    state: Floats | None = None,
+    *,
+    cancel: Cancel | None = None,
+) -> Pull:
     """The points of S nearest to `state` with f_n of one contact at the given values; a Pull.
 
     contact: its number in the packing. values (k,), force. state (N_c, 2), force: by default the
@@ -83,12 +100,12 @@ def pull(ensemble, contact, values, state=None, *, cancel=None):
     return Pull(int(contact), states[:, position, 0], states, residual, violation, opened, sliding)
 
 
-def _admitted(ensemble, states):
+def _admitted(ensemble: Ensemble, states: Floats) -> Mask:
     balanced = ensemble.residual(states) <= BALANCED
     return balanced & (ensemble.violation(states) <= ADMISSIBLE)
 
 
-def _pulled_all(ensemble, position, values, state):
+def _pulled_all(ensemble: Ensemble, position: int, values: Floats, state: Floats) -> Floats:
     """The networks (k, N_c, 2) of values (k,); where S has none, what comes nearest to it."""
     states = np.empty((len(values), *state.shape))
     for first in range(0, len(values), LANES):
@@ -97,7 +114,7 @@ def _pulled_all(ensemble, position, values, state):
     return states
 
 
-def _pulled(ensemble, position, values, state):
+def _pulled(ensemble: Ensemble, position: int, values: Floats, state: Floats) -> Floats:
     """The same of up to LANES values."""
     count, scale = len(values), ensemble.force_scale
     width = 1 if count == 1 else LANES
@@ -118,7 +135,7 @@ def _pulled(ensemble, position, values, state):
     return states
 
 
-def _near_ends(ensemble, contact, values, state):
+def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) -> Floats:
     """The networks of values that were not reached: outside the interval, or at its very ends.
 
     At an end multipliers grow without bound: its network is taken a little before it.
@@ -154,7 +171,7 @@ def _near_ends(ensemble, contact, values, state):
     )
 
 
-def _without_pulling(ensemble, contact, state):
+def _without_pulling(ensemble: Ensemble, contact: int, state: Floats) -> Floats:
     """The network nearest to state, which has the only f_n there is."""
     found = some_network(ensemble, state)
     if not ensemble.admits(found) and ensemble.dimension == 0 and ensemble.member is not None:
@@ -168,7 +185,7 @@ def _without_pulling(ensemble, contact, state):
 
 
 @cancelling.cancellable
-def reach(ensemble, contact, *, cancel=None):
+def reach(ensemble: Ensemble, contact: int, *, cancel: Cancel | None = None) -> Reach:
     """Exact least and largest f_n of one contact (its number in the packing); a Reach.
 
     Contacts that are open or slide at an end are those that hold f_n there.
@@ -177,7 +194,8 @@ def reach(ensemble, contact, *, cancel=None):
     not be certified, NotJammedError where S is empty.
     """
     (position,) = ensemble.positions([contact])
-    keys, points = [(int(position), 0, side) for side in (0, 1)], {}
+    keys = [(int(position), 0, side) for side in (0, 1)]
+    points: dict[Any, Floats] = {}
     system = make_system(ensemble)
     if is_a_point(ensemble, system):
         found = determined(ensemble, keys)
@@ -196,7 +214,7 @@ def reach(ensemble, contact, *, cancel=None):
     return Reach(int(contact), lower, upper, gap, states, *_at_walls(ensemble, states))
 
 
-def _balanced(ensemble, y):
+def _balanced(ensemble: Ensemble, y: Floats) -> Floats:
     """The network (N_c, 2) of a vertex, balanced to rounding where it is not to BALANCED."""
     forces = forces_of(ensemble, y)
     if ensemble.residual(forces) <= BALANCED:
@@ -204,7 +222,7 @@ def _balanced(ensemble, y):
     return restored(ensemble, ensemble.coordinates(forces))
 
 
-def _at_walls(ensemble, states):
+def _at_walls(ensemble: Ensemble, states: Floats) -> tuple[Mask, Integers]:
     """Which contacts are open, and which slide, in states (k, N_c, 2)."""
     normal, tangential = states[..., 0], states[..., 1]
     least = _AT_WALL * ensemble.force_scale

@@ -5,16 +5,28 @@ By default the network nearest to the perturbed one is taken, which is found 10 
 and for every perturbation; it visits the same kind of states (see `granforce bench`, part walks).
 """
 
+from __future__ import annotations
+
 import copy
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from granforce import measures, notebook
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.gauss_seidel import SideBySide, gauss_seidel
 from granforce.forces.nearest import nearest, nearest_of_many, starting_network
 from granforce.numerics.lanes import LANES
-from granforce.records import InputError, NotJammedError, Relaxation
+from granforce.records import (
+    Cancel,
+    Floats,
+    InputError,
+    Integers,
+    NotJammedError,
+    Progress,
+    Relaxation,
+)
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
@@ -23,23 +35,29 @@ WORTH_LANES = 4
 SHUFFLED = ("order", "seed")  # options of relaxations that each have their own order of contacts
 
 
+Seed = int | np.random.SeedSequence
+Relax = Callable[..., Relaxation]  # as `nearest`
+
+
 class Walk(NamedTuple):
     """Accepted states of one or more chains, and what it took to reach them."""
 
-    states: np.ndarray  # (S, N_c, 2) admissible networks, force
-    residual: np.ndarray  # (S,) in ⟨f_n⟩, by Ensemble.residual
-    violation: np.ndarray  # (S,) in ⟨f_n⟩, by Ensemble.violation
-    sweeps: np.ndarray  # (S,) solver iterations spent since the state before, failures included
-    attempts: np.ndarray  # (S,) perturbations tried since the state before
-    counts: dict  # accepted, rejected (no equilibrium), unconverged, skipped (S is one point)
+    states: Floats  # (S, N_c, 2) admissible networks, force
+    residual: Floats  # (S,) in ⟨f_n⟩, by Ensemble.residual
+    violation: Floats  # (S,) in ⟨f_n⟩, by Ensemble.violation
+    sweeps: Integers  # (S,) solver iterations spent since the state before, failures included
+    attempts: Integers  # (S,) perturbations tried since the state before
+    counts: dict[
+        str, int
+    ]  # accepted, rejected (no equilibrium), unconverged, skipped (S is one point)
 
     @property
-    def acceptance(self):
+    def acceptance(self) -> float:
         """Part of all attempts that gave a new state (1 where none was needed)."""
         tried = sum(self.counts[name] for name in ("accepted", "rejected", "unconverged"))
         return self.counts["accepted"] / tried if tried else 1.0
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The walk as notebooks show it."""
         lines = {"states": len(self.states), "acceptance": self.acceptance, **self.counts}
         if self.states.size:
@@ -54,7 +72,7 @@ class Found(NamedTuple):
 
     chain: int
     number: int  # among the chain's states, from 0
-    forces: np.ndarray  # (N_c, 2) its own copy
+    forces: Floats  # (N_c, 2) its own copy
     residual: float  # ⟨f_n⟩
     violation: float  # ⟨f_n⟩
     attempts: int  # perturbations tried since the state before
@@ -63,7 +81,7 @@ class Found(NamedTuple):
 class ChainState(NamedTuple):
     """Where a chain stands: its forces and its own random stream."""
 
-    forces: np.ndarray  # (N_c, 2)
+    forces: Floats  # (N_c, 2)
     rng: np.random.Generator
 
 
@@ -74,7 +92,7 @@ class Attempt(NamedTuple):
     outcome: str  # "accepted": the chain moved; "rejected" or "unconverged": it did not
 
 
-def init(ensemble, seed):
+def init(ensemble: Ensemble, seed: Seed) -> ChainState:
     """A chain at the packing's own network, or at the nearest admissible one if that left S.
 
     seed: anything numpy.random.default_rng takes. Raises NotJammedError where S is empty.
@@ -82,7 +100,9 @@ def init(ensemble, seed):
     return ChainState(np.array(starting_network(ensemble)), np.random.default_rng(seed))
 
 
-def step(ensemble, state, *, relax=nearest, **options):
+def step(
+    ensemble: Ensemble, state: ChainState, *, relax: Relax = nearest, **options: Any
+) -> tuple[ChainState, Attempt]:
     """One attempt: add to every component a number uniform in ±⟨F_n⟩ of the state, then relax.
 
     Returns (state, Attempt): "accepted" moves the chain; "rejected" (the solver ended, but not in
@@ -93,7 +113,7 @@ def step(ensemble, state, *, relax=nearest, **options):
     return _moved(state, rng, relax(ensemble, start, **options), options)
 
 
-def kicked(ensemble, state):
+def kicked(ensemble: Ensemble, state: ChainState) -> tuple[Floats, np.random.Generator]:
     """A state's forces (N_c, 2), a number uniform in ±⟨F_n⟩ added to each, and the stream then."""
     rng = copy.deepcopy(state.rng)
     amplitude = np.mean(state.forces[:, 0])
@@ -103,13 +123,15 @@ def kicked(ensemble, state):
     return state.forces + kick, rng
 
 
-def _moved(state, rng, relaxation, options):
+def _moved(
+    state: ChainState, rng: np.random.Generator, relaxation: Relaxation, options: dict[str, Any]
+) -> tuple[ChainState, Attempt]:
     outcome = judge(relaxation, options.get("tolerance", BALANCED))
     forces = relaxation.forces if outcome == "accepted" else state.forces
     return ChainState(forces, rng), Attempt(relaxation, outcome)
 
 
-def judge(relaxation, tolerance=BALANCED):
+def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:
     """ "accepted", "rejected" or "unconverged", by residual and violation in ⟨f_n⟩."""
     if not relaxation.converged:
         return "unconverged"
@@ -119,21 +141,21 @@ def judge(relaxation, tolerance=BALANCED):
 
 @cancelling.cancellable
 def walk(
-    ensemble,
-    states,
-    seed,
+    ensemble: Ensemble,
+    states: int,
+    seed: int,
     *,
-    chains=1,
-    workers=1,
-    relax=nearest,
-    max_attempts=None,
-    whole=True,
-    skip=True,
-    progress=None,
-    watch=None,
-    cancel=None,
-    **options,
-):
+    chains: int = 1,
+    workers: int = 1,
+    relax: Relax = nearest,
+    max_attempts: int | None = None,
+    whole: bool = True,
+    skip: bool = True,
+    progress: Progress | None = None,
+    watch: Callable[[Found], object] | None = None,
+    cancel: Cancel | None = None,
+    **options: Any,
+) -> Walk:
     """Random walk until `states` accepted states in all; chains follow each other in the result.
 
     chains: independent walks from the original network, states shared out evenly; workers: threads
@@ -156,7 +178,7 @@ def walk(
         limit = max_attempts or 20 * share
         all_chains.append(_Chain(ensemble, k, share, own, limit, whole))
 
-    def tell():
+    def tell() -> None:
         if progress is not None:
             progress(sum(chain.counts["accepted"] for chain in all_chains), states)
 
@@ -168,10 +190,19 @@ def walk(
             list(pool.map(lambda group: _run(group, relax, tell, watch, options), groups))
         parts = [chain.walked() for chain in all_chains]
     counts = {name: sum(part.counts[name] for part in parts) for name in parts[0].counts}
-    return Walk(*(np.concatenate(field) for field in list(zip(*parts, strict=True))[:-1]), counts)
+    return Walk(
+        states=np.concatenate([part.states for part in parts]),
+        residual=np.concatenate([part.residual for part in parts]),
+        violation=np.concatenate([part.violation for part in parts]),
+        sweeps=np.concatenate([part.sweeps for part in parts]),
+        attempts=np.concatenate([part.attempts for part in parts]),
+        counts=counts,
+    )
 
 
-def _groups(chains, relax, workers, options):
+def _groups(
+    chains: list[_Chain], relax: Relax, workers: int, options: dict[str, Any]
+) -> list[list[_Chain]]:
     """Chains that go side by side, in lanes if there are enough; it changes nothing in them."""
     in_lanes = relax is nearest or (relax is gauss_seidel and options.keys().isdisjoint(SHUFFLED))
     together = min(LANES, -(-len(chains) // workers)) if in_lanes else 1
@@ -179,7 +210,13 @@ def _groups(chains, relax, workers, options):
     return [chains[k : k + together] for k in range(0, len(chains), together)]
 
 
-def _run(group, relax, tell, watch, options):
+def _run(
+    group: list[_Chain],
+    relax: Relax,
+    tell: Callable[[], None],
+    watch: Callable[[Found], object] | None,
+    options: dict[str, Any],
+) -> None:
     """All chains of a group to their end."""
     if len(group) == 1:
         found = _alone(group[0], relax, options)
@@ -198,12 +235,14 @@ def _run(group, relax, tell, watch, options):
 # Each yields (chain, relaxation of its kicked state) until no chain goes on.
 
 
-def _alone(chain, relax, options):
+def _alone(
+    chain: _Chain, relax: Relax, options: dict[str, Any]
+) -> Iterator[tuple[_Chain, Relaxation]]:
     while not chain.done:
         yield chain, relax(chain.ensemble, chain.kicked(), **options)
 
 
-def _in_step(chains, options):
+def _in_step(chains: list[_Chain], options: dict[str, Any]) -> Iterator[tuple[_Chain, Relaxation]]:
     while left := [chain for chain in chains if not chain.done]:
         starts = [chain.kicked() for chain in left]
         if len(left) > 1:
@@ -213,7 +252,9 @@ def _in_step(chains, options):
         yield from zip(left, found, strict=True)
 
 
-def _each_at_its_pace(chains, options):
+def _each_at_its_pace(
+    chains: list[_Chain], options: dict[str, Any]
+) -> Iterator[tuple[_Chain, Relaxation]]:
     beside = SideBySide(chains[0].ensemble, len(chains), **options)
     for lane, chain in enumerate(chains):
         beside.begin(lane, chain.kicked())
@@ -230,7 +271,15 @@ def _each_at_its_pace(chains, options):
 class _Chain:
     """One chain of a walk, and the states it has found."""
 
-    def __init__(self, ensemble, number, states, seed, limit, whole):
+    def __init__(
+        self,
+        ensemble: Ensemble,
+        number: int,
+        states: int,
+        seed: Seed,
+        limit: int,
+        whole: bool,
+    ) -> None:
         self.ensemble, self.number = ensemble, number
         self.limit, self.whole = limit, whole
         self.state = init(ensemble, seed)
@@ -241,12 +290,12 @@ class _Chain:
         self.residual, self.violation = np.empty((2, states))
 
     @property
-    def done(self):
+    def done(self) -> bool:
         """Whether it has all its states, or may end without them."""
         ended = not self.whole and sum(self.counts.values()) >= self.limit
         return ended or self.counts["accepted"] == len(self.states)
 
-    def kicked(self):
+    def kicked(self) -> Floats:
         """The start of the next attempt; NotJammedError where there were too many."""
         if sum(self.counts.values()) >= self.limit:
             raise NotJammedError(
@@ -257,7 +306,7 @@ class _Chain:
         start, self.rng = kicked(self.ensemble, self.state)
         return start
 
-    def take(self, relaxation, options):
+    def take(self, relaxation: Relaxation, options: dict[str, Any]) -> bool:
         """Count an attempt, and keep its state if it is accepted; whether it was."""
         k = self.counts["accepted"]
         self.state, (_, outcome) = _moved(self.state, self.rng, relaxation, options)
@@ -270,19 +319,25 @@ class _Chain:
             self.violation[k] = relaxation.violation
         return outcome == "accepted"
 
-    def found(self):
+    def found(self) -> Found:
         """The last state accepted."""
         k = self.counts["accepted"] - 1
         numbers = float(self.residual[k]), float(self.violation[k]), int(self.attempts[k])
         return Found(self.number, k, self.states[k].copy(), *numbers)
 
-    def walked(self):
+    def walked(self) -> Walk:
         """The chain as a Walk."""
         count = self.counts["accepted"] + self.counts["skipped"]
-        fields = (self.states, self.residual, self.violation, self.sweeps, self.attempts)
-        return Walk(*(field[:count] for field in fields), self.counts)
+        return Walk(
+            states=self.states[:count],
+            residual=self.residual[:count],
+            violation=self.violation[:count],
+            sweeps=self.sweeps[:count],
+            attempts=self.attempts[:count],
+            counts=self.counts,
+        )
 
-    def single_point(self):
+    def single_point(self) -> Walk:
         """The Walk where S is the one point that the chain stands at."""
         self.counts["skipped"] = len(self.states)
         self.states[:] = self.state.forces

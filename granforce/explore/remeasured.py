@@ -14,14 +14,17 @@ What was not measured counts as 0 with an error of `unmeasured` ⟨f_n⟩, in ei
 """
 
 import time
+from typing import cast
 
 import numpy as np
+import numpy.typing as npt
 
-from granforce.explore.infer import Inference, judged, told
+from granforce.explore.infer import Draws, Inference, judged, told
 from granforce.explore.mixing import Mixing
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import checked, fitted_many, likeliest
 from granforce.numerics.lanes import LANES
-from granforce.records import positive, whole
+from granforce.records import Cancel, Floats, Progress, positive, whole
 from granforce.system import cancelling
 
 # Forces that were not measured are known to so many ⟨f_n⟩ beforehand.
@@ -38,30 +41,30 @@ class Remeasured(Inference):
     __slots__ = ()
 
     @property
-    def mean(self):
+    def mean(self) -> Floats:
         """(N_c, 2) the likeliest network itself, about which the errors are told, force."""
         return self.forces
 
     @property
-    def error(self):
+    def error(self) -> Floats:
         """(N_c, 2) standard error of every force: root mean square of draws less that."""
-        return np.sqrt(np.mean((self.draws.flat - self.forces) ** 2, axis=0))
+        return np.sqrt(np.mean((cast("Draws", self.draws).flat - self.forces) ** 2, axis=0))
 
 
 @cancelling.cancellable
 def remeasured(
-    ensemble,
-    measured,
-    sigma,
+    ensemble: Ensemble,
+    measured: npt.ArrayLike,
+    sigma: npt.ArrayLike,
     *,
-    states=200,
-    seed=0,
-    unmeasured=UNMEASURED,
-    chains=4,
-    workers=1,
-    progress=None,
-    cancel=None,
-):
+    states: int = 200,
+    seed: int = 0,
+    unmeasured: float = UNMEASURED,
+    chains: int = 4,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Remeasured:
     """The network with the least Σ ((f − m)/σ)², and what would be found if measured again.
 
     A Remeasured, with the same arguments as `infer`; its draws are independent of each other (their
@@ -86,7 +89,16 @@ def remeasured(
     return told(Remeasured, ensemble, best, draws, begin)
 
 
-def _again(ensemble, forces, s, states, chains, seed, workers, progress):
+def _again(
+    ensemble: Ensemble,
+    forces: Floats,
+    s: Floats,
+    states: int,
+    chains: int,
+    seed: int,
+    workers: int,
+    progress: Progress | None,
+) -> Floats:
     """Networks (chains, k, N_c, 2) of the network measured again, at least `states` in all."""
     each = -(-states // chains)
     streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(chains))

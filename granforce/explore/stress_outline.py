@@ -11,8 +11,8 @@ import numpy as np
 
 from granforce import notebook
 from granforce.explore.outline import outline, supports
-from granforce.forces.ensemble import stress_of, stress_rows
-from granforce.records import InputError, whole
+from granforce.forces.ensemble import Ensemble, stress_of, stress_rows
+from granforce.records import Cancel, Floats, InputError, Progress, whole
 from granforce.system import cancelling
 
 # Largest gap between the polygons, relative to the extent of the outline.
@@ -22,18 +22,18 @@ TOLERANCE = 1e-4
 class StressOutline(NamedTuple):
     """The stresses of all networks in S, as points ((σ_xx − σ_yy)/2P, σ_xy/P)."""
 
-    angles: np.ndarray  # (k,) θ
-    support: np.ndarray  # (k,) largest cos θ · first + sin θ · second over S
-    gap: np.ndarray  # (k,) duality gaps of the supports, in the same units
-    inner: np.ndarray  # (n, 2) corners of a polygon inside: stresses of networks in S
-    outer: np.ndarray  # (m, 2) corners of a polygon outside, of certified half planes
+    angles: Floats  # (k,) θ
+    support: Floats  # (k,) largest cos θ · first + sin θ · second over S
+    gap: Floats  # (k,) duality gaps of the supports, in the same units
+    inner: Floats  # (n, 2) corners of a polygon inside: stresses of networks in S
+    outer: Floats  # (m, 2) corners of a polygon outside, of certified half planes
     friction: float  # largest shear stress over pressure of any network in S
     friction_bound: float  # what it is certain not to exceed
-    own: np.ndarray  # (2,) the stress of the packing's own network
+    own: Floats  # (2,) the stress of the packing's own network
     converged: bool  # the polygons are as close as asked for
-    counts: dict  # as in `Outline`
+    counts: dict[str, int]  # as in `Outline`
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The outline as notebooks show it."""
         lines = {
             "largest shear stress / pressure": self.friction,
@@ -45,7 +45,14 @@ class StressOutline(NamedTuple):
 
 
 @cancelling.cancellable
-def stress_outline(ensemble, angles=64, *, workers=1, progress=None, cancel=None):
+def stress_outline(
+    ensemble: Ensemble,
+    angles: int = 64,
+    *,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> StressOutline:
     """The exact outline of the stresses that S can carry at its pressure; a StressOutline.
 
     angles: how many, evenly spaced from 0 on, or the angles themselves (k,). workers, progress,
@@ -77,7 +84,7 @@ def stress_outline(ensemble, angles=64, *, workers=1, progress=None, cancel=None
     )
 
 
-def stress_plane(ensemble, states):
+def stress_plane(ensemble: Ensemble, states: Floats) -> Floats:
     """Points (…, 2) of the stresses of networks (…, N_c, 2): ((σ_xx − σ_yy)/2P, σ_xy/P).
 
     NaN where there are no forces.
@@ -85,14 +92,14 @@ def stress_plane(ensemble, states):
     return plane_of(stress_of(ensemble.packing, ensemble.expand(states)))
 
 
-def plane_of(stresses):
+def plane_of(stresses: Floats) -> Floats:
     """Points (…, 2) of stresses (…, 3), σ_xx, σ_yy and σ_xy; NaN where nothing presses."""
     xx, yy, xy = np.moveaxis(stresses, -1, 0)
     twice = np.where(xx + yy > 0, xx + yy, np.nan)
     return np.stack([xx - yy, 2 * xy], axis=-1) / twice[..., None]
 
 
-def stress_axes(ensemble):
+def stress_axes(ensemble: Ensemble) -> Floats:
     """Axes (2, N_c, 2) of the plane of stresses, for forces in ⟨f_n⟩.
 
     Raises InputError where the pressure is not prescribed, or the whole stress is.

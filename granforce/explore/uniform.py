@@ -6,7 +6,8 @@ as their stationary one (see `billiard`), from whatever state they start.
 
 import copy
 import time
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.sparse.linalg import norm
@@ -15,8 +16,9 @@ from granforce.explore import billiard
 from granforce.explore.billiard import Rows
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import PROBES, Walls, walls
+from granforce.forces.ensemble import Ensemble
 from granforce.numerics import lanes
-from granforce.records import Cancelled, InputError
+from granforce.records import Cancel, Cancelled, Floats, InputError, Integers, Mask, Progress
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
 
@@ -48,7 +50,7 @@ METHODS = ("billiard", "hit_and_run")
 class ChainState(NamedTuple):
     """Where a chain stands: its place and its own random stream."""
 
-    slacks: np.ndarray  # (walls,) s
+    slacks: Floats  # (walls,) s
     rng: np.random.Generator
     paths: int = 0  # taken so far
 
@@ -56,7 +58,7 @@ class ChainState(NamedTuple):
 class Moves(NamedTuple):
     """What one step did."""
 
-    slacks: np.ndarray  # (count, walls) the states, for Walls.points
+    slacks: Floats  # (count, walls) the states, for Walls.points
     turns: int  # reflections at walls
     refused: int  # paths that were not taken, for their number of turns
 
@@ -64,12 +66,14 @@ class Moves(NamedTuple):
 class UniformSample(NamedTuple):
     """Uniform states of S by chain, and whether they can be trusted."""
 
-    states: np.ndarray  # (chains, k, N_c, 2) admissible networks, force
-    residual: np.ndarray  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
-    violation: np.ndarray  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
+    states: Floats  # (chains, k, N_c, 2) admissible networks, force
+    residual: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.residual
+    violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
     reached: bool  # complete, all in S, R̂ ≤ MIXED, worth as many independent states as wanted
-    counts: dict  # turns, refused paths, dropped states, held coordinates, skipped (h = 0)
+    counts: dict[
+        str, Any
+    ]  # turns, refused paths, dropped states, held coordinates, skipped (h = 0)
     setup_seconds: float  # wall time of the walls and of the rows of K that are kept
     sampling_seconds: float  # wall time of the steps, those dropped included
     diagnosis_seconds: float  # wall time of the diagnostics
@@ -77,25 +81,25 @@ class UniformSample(NamedTuple):
     walls: Walls  # the coordinates used
     rows: Rows | None  # those of K where all are kept
     reach: float  # root mean square distance |s − 1| from the centre, as found in the warm-up
-    ends: tuple  # ChainState of each chain, from which it can be continued
+    ends: Sequence[ChainState]  # ChainState of each chain, from which it can be continued
 
     @property
-    def effective(self):
+    def effective(self) -> float:
         """Smallest bulk or tail effective sample size of any component."""
         return min(self.mixing.least_bulk, self.mixing.least_tail)
 
     @property
-    def flat(self):
+    def flat(self) -> Floats:
         """All states (chains · k, N_c, 2), chain after chain."""
         return self.states.reshape(-1, *self.states.shape[2:])
 
     @property
-    def chain(self):
+    def chain(self) -> Integers:
         """(chains · k,) the chain of each state in `flat`."""
         return np.repeat(np.arange(self.states.shape[0]), self.states.shape[1])
 
 
-def init(made, seed):
+def init(made: Walls, seed: int | np.random.SeedSequence) -> ChainState:
     """A chain on a random ray from the centre, nine tenths of the way to the wall.
 
     Chains so start far from each other, which R̂ relies on. seed: as for numpy.random.default_rng.
@@ -106,7 +110,15 @@ def init(made, seed):
     return ChainState(1 + (0.9 / approach if approach > 0 else 1.0) * direction, rng)
 
 
-def step(made, ends, *, count, reach, rows=None, method="billiard"):
+def step(
+    made: Walls,
+    ends: Sequence[ChainState],
+    *,
+    count: int,
+    reach: float,
+    rows: Rows | None = None,
+    method: str = "billiard",
+) -> tuple[list[ChainState], list[Moves]]:
     """The next `count` states of some chains: (ChainState of each, Moves of each).
 
     The given ones are left as they were. rows: where rows of K are kept, made here by default.
@@ -123,10 +135,11 @@ def step(made, ends, *, count, reach, rows=None, method="billiard"):
     limit, lengths = MOST_TURNS * (made.dimension + 1), PATH * reach
     straight = np.ones((0, made.count))
 
-    def on(drawn, flight, out):
+    def on(drawn: Any, flight: billiard.Flight, out: Floats) -> int:
         return billiard.fly(rows, *drawn, straight, flight, limit, out, cancelling.flag())
 
-    found, counts = [], 0
+    found: list[Floats] = []
+    counts: Any = 0
     left = count * PATHS_PER_STATE
     while left:
         paths = min(left, BATCH - ends[0].paths % BATCH)
@@ -140,7 +153,9 @@ def step(made, ends, *, count, reach, rows=None, method="billiard"):
     return ends, [moves(made, *one) for one in zip(slacks, counts, strict=True)]
 
 
-def flown(made, rows, ends, on, drawn):
+def flown(
+    made: Walls, rows: Rows, ends: Sequence[ChainState], on: Callable[..., int], drawn: Any
+) -> tuple[list[ChainState], Floats, Integers]:
     """Chains on by a batch of paths: (ends, slacks (chains, paths, walls), turns and refused).
 
     on(drawn, flight, out): as `billiard.fly`, for what was drawn for the paths of a chain.
@@ -156,12 +171,14 @@ def flown(made, rows, ends, on, drawn):
     return ends, outs, np.array([billiard.counted(flight) for flight in flights])
 
 
-def moves(made, slacks, counts):
+def moves(made: Walls, slacks: Floats, counts: Integers) -> Moves:
     """The Moves of a chain, rounding taken off."""
     return Moves(made.on_hull(slacks), *(int(number) for number in counts))
 
 
-def directions(made, rng, count, unit=True):
+def directions(
+    made: Walls, rng: np.random.Generator, count: int, unit: bool = True
+) -> tuple[Floats, Floats]:
     """Speeds (count, walls) of covariance K, or uniform directions of it, and numbers in [0, 1]."""
     g, parts = np.empty((count, made.count)), np.empty(count)
     for path in range(count):
@@ -172,7 +189,9 @@ def directions(made, rng, count, unit=True):
     return speeds / np.sqrt((speeds * speeds).sum(axis=1, keepdims=True)), parts
 
 
-def _hit_and_run(made, ends, count):
+def _hit_and_run(
+    made: Walls, ends: Sequence[ChainState], count: int
+) -> tuple[list[ChainState], list[Moves]]:
     moves, rate, done, found = MOVES_PER_DIMENSION * made.dimension, np.empty(made.count), [], []
     for end in ends:
         out = np.empty((count, made.count))
@@ -191,18 +210,18 @@ def _hit_and_run(made, ends, count):
 
 @cancelling.cancellable
 def sample_uniform(
-    ensemble,
-    states=1000,
-    chains=4,
-    seed=0,
+    ensemble: Ensemble,
+    states: int = 1000,
+    chains: int = 4,
+    seed: int = 0,
     *,
-    workers=1,
-    effective=None,
-    method="billiard",
-    previous=None,
-    progress=None,
-    cancel=None,
-):
+    workers: int = 1,
+    effective: float | None = None,
+    method: str = "billiard",
+    previous: UniformSample | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> UniformSample:
     """At least `states` states of S in all, uniform in its affine hull; a UniformSample.
 
     chains: independent chains of equal length (states are rounded up to that); workers: threads,
@@ -232,11 +251,18 @@ def sample_uniform(
         if enough or not complete or done >= most:
             mixed = not h or sample.mixing.worst_r_hat <= MIXED
             return sample._replace(reached=bool(complete and enough and mixed and _inside(sample)))
-        growth = 1.1 * effective / max(sample.effective, 1.0)
-        states = min(most, int(done * min(2.0, max(1.1, growth))) + 1)
+        growth = 1.1 * (effective or 0.0) / max(sample.effective, 1.0)
+        states = int(min(most, int(done * min(2.0, max(1.1, growth))) + 1))
 
 
-def warm_up(made, chains, seed, *, method="billiard", stores=None):
+def warm_up(
+    made: Walls,
+    chains: int,
+    seed: int,
+    *,
+    method: str = "billiard",
+    stores: Sequence[Rows] | None = None,
+) -> tuple[list[ChainState], float, list[Moves]]:
     """Chains ready to draw from: (ChainState of each, reach, Moves made and dropped)."""
     ends = [init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
     reach, dropped = float(np.sqrt(made.dimension)), []
@@ -249,7 +275,7 @@ def warm_up(made, chains, seed, *, method="billiard", stores=None):
     return ends, reach, dropped
 
 
-def stores(made, kept, chains, workers):
+def stores(made: Walls, kept: Rows | None, chains: int, workers: int) -> Sequence[Rows]:
     """Rows of K for each thread: all of them together, or a part of the memory each."""
     groups = min(workers, chains)
     if kept is not None:
@@ -257,13 +283,27 @@ def stores(made, kept, chains, workers):
     return [billiard.some_rows(made, 1 / groups) for _ in range(groups)]
 
 
-def together(made, stores, ends, count, reach, method="billiard"):
+def together(
+    made: Walls,
+    stores: Sequence[Rows],
+    ends: Sequence[ChainState],
+    count: int,
+    reach: float,
+    method: str = "billiard",
+) -> tuple[list[ChainState], list[Moves]]:
     """All chains on by `count` states, over as many threads as stores: ends, and Moves of each."""
-    options = {"count": count, "reach": reach, "method": method}
-    return shared(stores, ends, lambda rows, group: step(made, group, rows=rows, **options))
+
+    def work(rows: Rows, group: list[ChainState]) -> tuple[list[ChainState], list[Moves]]:
+        return step(made, group, count=count, reach=reach, rows=rows, method=method)
+
+    return shared(stores, list(ends), work)
 
 
-def shared(stores, ends, work):
+def shared(
+    stores: Sequence[Any],
+    ends: list[Any],
+    work: Callable[[Any, list[Any]], tuple[list[Any], list[Any]]],
+) -> tuple[list[Any], list[Any]]:
     """work(rows, some of the chains) → (ends, moves), over threads, put together again."""
     groups = [[int(k) for k in part] for part in np.array_split(np.arange(len(ends)), len(stores))]
     if len(stores) == 1:
@@ -274,7 +314,7 @@ def shared(stores, ends, work):
     return [end for part in done for end in part[0]], [one for part in done for one in part[1]]
 
 
-def _start(ensemble, chains, seed, method, workers):
+def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int) -> UniformSample:
     """A sample without states yet, its chains warmed up."""
     begin = time.perf_counter()
     made = walls(ensemble)
@@ -289,7 +329,7 @@ def _start(ensemble, chains, seed, method, workers):
         states=np.zeros((chains, 0, len(ensemble.index), 2)),
         residual=nothing,
         violation=nothing,
-        mixing=None,
+        mixing=cast("Mixing", None),  # until there are states
         reached=False,
         counts=_counted(counts, dropped),
         setup_seconds=ready - begin,
@@ -303,12 +343,14 @@ def _start(ensemble, chains, seed, method, workers):
     )
 
 
-def _counted(counts, moves):
+def _counted(counts: dict[str, Any], moves: Sequence[Moves]) -> dict[str, Any]:
     turns, refused = sum(m.turns for m in moves), sum(m.refused for m in moves)
     return {**counts, "turns": counts["turns"] + turns, "refused": counts["refused"] + refused}
 
 
-def _extend(ensemble, sample, states, workers, progress):
+def _extend(
+    ensemble: Ensemble, sample: UniformSample, states: int, workers: int, progress: Progress | None
+) -> tuple[UniformSample, bool]:
     """The sample with at least `states` states, diagnosed, and whether it was not cancelled."""
     made, ends, counts = sample.walls, sample.ends, sample.counts
     chains, have = sample.residual.shape
@@ -352,12 +394,12 @@ def _extend(ensemble, sample, states, workers, progress):
     return sample, have >= target and not cancelling.cancelled()
 
 
-def _inside(sample):
+def _inside(sample: UniformSample) -> bool:
     balanced = sample.residual.max(initial=0.0) <= BALANCED
     return balanced and sample.violation.max(initial=0.0) <= ADMISSIBLE
 
 
-def forces_of(ensemble, made, slacks):
+def forces_of(ensemble: Ensemble, made: Walls, slacks: Floats) -> Floats:
     """Forces (…, N_c, 2) of slacks (…, walls)."""
     y = made.points(slacks)
     T = ensemble.scaled_form[2]
@@ -365,7 +407,7 @@ def forces_of(ensemble, made, slacks):
     return ensemble.pin(ensemble.to_forces(x.reshape(*y.shape[:-1], -1)))
 
 
-def varying(ensemble, made):
+def varying(ensemble: Ensemble, made: Walls) -> Mask:
     """Mask (N_c, 2) of components that are not the same in all of S: some random change has them.
 
     The numbers drawn are always the same.

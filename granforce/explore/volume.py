@@ -14,14 +14,16 @@ where they came from, both would differ.
 """
 
 import time
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from granforce import notebook
 from granforce.explore import billiard, uniform
-from granforce.explore.walls import walls
-from granforce.records import positive, random_seed, whole
+from granforce.explore.walls import Walls, walls
+from granforce.forces.ensemble import Ensemble
+from granforce.records import Cancel, Floats, Integers, Progress, positive, random_seed, whole
 from granforce.system import cancelling
 
 # Standard deviation of ½ (β − β′) q, by which steps of the ladder are chosen.
@@ -49,19 +51,19 @@ class Volume(NamedTuple):
     error: float  # its standard error
     dimension: int  # h
     per_grain: float  # ln V over the number of grains of the backbone
-    ladders: np.ndarray  # (2,) ln V by the way down and by the way up
+    ladders: Floats  # (2,) ln V by the way down and by the way up
     reached: bool  # the error is the wanted one, and both ladders agree
-    counts: dict  # rungs, paths, turns, refused paths
+    counts: dict[str, Any]  # rungs, paths, turns, refused paths
     seconds: float  # wall time
 
     @property
-    def extent(self):
+    def extent(self) -> float:
         """V^(1/h)/√(2πe): width per dimension of the normal distribution of the same entropy."""
         if not self.dimension:
             return 0.0
         return float(np.exp(self.log_volume / self.dimension) / np.sqrt(2 * np.pi * np.e))
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The volume as notebooks show it."""
         lines = {
             "dimension h": self.dimension,
@@ -74,7 +76,15 @@ class Volume(NamedTuple):
 
 
 @cancelling.cancellable
-def volume(ensemble, *, accuracy=0.05, seed=0, workers=1, progress=None, cancel=None):
+def volume(
+    ensemble: Ensemble,
+    *,
+    accuracy: float = 0.05,
+    seed: int = 0,
+    workers: int = 1,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Volume:
     """ln V of S with a standard error of `accuracy`; a Volume.
 
     V is the h-dimensional volume of S in its affine hull, with (f_n, f_t) of every contact in units
@@ -114,10 +124,10 @@ def volume(ensemble, *, accuracy=0.05, seed=0, workers=1, progress=None, cancel=
     )
 
 
-def _top(made, rng):
+def _top(made: Walls, rng: np.random.Generator) -> tuple[float, float, float]:
     """The largest β, ln Z there, and the variance of that."""
 
-    def reach(count):
+    def reach(count: int) -> Floats:
         # Normal states of β = 1: how far outside of S each is, as the β at which it lies on a wall.
         w = made.moved(rng.standard_normal((count, made.count)))
         return np.maximum(-w.min(axis=1), 0.0) ** 2
@@ -138,14 +148,15 @@ class _Rung(NamedTuple):
     beta: float
     reach: float  # √⟨q⟩ nearby: sets the length of paths
     end: uniform.ChainState
-    q: np.ndarray  # (paths,) |s − 1|²
+    q: Floats  # (paths,) |s − 1|²
     turns: int
     refused: int
 
 
-def _climbed(made, rows, top, seed):
+def _climbed(made: Walls, rows: billiard.Rows, top: float, seed: int) -> list[list[_Rung]]:
     """Rungs of both ladders, each from the narrowest to β = 0, with the first paths of each."""
-    down, beta, slacks, reach = [], top, np.ones(made.count), np.sqrt(made.dimension / top)
+    down: list[_Rung] = []
+    beta, slacks, reach = top, np.ones(made.count), float(np.sqrt(made.dimension / top))
     while not down or down[-1].beta > 0:
         down.append(_settled(made, rows, beta, reach, slacks, [seed, 1, len(down)]))
         q = down[-1].q
@@ -163,7 +174,14 @@ def _climbed(made, rows, top, seed):
     return [[rung._replace(q=rung.q[:0], turns=0, refused=0) for rung in way] for way in rungs]
 
 
-def _settled(made, rows, beta, reach, slacks, seed):
+def _settled(
+    made: Walls,
+    rows: billiard.Rows,
+    beta: float,
+    reach: float,
+    slacks: Floats,
+    seed: list[int],
+) -> _Rung:
     """A rung whose chain has left where it came from, with the paths after that."""
     end = uniform.ChainState(slacks, np.random.default_rng(seed))
     fresh = _Rung(beta, reach, end, np.zeros(0), 0, 0)
@@ -171,14 +189,14 @@ def _settled(made, rows, beta, reach, slacks, seed):
     return begun._replace(q=begun.q[_FORGOTTEN:])
 
 
-def _flown(made, rows, rung, count):
+def _flown(made: Walls, rows: billiard.Rows, rung: _Rung, count: int) -> _Rung:
     """The rung with so many more paths, in whole batches."""
     beta, end, found = rung.beta, rung.end, [rung.q]
     counts = np.zeros(2, dtype=np.int64)
     limit = uniform.MOST_TURNS * (made.dimension + 1)
     middle = np.ones((1 if beta > 0 else 0, made.count))
 
-    def on(drawn, flight, out):
+    def on(drawn: Any, flight: billiard.Flight, out: Floats) -> int:
         return billiard.fly(rows, *drawn, middle, flight, limit, out, cancelling.flag())
 
     for _ in range(0, count, uniform.BATCH):
@@ -195,7 +213,7 @@ def _flown(made, rows, rung, count):
     return _Rung(beta, rung.reach, end, np.concatenate(found), turns, refused)
 
 
-def _summed(rungs):
+def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:
     """ln Z(0)/Z(top) by each ladder (2,), and what each rung adds to the variance of their mean."""
     betas = np.array([rung.beta for rung in rungs[0]])
     step = 0.5 * -np.diff(betas)
@@ -213,7 +231,7 @@ def _summed(rungs):
     return sums, variance
 
 
-def _log_mean(values):
+def _log_mean(values: Floats) -> tuple[float, Floats]:
     """ln ⟨exp⟩ of values, and exp(value)/⟨exp⟩ of each."""
     most = values.max()
     weight = np.exp(values - most)
@@ -221,7 +239,7 @@ def _log_mean(values):
     return most + np.log(mean), weight / mean
 
 
-def _more(rungs, variance, wanted):
+def _more(rungs: list[list[_Rung]], variance: Floats, wanted: float) -> Integers:
     """How many more paths (2, rungs) each rung gets, for a variance as wanted at the least cost."""
     have = np.array([[len(rung.q) for rung in way] for way in rungs])
     turns = np.array([[rung.turns for rung in way] for way in rungs])
@@ -235,7 +253,13 @@ def _more(rungs, variance, wanted):
     return np.ceil(more).astype(int)
 
 
-def _extended(made, stores, rungs, more, progress):
+def _extended(
+    made: Walls,
+    stores: Sequence[Any],
+    rungs: list[list[_Rung]],
+    more: Integers,
+    progress: Progress | None,
+) -> list[list[_Rung]]:
     """The rungs with so many more paths each, over threads."""
     count = len(rungs[0])
     # Neighbours in different threads: the widest take the longest.
@@ -247,7 +271,7 @@ def _extended(made, stores, rungs, more, progress):
     ]
     tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
 
-    def work(rows, group):
+    def work(rows: billiard.Rows, group: list[Any]) -> tuple[list[Any], list[Any]]:
         return [_flown(made, rows, *task) for task in group], []
 
     done, _ = uniform.shared(stores, tasks, work)

@@ -25,7 +25,7 @@ from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics import highs as programs
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import WallMatrix
-from granforce.records import InputError
+from granforce.records import Floats, InputError, Integers, Mask
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, FLAT
 
@@ -43,41 +43,43 @@ PROBES = 8
 class Walls(NamedTuple):
     """y = centre; y[moving] *= s. Walls beyond those of `moving` are padding: there s = 1."""
 
-    centre: np.ndarray  # (n,) y°, coordinates of `Ensemble.scaled_form`
-    moving: np.ndarray  # (w,) positions in y of what is not held in all of S
+    centre: Floats  # (n,) y°, coordinates of `Ensemble.scaled_form`
+    moving: Integers  # (w,) positions in y of what is not held in all of S
     matrix: WallMatrix  # K of all `count` walls
     dimension: int  # h of the affine hull of S
-    pull: np.ndarray  # (2 N_c,) W (m − f°), what a measurement pulls with; 0 without one
-    root: np.ndarray  # (2 N_c,) √W
-    barrier: np.ndarray  # (N_c, 3) conductances of the barrier alone
+    pull: Floats  # (2 N_c,) W (m − f°), what a measurement pulls with; 0 without one
+    root: Floats  # (2 N_c,) √W
+    barrier: Floats  # (N_c, 3) conductances of the barrier alone
     units: float  # ln of the volume of S in ⟨f_n⟩ over that in s
 
     @property
-    def count(self):
+    def count(self) -> int:  # type: ignore[override]
         """Number of walls, padding included."""
         return len(self.matrix.contact)
 
-    def rows(self, walls):
+    def rows(self, walls: Integers) -> Floats:
         """Rows (k, count) of K."""
         return wall_matrix.rows(self.matrix, walls)
 
-    def moved(self, g, pulls=None):
+    def moved(self, g: Floats, pulls: Floats | None = None) -> Floats:
         """K g + B Q p, (k, count), of g (k, count) and forces p (k, 2 N_c)."""
         return wall_matrix.moved(self.matrix, g, pulls)
 
-    def on_hull(self, slacks):
+    def on_hull(self, slacks: Floats) -> Floats:
         """The slacks (k, count), or next to them, that balance lets be."""
         # With the barrier's own conductances f − f° is read off the slacks, contact by contact.
         return 1.0 + wall_matrix.moved(self.matrix, slacks - 1.0, None, _POLISH, self.barrier)
 
-    def points(self, slacks):
+    def points(self, slacks: Floats) -> Floats:
         """y (…, n) ≥ 0 of slacks (…, count)."""
         y = np.broadcast_to(self.centre, (*slacks.shape[:-1], len(self.centre))).copy()
         y[..., self.moving] *= np.maximum(slacks[..., : len(self.moving)], 0.0)
         return y
 
 
-def walls(ensemble, weight=None, measured=None):
+def walls(
+    ensemble: Ensemble, weight: Floats | None = None, measured: Floats | None = None
+) -> Walls:
     """The Walls of an ensemble.
 
     weight, measured (N_c, 2): W and m in ⟨f_n⟩ for the centre of exp(−½ Σ W (f − m)²) cut by the
@@ -97,7 +99,7 @@ def walls(ensemble, weight=None, measured=None):
     return _walls(frame, _centred(frame, y))
 
 
-def inner_point(A, b):
+def inner_point(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Mask]:
     """A point y (n,) inside the polytope relative to its affine hull, and the mask of what is held.
 
     Held are coordinates that stay below FLAT in all of the polytope. Each program raises the sum
@@ -116,7 +118,7 @@ def inner_point(A, b):
     return np.mean(found, axis=0), held
 
 
-def _raised(A, b, low):
+def _raised(A: sparse.csr_matrix, b: Floats, low: Integers) -> Floats:
     """The y with the largest Σ min(y, _AWAY) over the coordinates `low`."""
     n = A.shape[1]
     upper = np.concatenate([np.full(n, np.inf), np.full(len(low), _AWAY)])
@@ -138,37 +140,40 @@ class _Frame(NamedTuple):
 
     ensemble: Ensemble
     problem: Problem  # its balance, independent rows
-    contact: np.ndarray  # (n,) contact of each coordinate y
-    normal: np.ndarray  # (n, 2) what unit f_n, f_t/μ add to it
-    held: np.ndarray  # (n,) bool
-    stiff: np.ndarray  # (N_c, 2) W, of f_n and f_t/μ; PINNED for what is known
-    target: np.ndarray  # (N_c, 2) m, f_t/μ
+    contact: Integers  # (n,) contact of each coordinate y
+    normal: Floats  # (n, 2) what unit f_n, f_t/μ add to it
+    held: Mask  # (n,) bool
+    stiff: Floats  # (N_c, 2) W, of f_n and f_t/μ; PINNED for what is known
+    target: Floats  # (N_c, 2) m, f_t/μ
 
     @property
-    def cones(self):
+    def cones(self) -> int:
         """Coordinates of the cones; those of known bounds come after."""
         return self.ensemble.per_contact * len(self.stiff)
 
-    def forces(self, y):
+    def forces(self, y: Floats) -> Floats:
         """f_n, f_t/μ (N_c, 2) of y (n,)."""
         pairs = y[: self.cones].reshape(len(self.stiff), -1)
         if self.ensemble.mu == 0:
             return np.pad(pairs, ((0, 0), (0, 1)))
         return 0.5 * np.stack([pairs.sum(axis=1), pairs[:, 0] - pairs[:, 1]], axis=1)
 
-    def pull(self, y):
+    def pull(self, y: Floats) -> Floats:
         """W (m − f) (2 N_c,)."""
         free = np.where(self.stiff < PINNED, self.stiff, 0.0)
         return (free * (self.target - self.forces(y))).ravel()
 
 
-def _frame(ensemble, y, held, weight, measured):
+def _frame(
+    ensemble: Ensemble, y: Floats, held: Mask, weight: Floats | None, measured: Floats | None
+) -> _Frame:
     contacts, mu, known = len(ensemble.index), ensemble.mu, ensemble.known
     unit = knowledge.units(mu)
     contact = np.repeat(np.arange(contacts), ensemble.per_contact)
     normal = np.tile([[1.0, 1.0], [1.0, -1.0]] if mu > 0 else [[1.0, 0.0]], (contacts, 1))
     stiff, target = np.zeros((contacts, 2)), np.zeros((contacts, 2))
     if weight is not None:
+        assert measured is not None  # they come together
         stiff, target = weight * unit**2, measured / unit
     if mu == 0:
         stiff[:, 1] = PINNED
@@ -186,7 +191,9 @@ def _frame(ensemble, y, held, weight, measured):
     return frame
 
 
-def _conductances(frame, curvature, stiff):
+def _conductances(
+    frame: _Frame, curvature: Floats, stiff: Floats
+) -> tuple[Floats, Floats, Integers]:
     """`wall_matrix.conductances` of a stiffness (n,) along the coordinates and W (N_c, 2)."""
     cones = frame.cones
     # Half of it still counts as pinned.
@@ -198,12 +205,12 @@ def _conductances(frame, curvature, stiff):
     return wall_matrix.conductances(np.repeat(d[:cones, None] / 2, 2, axis=1), k)
 
 
-def _barrier(frame, y):
+def _barrier(frame: _Frame, y: Floats) -> Floats:
     """The curvature of −Σ log y."""
     return np.where(frame.held, 1.0, y) ** -2.0
 
 
-def _matrix(frame, y, stiff):
+def _matrix(frame: _Frame, y: Floats, stiff: Floats) -> tuple[WallMatrix, Integers]:
     """(K at y, its walls' positions in y)."""
     C, _, free = _conductances(frame, _barrier(frame, y), stiff)
     moving = np.flatnonzero(~frame.held & (free[frame.contact] > 0))
@@ -215,7 +222,7 @@ def _matrix(frame, y, stiff):
     return WallMatrix(problem.network, contact, normal, C, factors), moving
 
 
-def _rest(frame, y):
+def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
     """Unbalance b − A f of y, by rows of the problem and global rows."""
     S, problem = frame.ensemble, frame.problem
     forces = frame.forces(y) * knowledge.units(S.mu)
@@ -225,7 +232,7 @@ def _rest(frame, y):
     return rest[: len(problem.b)], rest[len(problem.b) :]
 
 
-def _centred(frame, y):
+def _centred(frame: _Frame, y: Floats) -> Floats:
     """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps."""
     weight = np.where(frame.stiff < PINNED, frame.stiff, 0.0)
     for _ in range(_MOST_NEWTON_STEPS):
@@ -252,7 +259,7 @@ def _centred(frame, y):
     raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
 
 
-def _polished(frame, y):
+def _polished(frame: _Frame, y: Floats) -> Floats:
     """y, its balance restored by dense matrices where rows had been left out."""
     A, b, _ = frame.ensemble.scaled_form
     if np.abs(A @ y - b).max(initial=0.0) <= BALANCED / 10 or A.shape[0] > MOST_DENSE:
@@ -260,18 +267,18 @@ def _polished(frame, y):
     return in_balance(A, b, y)
 
 
-def _rise(step, relative, slope, curve):
+def _rise(step: float, relative: Floats, slope: float, curve: float) -> float:
     """Growth of Σ log y − ½ Σ W (f − m)² along a step."""
     return np.log1p(step * relative).sum() + step * (slope - 0.5 * step * curve)
 
 
-def _shifted(y, moving, relative):
+def _shifted(y: Floats, moving: Integers, relative: Floats) -> Floats:
     y = y.copy()
     y[moving] *= 1 + relative
     return y
 
 
-def _walls(frame, y):
+def _walls(frame: _Frame, y: Floats) -> Walls:
     """The Walls around y."""
     known = np.where(frame.stiff < PINNED, 0.0, PINNED)
     weight = np.where(frame.stiff < PINNED, frame.stiff, 0.0)
@@ -295,7 +302,7 @@ def _walls(frame, y):
     )
 
 
-def _thin_shape(ensemble, y, moving):
+def _thin_shape(ensemble: Ensemble, y: Floats, moving: Integers) -> tuple[int, float]:
     """Dimension h, and ln of the volume in ⟨f_n⟩ over that in slacks, by dense matrices.
 
     A whole stress leaves rows that follow from others where S is thin: pivots do not tell those.
@@ -307,14 +314,14 @@ def _thin_shape(ensemble, y, moving):
     return null.shape[1], 0.5 * float(logs[0] - logs[1])
 
 
-def null_space(dense):
+def null_space(dense: Floats) -> Floats:
     """Orthonormal (n, h) of a matrix (rows, n), by singular values."""
     _, values, rows = np.linalg.svd(dense)
     rank = int(np.sum(values > FLAT * values.max(initial=0.0)))
     return rows[rank:].T
 
 
-def _shape(frame, curvature, stiff):
+def _shape(frame: _Frame, curvature: Floats, stiff: Floats) -> tuple[int, float]:
     """Dimension h of what balance leaves free, and ½ ln det of the stiffness M there.
 
     For N a basis of the null space of A, det NᵀMN is det M det A M⁻¹Aᵀ but for a factor that only

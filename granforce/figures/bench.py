@@ -1,9 +1,15 @@
 """Figure of the benchmark: run time against error, size and friction."""
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import holoviews as hv
+
 from granforce.figures import style
+from granforce.records import Rows
 
 
-def benchmark(results, *, backend="bokeh"):
+def benchmark(results: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout | None:
     """One frame for each part of the results that has a figure, as from `granforce.bench.run`.
 
     relaxation: time against μ by solver; scaling: against N; compaction: mean overlap against time;
@@ -12,33 +18,33 @@ def benchmark(results, *, backend="bokeh"):
     of them.
     """
     style.ready(backend)
-    frames = []
+    frames: list[hv.Overlay] = []
     for part, draw in _DRAWN.items():
         if part in results:
             frames += draw(results[part], backend)
     return style.page(frames, backend) if frames else None
 
 
-def _relaxation(rows, backend):
+def _relaxation(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by(rows, "solver", "mu", "seconds")
     words = {"title": "one relaxation to 1e-9 ⟨f_n⟩", "x": "μ", "y": "time / s"}
     yield _frame(series, backend, words, room=50.0, logx=True, logy=True)
 
 
-def _scaling(rows, backend):
+def _scaling(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by([row for row in rows if row["n"] != "fit"], "solver", "n", "seconds")
     words = {"title": "one relaxation against size", "x": "N", "y": "time / s"}
     yield _frame(series, backend, words, logx=True, logy=True)
 
 
-def _compaction(rows, backend):
+def _compaction(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     named = [row | {"name": f"Δt = {row['dt']:g}"} for row in rows]
     series = _by(named, "name", "seconds", "overlap")
     words = {"title": "compaction", "x": "time / s", "y": "mean overlap / r_max"}
     yield _frame(series, backend, words, legend="top_right", logx=True, logy=True)
 
 
-def _intervals(rows, backend):
+def _intervals(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     for mu in sorted({row["mu"] for row in rows}):
         chosen = [row for row in rows if row["mu"] == mu]
         series = _by(chosen, "method", "seconds", "extent_part")
@@ -47,13 +53,13 @@ def _intervals(rows, backend):
         yield _frame(series, backend, words, legend="bottom_right", logx=True, ylim=(-0.6, 1.1))
 
 
-def _uniform(rows, backend):
+def _uniform(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by(rows, "method", "h", "seconds_per_state")
     words = {"title": "uniform sampling", "x": "h", "y": "processor time per effective state / s"}
     yield _frame(series, backend, words, room=200.0, logx=True, logy=True)
 
 
-def _uniform_growth(rows, backend):
+def _uniform_growth(rows: Rows, backend: str) -> Iterator[hv.Overlay]:
     series = _by([row for row in rows if row["n"] != "fit"], "rows", "n", "seconds_per_state")
     words = {"title": "uniform sampling against size", "x": "N"}
     words["y"] = "processor time per effective state / s"
@@ -70,16 +76,24 @@ _DRAWN = {
 }
 
 
-def _by(rows, name, x, y):
+def _by(rows: Rows, name: str, x: str, y: str) -> dict[Any, list[tuple[float, float]]]:
     """{value of the column `name`: points (x, y)} of the rows that have both."""
-    series = {}
+    series: dict[Any, list[tuple[float, float]]] = {}
     for row in rows:
         if row.get(x) is not None and row.get(y) is not None:
             series.setdefault(row[name], []).append((row[x], row[y]))
     return series
 
 
-def _frame(series, backend, words, *, legend="top_left", room=1.0, **axes):
+def _frame(
+    series: Mapping[Any, list[tuple[float, float]]],
+    backend: str,
+    words: dict[str, str],
+    *,
+    legend: str = "top_left",
+    room: float = 1.0,
+    **axes: Any,
+) -> hv.Overlay:
     """room: factor by which a logarithmic axis reaches above the data, for the legend."""
     drawn = []
     y = [point[1] for points in series.values() for point in points]

@@ -5,12 +5,15 @@ import numpy as np
 
 from granforce.figures import style
 from granforce.figures.networks import contact_points, outline
+from granforce.records import Floats, Packing
 
 # The length of the arrow of the fastest grain, in mean diameters.
 LONGEST_ARROW = 2.0
 
 
-def displacement(packing, field, contact=None, *, backend="bokeh"):
+def displacement(
+    packing: Packing, field: Floats, contact: int | None = None, *, backend: str = "bokeh"
+) -> hv.Overlay:
     """Displacements of the grains as arrows on the packing.
 
     field (N, 2): displacements in any unit, NaN for grains without; the longest arrow is
@@ -47,7 +50,7 @@ def displacement(packing, field, contact=None, *, backend="bokeh"):
     )
 
 
-def _disks(x, r, colour, backend):
+def _disks(x: Floats, r: Floats, colour: str, backend: str) -> hv.Path:
     angle = np.linspace(0, 2 * np.pi, 25)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     outlines = [centre + radius * circle for centre, radius in zip(x, r, strict=True)]
@@ -55,7 +58,7 @@ def _disks(x, r, colour, backend):
     return hv.Path(outlines).opts(backend=backend, **{name: colour})
 
 
-def _arrows(x, along, backend):
+def _arrows(x: Floats, along: Floats, backend: str) -> hv.Overlay:
     colour = style.COLOURS[0]
     lines = [np.array([a, a + d]) for a, d in zip(x, along, strict=True)]
     tips = x + along

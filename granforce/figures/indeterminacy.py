@@ -1,9 +1,14 @@
 """Figures 1, 4 and 6: indeterminacy, its distribution and its correlation with the force."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import holoviews as hv
 import numpy as np
 
-from granforce import statistics
 from granforce.figures import style
+from granforce.measures import statistics
+from granforce.records import Floats, Rows
 
 _MEASURES = (
     *(("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15)),
@@ -11,7 +16,9 @@ _MEASURES = (
 )
 
 
-def indeterminacy(rows, *, beside=None, backend="bokeh"):
+def indeterminacy(
+    rows: Rows, *, beside: Mapping[str, Rows] | None = None, backend: str = "bokeh"
+) -> hv.Layout:
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
 
     rows: dicts with mu, eta1, eta2, eta3, extent (the width of S per free dimension, in ⟨f_n⟩), of
@@ -24,7 +31,8 @@ def indeterminacy(rows, *, beside=None, backend="bokeh"):
         points = statistics.means(rows, name, factor=factor)
         if points:
             curves.append((points, label, style.COLOURS[k], "solid", k))
-    for source, dash in zip(beside or {}, ("dashed", "dotted"), strict=False):
+    beside = beside or {}
+    for source, dash in zip(beside, ("dashed", "dotted"), strict=False):
         for k, (name, label, factor) in enumerate(_MEASURES):
             points = statistics.means(beside[source], name, factor=factor)
             if points:
@@ -68,7 +76,14 @@ def indeterminacy(rows, *, beside=None, backend="bokeh"):
 _SMALL, _MIDDLE = 0.02, 0.3
 
 
-def extents(groups, *, backend="bokeh", largest=4.0, bins=24, unit=None):
+def extents(
+    groups: Mapping[float, Sequence[Floats]],
+    *,
+    backend: str = "bokeh",
+    largest: float = 4.0,
+    bins: int = 24,
+    unit: Mapping[float, float] | None = None,
+) -> hv.Layout:
     """Figure 4: P(ΔF_n) for several μ, linear, and semi-logarithmic by ranges of μ.
 
     groups: {μ: list of arrays (N_c,) of ΔF_n, one for each packing}. ΔF_n is drawn in units of its
@@ -94,12 +109,15 @@ def extents(groups, *, backend="bokeh", largest=4.0, bins=24, unit=None):
     for word, some in zip(words, ranges, strict=True):
         if some:
             top = max(p for mu in some for _, p, _ in series[mu][0])
-            room = {"legend": "top_right", "ylim": (None, 20 * top)}  # above what falls
+            room: dict[str, Any] = {
+                "legend": "top_right",
+                "ylim": (None, 20 * top),
+            }  # above what falls
             frames.append(_densities(series, some, True, backend, title=word, **room, **axes))
     return style.page(frames, backend, columns=2)
 
 
-def _density(group, edges):
+def _density(group: Sequence[Floats], edges: Floats) -> list[tuple[float, float, float]]:
     """Points (x, P, standard error over packings) of the bins up to the last that holds any."""
     heights = np.array([statistics.density(values, edges) for values in group])
     sizes = np.array([len(values) for values in group])
@@ -109,7 +127,9 @@ def _density(group, edges):
     return list(zip(((edges[1:] + edges[:-1]) / 2)[:last], mean[:last], error[:last], strict=True))
 
 
-def _densities(series, some, logy, backend, *, x, y, **options):
+def _densities(
+    series: Any, some: Any, logy: bool, backend: str, *, x: str, y: str, **options: Any
+) -> hv.Overlay:
     """A frame of the densities at some μ."""
     drawn = []
     for mu in some:
@@ -123,7 +143,13 @@ def _densities(series, some, logy, backend, *, x, y, **options):
     return style.frame(drawn, backend, x=x, y=y, logy=logy, **options)
 
 
-def correlations(rows, *, beside=None, chance=None, backend="bokeh"):
+def correlations(
+    rows: Rows,
+    *,
+    beside: Mapping[str, Rows] | None = None,
+    chance: Mapping[float, float] | None = None,
+    backend: str = "bokeh",
+) -> hv.Overlay:
     """Figure 6: corr(f_n, ΔF_n) against μ with the paper's error bars.
 
     rows: dicts with mu, correlation, correlation_low and correlation_high (the least and largest

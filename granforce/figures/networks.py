@@ -1,16 +1,26 @@
 """Figures 3 and 5: the forces that single contacts can have, and where those contacts are."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import holoviews as hv
 import numpy as np
 
 from granforce.figures import style
+from granforce.records import Floats, Integers, Packing
 
 SHOWN_CONTACTS = 40
 LARGEST = 3.0  # f_n / f_n,orig at which frames are cut
 RATIOS = np.linspace(0, LARGEST, 121)  # edges of the bins that states are counted in
 
 
-def possible_forces(groups, *, backend="bokeh", largest=LARGEST, contacts=SHOWN_CONTACTS):
+def possible_forces(
+    groups: Mapping[float, Sequence[Floats]],
+    *,
+    backend: str = "bokeh",
+    largest: float = LARGEST,
+    contacts: int = SHOWN_CONTACTS,
+) -> hv.Layout:
     """Figure 3: values of f_n / f_n,orig of contacts, weak to strong, for several μ.
 
     groups: {μ: (original (N_c,), states (S, N_c), least (N_c,), extent (N_c,))}: normal forces of
@@ -32,7 +42,9 @@ def possible_forces(groups, *, backend="bokeh", largest=LARGEST, contacts=SHOWN_
     return style.page(frames, backend, columns=2)
 
 
-def force_densities(groups, *, backend="bokeh"):
+def force_densities(
+    groups: Mapping[float, Sequence[Floats]], *, backend: str = "bokeh"
+) -> hv.Layout:
     """Figure 3 of every contact and any number of states, counted by `ratio_counts`.
 
     groups: {μ: (original (N_c,), counts (N_c, bins), least (N_c,), extent (N_c,))}. Colours tell
@@ -54,7 +66,7 @@ def force_densities(groups, *, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
-def ratio_counts(original, states):
+def ratio_counts(original: Floats, states: Floats) -> Integers:
     """How many states (S, N_c) have f_n / f_n,orig in each bin of RATIOS: (N_c, bins).
 
     States beyond the last edge are in none; contacts without a force are not counted.
@@ -65,13 +77,22 @@ def ratio_counts(original, states):
     return counts
 
 
-def _weak_to_strong(original):
+def _weak_to_strong(original: Floats) -> Integers:
     """Contacts that carry, in order of their force."""
     order = np.argsort(original, kind="stable")
     return order[original[order] > 0]
 
 
-def _ratios(mu, drawn, original, least, extent, chosen, largest, backend):
+def _ratios(
+    mu: float,
+    drawn: list[Any],
+    original: Floats,
+    least: Floats,
+    extent: Floats,
+    chosen: Integers,
+    largest: float,
+    backend: str,
+) -> hv.Overlay:
     """A frame of what is drawn over the intervals of chosen contacts; it says what is cut."""
     x, scale = np.arange(1, len(chosen) + 1), original[chosen]
     low, high = least[chosen] / scale, (least + extent)[chosen] / scale
@@ -90,7 +111,12 @@ def _ratios(mu, drawn, original, least, extent, chosen, largest, backend):
     return style.frame(drawn, backend, title=title, ylim=(0, largest), **axes)
 
 
-def places(groups, *, backend="bokeh", part=0.1):
+def places(
+    groups: Mapping[float, tuple[Packing, Integers, Floats, Floats]],
+    *,
+    backend: str = "bokeh",
+    part: float = 0.1,
+) -> hv.Layout:
     """Figure 5: where the strongest and the least determined contacts are.
 
     groups: {μ: (packing, contacts, normal, extent)}: a Packing, positions in its contact list, and
@@ -121,7 +147,9 @@ def places(groups, *, backend="bokeh", part=0.1):
     return style.page(frames, backend, columns=2)
 
 
-def overlaid(groups, *, backend="bokeh"):
+def overlaid(
+    groups: Mapping[float, tuple[Packing, Integers, Floats, Floats]], *, backend: str = "bokeh"
+) -> hv.Layout:
     """Figure 5: where forces are strong, f_n > 2⟨f_n⟩, and where undetermined, ΔF_n > ⟨ΔF_n⟩.
 
     groups: as for `places`; both are drawn over each other, and the title counts them.
@@ -150,21 +178,21 @@ def overlaid(groups, *, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
-def contact_points(packing, contacts):
+def contact_points(packing: Packing, contacts: Integers) -> Floats:
     """Points of contact (n, 2), folded into the cell."""
     c = packing.contacts
     at = packing.x[c.i[contacts]] + c.arm_i[contacts, None] * c.normal[contacts]
     return packing.cell.wrapped(at)
 
 
-def outline(packing, backend):
+def outline(packing: Packing, backend: str) -> list[hv.Curve]:
     """The cell as a list of one line, where the frame's own edges are not it."""
     if not packing.tilt:
         return []
     return [style.line(packing.cell.corners, "cell", style.GREY, backend, "dashed")]
 
 
-def _axes(packing, backend):
+def _axes(packing: Packing, backend: str) -> dict[str, Any]:
     """Options of a frame that shows the cell, both axes in one scale."""
     low, high = packing.cell.extent
     limits = {"xlim": (low[0], high[0]), "ylim": (low[1], high[1])}

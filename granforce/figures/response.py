@@ -1,12 +1,17 @@
 """Figure 2: how a packing answers to a local force, against its indeterminacy."""
 
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import holoviews as hv
 import numpy as np
 
-from granforce import statistics
 from granforce.figures import style
+from granforce.measures import statistics
+from granforce.records import Rows
 
 
-def perturbation(rows, *, limit=False, backend="bokeh"):
+def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> hv.Layout:
     """Figure 2: ⟨F_crit⟩/⟨f_n⟩ and the decay exponent α against η2, joined in order of μ.
 
     rows: dicts with mu, eta2, critical_force (mean over contacts, in ⟨f_n⟩) and decay_exponent, one
@@ -25,7 +30,7 @@ def perturbation(rows, *, limit=False, backend="bokeh"):
     looks = style.looks(sorted({row["mu"] for row in rows}))
     frames = []
     for names, title, label in panels:
-        drawn = []
+        drawn: list[Any] = []
         for name, word, dash in names:
             drawn += _joined(_points(rows, name), word, dash, looks, backend)
         legend = style.beside("top_left", backend) if label.startswith("α") else None
@@ -33,14 +38,20 @@ def perturbation(rows, *, limit=False, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
-def _points(rows, name):
+def _points(rows: Rows, name: str) -> list[tuple[float, ...]]:
     """[(μ, η2, value, standard error of η2, of the value)], means over packings."""
     rows = [row for row in rows if np.isfinite(row.get(name, np.nan))]
     across, up = statistics.means(rows, "eta2"), statistics.means(rows, name)
     return [(mu, x, y, dx, dy) for (mu, x, dx), (_, y, dy) in zip(across, up, strict=True)]
 
 
-def _joined(points, word, dash, looks, backend):
+def _joined(
+    points: Sequence[tuple[float, ...]],
+    word: str,
+    dash: str,
+    looks: Mapping[float, tuple[str, str]],
+    backend: str,
+) -> Iterator[Any]:
     if not points:
         return
     yield style.line([point[1:3] for point in points], word, style.GREY, backend, dash)

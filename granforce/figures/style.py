@@ -2,19 +2,24 @@
 
 import io
 import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import holoviews as hv
 from holoviews.plotting.util import process_cmap
 
-from granforce.records import InputError
+from granforce.records import Floats, InputError
 from granforce.system.files import written
 
 # Okabe and Ito's palette: told apart by colour-blind eyes.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
 GREY = "#999999"
 MARKERS = ("o", "s", "^", "d", "v", "+", "x", "*")
+# Of a line: x, y and, with bars, how far they reach.
+Points = Sequence[Any] | Floats
+
 DASHES = {"solid": ("solid", "-"), "dashed": ("dashed", "--"), "dotted": ("dotted", ":")}
 FRAME_PIXELS = (300, 260)
 FRAME_INCHES = (4.2, 3.5)
@@ -41,12 +46,12 @@ SYMBOLS = {
 _SYMBOL = re.compile("|".join(map(re.escape, SYMBOLS)) + r"|(?<!/ )\b[a-zA-Z]\b(?= =|$| /)")
 
 
-def typeset(text, backend):
+def typeset(text: str, backend: str) -> str:
     """A text with its symbols in mathematical type; what is typeset already stays as it is."""
     if "$" in text:
         return text
 
-    def symbol(match):
+    def symbol(match: re.Match[str]) -> str:
         written = match.group()
         maths, plain = SYMBOLS.get(written, (written, written))
         return f"${maths}$" if backend == "matplotlib" else plain
@@ -54,7 +59,7 @@ def typeset(text, backend):
     return _SYMBOL.sub(symbol, text)
 
 
-def ready(backend):
+def ready(backend: str) -> None:
     """Load a plotting backend of HoloViews without changing which one is current.
 
     Raises InputError for another backend than "bokeh" and "matplotlib".
@@ -67,7 +72,7 @@ def ready(backend):
         hv.Store.set_current_backend(current)
 
 
-def line(points, label, colour, backend, dash="solid"):
+def line(points: Points, label: str, colour: str, backend: str, dash: str = "solid") -> hv.Curve:
     """A line through points (x, y)."""
     bokeh, mpl = DASHES[dash]
     width = {"line_width": 1.5, "line_dash": bokeh}
@@ -76,16 +81,18 @@ def line(points, label, colour, backend, dash="solid"):
     return hv.Curve(points, label=label).opts(color=colour, backend=backend, **width)
 
 
-def dots(points, label, colour, backend, marker="o", size=6):
+def dots(
+    points: Points, label: str, colour: str, backend: str, marker: str = "o", size: float = 6
+) -> hv.Points:
     """Points (x, y)."""
-    area = {"size": size} if backend == "bokeh" else {"s": size**2 / 2}
+    area: dict[str, Any] = {"size": size} if backend == "bokeh" else {"s": size**2 / 2}
     if backend == "bokeh":
         area["tools"] = ["hover"]
     marks = hv.Scatter(points, label=label)
     return marks.opts(color=colour, marker=_marker(marker, backend), backend=backend, **area)
 
 
-def bars(points, colour, backend, horizontal=False):
+def bars(points: Points, colour: str, backend: str, horizontal: bool = False) -> hv.ErrorBars:
     """Error bars (x, y, below, above)."""
     if backend == "bokeh":
         look = {"line_color": colour, "upper_head": None, "lower_head": None}
@@ -96,13 +103,15 @@ def bars(points, colour, backend, horizontal=False):
     )
 
 
-def looks(keys):
+def looks(keys: Sequence[Any]) -> dict[Any, tuple[str, str]]:
     """{key: (colour, marker)} of points in order, from dark blue to yellow, each of its own."""
     names = process_cmap("viridis", len(keys) + 1)
     return {key: (names[k], MARKERS[k % 5]) for k, key in enumerate(keys)}
 
 
-def curves(series, backend, logx=False, logy=False):
+def curves(
+    series: Iterable[Any], backend: str, logx: bool = False, logy: bool = False
+) -> Iterator[Any]:
     """Lines with points and error bars: series of (points, label, colour, dash, marker's number).
 
     points: (x, y, standard error), as `statistics.means` gives them; those that a logarithmic axis
@@ -117,7 +126,7 @@ def curves(series, backend, logx=False, logy=False):
         yield bars([bar for bar in reach if bar[3] > 0], colour, backend)
 
 
-def beside(corner, backend):
+def beside(corner: str, backend: str) -> str:
     """Place of a legend that would lie over data: beside the frame, in pages in this corner.
 
     A page has no room beside its frames, and can be moved under the legend.
@@ -125,7 +134,16 @@ def beside(corner, backend):
     return corner if backend == "bokeh" else "right"
 
 
-def frame(elements, backend, *, title, x, y, legend=None, **options):
+def frame(
+    elements: Iterable[Any],
+    backend: str,
+    *,
+    title: str,
+    x: str,
+    y: str,
+    legend: str | None = None,
+    **options: Any,
+) -> hv.Overlay:
     """Elements in one frame. legend: its corner, such as "top_right"; options: logx, ylim, …"""
     elements = list(elements)
     if backend == "bokeh":
@@ -150,7 +168,9 @@ def frame(elements, backend, *, title, x, y, legend=None, **options):
     )
 
 
-def inset(outer, inner, place, backend):
+def inset(
+    outer: hv.Overlay, inner: hv.Overlay, place: Sequence[float], backend: str
+) -> list[hv.Overlay]:
     """The frames of which one is an inset of the other, as a list.
 
     place: (left, bottom, width, height) in parts of the outer frame. Pages have no insets: there
@@ -159,7 +179,7 @@ def inset(outer, inner, place, backend):
     if backend == "bokeh":
         return [outer, inner]
 
-    def draw(plot, _):
+    def draw(plot: Any, _: Any) -> None:
         axes = plot.handles["axis"].inset_axes(place)
         small = inner.opts(backend=backend, clone=True, title="", fontscale=0.65, show_legend=False)
         kind = hv.Store.registry[backend][hv.Overlay]
@@ -171,7 +191,7 @@ def inset(outer, inner, place, backend):
     return [outer.opts(backend=backend, clone=True, hooks=hooks)]
 
 
-def _legend_of(elements):
+def _legend_of(elements: Sequence[Any]) -> Callable[[Any, Any], None]:
     """A hook that typesets a picture's legend, and shows the symbols of its points on its lines."""
     looks = {
         element.label: element.opts.get("style", backend="matplotlib").kwargs
@@ -179,7 +199,7 @@ def _legend_of(elements):
         if isinstance(element, hv.Scatter)
     }
 
-    def finish(plot, _):
+    def finish(plot: Any, _: Any) -> None:
         legend = plot.handles["axis"].get_legend()
         if legend is None:
             return
@@ -193,7 +213,7 @@ def _legend_of(elements):
     return finish
 
 
-def equal_scales(box, backend):
+def equal_scales(box: Sequence[float] | Floats, backend: str) -> dict[str, Any]:
     """Options of a frame in which both axes have the same scale: box, its sides."""
     if backend == "matplotlib":
         return {"aspect": "equal"}
@@ -201,7 +221,7 @@ def equal_scales(box, backend):
     return {"frame_width": width, "frame_height": round(width * box[1] / box[0])}
 
 
-def page(frames, backend, columns=3):
+def page(frames: Sequence[Any], backend: str, columns: int = 3) -> hv.Layout:
     """Frames beside each other."""
     layout = hv.Layout(list(frames)).cols(columns)
     if backend == "bokeh":
@@ -211,7 +231,7 @@ def page(frames, backend, columns=3):
     return layout.opts(sublabel_format="", hspace=0.3, vspace=0.35, backend=backend, **size)
 
 
-def save(figure, path, caption=""):
+def save(figure: Any, path: str | Path, caption: str = "") -> None:
     """Write a figure: a page that needs no network (.html), or a picture (.png, .svg).
 
     Pages are for figures made with the backend "bokeh", pictures with "matplotlib": no browser.
@@ -233,7 +253,7 @@ def save(figure, path, caption=""):
         file.write(content)
 
 
-def rendered(figure):
+def rendered(figure: Any) -> Any:
     """A figure for pictures as a Matplotlib figure of the size that all its frames need."""
     ready("matplotlib")
     drawn = hv.render(figure, backend="matplotlib")
@@ -243,12 +263,12 @@ def rendered(figure):
     return drawn
 
 
-def _picture(figure, form, caption):
+def _picture(figure: Any, form: str, caption: str) -> bytes:
     """A figure as the bytes of a PNG or an SVG, with its caption."""
     drawn = rendered(figure)
     from matplotlib import rc_context  # seconds to load, of use here only
 
-    metadata = {"Title": "granforce", "Description": caption}
+    metadata: dict[str, str | None] = {"Title": "granforce", "Description": caption}
     if form == "svg":
         metadata["Date"] = None  # the same figure, the same file
     file = io.BytesIO()
@@ -262,7 +282,7 @@ def _picture(figure, form, caption):
     return content
 
 
-def _marker(marker, backend):
+def _marker(marker: str, backend: str) -> str:
     names = {
         "o": "circle",
         "s": "square",

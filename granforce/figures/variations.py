@@ -1,14 +1,20 @@
 """Beyond the paper's figures: other sizes, boundaries and frictions, and the centre of S."""
 
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import holoviews as hv
 import numpy as np
 
-from granforce import statistics
 from granforce.figures import style
+from granforce.figures.style import Points
+from granforce.measures import statistics
+from granforce.records import Rows
 
 _MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
 
 
-def samplers(groups, *, backend="bokeh"):
+def samplers(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
     """η1, η2 and 0.15 η3 against μ, one frame each, of states drawn in several ways.
 
     groups: {name: rows}, dicts with mu and those of eta1, eta2, eta3 that it has.
@@ -17,7 +23,7 @@ def samplers(groups, *, backend="bokeh"):
     return _frames(sources, backend, _MEASURES, "right", columns=3)
 
 
-def effort(groups, *, backend="bokeh"):
+def effort(groups: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout:
     """Accepted part of attempts and sweeps per state against μ, of walks by sweeps alone.
 
     groups: {name: rows}, dicts with mu, acceptance and mean_sweeps.
@@ -27,7 +33,7 @@ def effort(groups, *, backend="bokeh"):
     return _frames(sources, backend, names, "right", logy=("mean_sweeps",))
 
 
-def sizes(rows, *, backend="bokeh"):
+def sizes(rows: Rows, *, backend: str = "bokeh") -> hv.Layout:
     """η1, η2 and 0.15 η3 against the number of disks, one frame for each μ.
 
     rows: dicts with n, mu, eta1, eta2, eta3.
@@ -54,7 +60,7 @@ def sizes(rows, *, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
-def opened(rows, own, *, backend="bokeh"):
+def opened(rows: Rows, own: Rows, *, backend: str = "bokeh") -> hv.Layout:
     """η2 and 0.15 η3 of packings made without friction whose cones are opened to μ.
 
     rows: dicts with mu (of the cones), eta2, eta3; own: the same of packings made with that μ.
@@ -64,7 +70,7 @@ def opened(rows, own, *, backend="bokeh"):
     return _frames(sources, backend, names, "top_left", logy=("eta2", "eta3"))
 
 
-def frozen(periodic, inner, larger=(), *, backend="bokeh"):
+def frozen(periodic: Rows, inner: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layout:
     """Part of contacts without a unique force, and their clusters, against μ.
 
     periodic: rows (dicts with mu, undetermined_part, clusters) where only the pressure is
@@ -78,7 +84,7 @@ def frozen(periodic, inner, larger=(), *, backend="bokeh"):
     return _frames(sources, backend, names, "right")
 
 
-def distances(rows, *, backend="bokeh"):
+def distances(rows: Rows, *, backend: str = "bokeh") -> hv.Overlay:
     """Distance from the centre of S of original, walk and uniform states, against μ.
 
     rows: dicts with mu, original_ratio and walk_ratio: mean distances from the mean of uniform
@@ -104,7 +110,7 @@ def distances(rows, *, backend="bokeh"):
     )
 
 
-def stresses(rows, uniform, *, backend="bokeh"):
+def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     """Shear stress over pressure against μ: the largest in S and that of the original network.
 
     Beside it the original network's and uniform states' in parts of the largest in their packing.
@@ -160,7 +166,7 @@ def stresses(rows, uniform, *, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
-def volumes(rows, larger=(), *, backend="bokeh"):
+def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layout:
     """Width of S per free dimension and ln V per grain against μ, and ln V per grain against N.
 
     rows: dicts with mu, n, extent and log_volume_per_grain; larger: those of other numbers n.
@@ -168,6 +174,7 @@ def volumes(rows, larger=(), *, backend="bokeh"):
     style.ready(backend)
     by_mu = (("extent", "width / ⟨f_n⟩", True), ("log_volume_per_grain", "ln V / grain", False))
     frames = []
+    axes: dict[str, Any]
     for name, label, logy in by_mu:
         series = [(statistics.means(rows, name), label, style.COLOURS[0], "solid", 0)]
         drawn = style.curves(series, backend, logx=True, logy=logy)
@@ -190,7 +197,7 @@ def volumes(rows, larger=(), *, backend="bokeh"):
     return style.page(frames, backend, columns=2)
 
 
-def tails(groups, *, backend="bokeh"):
+def tails(groups: Mapping[str, Mapping[float, Points]], *, backend: str = "bokeh") -> hv.Layout:
     """P(f_n/⟨f_n⟩) of uniform states, semi-logarithmic, one frame for each word.
 
     groups: {word: {μ: [(f, P), …]}}. Beside them exponential and Gaussian forces of mean 1.
@@ -214,12 +221,19 @@ def tails(groups, *, backend="bokeh"):
             ends = list(zip(f[seen], density[seen], strict=True))
             drawn.append(style.line(ends, law, style.GREY, backend, dash))
         legend = None if last else "right"
-        axes = {"x": "f_n / ⟨f_n⟩", "y": "P(f_n)", "logy": True, "legend": legend}
+        axes: dict[str, Any] = {"x": "f_n / ⟨f_n⟩", "y": "P(f_n)", "logy": True, "legend": legend}
         frames.append(style.frame(drawn, backend, title=word, **axes))
     return style.page(frames, backend, columns=2)
 
 
-def _frames(sources, backend, names, legend, logy=(), columns=2):
+def _frames(
+    sources: Sequence[tuple[str, Rows, str]],
+    backend: str,
+    names: Sequence[tuple[str, str, float]],
+    legend: str,
+    logy: Collection[str] = (),
+    columns: int = 2,
+) -> hv.Layout:
     """One frame for each name against μ > 0, with all sources: (word, rows, dash).
 
     logy: names that are drawn logarithmically.
@@ -233,6 +247,6 @@ def _frames(sources, backend, names, legend, logy=(), columns=2):
         ]
         drawn = style.curves(series, backend, logx=True, logy=name in logy)
         shown = None if last and legend == "right" else legend  # between frames is no room for one
-        axes = {"x": "μ", "y": label, "logx": True, "logy": name in logy}
+        axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "logy": name in logy}
         frames.append(style.frame(drawn, backend, title=label, legend=shown, **axes))
     return style.page(frames, backend, columns=columns)

@@ -35,23 +35,24 @@ from granforce.numerics.lanes import (
     vanishes,
     within,
 )
+from granforce.records import Floats, Integers
 
 
 class StepProblem(NamedTuple):
     """The contact problem of one time step; all arrays (N_c,) but the last two (N,)."""
 
-    i: np.ndarray
-    j: np.ndarray
-    n_x: np.ndarray
-    n_y: np.ndarray
-    length: np.ndarray
-    arm_i: np.ndarray
-    arm_j: np.ndarray
-    closing: np.ndarray  # gap/Δt: approach velocity that just closes it; < 0 pushes overlap out
-    stiff_n: np.ndarray  # Δf_n per normal velocity to be stopped
-    stiff_t: np.ndarray  # Δf_t per tangential velocity to be stopped
-    inverse_mass: np.ndarray  # Δt/m
-    inverse_inertia: np.ndarray  # Δt/I
+    i: Integers
+    j: Integers
+    n_x: Floats
+    n_y: Floats
+    length: Floats
+    arm_i: Floats
+    arm_j: Floats
+    closing: Floats  # gap/Δt: approach velocity that just closes it; < 0 pushes overlap out
+    stiff_n: Floats  # Δf_n per normal velocity to be stopped
+    stiff_t: Floats  # Δf_t per tangential velocity to be stopped
+    inverse_mass: Floats  # Δt/m
+    inverse_inertia: Floats  # Δt/I
     box_compliance: float  # Δt/(2 V M_λ): change of λ per unit f_n ℓ
 
 
@@ -141,19 +142,19 @@ def sweep(problem, order, mu, force, velocity, dilation, lanes):
 class Motion(NamedTuple):
     """State of a moving packing; arrays change in place."""
 
-    x: np.ndarray  # (N, 2)
-    velocity: np.ndarray  # (N, 3) intrinsic v_x, v_y, ω
-    r: np.ndarray  # (N,)
-    mass: np.ndarray  # (N,) π r²
-    box: np.ndarray  # (2,)
-    tilt: np.ndarray  # (1,) of the cell
-    dilation: np.ndarray  # (1,) λ; or (1, 3) e_x, e_y, g of a cell that is free in its shape
-    i: np.ndarray  # (P,) neighbour list
-    j: np.ndarray  # (P,)
-    shift: np.ndarray  # (P, 2)
-    force: np.ndarray  # (P, 2) of the last step, the warm start of the next
-    drift: np.ndarray  # (1,) bound on the approach of any pair since the list was built
-    pace: np.ndarray  # (2,) Δt of the next step, and the relaxation factor of its sweeps
+    x: Floats  # (N, 2)
+    velocity: Floats  # (N, 3) intrinsic v_x, v_y, ω
+    r: Floats  # (N,)
+    mass: Floats  # (N,) π r²
+    box: Floats  # (2,)
+    tilt: Floats  # (1,) of the cell
+    dilation: Floats  # (1,) λ; or (1, 3) e_x, e_y, g of a cell that is free in its shape
+    i: Integers  # (P,) neighbour list
+    j: Integers  # (P,)
+    shift: Integers  # (P, 2)
+    force: Floats  # (P, 2) of the last step, the warm start of the next
+    drift: Floats  # (1,) bound on the approach of any pair since the list was built
+    pace: Floats  # (2,) Δt of the next step, and the relaxation factor of its sweeps
 
 
 class Pace(NamedTuple):

@@ -1,8 +1,11 @@
 """S as a contact program: from an ensemble's balance and cones to what `numerics` works on."""
 
+from __future__ import annotations
+
 import threading
 import weakref
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import linalg, sparse
@@ -14,8 +17,15 @@ from granforce.numerics import (
     contact_program,
     linear_programs,
 )
+from granforce.numerics.contact_matrix import Network
+from granforce.numerics.contact_program import Problem
+from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
+    from granforce.forces.knowledge import Polygons
 
 # Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
 # slows no step, only bounds them.
@@ -29,7 +39,9 @@ UNBALANCED, _RESTORED = 1e-9, 3
 WELL_INSIDE = 1e-5
 
 
-def balance_of(ensemble, unit=1.0):
+def balance_of(
+    ensemble: Ensemble, unit: float = 1.0
+) -> tuple[Network, Floats, Floats, Floats, Integers]:
     """(Network, b, b of the global rows, idle, place) of an ensemble, forces in ⟨f_n⟩.
 
     unit: of the tangential forces. place: where the ensemble's rows are among those of the network
@@ -53,7 +65,9 @@ def balance_of(ensemble, unit=1.0):
             here = ~whole
             here[here] = balanced[grain[here]] == own[columns.col[here]]
             dense[side, columns.col[here], row[here], part] = value[here]
-    network = contact_matrix.make_network(ensemble.packing.x[grains], i, j, *dense, border)
+    network = contact_matrix.make_network(
+        ensemble.packing.x[grains], i, j, dense[0], dense[1], border
+    )
     rows = 3 * len(grains)
     place = (3 * network.layout.position[balanced, None] + np.arange(size)).ravel()
     place = np.concatenate([place, rows + np.arange(border.shape[1])])
@@ -63,19 +77,21 @@ def balance_of(ensemble, unit=1.0):
     return network, b[:rows], b[rows:], idle, place
 
 
-def make_problem(ensemble):
+def make_problem(ensemble: Ensemble) -> tuple[Problem, Floats]:
     """The Problem of an ensemble, tangential forces in μ ⟨f_n⟩, and its idle rows (rows,)."""
     network, b, b_border, idle, place = balance_of(ensemble, ensemble.mu)
     problem = contact_program.make_problem(network, b, b_border, idle, place, ensemble.mu, SHIFT)
-    return problem if ensemble.known is None else _with_known(problem, ensemble), idle
+    if ensemble.known is not None:
+        problem = _with_known(problem, ensemble, ensemble.known)
+    return problem, idle
 
 
-def _with_known(problem, ensemble):
+def _with_known(problem: Problem, ensemble: Ensemble, known: Polygons) -> Problem:
     """The Problem with what is known; contacts known altogether stay at y = (1, 1) in it."""
-    known, mu = ensemble.known, ensemble.mu
+    mu = ensemble.mu
     first = knowledge.first_forces(known, mu)
     rows = np.zeros(len(problem.b) + len(problem.b_border))
-    rows[problem.place] = _instead(ensemble)
+    rows[problem.place] = _instead(ensemble, known)
     sides = known.contact, known.component, known.sign
     slack = known.limit / knowledge.units(mu)[known.component]
     rest = slack - known.sign * first[known.contact, known.component]
@@ -91,14 +107,14 @@ def _with_known(problem, ensemble):
     )
 
 
-def _instead(ensemble):
+def _instead(ensemble: Ensemble, known: Polygons) -> Floats:
     """A (f° − f) for contacts known altogether: f their force, f° = (1, 0) what stands for it."""
-    wholly = ensemble.known.wholly[:, None]
-    instead = np.where(wholly, np.array([1.0, 0.0]) - ensemble.known.value, 0.0)
+    wholly = known.wholly[:, None]
+    instead = np.where(wholly, np.array([1.0, 0.0]) - known.value, 0.0)
     return ensemble.A @ ensemble.to_vector(instead)
 
 
-def forces_of(ensemble, y):
+def forces_of(ensemble: Ensemble, y: Floats) -> Floats:
     """Forces (…, N_c, 2) of cone coordinates (…, n)."""
     pairs = y[..., : 2 * len(ensemble.index)].reshape(*y.shape[:-1], -1, 2)
     normal, tangential = pairs.sum(axis=-1), ensemble.mu * (pairs[..., 0] - pairs[..., 1])
@@ -106,17 +122,17 @@ def forces_of(ensemble, y):
     return ensemble.pin(forces)
 
 
-_known = weakref.WeakKeyDictionary()
-_systems = weakref.WeakKeyDictionary()
+_known: weakref.WeakKeyDictionary[Ensemble, list[Any]] = weakref.WeakKeyDictionary()
+_systems: weakref.WeakKeyDictionary[Ensemble, certified_values.System] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
 
 
-def problem_of(ensemble):
+def problem_of(ensemble: Ensemble) -> Problem:
     """The Problem for networks nearest to others: all rows, those that others imply shifted."""
     return _kept(ensemble)[0]
 
 
-def independent_problem_of(ensemble):
+def independent_problem_of(ensemble: Ensemble) -> Problem:
     """The Problem for linear programs: independent rows, exactly."""
     kept = _kept(ensemble)
     if len(kept) == 2:
@@ -130,7 +146,7 @@ def independent_problem_of(ensemble):
     return kept[2]
 
 
-def _dependent_rows(ensemble):
+def _dependent_rows(ensemble: Ensemble) -> Mask:
     """Mask of rows of A that follow from others, none of which it is many times.
 
     Frozen surroundings determine most forces: rows without a pivot may be others times 2·10⁵ there,
@@ -144,7 +160,7 @@ def _dependent_rows(ensemble):
     return out
 
 
-def _kept(ensemble):
+def _kept(ensemble: Ensemble) -> list[Any]:
     """[Problem, idle rows, …], made on first use and kept as long as the ensemble."""
     with _lock:
         found = _known.get(ensemble)
@@ -153,7 +169,7 @@ def _kept(ensemble):
     return found
 
 
-def make_system(ensemble):
+def make_system(ensemble: Ensemble) -> certified_values.System:
     """The certified_values.System of an ensemble, in the cone coordinates of its Problem.
 
     It is made on first use and kept as long as the ensemble. Cancelled where that was asked for;
@@ -166,7 +182,7 @@ def make_system(ensemble):
     return found
 
 
-def _new_system(ensemble):
+def _new_system(ensemble: Ensemble) -> certified_values.System:
     count, mu, known = len(ensemble.index), ensemble.mu, ensemble.known
     block = np.array([[0.5, 0.5], [0.5 * mu, -0.5 * mu]])[: ensemble.per_contact]
     T = sparse.kron(sparse.identity(count), block, format="csc")
@@ -175,7 +191,7 @@ def _new_system(ensemble):
     bounding = ensemble.pressure_row if ensemble.has_pressure_row else None
     if known is not None:
         value = np.where(known.wholly[:, None], [1.0, 0.0], known.value)
-        A, b, _ = knowledge.extended(A, b + _instead(ensemble), T, known, mu, value)
+        A, b, _ = knowledge.extended(A, b + _instead(ensemble, known), T, known, mu, value)
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
     if ensemble.member is not None:
@@ -189,7 +205,7 @@ def _new_system(ensemble):
     return certified_values.make_system(problem, A.tocsr(), b, loads.tocsc(), bounding)
 
 
-def _coordinates(ensemble, forces):
+def _coordinates(ensemble: Ensemble, forces: Floats) -> Floats:
     """y (n,) ≥ 0 of a Problem nearest to forces (N_c, 2)."""
     y = ensemble.coordinates(forces)
     parts = ensemble.per_contact * len(ensemble.index)
@@ -199,7 +215,7 @@ def _coordinates(ensemble, forces):
     return np.append(pairs, y[parts:])
 
 
-def cone_costs(ensemble, forces):
+def cone_costs(ensemble: Ensemble, forces: Floats) -> Floats:
     """Costs (…, 2 N_c) of y for costs (…, N_c, 2) of the forces f_n, f_t that are not known."""
     if ensemble.known is not None:
         forces = np.where(ensemble.known.wholly[:, None], 0.0, forces)
@@ -208,7 +224,7 @@ def cone_costs(ensemble, forces):
     return pairs.reshape(*forces.shape[:-2], -1)
 
 
-def known_part(ensemble, axes):
+def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
     """What contacts known altogether add to the projections (…,) of forces on axes (…, N_c, 2)."""
     if ensemble.known is None:
         return np.zeros(axes.shape[:-2])
@@ -216,14 +232,14 @@ def known_part(ensemble, axes):
     return (axes * value).sum(axis=(-2, -1))
 
 
-def inner_network(ensemble):
+def inner_network(ensemble: Ensemble) -> Floats | None:
     """The analytic centre of S in the coordinates of `Ensemble.scaled_form`, None without one.
 
     S has none where some contact's force is fixed at the wall of its cone, or nearly so. Rows that
     are scaled up, or all but follow from others, magnify what the centre is out of balance by: that
     is taken off first.
     """
-    if is_a_point(ensemble):
+    if is_a_point(ensemble) and ensemble.member is not None:
         y = ensemble.coordinates(ensemble.member)
         return np.where(y > 0.1 * BALANCED, y, 0.0)
     middle = linear_programs.centre(independent_problem_of(ensemble))
@@ -243,13 +259,13 @@ def inner_network(ensemble):
     return inner if inner.min(initial=1.0) > 0 else None
 
 
-def is_a_point(ensemble):
+def is_a_point(ensemble: Ensemble) -> bool:
     """Whether S is the network at hand alone, as far as that is asked of dense matrices."""
     few = ensemble.A.shape[0] <= MOST_DENSE
     return few and ensemble.member is not None and ensemble.dimension == 0
 
 
-def in_balance(A, b, y, away=0.0):
+def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:
     """y (n,), what it lacks of A y = b added by the least change in proportion to y + away."""
     dense = A.toarray()
     for _ in range(_RESTORED):

@@ -3,21 +3,29 @@
 Unknowns x = (f_n1, f_t1, f_n2, …), or (f_n1, f_n2, …) at μ = 0 where no contact can carry f_t.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import highspy
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 
 from granforce import notebook
 from granforce.forces import knowledge
+from granforce.forces.knowledge import Known
 from granforce.forces.nearest import nearest, some_network
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import (
     Contacts,
+    Floats,
     InputError,
+    Integers,
+    Mask,
     NotJammedError,
     Packing,
     are_whole,
@@ -40,26 +48,26 @@ class Ensemble:
 
     packing: Packing
     mu: float  # friction coefficient of the cones (not necessarily the packing's)
-    index: np.ndarray  # (N_c,) the unknown contacts, as positions in packing.contacts
+    index: Integers  # (N_c,) the unknown contacts, as positions in packing.contacts
     contacts: Contacts  # their geometry
-    grains: np.ndarray  # (M,) grains of the backbone, as positions in packing.x
+    grains: Integers  # (M,) grains of the backbone, as positions in packing.x
     A: sparse.csr_matrix  # (rows, unknowns): forces and torque/r by grain, then what is prescribed
-    b: np.ndarray  # (rows,) force
+    b: Floats  # (rows,) force
     force_scale: float  # ⟨f_n⟩ weighted with ℓ: 2 P0 V / Σ ℓ where the pressure is prescribed
-    original: np.ndarray  # (N_c, 2) the packing's own network on these contacts
-    frozen: np.ndarray  # contacts held at their original forces, as positions in packing.contacts
-    skipped: dict  # counts of what was left out: rattlers, unloaded contacts, tangential unknowns
+    original: Floats  # (N_c, 2) the packing's own network on these contacts
+    frozen: Integers  # contacts held at their original forces, as positions in packing.contacts
+    skipped: dict[str, int]  # what was left out: rattlers, unloaded contacts, tangential unknowns
     prescribed: str  # "pressure", "stress" (with the pressure) or "none"
     known: knowledge.Polygons | None  # bounds on single forces, in ⟨f_n⟩; None without any
-    found: np.ndarray | None = None  # (N_c, 2) a network met while these contacts were sorted out
+    found: Floats | None = None  # (N_c, 2) a network met while these contacts were sorted out
 
     @property
-    def per_contact(self):
+    def per_contact(self) -> int:
         """Unknowns per contact: 2, or 1 at μ = 0."""
         return 2 if self.mu > 0 else 1
 
     @property
-    def has_pressure_row(self):
+    def has_pressure_row(self) -> bool:
         """Whether the pressure is prescribed, alone or with the whole stress.
 
         It is in a periodic box without frozen contacts.
@@ -67,12 +75,12 @@ class Ensemble:
         return self.prescribed != "none"
 
     @property
-    def pressure_row(self):
+    def pressure_row(self) -> int:
         """Row of A with the pressure, if it is prescribed: the first below those of the grains."""
         return (1 + self.per_contact) * len(self.grains)
 
     @cached_property
-    def dimension(self):
+    def dimension(self) -> int:
         """Dimension h of S: unknowns that are not pinned, less independent rows.
 
         2N_c − (3M − 1) in a disordered packing with prescribed pressure (N_c − (2M − 1) at μ = 0),
@@ -92,19 +100,19 @@ class Ensemble:
         return unknowns - int(np.sum(square > 1e-12 * square[-1]))
 
     @property
-    def free_columns(self):
+    def free_columns(self) -> sparse.csr_matrix:
         """A without the columns of components that are pinned."""
         if self.known is None:
             return self.A
-        return self.A.tocsc()[:, ~self.to_vector(self.known.pinned).astype(bool)]
+        return self.A.tocsc()[:, ~self.to_vector(self.known.pinned).astype(np.bool_)]
 
     @property
-    def coordination(self):
+    def coordination(self) -> float:
         """Mean coordination number z = 2 N_c / M of the backbone."""
         return 2 * len(self.index) / max(1, len(self.grains))
 
     @cached_property
-    def cone_form(self):
+    def cone_form(self) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
         """(A T, T) in csc form with x = T y, y ≥ 0: f_n = (p + q)/2, f_t = μ (p − q)/2."""
         if self.mu == 0:
             T = sparse.identity(self.A.shape[1], format="csc")
@@ -114,7 +122,7 @@ class Ensemble:
         return sparse.csc_matrix(self.A @ T), T
 
     @cached_property
-    def member(self):
+    def member(self) -> Floats | None:
         """A network (N_c, 2) of S that is at hand, force; None without one.
 
         It is a certificate that S is not empty, which no program can contradict.
@@ -123,7 +131,7 @@ class Ensemble:
         return next((forces for forces in at_hand if self.admits(forces)), None)
 
     @cached_property
-    def scaled_form(self):
+    def scaled_form(self) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
         """(A, b, T) of S = {x = ⟨f_n⟩ T y : A y = b, y ≥ 0}; where forces are known, with slacks.
 
         The largest entry of each row of the balance is 1: torque rows are as small (or large) as μ
@@ -140,7 +148,7 @@ class Ensemble:
         return A, b, T
 
     @cached_property
-    def slack(self):
+    def slack(self) -> Floats:
         """(rows,) of `scaled_form`: up to what it may differ from b in forces that are admitted."""
         scale = self._row_scale
         if self.known is None:
@@ -149,7 +157,7 @@ class Ensemble:
         parts = self.known.component, knowledge.pins(self.known, self.mu)[1]
         return np.append(BALANCED * scale, ADMISSIBLE / unit[np.concatenate(parts)])
 
-    def coordinates(self, forces):
+    def coordinates(self, forces: Floats) -> Floats:
         """y (n,) ≥ 0 of `scaled_form` nearest to forces (N_c, 2)."""
         normal, tangential = forces.T / self.force_scale
         y = normal[:, None]
@@ -165,18 +173,18 @@ class Ensemble:
         return np.maximum(y, 0.0)
 
     @cached_property
-    def _row_scale(self):
+    def _row_scale(self) -> Floats:
         """(rows,) what makes the largest entry of each row of `cone_form` 1."""
         largest = abs(self.cone_form[0]).max(axis=1).toarray().ravel()
         return 1 / np.where(largest > 0, largest, 1.0)
 
     @cached_property
-    def _scaled_balance(self):
+    def _scaled_balance(self) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
         scale = self._row_scale
         A, T = self.cone_form
         return sparse.csc_matrix(sparse.diags(scale) @ A), scale * self.b / self.force_scale, T
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The ensemble as notebooks show it."""
         lines = {
             "disks of the backbone M": len(self.grains),
@@ -194,7 +202,7 @@ class Ensemble:
         left_out = {name.replace("_", " "): n for name, n in self.skipped.items() if n}
         return notebook.table("Admissible force networks S", lines | left_out)
 
-    def with_normal(self, position, value, found):
+    def with_normal(self, position: int, value: float, found: Floats) -> Ensemble:
         """The same where f_n of the contact at `position` is known, too, to be `value` (force).
 
         found (N_c, 2): a network of S with that f_n, which is then at hand.
@@ -208,7 +216,7 @@ class Ensemble:
         known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
         return replace(self, known=known, found=found)
 
-    def positions(self, contacts):
+    def positions(self, contacts: npt.ArrayLike) -> Integers:
         """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
         contacts = np.asarray(contacts)
         unknown = contacts[~np.isin(contacts, self.index)]
@@ -219,19 +227,19 @@ class Ensemble:
             )
         return np.searchsorted(self.index, contacts)
 
-    def to_vector(self, forces):
+    def to_vector(self, forces: Any) -> Any:
         """Forces (…, N_c, 2) as vectors x (…, unknowns)."""
         forces = np.asarray(forces, dtype=np.float64)
         return forces[..., : self.per_contact].reshape(*forces.shape[:-2], -1)
 
-    def to_forces(self, vector):
+    def to_forces(self, vector: Floats) -> Floats:
         """Vectors x (…, unknowns) as forces (…, N_c, 2)."""
         shape = (*vector.shape[:-1], len(self.index), self.per_contact)
         forces = np.zeros((*shape[:-1], 2))
         forces[..., : self.per_contact] = vector.reshape(shape)
         return forces
 
-    def expand(self, forces):
+    def expand(self, forces: Floats) -> Floats:
         """Forces (…, N_c, 2) of S on all contacts of the packing: zero off the backbone.
 
         Frozen contacts get their original forces.
@@ -243,14 +251,14 @@ class Ensemble:
         full[..., self.frozen, :] = self.packing.forces[self.frozen]
         return full
 
-    def pin(self, forces):
+    def pin(self, forces: Floats) -> Floats:
         """The forces (…, N_c, 2) with all pinned components at their values."""
         if self.known is not None:
             pinned = self.known.pinned
             forces[..., pinned] = self.known.value[pinned] * self.force_scale
         return forces
 
-    def residual(self, forces):
+    def residual(self, forces: Floats) -> Any:
         """Largest unbalance |A x − b| over rows, in ⟨f_n⟩: scalar, or (…,) for (…, N_c, 2).
 
         Rows are force components and torque/r of every backbone grain, and the pressure as mean
@@ -262,7 +270,7 @@ class Ensemble:
         worst = rows.max(axis=0, initial=0.0) / self.force_scale
         return _plain(worst.reshape(x.shape[:-1]))
 
-    def violation(self, forces):
+    def violation(self, forces: Floats) -> Any:
         """Largest violation of f_n ≥ 0, |f_t| ≤ μ f_n and what is known, in ⟨f_n⟩, (…,)."""
         forces = np.asarray(forces, dtype=np.float64)
         normal, tangential = forces[..., 0], forces[..., 1]
@@ -274,18 +282,27 @@ class Ensemble:
             worst = np.maximum(worst, outside.max(axis=(-2, -1), initial=0.0))
         return _plain(worst)
 
-    def admits(self, forces, residual=BALANCED, violation=ADMISSIBLE):
+    def admits(
+        self, forces: Floats, residual: float = BALANCED, violation: float = ADMISSIBLE
+    ) -> bool:
         """Whether forces (N_c, 2) are an equilibrium inside the cones, to the given tolerances."""
         return bool(self.residual(forces) <= residual and self.violation(forces) <= violation)
 
 
-def _plain(values):
+def _plain(values: Floats) -> Floats | float:
     return float(values) if values.ndim == 0 else values
 
 
 def ensemble(
-    packing, mu=None, *, prescribed="pressure", stress=None, known=None, frozen=None, prune=True
-):
+    packing: Packing,
+    mu: float | None = None,
+    *,
+    prescribed: str = "pressure",
+    stress: npt.ArrayLike | None = None,
+    known: Known | None = None,
+    frozen: npt.ArrayLike | None = None,
+    prune: bool = True,
+) -> Ensemble:
     """The set S of admissible force networks of a packing.
 
     mu: friction coefficient of the cones, by default the packing's. prescribed: "pressure", the
@@ -330,12 +347,14 @@ class _Asked(NamedTuple):
     """What an ensemble is asked to hold to."""
 
     mu: float
-    held: np.ndarray  # (contacts,) bool, frozen
-    stress: np.ndarray | None  # prescribed: (1,) pressure, (3,) xx, yy, xy, or None
-    bounds: np.ndarray | None  # (contacts, 2, 2) force, by knowledge.bounds_of
+    held: Mask  # (contacts,) bool, frozen
+    stress: Floats | None  # prescribed: (1,) pressure, (3,) xx, yy, xy, or None
+    bounds: Floats | None  # (contacts, 2, 2) force, by knowledge.bounds_of
 
 
-def _prescribed(packing, prescribed, stress, held):
+def _prescribed(
+    packing: Packing, prescribed: str, stress: npt.ArrayLike | None, held: Mask
+) -> Floats | None:
     """What is prescribed, as in _Asked; InputError where it makes no sense here."""
     if prescribed not in ("pressure", "stress", "none"):
         raise InputError(f"prescribed must be pressure, stress or none, got {prescribed!r:.40}")
@@ -369,7 +388,7 @@ def _prescribed(packing, prescribed, stress, held):
     return stress
 
 
-def stress_of(packing, forces):
+def stress_of(packing: Packing, forces: Floats) -> Floats:
     """σ_xx, σ_yy, σ_xy (…, 3) of networks (…, N_c, 2) on all contacts, force per length.
 
     σ_ab = (1/V) Σ F_a ℓ_b; off the diagonal the mean of both, which are equal in balance.
@@ -377,7 +396,7 @@ def stress_of(packing, forces):
     return np.einsum("kci,...ci->...k", stress_rows(packing.contacts), forces) / packing.volume
 
 
-def stress_rows(contacts):
+def stress_rows(contacts: Contacts) -> Floats:
     """V σ of unit f_n and f_t: (3, N_c, 2)."""
     n_x, n_y = contacts.normal.T
     normal = np.stack([n_x * n_x, n_y * n_y, n_x * n_y])
@@ -385,7 +404,9 @@ def stress_rows(contacts):
     return np.stack([normal, tangential], axis=-1) * contacts.length[:, None]
 
 
-def _check_frozen_and_known(packing, held, bounds, scale):
+def _check_frozen_and_known(
+    packing: Packing, held: Mask, bounds: Floats | None, scale: float
+) -> None:
     if bounds is None or not held.any():
         return
     outside = np.maximum(bounds[..., 0] - packing.forces, packing.forces - bounds[..., 1])
@@ -397,7 +418,7 @@ def _check_frozen_and_known(packing, held, bounds, scale):
         )
 
 
-def _check_idle_and_known(S, bounds):
+def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
     """Contacts that carry nothing may not be known to carry."""
     if bounds is None:
         return
@@ -411,12 +432,12 @@ def _check_idle_and_known(S, bounds):
         )
 
 
-def left_open_in(packing):
+def left_open_in(packing: Packing) -> Mask:
     """Mask (N,) of grains whose balance is left open: nothing is known of the load on them."""
-    return np.isnan(packing.load).any(axis=1)
+    return np.any(np.isnan(packing.load), axis=1)
 
 
-def _frozen_positions(frozen, count):
+def _frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
     frozen = np.asarray(frozen)
     if frozen.dtype == bool:
         if frozen.shape != (count,):
@@ -427,7 +448,7 @@ def _frozen_positions(frozen, count):
     return frozen.astype(np.int64)
 
 
-def _without_danglers(packing, free, held):
+def _without_danglers(packing: Packing, free: Integers, held: Mask) -> Integers:
     """Drop, one after another, contacts of unloaded grains that have no other contact."""
     i, j = packing.contacts.i, packing.contacts.j
     count = len(packing.r)
@@ -442,7 +463,7 @@ def _without_danglers(packing, free, held):
         free = free[keep]
 
 
-def _assemble(packing, asked, free):
+def _assemble(packing: Packing, asked: _Asked, free: Integers) -> Ensemble:
     mu, held = asked.mu, asked.held
     if not len(free):
         if held.any():
@@ -450,7 +471,7 @@ def _assemble(packing, asked, free):
                 "no free contact can carry a force; freeze fewer contacts, or take a larger slice"
             )
         raise NotJammedError("the packing has no contact that could carry a load")
-    contacts = Contacts(*(field[free] for field in packing.contacts))
+    contacts = packing.contacts.picked(free)
     loaded = np.any(packing.load != 0, axis=1)
     grains = np.union1d(np.union1d(contacts.i, contacts.j), np.flatnonzero(loaded))
     left_open = np.flatnonzero(left_open_in(packing))
@@ -492,7 +513,9 @@ def _assemble(packing, asked, free):
     )
 
 
-def _balance(packing, contacts, grains, held, mu):
+def _balance(
+    packing: Packing, contacts: Contacts, grains: Integers, held: Mask, mu: float
+) -> tuple[sparse.csr_matrix, Floats]:
     """Force and torque rows of the given grains; frozen contacts and loads go to the right."""
     row_of = np.full(len(packing.r), -1)
     row_of[grains] = np.arange(len(grains))
@@ -502,7 +525,7 @@ def _balance(packing, contacts, grains, held, mu):
     b[:, 2:] /= packing.r[grains, None]
     b = b.ravel()
     if held.any():
-        fixed = Contacts(*(field[held] for field in packing.contacts))
+        fixed = packing.contacts.picked(held)
         fixed_matrix = _force_matrix(packing, fixed, row_of, len(grains), 3)
         unbalance = fixed_matrix @ packing.forces[held].ravel()
         b = b - unbalance.reshape(-1, 3)[:, :size].ravel()
@@ -511,7 +534,7 @@ def _balance(packing, contacts, grains, held, mu):
     return sparse.csr_matrix(A), b
 
 
-def _without_rounding(A, balance, contacts):
+def _without_rounding(A: sparse.csr_matrix, balance: int, contacts: Contacts) -> sparse.csr_matrix:
     """A without entries that are rounding of 0: n_y of contacts along x, n_x² − n_y² at 45°.
 
     A row of nothing else would be a condition of its own once it is scaled. Entries of the
@@ -525,7 +548,7 @@ def _without_rounding(A, balance, contacts):
     return A
 
 
-def _held_in_balance(A, b, original, tolerance):
+def _held_in_balance(A: sparse.csr_matrix, b: Floats, original: Floats, tolerance: float) -> Floats:
     """A x of the original network x, if that is balanced: b without what rounding left of it.
 
     Frozen surroundings determine most forces, and leave rows of A that follow from others times
@@ -535,7 +558,9 @@ def _held_in_balance(A, b, original, tolerance):
     return balanced if np.abs(balanced - b).max(initial=0.0) <= tolerance else b
 
 
-def _force_matrix(packing, contacts, row_of, count, size):
+def _force_matrix(
+    packing: Packing, contacts: Contacts, row_of: Integers, count: int, size: int
+) -> sparse.csr_matrix:
     """Sparse (size · count, 2 N_c): what unit f_n, f_t do to each grain (torque divided by r)."""
     columns = 2 * np.arange(len(contacts.i))
     n_x, n_y = contacts.normal.T
@@ -554,7 +579,9 @@ def _force_matrix(packing, contacts, row_of, count, size):
     return sparse.csr_matrix((value, (row, column)), shape=(size * count, 2 * len(columns)))
 
 
-def _conditions(packing, contacts, mu, stress):
+def _conditions(
+    packing: Packing, contacts: Contacts, mu: float, stress: Floats
+) -> tuple[Any, Floats]:
     """Rows (m, unknowns) and values (m,) of what is prescribed, as mean normal forces.
 
     The pressure comes first: Σ f_n ℓ / Σ ℓ = 2 P0 V / Σ ℓ. With the whole stress, (σ_xx − σ_yy)/2
@@ -572,7 +599,7 @@ def _conditions(packing, contacts, mu, stress):
     return np.stack([row, 0.5 * (xx - yy), xy]), np.array([s_xx + s_yy, 0.5 * (s_xx - s_yy), s_xy])
 
 
-def _carrying(full):
+def _carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
     """Mask of contacts whose largest f_n over S is positive, exactly; and a network, or None.
 
     What presses in a known state carries; known are the original network, or the one nearest to
@@ -587,7 +614,7 @@ def _carrying(full):
     trusted = full.admits(known)
     if not trusted and full.known is not None:
         _tell_contradiction(full)
-    idle = np.ones(len(known), bool)
+    idle = np.ones(len(known), np.bool_)
     dead = ~idle
     if trusted:
         idle = known[:, 0] <= SEEN_CARRYING * full.force_scale
@@ -600,21 +627,24 @@ def _carrying(full):
     return carrying, known if trusted else None
 
 
-def _tell_contradiction(full):
+def _tell_contradiction(full: Ensemble) -> None:
     """NotJammedError with the statements that cannot hold together, where that can be proved."""
-    where = full.known, full.mu, full.index, full.force_scale, full.slack
-    message = knowledge.contradiction(*full._scaled_balance, *where)
+    assert full.known is not None
+    A, b, T = full._scaled_balance
+    message = knowledge.contradiction(
+        A, b, T, full.known, full.mu, full.index, full.force_scale, full.slack
+    )
     if message is not None:
         raise NotJammedError(message)
 
 
-def _nearest_to(full, known, pulled):
+def _nearest_to(full: Ensemble, known: Floats, pulled: Mask) -> Floats:
     target = known.copy()
     target[pulled, 0] += full.force_scale
     return nearest(full, target).forces
 
 
-def _cannot_balance(full, idle):
+def _cannot_balance(full: Ensemble, idle: Mask) -> Mask:
     """Mask of idle contacts that even their own grains alone cannot balance: local, exact.
 
     Grains whose contacts are all idle must be in balance; all others may answer any force.
@@ -629,7 +659,7 @@ def _cannot_balance(full, idle):
     rows = np.repeat(~held_up[full.grains], size)
     columns = np.repeat(idle, full.per_contact)
     if not rows.any():
-        return np.zeros(len(idle), bool)
+        return np.zeros(len(idle), np.bool_)
     A, T = full.cone_form
     local = A[: len(rows)].tocsr()[rows][:, columns]
     normal = sparse.csr_matrix(T)[:: full.per_contact][idle][:, columns]
@@ -641,7 +671,9 @@ def _cannot_balance(full, idle):
     return dead
 
 
-def _shown_idle(model, A, b, normal, idle):
+def _shown_idle(
+    model: highspy.Highs, A: sparse.csr_matrix, b: Floats, normal: sparse.csr_matrix, idle: Mask
+) -> Mask | None:
     """Those of the idle contacts that carry nothing in {y ≥ 0 : A y = b}; None where undecided.
 
     normal (contacts, n): f_n = normal · y. Contacts that press where Σ f_n is largest are taken
@@ -667,7 +699,7 @@ def _shown_idle(model, A, b, normal, idle):
     return idle
 
 
-def _proven_idle(full, idle, trusted):
+def _proven_idle(full: Ensemble, idle: Mask, trusted: bool) -> Mask:
     """Those of the idle contacts whose sum, and so each, can only be 0 over S."""
     if not idle.any():
         return idle
@@ -685,7 +717,7 @@ def _proven_idle(full, idle, trusted):
     raise certificates.why_unsolved(A, b, _unbalanced_message(full), slack=full.slack)
 
 
-def _unbalanced_message(full):
+def _unbalanced_message(full: Ensemble) -> str:
     A, _ = full.cone_form
     _, rest = programs.least_unbalanced(A, full.b / full.force_scale)
     size = 1 + full.per_contact

@@ -1,7 +1,9 @@
 """Relaxation by contact dynamics: the paper's Gauss–Seidel-like sweeps on a fixed geometry."""
 
+from __future__ import annotations
+
 import time
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,9 +21,12 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import InputError, Relaxation
+from granforce.records import Cancel, Floats, InputError, Integers, Relaxation
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
 
 # Inertia M_λ of the box in masses ρ r_max²: between 1 and 100 it changes the number of sweeps by
 # less than 10 % for μ from 0.01 to 10.
@@ -42,15 +47,23 @@ UNDER_WAY, SETTLED_DOWN, ENDED = range(3)  # at rest or moving steadily; ended w
 class _Looks(NamedTuple):
     """What is remembered of the relaxation in each lane, between two looks at its residual."""
 
-    dilation: np.ndarray  # λ
-    least: np.ndarray  # residual so far
-    earlier: np.ndarray  # the least when half the sweeps until `back` were done
-    back: np.ndarray  # number of sweeps at which progress is judged next
-    state: np.ndarray  # UNDER_WAY, SETTLED_DOWN or ENDED
+    dilation: Floats  # λ
+    least: Floats  # residual so far
+    earlier: Floats  # the least when half the sweeps until `back` were done
+    back: Integers  # number of sweeps at which progress is judged next
+    state: Integers  # UNDER_WAY, SETTLED_DOWN or ENDED
 
 
 @cancelling.cancellable
-def gauss_seidel(ensemble, start, *, order="sequential", seed=0, cancel=None, **options):
+def gauss_seidel(
+    ensemble: Ensemble,
+    start: Floats,
+    *,
+    order: str = "sequential",
+    seed: int = 0,
+    cancel: Cancel | None = None,
+    **options: Any,
+) -> Relaxation:
     """One step of contact dynamics from rest, with the given forces (N_c, 2) as first guess.
 
     Options as of `SideBySide`. order: "sequential" or "random" (a fresh permutation each sweep,
@@ -74,10 +87,17 @@ class SideBySide:
     """
 
     def __init__(
-        self, ensemble, count, *, tolerance=BALANCED, max_iterations=100_000, rest=AT_REST
-    ):
+        self,
+        ensemble: Ensemble,
+        count: int,
+        *,
+        tolerance: float = BALANCED,
+        max_iterations: int = 100_000,
+        rest: float | None = AT_REST,
+    ) -> None:
         self.ensemble, self.tolerance, self.rest = ensemble, tolerance, rest
-        self.most, self.rng = max_iterations, None
+        self.most = max_iterations
+        self.rng: np.random.Generator | None = None
         self.problem, self.at_rest, self.dilation, self.unit = _from_rest(ensemble)
         set_stiffness(self.problem)
         self.lanes = ONE if count == 1 else MANY
@@ -95,7 +115,7 @@ class SideBySide:
         self.sweeps = np.zeros(width, dtype=np.int64)
         self.begun = np.zeros(width)
 
-    def begin(self, lane, start):
+    def begin(self, lane: int, start: Floats) -> None:
         """Relax the given forces (N_c, 2) from now on, in a lane in which nothing goes on."""
         self.begun[lane] = time.perf_counter()
         force = np.ascontiguousarray(start, dtype=np.float64) / self.ensemble.force_scale
@@ -107,7 +127,7 @@ class SideBySide:
         self.looks.state[lane] = UNDER_WAY
         self.sweeps[lane] = 0
 
-    def ended(self):
+    def ended(self) -> list[tuple[int, Relaxation]]:
         """Sweep until one relaxation or more has ended: [(lane, Relaxation)]."""
         before = self.looks.state.copy()
         _relax(
@@ -126,9 +146,9 @@ class SideBySide:
         )
         cancelling.check("relaxation")
         ended = np.flatnonzero((before == UNDER_WAY) & (self.looks.state != UNDER_WAY))
-        return [(int(lane), self._relaxation(lane)) for lane in ended]
+        return [(lane, self._relaxation(lane)) for lane in ended.tolist()]
 
-    def _relaxation(self, lane):
+    def _relaxation(self, lane: int) -> Relaxation:
         S, rest, tolerance = self.ensemble, self.rest, self.tolerance
         forces = self.force[:, :, lane] * S.force_scale
         residual = S.residual(forces)
@@ -145,7 +165,7 @@ class SideBySide:
         )
 
 
-def _from_rest(ensemble):
+def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
 
     The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the

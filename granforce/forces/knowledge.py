@@ -11,7 +11,7 @@ from scipy import sparse
 
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import InputError, NotJammedError, are_whole
+from granforce.records import Floats, InputError, Integers, Mask, NotJammedError, are_whole
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
 _NAMES = "f_n", "f_t"
@@ -22,42 +22,42 @@ _WEIGHTY = 1e-6
 class Known(NamedTuple):
     """Bounds on the forces of k contacts: low ≤ (f_n, f_t) ≤ high."""
 
-    contacts: np.ndarray  # (k,) numbers in the packing
-    low: np.ndarray  # (k, 2) force; −inf where nothing is known
-    high: np.ndarray  # (k, 2) force; inf where nothing is known; equal to low for a pin
+    contacts: Integers  # (k,) numbers in the packing
+    low: Floats  # (k, 2) force; −inf where nothing is known
+    high: Floats  # (k, 2) force; inf where nothing is known; equal to low for a pin
 
 
 class Polygons(NamedTuple):
     """What is known of the N_c contacts of an ensemble, in ⟨f_n⟩."""
 
-    low: np.ndarray  # (N_c, 2) as given, for the judge
-    high: np.ndarray  # (N_c, 2)
-    pinned: np.ndarray  # (N_c, 2) bool
-    value: np.ndarray  # (N_c, 2) of what is pinned, 0 elsewhere
-    contact: np.ndarray  # (sides,) contact of each side
-    component: np.ndarray  # (sides,) 0 for f_n, 1 for f_t
-    sign: np.ndarray  # (sides,) 1 for a bound from above, −1 from below
-    limit: np.ndarray  # (sides,) sign · f ≤ limit
+    low: Floats  # (N_c, 2) as given, for the judge
+    high: Floats  # (N_c, 2)
+    pinned: Mask  # (N_c, 2) bool
+    value: Floats  # (N_c, 2) of what is pinned, 0 elsewhere
+    contact: Integers  # (sides,) contact of each side
+    component: Integers  # (sides,) 0 for f_n, 1 for f_t
+    sign: Floats  # (sides,) 1 for a bound from above, −1 from below
+    limit: Floats  # (sides,) sign · f ≤ limit
 
     @property
-    def informed(self):
+    def informed(self) -> Mask:
         """(N_c,) bool: contacts of which something is known."""
-        return (np.isfinite(self.low) | np.isfinite(self.high)).any(axis=1)
+        return np.any(np.isfinite(self.low) | np.isfinite(self.high), axis=1)
 
     @property
-    def wholly(self):
+    def wholly(self) -> Mask:
         """(N_c,) bool: contacts whose force is known altogether."""
-        return self.pinned.all(axis=1)
+        return np.all(self.pinned, axis=1)
 
 
-def bounds_of(known, count):
+def bounds_of(known: Known | None, count: int) -> Floats:
     """Bounds (count, 2, 2) [contact, component, low or high] of all contacts, force.
 
     known: a Known. What is said of a contact more than once holds together. Raises InputError for
     contacts that do not exist, bounds of another shape or NaN, and low > high.
     """
     try:
-        contacts, low, high = known
+        contacts, low, high = known  # type: ignore[misc]  # anything else is refused below
         contacts = np.atleast_1d(np.asarray(contacts, dtype=np.float64))
         low, high = (
             np.broadcast_to(np.asarray(side, dtype=np.float64), (len(contacts), 2))
@@ -88,7 +88,7 @@ def bounds_of(known, count):
     return bounds
 
 
-def polygons(bounds, mu, scale, index):
+def polygons(bounds: Floats, mu: float, scale: float, index: Integers) -> Polygons | None:
     """The Polygons of bounds (N_c, 2, 2), force; None where they say nothing.
 
     scale: ⟨f_n⟩. index (N_c,): numbers of the contacts, for messages. Raises NotJammedError where
@@ -124,12 +124,12 @@ def polygons(bounds, mu, scale, index):
     there[:, 1] &= mu > 0
     there &= ~pinned[..., None]
     contact, component, above = np.nonzero(there)
-    sign = 2.0 * above - 1.0
+    sign = np.where(above, 1.0, -1.0)
     limit = sign * np.stack([low, high], axis=-1)[contact, component, above]
     return Polygons(low, high, pinned, value, contact, component, sign, limit)
 
 
-def _beyond_coulomb(contact, bounds, mu, needed, short):
+def _beyond_coulomb(contact: int, bounds: Floats, mu: float, needed: float, short: Floats) -> str:
     (_, high), (t_low, t_high) = bounds
     if high < 0:
         return (
@@ -143,7 +143,7 @@ def _beyond_coulomb(contact, bounds, mu, needed, short):
     )
 
 
-def first_forces(known, mu):
+def first_forces(known: Polygons, mu: float) -> Floats:
     """Forces (N_c, 2) to start programs from, f_t in units of μ ⟨f_n⟩.
 
     Pinned components are where they are to stay, inside the cone; contacts that are known
@@ -165,12 +165,14 @@ def first_forces(known, mu):
     return first
 
 
-def units(mu):
+def units(mu: float) -> Floats:
     """Units (2,) of f_n and f_t in programs, in ⟨f_n⟩."""
     return np.array([1.0, mu if mu > 0 else 1.0])
 
 
-def extended(A, b, T, known, mu, value):
+def extended(
+    A: sparse.csr_matrix, b: Floats, T: sparse.csc_matrix, known: Polygons, mu: float, value: Floats
+) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
     """A y = b with rows and slacks of what is known: (A, b, T) in y and the slacks of the sides.
 
     A (rows, n) and T (unknowns, n) in cone coordinates y, T y being forces in ⟨f_n⟩; value (N_c, 2)
@@ -196,12 +198,22 @@ def extended(A, b, T, known, mu, value):
     return whole, np.concatenate(right), T
 
 
-def pins(known, mu):
+def pins(known: Polygons, mu: float) -> tuple[Integers, Integers]:
     """Contact and component of each pinned unknown; without friction f_t is none."""
-    return np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
+    contact, component = np.nonzero(known.pinned[:, : 2 if mu > 0 else 1])
+    return contact, component
 
 
-def contradiction(A, b, T, known, mu, index, scale, slack):
+def contradiction(
+    A: sparse.csr_matrix,
+    b: Floats,
+    T: sparse.csc_matrix,
+    known: Polygons,
+    mu: float,
+    index: Integers,
+    scale: float,
+    slack: Floats,
+) -> str | None:
     """The message that names what cannot hold together, with proof; None where none was found.
 
     A, b, T: `Ensemble.scaled_form` without what is known; scale: ⟨f_n⟩; slack:
@@ -230,7 +242,9 @@ def contradiction(A, b, T, known, mu, index, scale, slack):
     return None
 
 
-def _statements(known, mu, index, scale, multiplier, given):
+def _statements(
+    known: Polygons, mu: float, index: Integers, scale: float, multiplier: Floats, given: Floats
+) -> str:
     """The statements with a multiplier, heaviest first, and by how much they would have to give."""
     contact, component = pins(known, mu)
     contact = np.append(known.contact, contact)

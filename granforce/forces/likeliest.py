@@ -4,9 +4,12 @@ It has the least χ² = Σ ((f − m)/σ)² over S, and is found as a contact pr
 1/σ² of each component (`contact_program`).
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
@@ -16,9 +19,12 @@ from granforce.forces.nearest_piqp import likeliest_piqp
 from granforce.numerics import certificates, contact_program
 from granforce.numerics.contact_program import OPTIMUM, PINNED
 from granforce.numerics.lanes import LANES, MANY, ONE
-from granforce.records import InputError, positive
+from granforce.records import Floats, InputError, positive
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
 
 # What was not measured counts as 0 with a standard error of so many ⟨f_n⟩, if not told otherwise:
 # among networks that the measurement cannot tell apart, the one with the least forces is taken.
@@ -38,13 +44,18 @@ _SHIFTS = 1e-12, 1e-10
 class Likeliest(NamedTuple):
     """The network that fits a measurement best, and how well."""
 
-    forces: np.ndarray  # (N_c, 2) the admissible network with the least χ², force
+    forces: Floats  # (N_c, 2) the admissible network with the least χ², force
     chi_square: float  # its Σ ((f − m)/σ)²
     freedom: int  # degrees of freedom: what was measured less what the network could adapt to
-    deviation: np.ndarray  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
+    deviation: Floats  # (N_c, 2) its (f − m)/σ, NaN where nothing was measured
 
 
-def likeliest(ensemble, measured, sigma, unmeasured=UNMEASURED):
+def likeliest(
+    ensemble: Ensemble,
+    measured: npt.ArrayLike,
+    sigma: npt.ArrayLike,
+    unmeasured: float = UNMEASURED,
+) -> Likeliest:
     """The network of S with the least Σ ((f − m)/σ)²; a Likeliest.
 
     measured, sigma: m and σ as `checked` takes them. unmeasured: standard error, in ⟨f_n⟩, with
@@ -59,7 +70,9 @@ def likeliest(ensemble, measured, sigma, unmeasured=UNMEASURED):
     return Likeliest(forces, float(np.nansum(deviation**2)), freedom, deviation)
 
 
-def checked(ensemble, measured, sigma):
+def checked(
+    ensemble: Ensemble, measured: npt.ArrayLike, sigma: npt.ArrayLike
+) -> tuple[Floats, Floats]:
     """m and σ (N_c, 2), NaN in both where nothing was measured.
 
     measured (N_c, 2), force; sigma likewise, or one number, or two for f_n and f_t. Raises
@@ -85,12 +98,14 @@ def checked(ensemble, measured, sigma):
     return m, s
 
 
-def fitted(ensemble, m, s, unmeasured=UNMEASURED):
+def fitted(ensemble: Ensemble, m: Floats, s: Floats, unmeasured: float = UNMEASURED) -> Floats:
     """The forces (N_c, 2) of `likeliest`, for m and σ that were checked."""
     return fitted_many(ensemble, m[None], s, unmeasured)[0]
 
 
-def fitted_many(ensemble, many, s, unmeasured=UNMEASURED):
+def fitted_many(
+    ensemble: Ensemble, many: Floats, s: Floats, unmeasured: float = UNMEASURED
+) -> Floats:
     """The same (k, N_c, 2) of k ≤ LANES measurements (k, N_c, 2) of the same components, in lanes.
 
     Each gives the same network as alone.
@@ -126,7 +141,9 @@ def fitted_many(ensemble, many, s, unmeasured=UNMEASURED):
     return forces
 
 
-def _otherwise(ensemble, forces, m, s, unmeasured):
+def _otherwise(
+    ensemble: Ensemble, forces: Floats, m: Floats, s: Floats, unmeasured: float
+) -> Floats:
     """The likeliest network where rounding left the steps just outside S, or they ended nowhere."""
     found = nearest(ensemble, forces) if np.isfinite(forces).all() else None
     if found is not None and found.converged and found.residual <= BALANCED:
@@ -141,7 +158,7 @@ def _otherwise(ensemble, forces, m, s, unmeasured):
     raise certificates.why_unsolved(*ensemble.scaled_form[:2], slack=ensemble.slack)
 
 
-def _adapted(ensemble, m, forces):
+def _adapted(ensemble: Ensemble, m: Floats, forces: Floats) -> int:
     """Dimensions in which the measured part of a network could follow the measurement.
 
     With the cone coordinates that are 0 there held, the rank of what is measured on the null space
@@ -156,7 +173,7 @@ def _adapted(ensemble, m, forces):
     return _rank(sparse.vstack([A, T], format="csr")) - _rank(A)
 
 
-def _rank(rows):
+def _rank(rows: sparse.csr_matrix) -> int:
     """The rank of a sparse matrix R.
 
     With ε added to the diagonal of R Rᵀ (in which a row that meets all contacts fills one row only)
@@ -173,7 +190,7 @@ def _rank(rows):
     return len(there) - round((more - less) / np.log(_SHIFTS[1] / _SHIFTS[0]))
 
 
-def _log_determinant(square):
+def _log_determinant(square: sparse.csc_matrix) -> float:
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
     options["options"] = {"SymmetricMode": True}
     factors = cancelling.apart(lambda: splu(sparse.csc_matrix(square), **options))

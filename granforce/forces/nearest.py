@@ -12,18 +12,25 @@ Laplacian of the contact graph, A K Aᵀ, with one 2×2 conductance K per contac
    the neighbourhood at once; then the first phase goes on.
 """
 
+from __future__ import annotations
+
 import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from granforce.forces.contact_problem import problem_of
 from granforce.forces.nearest_piqp import likeliest_piqp, restored
 from granforce.numerics import certificates, contact_program, highs
-from granforce.numerics.contact_program import OPTIMUM, PINNED, PROJECTED
+from granforce.numerics.contact_program import OPTIMUM, PINNED, PROJECTED, Problem
 from granforce.numerics.lanes import LANES, MANY, ONE
-from granforce.records import Relaxation
+from granforce.records import Cancel, Floats, Relaxation
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
 
 # Distance to the nearest network itself (over all components) that ends the steps. This and INSIDE
 # are in ⟨f_n⟩, or in rms forces of the start where those are larger.
@@ -41,7 +48,14 @@ MOST_STEPS = 100
 SHORT, SHORT_IN_A_ROW = 1e-4, 8
 
 
-def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=MOST_STEPS, cancel=None):
+def nearest(
+    ensemble: Ensemble,
+    start: Floats,
+    *,
+    tolerance: float = BALANCED,
+    max_iterations: int = MOST_STEPS,
+    cancel: Cancel | None = None,
+) -> Relaxation:
     """The point of S with the least Σ |F_c − F_start,c|²; a Relaxation.
 
     start (N_c, 2), force. Ends when the residual (in ⟨f_n⟩) is below the tolerance and the
@@ -49,27 +63,36 @@ def nearest(ensemble, start, *, tolerance=BALANCED, max_iterations=MOST_STEPS, c
     empty, or max_iterations were too few): forces are the last iterate, inside the cones.
     cancel() returning True raises Cancelled.
     """
-    options = {"tolerance": tolerance, "max_iterations": max_iterations, "cancel": cancel}
-    return nearest_of_many(ensemble, [start], **options)[0]
+    (found,) = nearest_of_many(
+        ensemble, [start], tolerance=tolerance, max_iterations=max_iterations, cancel=cancel
+    )
+    return found
 
 
 def nearest_of_many(
-    ensemble, starts, *, tolerance=BALANCED, max_iterations=MOST_STEPS, cancel=None
-):
+    ensemble: Ensemble,
+    starts: Sequence[Floats],
+    *,
+    tolerance: float = BALANCED,
+    max_iterations: int = MOST_STEPS,
+    cancel: Cancel | None = None,
+) -> list[Relaxation]:
     """`nearest` of each start, LANES of them side by side: the same results, bit for bit."""
     if cancel is not None:
         with cancelling.watched(cancel):
             return nearest_of_many(
                 ensemble, starts, tolerance=tolerance, max_iterations=max_iterations
             )
-    found = []
+    found: list[Relaxation] = []
     while len(found) < len(starts):
         left = starts[len(found) :]
         found += _batch(ensemble, left[: LANES if len(left) > 1 else 1], tolerance, max_iterations)
     return found
 
 
-def _batch(ensemble, starts, tolerance, max_iterations):
+def _batch(
+    ensemble: Ensemble, starts: Sequence[Floats], tolerance: float, max_iterations: int
+) -> list[Relaxation]:
     begin = time.perf_counter()
     problem, width = problem_of(ensemble), 1 if len(starts) == 1 else LANES
     targets = np.zeros((len(ensemble.index), 2, width))
@@ -80,7 +103,7 @@ def _batch(ensemble, starts, tolerance, max_iterations):
     converged = [search.ended[k] for k in range(len(starts))]
     if ensemble.member is not None and max_iterations >= MOST_STEPS:
         # S is not empty, and the steps were not cut short: at μ ≳ 10³ they may lead nowhere.
-        for k in np.flatnonzero(~np.array(converged)):
+        for k in np.flatnonzero(~np.array(converged)).tolist():
             if np.isfinite(starts[k]).all():
                 forces[k] = likeliest_piqp(ensemble, np.ones_like(forces[k]), starts[k])
                 converged[k] = ensemble.admits(forces[k])
@@ -99,7 +122,7 @@ def _batch(ensemble, starts, tolerance, max_iterations):
     ]
 
 
-def starting_network(ensemble):
+def starting_network(ensemble: Ensemble) -> Floats:
     """The packing's own network (N_c, 2), or another one that is admitted if that left S.
 
     Raises NotJammedError where S is empty, UndecidedError where neither could be shown.
@@ -107,17 +130,19 @@ def starting_network(ensemble):
     if ensemble.admits(ensemble.original):
         return ensemble.original
     found = nearest(ensemble, ensemble.original).forces
+    if ensemble.admits(found):
+        return found
+    member = ensemble.member
+    if member is not None:
+        return member
+    found = some_network(ensemble, ensemble.original)
     if not ensemble.admits(found):
-        found = ensemble.member
-    if found is None:
-        found = some_network(ensemble, ensemble.original)
-        if not ensemble.admits(found):
-            A, b, _ = ensemble.scaled_form
-            raise certificates.why_unsolved(A, b, slack=ensemble.slack)
+        A, b, _ = ensemble.scaled_form
+        raise certificates.why_unsolved(A, b, slack=ensemble.slack)
     return found
 
 
-def some_network(ensemble, start):
+def some_network(ensemble: Ensemble, start: Floats) -> Floats:
     """A network (N_c, 2) of S, the one nearest to start where that is reached.
 
     Where it is not, others are asked: PIQP, then HiGHS, whose vertices are exact to rounding. What
@@ -140,7 +165,7 @@ def some_network(ensemble, start):
 class Search:
     """Up to LANES searches under way, each at its own step."""
 
-    def __init__(self, problem, targets, start=None):
+    def __init__(self, problem: Problem, targets: Floats, start: Floats | None = None) -> None:
         """targets (N_c, 2, W) in ⟨f_n⟩; those of lanes that are not used are 0.
 
         start (2 N_c, W): first y of contacts with pinned components, by default the problem's.
@@ -158,7 +183,7 @@ class Search:
         self.ended = [False] * width
         self.found = self.at.y[:-1].copy()
 
-    def _begin(self, targets, start):
+    def _begin(self, targets: Floats, start: Floats | None) -> None:
         """y and z of each contact's own projection, moved inside; pinned ones stay."""
         problem, mu, at = self.problem, self.problem.mu, self.at
         first, second = slice(0, len(problem.w), 2), slice(1, len(problem.w), 2)
@@ -179,7 +204,7 @@ class Search:
         slacks = slice(len(problem.w), len(at.z) - 1)
         at.y[slacks], at.z[slacks] = problem.start[slacks, None], 1.0
 
-    def run(self, tolerance, most, used):
+    def run(self, tolerance: float, most: int, used: int) -> None:
         """Step until every one of the lanes in use has ended, or will not end."""
         near = [NEAREST * size for size in self.size.tolist()]
         # Between sides, `project` does not know the nearest point.
@@ -212,23 +237,23 @@ class Search:
                     attempt[k] = LOWER * product[k]
                 active = self._finish(ready, tolerance, most)
 
-    def forces(self):
+    def forces(self) -> Floats:
         """Forces (W, N_c, 2) found, in ⟨f_n⟩."""
         pairs = self.found[: len(self.problem.w)].reshape(-1, 2, self.found.shape[1])
         normal, tangential = 0.5 * (pairs[:, 0] + pairs[:, 1]), 0.5 * (pairs[:, 0] - pairs[:, 1])
         return np.moveaxis(np.stack([normal, self.problem.mu * tangential], axis=1), -1, 0)
 
-    def _look(self):
+    def _look(self) -> tuple[list[float], list[float], list[float]]:
         """Products, unbalance and slackness by lane."""
         contact_program.look(self.problem, False, self.at, self.work, self.lanes)
         work = self.work
         return work.product[0].tolist(), work.unbalance[0].tolist(), work.slackness[0].tolist()
 
-    def _end(self, lane, reached):
+    def _end(self, lane: int, reached: bool) -> None:
         self.found[:, lane] = self.at.y[:-1, lane]
         self.ended[lane] = reached
 
-    def _advance(self, going, mode):
+    def _advance(self, going: Sequence[int], mode: int) -> None:
         """One step of the lanes `going`."""
         self.work.going[:] = 0.0
         for k in going:
@@ -236,13 +261,13 @@ class Search:
             self.steps[k] += 1
         contact_program.advance(self.problem, False, mode, self.at, self.work, self.lanes)
 
-    def _step(self, going):
+    def _step(self, going: Sequence[int]) -> None:
         self._advance(going, OPTIMUM)
         for k in going:
             length = min(self.work.primal[0, k], self.work.dual[0, k])
             self.short[k] = self.short[k] + 1 if length < SHORT else 0
 
-    def _finish(self, ready, tolerance, most):
+    def _finish(self, ready: Sequence[int], tolerance: float, most: int) -> list[int]:
         """Newton's method without barrier, from the iterate's v; who did not end by it.
 
         Those are put back to where they were, and go on.

@@ -3,7 +3,10 @@
 And what takes over where the project's own method, of nearest or likeliest networks, reached none.
 """
 
+from __future__ import annotations
+
 import time
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import piqp
@@ -11,15 +14,20 @@ from scipy import sparse
 
 from granforce.forces.contact_problem import MOST_DENSE, in_balance
 from granforce.numerics import highs as programs
-from granforce.records import Relaxation
+from granforce.records import Floats, Relaxation
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
 
 # Coordinates y (in ⟨f_n⟩) far below this hardly change where balance is restored.
 _AWAY = 1e-6
 
 
-def nearest_piqp(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
+def nearest_piqp(
+    ensemble: Ensemble, start: Floats, *, tolerance: float = BALANCED, max_iterations: int = 200
+) -> Relaxation:
     """The point of S with the least Σ |F_c − F_start,c|².
 
     start (N_c, 2). Solved in cone coordinates y ≥ 0 (p = f_n + f_t/μ, q = f_n − f_t/μ), in units
@@ -44,7 +52,7 @@ def nearest_piqp(ensemble, start, *, tolerance=BALANCED, max_iterations=200):
     )
 
 
-def likeliest_piqp(ensemble, weights, target):
+def likeliest_piqp(ensemble: Ensemble, weights: Floats, target: Floats) -> Floats:
     """The forces (N_c, 2) of S with the least Σ (weights (f − target))², balanced to rounding.
 
     weights (N_c, 2), 1/force; target (N_c, 2), force, NaN counts as 0. Whether they are admitted is
@@ -58,7 +66,7 @@ def likeliest_piqp(ensemble, weights, target):
     return restored(ensemble, y)
 
 
-def restored(ensemble, y):
+def restored(ensemble: Ensemble, y: Floats) -> Floats:
     """Forces (N_c, 2) of y ≥ 0 (n,) of `Ensemble.scaled_form`, balanced to rounding.
 
     A program ends at its tolerance: what is left is taken off by the least change in proportion.
@@ -69,7 +77,9 @@ def restored(ensemble, y):
     return ensemble.pin(ensemble.to_forces(T @ y * ensemble.force_scale))
 
 
-def _least(ensemble, W, target, max_iterations):
+def _least(
+    ensemble: Ensemble, W: sparse.csc_matrix, target: Floats, max_iterations: int
+) -> tuple[Floats, Any, int]:
     """y ≥ 0 (n,) of S with the least |W y − target/⟨f_n⟩|², PIQP's verdict and its iterations.
 
     The interior-point iterate may be negative by its tolerance: y ≥ 0 is set exactly, so that only

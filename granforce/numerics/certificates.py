@@ -9,11 +9,13 @@ Solvers only propose; every proof is checked here against A and b. What one solv
 is tried by others, and what none settles is said to be undecided.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy import sparse
 
 from granforce.numerics import highs as programs
-from granforce.records import InputError, NotJammedError, UndecidedError
+from granforce.records import Floats, InputError, NotJammedError, UndecidedError
 from granforce.tolerances import BALANCED, CARRYING
 
 # Mean of y (in ⟨f_n⟩) up to which a proof of emptiness excludes networks in spite of rounding.
@@ -25,8 +27,12 @@ _USUAL_MEAN = 2.0
 
 
 def why_unsolved(
-    A, b, empty="no admissible force network exists on these contacts", *, slack=BALANCED
-):
+    A: sparse.csr_matrix,
+    b: Floats,
+    empty: str = "no admissible force network exists on these contacts",
+    *,
+    slack: Floats | float = BALANCED,
+) -> InputError:
     """The exception to raise where a program over S has no optimum, by what can be proved.
 
     A sparse (m, n), rows of order 1; b (m,). empty: the message for an empty S. slack: as in
@@ -45,7 +51,7 @@ def why_unsolved(
     )
 
 
-def empty_ray(A, b, slack=BALANCED):
+def empty_ray(A: sparse.csr_matrix, b: Floats, slack: Floats | float = BALANCED) -> Floats | None:
     """λ (m,) that proves S to be empty, None where no proof was found.
 
     From the duals of the least Σ |A y − b|, and from the least |A y − b|², whose own unbalance is
@@ -63,7 +69,9 @@ def empty_ray(A, b, slack=BALANCED):
     return multiplier if proves_empty(A, b, multiplier, slack) else None
 
 
-def proves_empty(A, b, multiplier, slack=BALANCED):
+def proves_empty(
+    A: sparse.csr_matrix, b: Floats, multiplier: Floats, slack: Floats | float = BALANCED
+) -> bool:
     """Whether Aᵀλ ≤ 0 < b·λ, beyond what rounding, and what is admitted, could hide.
 
     slack (m,) or one number: |A y − b| of forces that judges admit, more where rows are scaled up.
@@ -75,7 +83,7 @@ def proves_empty(A, b, multiplier, slack=BALANCED):
     return bool(b @ multiplier > 2 * (wrong + allowed))
 
 
-def recession(A):
+def recession(A: sparse.csr_matrix) -> Floats | None:
     """d ≥ 0 (n,) with A d = 0 and Σ d = 1: S, if not empty, is not bounded along it. Or None."""
     both, one = _with_sum(A)
     for d, _ in _proposals(both, one, np.zeros(A.shape[1])):
@@ -85,7 +93,7 @@ def recession(A):
     return None
 
 
-def bounding_rows(A):
+def bounding_rows(A: sparse.csr_matrix) -> Floats | None:
     """π (m,) with Aᵀπ > 0, so that Aᵀπ · y = b·π bounds every y in S. None where none was found."""
     ray = empty_ray(*_with_sum(A))
     if ray is None:
@@ -94,19 +102,19 @@ def bounding_rows(A):
     return rows if (A.T @ rows).min(initial=1.0) > 0 else None
 
 
-def proves_small(A, b, gains, multiplier):
+def proves_small(A: sparse.csr_matrix, b: Floats, gains: Floats, multiplier: Floats) -> bool:
     """Whether gains · y ≤ CARRYING for every y in S of usual size, by λ with Aᵀλ ≥ gains."""
     short = (gains - A.T @ multiplier).max(initial=0.0)
     return bool(b @ multiplier + short * _USUAL_MEAN * A.shape[1] <= CARRYING)
 
 
-def _with_sum(A):
+def _with_sum(A: sparse.csr_matrix) -> tuple[sparse.csc_matrix, Floats]:
     """A with a row for Σ y, and (0, …, 0, 1)."""
     both = sparse.csc_matrix(sparse.vstack([A, np.ones((1, A.shape[1]))]))
     return both, np.append(np.zeros(A.shape[0]), 1.0)
 
 
-def _proposals(A, b, cost):
+def _proposals(A: sparse.csr_matrix, b: Floats, cost: Floats) -> Iterator[tuple[Floats, Floats]]:
     """Points and multipliers of one program over {y ≥ 0 : A y = b} by one method after another."""
     model = programs.standard_form(A, b)
     programs.set_cost(model, cost)

@@ -10,16 +10,18 @@ value it prescribes. What the interior-point method leaves open is solved from s
 """
 
 import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import highspy
 import numpy as np
 from scipy import sparse
 
 from granforce.numerics import certificates, highs, linear_programs
 from granforce.numerics.contact_program import Problem
-from granforce.numerics.linear_programs import Centre, Outcome
-from granforce.records import Cancelled
+from granforce.numerics.linear_programs import Centre, Outcome, Program
+from granforce.records import Cancelled, Floats
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
@@ -34,14 +36,20 @@ class System(NamedTuple):
     problem: Problem
     middle: Centre
     A: sparse.csc_matrix  # (rows, n)
-    b: np.ndarray
+    b: Floats
     loads: sparse.csc_matrix  # (rows, N_c) what F = 1 on each contact adds to A y
-    weight: np.ndarray  # (n,) w > 0
+    weight: Floats  # (n,) w > 0
     total: float  # W: w·y = W for every y in S; a load F on contact c adds F gains[c]
-    gains: np.ndarray  # (N_c,)
+    gains: Floats  # (N_c,)
 
 
-def make_system(problem, A, b, loads, bounding):
+def make_system(
+    problem: Problem,
+    A: sparse.csr_matrix,
+    b: Floats,
+    loads: sparse.csc_matrix,
+    bounding: int | None,
+) -> System:
     """The System of a Problem; bounding: the row of A that bounds y > 0, None without one.
 
     A has the rows of the Problem's balance, then those of its sides and pinned components.
@@ -64,12 +72,12 @@ def make_system(problem, A, b, loads, bounding):
     return System(problem, middle, A.tocsc(), b, loads, weight, total, -(loads.T @ combination))
 
 
-def _centre_multipliers(problem, middle, A):
+def _centre_multipliers(problem: Problem, middle: Centre, A: sparse.csr_matrix) -> Floats:
     balance = np.concatenate([middle.v, middle.v_border])[problem.place]
     return linear_programs.multipliers(problem, A, np.zeros(A.shape[1]), balance, middle.z)
 
 
-def _bounding_rows(A, b):
+def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> Floats:
     """π with Aᵀπ > 0: the duals of max Σ y, which exist where S is bounded and not empty."""
     model = highs.standard_form(A, b)
     highs.set_cost(model, -np.ones(A.shape[1]))
@@ -86,7 +94,15 @@ def _bounding_rows(A, b):
 class Solver:
     """Solves and certifies programs over one System; keeps count of what it did."""
 
-    def __init__(self, system, *, workers=1, seen=None, report=None, found=None):
+    def __init__(
+        self,
+        system: System,
+        *,
+        workers: int = 1,
+        seen: Callable[[Any, Floats], object] | None = None,
+        report: Callable[[int], object] | None = None,
+        found: Callable[[Any, float, float], object] | None = None,
+    ) -> None:
         """seen(key, y): called with each y (n,) of S without load at which a value is attained.
 
         report(count): called as so many programs end. found(key, attained, bound): called as each
@@ -98,18 +114,26 @@ class Solver:
         self.counts = {"programs": 0, "again": 0, "iterations": 0}
         self.lock = threading.Lock()
 
-    def solve(self, keys, tasks, points=None):
+    def solve(
+        self, keys: Sequence[Any], tasks: Sequence[Program], points: dict[Any, Floats] | None = None
+    ) -> dict[Any, tuple[float, float]]:
         """{key: (value attained in S, value that bounds it from below)} of those reached.
 
         points: a dict to fill with the y (n,) at which each key's value is attained. Once
         cancelled, those that were reached are given.
         """
-        bounds = {}
+        bounds: dict[Any, tuple[float, float]] = {}
         with suppress(Cancelled):
             self._solve(keys, tasks, bounds, points)
         return bounds
 
-    def _solve(self, keys, tasks, bounds, points):
+    def _solve(
+        self,
+        keys: Sequence[Any],
+        tasks: Sequence[Program],
+        bounds: dict[Any, tuple[float, float]],
+        points: dict[Any, Floats] | None,
+    ) -> None:
         if self.system.middle.reached:
             self._carry(keys, tasks, range(len(keys)), False, bounds, points)
             # Of thousands of contacts, rounding may leave the bound of one or two short.
@@ -125,25 +149,47 @@ class Solver:
                 if not self._open([keys[number]], bounds):
                     break
 
-    def _carry(self, keys, tasks, numbers, refined, bounds, points):
+    def _carry(
+        self,
+        keys: Sequence[Any],
+        tasks: Sequence[Program],
+        numbers: Sequence[int],
+        refined: bool,
+        bounds: dict[Any, tuple[float, float]],
+        points: dict[Any, Floats] | None,
+    ) -> None:
         """Take what the interior-point method makes of the tasks of these numbers."""
         problem, middle = self.system.problem, self.system.middle
         if not len(numbers):
             return
 
-        def finished(outcomes):
+        def finished(outcomes: Sequence[Outcome]) -> None:
             self._take(outcomes, keys, tasks, bounds, points)
 
-        options = {"refined": refined, "workers": self.workers, "finished": finished}
-        linear_programs.run(problem, middle, tasks, numbers, **options)
+        linear_programs.run(
+            problem,
+            middle,
+            tasks,
+            numbers,
+            refined=refined,
+            workers=self.workers,
+            finished=finished,
+        )
 
-    def _open(self, keys, bounds):
+    def _open(self, keys: Sequence[Any], bounds: dict[Any, tuple[float, float]]) -> list[int]:
         """Numbers of the keys without a value and bound as close as they are to be."""
         none = np.inf, -np.inf
         value_and_bound = [bounds.get(key, none) for key in keys]
         return [k for k, (a, b) in enumerate(value_and_bound) if not a - b <= INTERVAL_GAP]
 
-    def _take(self, outcomes, keys, tasks, bounds, points):
+    def _take(
+        self,
+        outcomes: Sequence[Outcome],
+        keys: Sequence[Any],
+        tasks: Sequence[Program],
+        bounds: dict[Any, tuple[float, float]],
+        points: dict[Any, Floats] | None,
+    ) -> None:
         """Certify outcomes; of a key's outcomes keep the better value and the better bound."""
         attained, bound = certify(self.system, outcomes, tasks)
         with self.lock:
@@ -162,7 +208,9 @@ class Solver:
                     self.seen(key, outcome.y)
 
 
-def certify(system, outcomes, tasks):
+def certify(
+    system: System, outcomes: Sequence[Outcome], tasks: Sequence[Program]
+) -> tuple[Floats, Floats]:
     """Value attained by each outcome, and a bound on the minimum from A, b and c alone (⟨f_n⟩).
 
     The value is inf where the state is not one of S to BALANCED; the bound is −inf where the
@@ -172,7 +220,9 @@ def certify(system, outcomes, tasks):
         return _certify(system, outcomes, tasks)
 
 
-def _certify(system, outcomes, tasks):
+def _certify(
+    system: System, outcomes: Sequence[Outcome], tasks: Sequence[Program]
+) -> tuple[Floats, Floats]:
     y = np.stack([outcome.y for outcome in outcomes], axis=1)
     cost, gain = np.zeros_like(y), np.zeros(len(outcomes))
     multiplier = np.zeros((len(system.b), len(outcomes)))
@@ -201,7 +251,7 @@ def _certify(system, outcomes, tasks):
     return np.where(admitted, value, np.inf), np.where(np.isfinite(bound), bound, -np.inf)
 
 
-def one_after_another(system, tasks):
+def one_after_another(system: System, tasks: Sequence[Program]) -> Iterator[Outcome]:
     """Yield the outcomes of the programs without a load by HiGHS's simplex method.
 
     Each goes on from the vertex of the one before, which takes a tenth of the time: for S without
@@ -219,7 +269,7 @@ def one_after_another(system, tasks):
             )
 
 
-def from_scratch(system, number, task):
+def from_scratch(system: System, number: int, task: Program) -> Iterator[Outcome]:
     """Yield the outcomes of one program by one of HiGHS's methods after another, without a start.
 
     The first takes presolve and tightest tolerances.
@@ -237,19 +287,28 @@ def from_scratch(system, number, task):
             yield _outcome(system, model, y, A, scale, cost, number, task)
 
 
-def _row_scale(A):
+def _row_scale(A: sparse.csr_matrix) -> Floats:
     """What makes the largest entry of each row 1: feasibility is asked of rows of that size."""
     largest = abs(A).max(axis=1).toarray().ravel()
     return 1 / np.where(largest > 0, largest, 1.0)
 
 
-def _cost_of(system, task):
+def _cost_of(system: System, task: Program) -> Floats:
     cost = np.zeros(system.A.shape[1])
     cost[task.columns] = task.costs
     return cost
 
 
-def _outcome(system, model, y, A, scale, cost, number, task):
+def _outcome(
+    system: System,
+    model: highspy.Highs,
+    y: Floats,
+    A: sparse.csr_matrix,
+    scale: Floats,
+    cost: Floats,
+    number: int,
+    task: Program,
+) -> Outcome:
     """What HiGHS made of a program whose rows were scaled, from its basis, if any, to rounding."""
     multiplier = scale * np.array(model.getSolution().row_dual) / _DEARER
     basis = highs.basis(model)

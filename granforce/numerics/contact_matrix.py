@@ -28,6 +28,7 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
+from granforce.records import Floats, Integers, Mask
 
 # A pivot that rounding has driven to zero or below belongs to a direction without weight.
 NO_PIVOT, _NO_WEIGHT = 1e-40, 1e64
@@ -39,24 +40,26 @@ class Network(NamedTuple):
     """A, and where its products go."""
 
     layout: Pattern
-    high: np.ndarray  # (N_c,) place of the grain that is eliminated later
-    low: np.ndarray  # (N_c,) of the other one
-    block: np.ndarray  # (N_c,) block that couples them
-    columns: np.ndarray  # (N_c, 12)
-    border: np.ndarray  # (N_c, 2 m)
+    high: Integers  # (N_c,) place of the grain that is eliminated later
+    low: Integers  # (N_c,) of the other one
+    block: Integers  # (N_c,) block that couples them
+    columns: Floats  # (N_c, 12)
+    border: Floats  # (N_c, 2 m)
 
 
 class Factors(NamedTuple):
     """Memory of one factorisation; W is 1 or LANES."""
 
-    lower: np.ndarray  # (blocks · 9, W)
-    upper: np.ndarray  # (blocks · 9, W) transposed; no room where the matrix is symmetric
-    sides: np.ndarray  # (m · rows, W) L⁻¹ of the global rows
-    tops: np.ndarray  # (m · rows, W) the same of the global columns; no room where symmetric
-    corner: np.ndarray  # (m · m, W) factors of the global rows' Schur complement
+    lower: Floats  # (blocks · 9, W)
+    upper: Floats  # (blocks · 9, W) transposed; no room where the matrix is symmetric
+    sides: Floats  # (m · rows, W) L⁻¹ of the global rows
+    tops: Floats  # (m · rows, W) the same of the global columns; no room where symmetric
+    corner: Floats  # (m · m, W) factors of the global rows' Schur complement
 
 
-def make_network(x, i, j, first, second, border):
+def make_network(
+    x: Floats, i: Integers, j: Integers, first: Floats, second: Floats, border: Floats
+) -> Network:
     """The Network of grains at x (M, 2) in contact i, j (N_c,).
 
     first, second (N_c, 3, 2): what unit f_n, f_t do to the rows of grains i and j; border
@@ -79,7 +82,7 @@ def make_network(x, i, j, first, second, border):
     )
 
 
-def make_factors(network, width, symmetric=True):
+def make_factors(network: Network, width: int, symmetric: bool = True) -> Factors:
     """Room for the factors of `width` matrices side by side."""
     blocks, rows = len(network.layout.row), 3 * len(network.layout.position)
     m = network.border.shape[1] // 2
@@ -309,12 +312,12 @@ def factor(network, least, factors, stop, lanes):
     _factor_corner(corner, m, lanes)
 
 
-def diagonals(network):
+def diagonals(network: Network) -> Integers:
     """Places (grains, 3) of the diagonal among the entries of the lower factor."""
     return 9 * network.layout.start[:-1, None] + np.array([0, 4, 8])
 
 
-def left_out(network, factors):
+def left_out(network: Network, factors: Factors) -> Mask:
     """Mask (rows,) of the rows that the last factorisation of the first lane left out."""
     return (factors.lower[diagonals(network), 0] <= 1.01 / np.sqrt(_NO_WEIGHT)).ravel()
 

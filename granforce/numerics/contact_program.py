@@ -43,6 +43,7 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
+from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
 
 # Part of the way to the nearest wall that a step may go, and of one towards the centre.
@@ -69,83 +70,106 @@ class Problem(NamedTuple):
     """What all programs over one set of networks share."""
 
     network: Network  # A, for forces (f_n, f_t/μ)
-    b: np.ndarray  # (rows,) in order of elimination
-    b_border: np.ndarray  # (m,)
-    diagonal: np.ndarray  # (rows,) added to that of A K Aᵀ: 1 for rows that are not there
+    b: Floats  # (rows,) in order of elimination
+    b_border: Floats  # (m,)
+    diagonal: Floats  # (rows,) added to that of A K Aᵀ: 1 for rows that are not there
     mu: float
-    place: np.ndarray  # (rows of A,) where they are among the rows, then the border
-    w: np.ndarray  # (2 N_c,) weights of f_n, f_t/μ in ½ Σ w f²; PINNED for those that stay
-    start: np.ndarray  # (n,) first y; it has the pinned components where they are to stay
-    side: np.ndarray  # (sides,) component that each side bounds, in order of w
-    sign: np.ndarray  # (sides,) E: 1 for a bound from above, −1 from below
-    limit: np.ndarray  # (sides,) d
+    place: Integers  # (rows of A,) where they are among the rows, then the border
+    w: Floats  # (2 N_c,) weights of f_n, f_t/μ in ½ Σ w f²; PINNED for those that stay
+    start: Floats  # (n,) first y; it has the pinned components where they are to stay
+    side: Integers  # (sides,) component that each side bounds, in order of w
+    sign: Floats  # (sides,) E: 1 for a bound from above, −1 from below
+    limit: Floats  # (sides,) d
 
 
 class Iterate(NamedTuple):
     """Where W programs stand: y of n = 2 N_c + sides coordinates, then F. Arrays (…, W)."""
 
-    y: np.ndarray  # (n + 1, W) cone coordinates, slacks of the sides, F
-    z: np.ndarray  # (n + 1, W)
-    c: np.ndarray  # (n + 1, W)
-    v: np.ndarray  # (rows, W)
-    v_border: np.ndarray  # (m, W)
-    loaded: np.ndarray  # (W,) contact that carries F, −1 without
+    y: Floats  # (n + 1, W) cone coordinates, slacks of the sides, F
+    z: Floats  # (n + 1, W)
+    c: Floats  # (n + 1, W)
+    v: Floats  # (rows, W)
+    v_border: Floats  # (m, W)
+    loaded: Integers  # (W,) contact that carries F, −1 without
 
 
 class Workspace(NamedTuple):
     """Scratch arrays of W programs, and numbers (1, W) that tell how far each has come."""
 
     factors: Factors
-    stop: np.ndarray  # (1,) bool, raised where the work is cancelled
-    least: np.ndarray  # (rows,) pivots up to this are none
-    K: np.ndarray  # (3 N_c, W) nn, nt, tt
-    h: np.ndarray  # (n + 1, W)
-    dy: np.ndarray  # (n + 1, W)
-    turn: np.ndarray  # (n + 1, W) δy δz of the predictor, then δz
-    r: np.ndarray  # (rows, W) b − A T y − a F
-    r_border: np.ndarray  # (m, W)
-    dv: np.ndarray  # (rows, W)
-    dv_border: np.ndarray  # (m, W)
-    rest: np.ndarray  # (sides, W) d − E f − s
-    push: np.ndarray  # (2 N_c, W) Eᵀ ζ
-    k: np.ndarray  # (2 N_c, W) stiffness of each component
-    product: np.ndarray  # Σ y z
-    unbalance: np.ndarray  # largest |b − A T y − a F| and |d − E f − s|
-    slackness: np.ndarray  # largest |Tᵀ w T y + c − Tᵀ Aᵀ v + Tᵀ Eᵀ ζ − z|
-    primal: np.ndarray  # length of the step of y
-    dual: np.ndarray  # of v and z
-    target: np.ndarray  # τ
-    going: np.ndarray  # 1, or 0 for programs that stay where they are
+    stop: Mask  # (1,) bool, raised where the work is cancelled
+    least: Floats  # (rows,) pivots up to this are none
+    K: Floats  # (3 N_c, W) nn, nt, tt
+    h: Floats  # (n + 1, W)
+    dy: Floats  # (n + 1, W)
+    turn: Floats  # (n + 1, W) δy δz of the predictor, then δz
+    r: Floats  # (rows, W) b − A T y − a F
+    r_border: Floats  # (m, W)
+    dv: Floats  # (rows, W)
+    dv_border: Floats  # (m, W)
+    rest: Floats  # (sides, W) d − E f − s
+    push: Floats  # (2 N_c, W) Eᵀ ζ
+    k: Floats  # (2 N_c, W) stiffness of each component
+    product: Floats  # Σ y z
+    unbalance: Floats  # largest |b − A T y − a F| and |d − E f − s|
+    slackness: Floats  # largest |Tᵀ w T y + c − Tᵀ Aᵀ v + Tᵀ Eᵀ ζ − z|
+    primal: Floats  # length of the step of y
+    dual: Floats  # of v and z
+    target: Floats  # τ
+    going: Floats  # 1, or 0 for programs that stay where they are
 
 
-def make_iterate(problem, width):
+def make_iterate(problem: Problem, width: int) -> Iterate:
     """An Iterate of trivial programs that take any step."""
     n, rows, m = len(problem.start), len(problem.b), len(problem.b_border)
     return Iterate(
-        side_by_side(np.append(problem.start, 1.0), width),
-        room(n + 1, width, value=1.0),
-        *(room(length, width) for length in (n + 1, rows, m)),
-        np.full(width, -1),
+        y=side_by_side(np.append(problem.start, 1.0), width),
+        z=room(n + 1, width, value=1.0),
+        c=room(n + 1, width),
+        v=room(rows, width),
+        v_border=room(m, width),
+        loaded=np.full(width, -1),
     )
 
 
-def make_workspace(problem, width):
+def make_workspace(problem: Problem, width: int) -> Workspace:
     """The Workspace of `width` programs side by side."""
     n, rows, m = len(problem.start), len(problem.b), len(problem.b_border)
     forces, sides = len(problem.w), len(problem.side)
-    lengths = (3 * forces // 2, n + 1, n + 1, n + 1, rows, m, rows, m, sides, forces)
     return Workspace(
-        contact_matrix.make_factors(problem.network, width),
-        cancelling.flag(),
-        np.full(rows, contact_matrix.NO_PIVOT),
-        *(room(length, width) for length in lengths),
-        side_by_side(problem.w, width),
-        *(room(1, width) for _ in range(6)),
-        room(1, width, value=1.0),
+        factors=contact_matrix.make_factors(problem.network, width),
+        stop=cancelling.flag(),
+        least=np.full(rows, contact_matrix.NO_PIVOT),
+        K=room(3 * forces // 2, width),
+        h=room(n + 1, width),
+        dy=room(n + 1, width),
+        turn=room(n + 1, width),
+        r=room(rows, width),
+        r_border=room(m, width),
+        dv=room(rows, width),
+        dv_border=room(m, width),
+        rest=room(sides, width),
+        push=room(forces, width),
+        k=side_by_side(problem.w, width),
+        product=room(1, width),
+        unbalance=room(1, width),
+        slackness=room(1, width),
+        primal=room(1, width),
+        dual=room(1, width),
+        target=room(1, width),
+        going=room(1, width, value=1.0),
     )
 
 
-def make_problem(network, b, b_border, idle, place, mu, shift):
+def make_problem(
+    network: Network,
+    b: Floats,
+    b_border: Floats,
+    idle: Floats,
+    place: Integers,
+    mu: float,
+    shift: float,
+) -> Problem:
     """The Problem with `shift`, relative to that of A Aᵀ, on the diagonal of A K Aᵀ.
 
     idle (rows,): 1 for rows that no contact meets. All weights are 1, and there are no sides.
@@ -159,7 +183,7 @@ def make_problem(network, b, b_border, idle, place, mu, shift):
     return Problem(network, b, b_border, diagonal, mu, place, w, start, side, none, none)
 
 
-def dependent_rows(problem, idle):
+def dependent_rows(problem: Problem, idle: Floats) -> Mask:
     """Mask (rows,) of rows of the balance that follow from others: those without a pivot."""
     network, problem = problem.network, _linear(problem, idle)
     # With y = 1 the matrix is A Aᵀ/2.
@@ -171,7 +195,7 @@ def dependent_rows(problem, idle):
     return contact_matrix.left_out(network, work.factors) & (idle == 0)
 
 
-def without_rows(problem, idle, out):
+def without_rows(problem: Problem, idle: Floats, out: Mask) -> Problem:
     """The problem, linear, without shift and the rows (rows,) that are out."""
     network = problem.network
     columns = np.where(out[_rows(network)], 0.0, network.columns.reshape(-1, 2, 2, 3))
@@ -182,17 +206,17 @@ def without_rows(problem, idle, out):
     )
 
 
-def _linear(problem, idle):
+def _linear(problem: Problem, idle: Floats) -> Problem:
     return problem._replace(diagonal=idle, w=np.where(problem.w < PINNED, 0.0, PINNED))
 
 
-def _rows(network):
+def _rows(network: Network) -> Integers:
     """Rows (N_c, 2, 2, 3) that the entries of `columns` belong to, by component and grain."""
     first = 3 * np.stack([network.high, network.low], axis=1)
     return (first[:, None, :, None] + np.arange(3)).repeat(2, axis=1)
 
 
-def _diagonal(network):
+def _diagonal(network: Network) -> Floats:
     """The diagonal of A Aᵀ, (rows,)."""
     diagonal = np.zeros(3 * len(network.layout.position))
     np.add.at(diagonal, _rows(network).ravel(), network.columns.ravel() ** 2)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.numerics.lanes import compiled, within
+from granforce.records import Floats, Integers
 from granforce.system import cancelling
 
 # Columns of a panel: more of them do not fit into the fastest cache beside what they change.
@@ -21,14 +22,14 @@ _WIDEST = 8
 class Pattern(NamedTuple):
     """Where the blocks of the lower factor L are; block numbers count along the columns of L."""
 
-    position: np.ndarray  # (grains,) place of each grain in the order of elimination
-    start: np.ndarray  # (grains + 1,) first block of each column: the diagonal one
-    row: np.ndarray  # (blocks,) block row of each block, ascending in each column
-    panel: np.ndarray  # (panels + 1,) first column of each panel: columns with the same rows below
-    target: np.ndarray  # (pairs,) int32, block that each product of two blocks below is taken from
+    position: Integers  # (grains,) place of each grain in the order of elimination
+    start: Integers  # (grains + 1,) first block of each column: the diagonal one
+    row: Integers  # (blocks,) block row of each block, ascending in each column
+    panel: Integers  # (panels + 1,) first column of each panel: columns with the same rows below
+    target: Integers  # (pairs,) int32, block that each product of two blocks below is taken from
 
 
-def pattern(x, i, j):
+def pattern(x: Floats, i: Integers, j: Integers) -> Pattern:
     """The Pattern of a matrix with blocks on the diagonal and where grains i, j (N_c,) touch.
 
     x (grains, 2): centres, which are used to number the grains only.
@@ -46,14 +47,16 @@ def pattern(x, i, j):
     return Pattern(position, start, row, panel, _targets(start, row, panel, int(pairs)))
 
 
-def block_of(layout, high, low):
+def block_of(layout: Pattern, high: Integers, low: Integers) -> Integers:
     """Numbers (n,) of the blocks in rows `high` of columns `low` (places, (n,)), high ≥ low."""
     count = len(layout.position)
     column = np.repeat(np.arange(count), np.diff(layout.start))
     return np.searchsorted(column * count + layout.row, np.asarray(low) * count + high)
 
 
-def _eliminated(numbered, i, j):
+def _eliminated(
+    numbered: Integers, i: Integers, j: Integers
+) -> tuple[Integers, Integers, Integers]:
     """Elimination with the grains numbered so: their order, and the fill of each column."""
     place = np.empty(len(numbered), dtype=np.int64)
     place[numbered] = np.arange(len(numbered))
@@ -63,7 +66,7 @@ def _eliminated(numbered, i, j):
     return numbered[order], begin, below
 
 
-def neighbours(count, i, j):
+def neighbours(count: int, i: Integers, j: Integers) -> tuple[Integers, Integers]:
     """Each grain's neighbours once, as (start (count + 1,), list), ascending."""
     low, high = np.minimum(i, j), np.maximum(i, j)
     pairs = np.unique(low * count + high) if count else np.zeros(0, dtype=np.int64)
@@ -74,7 +77,7 @@ def neighbours(count, i, j):
     return start.astype(np.int64), there[order].astype(np.int64)
 
 
-def _updates(begin):
+def _updates(begin: Integers) -> int:
     """Pairs of blocks of the same column: as many products does the factorisation take."""
     size = np.diff(begin)
     return np.sum(size * (size + 1) // 2)
@@ -236,7 +239,7 @@ def _by_subtrees(begin, below):
     return after
 
 
-def _renumbered(begin, below, after):
+def _renumbered(begin: Integers, below: Integers, after: Integers) -> tuple[Integers, Integers]:
     """Start of each column and rows of its blocks, when columns are taken in the order `after`."""
     count = len(after)
     place = np.empty(count, dtype=np.int64)

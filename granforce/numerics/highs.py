@@ -3,6 +3,7 @@
 And quadratic ones by PIQP. What a solver says of its own result proves nothing: see `certificates`.
 """
 
+from collections.abc import Iterator
 from contextlib import suppress
 
 import highspy
@@ -11,6 +12,7 @@ import piqp
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from granforce.records import Floats, Integers
 from granforce.system import cancelling
 from granforce.tolerances import PROGRAM
 
@@ -25,20 +27,29 @@ _OTHER_WAYS = (
 )
 
 
-def standard_form(A, b, *, upper=np.inf, solver="choose"):
+def standard_form(
+    A: sparse.csr_matrix, b: Floats, *, upper: float = np.inf, solver: str = "choose"
+) -> highspy.Highs:
     """A silent HiGHS model of {0 ≤ y ≤ upper, A y = b}, zero cost; A sparse (m, n), b (m,)."""
     columns = np.zeros(A.shape[1]), np.full(A.shape[1], upper)
     return bounded(A, (b, b), columns, np.zeros(A.shape[1]), solver=solver)
 
 
-def going_on(A, b):
+def going_on(A: sparse.csr_matrix, b: Floats) -> highspy.Highs:
     """A standard_form for the primal simplex method: a vertex stays one when costs change."""
     model = standard_form(A, b, solver="simplex")
     model.setOptionValue("simplex_strategy", _PRIMAL_SIMPLEX)
     return model
 
 
-def bounded(A, rows, columns, cost, *, solver="choose"):
+def bounded(
+    A: sparse.csr_matrix,
+    rows: tuple[Floats, Floats],
+    columns: tuple[Floats, Floats],
+    cost: Floats,
+    *,
+    solver: str = "choose",
+) -> highspy.Highs:
     """A silent HiGHS model: minimise cost·y with A y and y between bounds.
 
     A sparse (m, n); rows: lower and upper bounds (m,) of A y; columns: those (n,) of y; cost (n,).
@@ -55,31 +66,32 @@ def bounded(A, rows, columns, cost, *, solver="choose"):
     lp.a_matrix_.index_ = A.indices.astype(np.int32)
     lp.a_matrix_.value_ = A.data
     model = highspy.Highs()
-    for name, value in {
+    options: dict[str, bool | int | float | str] = {
         "output_flag": False,
         "threads": 1,
         "solver": solver,
         "primal_feasibility_tolerance": PROGRAM,
         "dual_feasibility_tolerance": PROGRAM,
-    }.items():
+    }
+    for name, value in options.items():
         model.setOptionValue(name, value)
     model.passModel(lp)
     return model
 
 
-def set_cost(model, cost):
+def set_cost(model: highspy.Highs, cost: Floats) -> None:
     """Replace the whole cost vector (n,) of a model, which keeps its basis."""
     columns = np.arange(len(cost), dtype=np.int32)
     model.changeColsCost(len(cost), columns, np.asarray(cost, dtype=np.float64))
 
 
-def solve(model):
+def solve(model: highspy.Highs) -> tuple[highspy.HighsModelStatus, Floats]:
     """Run the model; its status and the point y reached (n,)."""
     cancelling.apart(model.run, interrupt=lambda: _interrupt(model))
     return model.getModelStatus(), np.array(model.getSolution().col_value)
 
 
-def solutions(model):
+def solutions(model: highspy.Highs) -> Iterator[tuple[highspy.HighsModelStatus, Floats]]:
     """Status and point y (n,) of the model as it is set up, and then by other methods, in turn."""
     yield solve(model)
     own = {name: model.getOptionValue(name)[1] for options in _OTHER_WAYS for name in options}
@@ -94,12 +106,12 @@ def solutions(model):
             model.setOptionValue(name, value)
 
 
-def optimal(model):
+def optimal(model: highspy.Highs) -> Floats | None:
     """The first point (n,) that some method calls an optimum; None where none does."""
     return next((y for status, y in solutions(model) if status == OPTIMAL), None)
 
 
-def points(A, b):
+def points(A: sparse.csr_matrix, b: Floats) -> Iterator[Floats]:
     """Points y (n,) ≥ 0 of {A y = b} as one method after another proposes them, rounding apart."""
     model = standard_form(A, b, solver="simplex")
     for _, y in solutions(model):
@@ -110,7 +122,7 @@ def points(A, b):
                 yield np.maximum(vertex(A, b, np.zeros(A.shape[1]), *found)[0], 0.0)
 
 
-def multipliers(model, A, cost):
+def multipliers(model: highspy.Highs, A: sparse.csr_matrix, cost: Floats) -> Floats:
     """Multipliers λ (m,) of the rows of a solved model; from its basis, if any, to rounding."""
     found = basis(model)
     if found is not None:
@@ -121,7 +133,9 @@ def multipliers(model, A, cost):
     return np.array(model.getSolution().row_dual)
 
 
-def vertex(A, b, cost, rows, columns):
+def vertex(
+    A: sparse.csr_matrix, b: Floats, cost: Floats, rows: Integers, columns: Integers
+) -> tuple[Floats, Floats]:
     """y and λ of a basis by its own LU factors: rounding error in place of tolerances."""
     factors = cancelling.apart(splu, sparse.csc_matrix(A.tocsr()[rows][:, columns]))
     y, multiplier = np.zeros(A.shape[1]), np.zeros(A.shape[0])
@@ -132,7 +146,7 @@ def vertex(A, b, cost, rows, columns):
     return y, multiplier
 
 
-def _interrupt(model):
+def _interrupt(model: highspy.Highs) -> None:
     """Have a running model end at its next step, to be called from another thread.
 
     Only now does it call back: asked at every step it would wait for Python each time.
@@ -141,7 +155,7 @@ def _interrupt(model):
         event.subscribe(lambda step: step.interrupt())
 
 
-def basis(model):
+def basis(model: highspy.Highs) -> tuple[Integers, Integers] | None:
     """Rows and columns (positions) of the square basis matrix of a solved model, None without.
 
     Rows whose own logical is basic are implied by the others and left out.
@@ -153,7 +167,7 @@ def basis(model):
     return (rows, columns) if found.valid and len(rows) == len(columns) else None
 
 
-def least_unbalanced(A, b):
+def least_unbalanced(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Floats]:
     """y ≥ 0 with the least |A y − b|², and that residual vector, shapes (n,) and (m,)."""
     rows, columns = A.shape
     solver = quadratic_solver(200)
@@ -171,7 +185,7 @@ def least_unbalanced(A, b):
     return y, A @ y - b
 
 
-def quadratic_solver(max_iterations):
+def quadratic_solver(max_iterations: int) -> piqp.SparseSolver:
     """A silent PIQP solver with granforce's tolerances."""
     solver = piqp.SparseSolver()
     solver.settings.verbose = False

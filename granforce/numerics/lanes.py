@@ -12,12 +12,16 @@ are slower: eight factors fit into the cache and sixteen do not).
 """
 
 import operator
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
+
+from granforce.records import Floats
 
 LANES = 8
 # Kernels that are called from Python, and those that are called by kernels only: without what the
@@ -48,12 +52,12 @@ _FEW = 2
 _LINE = 8
 
 
-def lanes_for(count):
+def lanes_for(count: int) -> Any:
     """The lanes that so many waiting problems go in."""
     return MANY if count > _FEW else ONE
 
 
-def room(*shape, value=0.0):
+def room(*shape: int, value: float = 0.0) -> Floats:
     """An array of one value that begins where a line of the cache does.
 
     Lanes that lie across two lines take up to twice the time: a factorisation reaches 22 to 28
@@ -68,10 +72,11 @@ def room(*shape, value=0.0):
     return found
 
 
-def side_by_side(values, width):
+def side_by_side(values: npt.ArrayLike, width: int) -> Floats:
     """Values (n,) in each of so many lanes: (n, width)."""
+    values = np.asarray(values)
     found = room(len(values), width)
-    found[:] = np.asarray(values)[:, None]
+    found[:] = values[:, None]
     return found
 
 
@@ -110,7 +115,7 @@ def _place(context, builder, signature, args):
 _SHARED = 4
 
 
-def shared(values):
+def shared(values: Floats) -> Floats:
     """Values (n, 1) as numbers that `load` gives to all lanes alike."""
     return values.reshape(-1, *(1,) * (_SHARED - 1))
 

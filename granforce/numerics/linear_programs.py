@@ -5,13 +5,24 @@ Every program starts at the analytic centre y°, where y° z° = 1 with z° = �
 """
 
 from collections import deque
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from granforce.numerics import contact_program
-from granforce.numerics.contact_program import BALANCE, CENTRE, OPTIMUM, REFINED
+from granforce.numerics.contact_program import (
+    BALANCE,
+    CENTRE,
+    OPTIMUM,
+    REFINED,
+    Iterate,
+    Problem,
+    Workspace,
+)
 from granforce.numerics.lanes import ONE, lanes_for
+from granforce.records import Floats
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
@@ -35,8 +46,8 @@ _RESTORED, _RESTORED_LOADED = 0.1, 1e-4
 class Program(NamedTuple):
     """One program: minimise Σ cost · y[columns], or, if loaded ≥ 0, maximise the load F there."""
 
-    columns: list  # positions of the nonzero costs
-    costs: list  # their values
+    columns: list[int]  # positions of the nonzero costs
+    costs: list[float]  # their values
     loaded: int  # contact that carries the load F, −1 without
 
 
@@ -45,24 +56,24 @@ class Outcome(NamedTuple):
 
     number: int  # place in the list of programs
     loaded: int  # as in its Program
-    y: np.ndarray  # (n,)
+    y: Floats  # (n,)
     load: float  # F
-    multiplier: np.ndarray  # v of the balance; of all rows of A where z is None
-    z: np.ndarray | None  # (n,) multipliers of y ≥ 0
+    multiplier: Floats  # v of the balance; of all rows of A where z is None
+    z: Floats | None  # (n,) multipliers of y ≥ 0
     steps: int
 
 
 class Centre(NamedTuple):
     """The analytic centre y° (n,), its multipliers, and whether it was reached."""
 
-    y: np.ndarray
-    z: np.ndarray
-    v: np.ndarray
-    v_border: np.ndarray
+    y: Floats
+    z: Floats
+    v: Floats
+    v_border: Floats
     reached: bool
 
 
-def centre(problem):
+def centre(problem: Problem) -> Centre:
     """The analytic centre of a problem, by Newton's method on y z = 1."""
     at, work = contact_program.make_iterate(problem, 1), contact_program.make_workspace(problem, 1)
     at.c[-1] = 1.0
@@ -79,7 +90,16 @@ def centre(problem):
     return Centre(at.y[:-1, 0], at.z[:-1, 0], at.v[:, 0], at.v_border[:, 0], reached)
 
 
-def run(problem, middle, programs, numbers, *, refined=False, workers=1, finished):
+def run(
+    problem: Problem,
+    middle: Centre,
+    programs: Sequence[Program],
+    numbers: Iterable[int],
+    *,
+    refined: bool = False,
+    workers: int = 1,
+    finished: Callable[[Sequence[Outcome]], object],
+) -> None:
     """Carry the programs of these numbers from the centre to their optimum on ``workers`` threads.
 
     refined: each step is solved again and again until rounding leaves nothing of the unbalance.
@@ -88,16 +108,27 @@ def run(problem, middle, programs, numbers, *, refined=False, workers=1, finishe
     bit for bit.
     """
     mode = REFINED if refined else OPTIMUM
-    given = problem, middle, programs, deque(numbers), mode, finished
+    waiting = deque(numbers)
+
+    def work() -> None:
+        _work(problem, middle, programs, waiting, mode, finished)
+
     if workers == 1:
-        _work(*given)
+        work()
         return
     with cancelling.threads(workers) as pool:
-        for task in [pool.submit(_work, *given) for _ in range(workers)]:
+        for task in [pool.submit(work) for _ in range(workers)]:
             task.result()
 
 
-def _work(problem, middle, programs, waiting, mode, finished):
+def _work(
+    problem: Problem,
+    middle: Centre,
+    programs: Sequence[Program],
+    waiting: deque[int],
+    mode: int,
+    finished: Callable[[Sequence[Outcome]], object],
+) -> None:
     """One thread: fill lanes from the queue, step, hand over what has arrived."""
     if not waiting:
         return
@@ -115,7 +146,7 @@ def _work(problem, middle, programs, waiting, mode, finished):
         there = (gap <= _LEAVE_GAP) & (unbalance <= _LEAVE_UNBALANCE)
         there |= (gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
         left = np.flatnonzero(there & (number >= 0))
-        for lane in left:
+        for lane in left.tolist():
             loaded = programs[number[lane]].loaded
             arrived.append(_outcome(problem, at, lane, number[lane], loaded, steps[lane]))
             number[lane] = _fill(middle, at, lane, programs, waiting)
@@ -131,7 +162,9 @@ def _work(problem, middle, programs, waiting, mode, finished):
         steps += 1
 
 
-def _fill(middle, at, lane, programs, waiting):
+def _fill(
+    middle: Centre, at: Iterate, lane: int, programs: Sequence[Program], waiting: deque[int]
+) -> int:
     """Start the next program in a lane; its number, or −1 where none is waiting."""
     try:
         number = waiting.popleft()
@@ -152,20 +185,25 @@ def _fill(middle, at, lane, programs, waiting):
     return number
 
 
-def _outcome(problem, at, lane, number, loaded, steps):
+def _outcome(
+    problem: Problem, at: Iterate, lane: int, number: int, loaded: int, steps: int
+) -> Outcome:
     multiplier = np.concatenate([at.v[:, lane], at.v_border[:, lane]])[problem.place]
     load = float(at.y[-1, lane]) if loaded >= 0 else 0.0
     y, z = at.y[:-1, lane].copy(), at.z[:-1, lane].copy()
     return Outcome(int(number), int(loaded), y, load, multiplier, z, int(steps))
 
 
-def multipliers(problem, A, cost, balance, z):
+def multipliers(
+    problem: Problem, A: sparse.csr_matrix, cost: Floats, balance: Floats, z: Floats | None
+) -> Floats:
     """Multipliers of all rows of A, from those of the balance and z (n,); see `certified_values`.
 
     Those of the sides are −ζ, and pinned components answer for what is then left of the costs.
     """
     if len(balance) == A.shape[0]:
         return balance
+    assert z is not None  # it is left out only where the multipliers are of all rows
     pairs = len(problem.w)
     sides = -z[pairs:]
     known = np.concatenate([balance, sides])
@@ -177,7 +215,13 @@ def multipliers(problem, A, cost, balance, z):
     return np.concatenate([known, reaction[pinned]])
 
 
-def balanced(problem, middle, outcomes, work=None, lanes=ONE):
+def balanced(
+    problem: Problem,
+    middle: Centre,
+    outcomes: Sequence[Outcome],
+    work: Workspace | None = None,
+    lanes: Any = ONE,
+) -> list[Outcome]:
     """As many outcomes as lanes, or fewer, moved into S, if they are close to it.
 
     First A y + a F = b is restored; what this drove below zero is then undone by mixing in as

@@ -32,6 +32,7 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
+from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
 
 # Rows whose pivot is below this, relative to the diagonal, follow from others.
@@ -42,23 +43,23 @@ class WallMatrix(NamedTuple):
     """K in factors; walls are padded with such that meet no force."""
 
     network: Network  # A, for forces (f_n, f_t/μ)
-    contact: np.ndarray  # (walls,) contact of each wall
-    normal: np.ndarray  # (walls, 2) B: what unit f_n, f_t/μ add to its slack
-    C: np.ndarray  # (N_c, 3) nn, nt, tt of each conductance
+    contact: Integers  # (walls,) contact of each wall
+    normal: Floats  # (walls, 2) B: what unit f_n, f_t/μ add to its slack
+    C: Floats  # (N_c, 3) nn, nt, tt of each conductance
     factors: Factors  # of A C Aᵀ, one number for all lanes
 
 
 class Scratch(NamedTuple):
     """Room for W right-hand sides."""
 
-    f: np.ndarray  # (2 N_c, W) forces
-    x: np.ndarray  # (rows, W)
-    y: np.ndarray  # (m, W)
-    g: np.ndarray  # (walls, W)
-    out: np.ndarray  # (walls, W)
+    f: Floats  # (2 N_c, W) forces
+    x: Floats  # (rows, W)
+    y: Floats  # (m, W)
+    g: Floats  # (walls, W)
+    out: Floats  # (walls, W)
 
 
-def conductances(d, k):
+def conductances(d: Floats, k: Floats) -> tuple[Floats, Floats, Integers]:
     """(C (N_c, 3), ln det M (N_c,) on what is free, free (N_c,)) of contacts.
 
     M = Tᵀ-form of `contact_program`: d (N_c, 2) along y₁, y₂ = f_n ± f_t/μ and k (N_c, 2) along
@@ -74,7 +75,7 @@ def conductances(d, k):
     return C, np.where(free == 2, np.log(4 * det), -np.log(one)), free
 
 
-def factored(network, C, diagonal, least):
+def factored(network: Network, C: Floats, diagonal: Floats, least: float) -> tuple[Factors, Mask]:
     """(Factors of A C Aᵀ + diag(diagonal), mask (rows,) of rows without a pivot above `least`).
 
     least: relative to the diagonal of A C Aᵀ.
@@ -92,7 +93,7 @@ def factored(network, C, diagonal, least):
     return Factors(*(shared(part) for part in factors)), out
 
 
-def _without_dependent(corner, weight):
+def _without_dependent(corner: Floats, weight: Floats) -> None:
     """Leave global rows out, in place, whose pivot is but rounding of their weight (m,) in A C Aᵀ.
 
     Known forces can be such that a pressure follows from them.
@@ -112,12 +113,12 @@ def _without_dependent(corner, weight):
         corner[a, a] = 1 / column[0] if there else 0.0
 
 
-def global_rows(network, factors):
+def global_rows(network: Network, factors: Factors) -> int:
     """Number of global rows that do not follow from others."""
     return int(np.sum(factors.corner[:: network.border.shape[1] // 2 + 1] > 0))
 
 
-def log_determinant(network, factors):
+def log_determinant(network: Network, factors: Factors) -> float:
     """ln det A C Aᵀ by its factors, rows without a pivot left out."""
     m = network.border.shape[1] // 2
     own = factors.lower[contact_matrix.diagonals(network)].ravel()
@@ -126,7 +127,13 @@ def log_determinant(network, factors):
     return -2 * np.log(pivots).sum()
 
 
-def moved(matrix, g, pulls=None, times=1, C=None):
+def moved(
+    matrix: WallMatrix,
+    g: Floats,
+    pulls: Floats | None = None,
+    times: int = 1,
+    C: Floats | None = None,
+) -> Floats:
     """B Q (Bᵀ g + p), (k, walls), of g (k, walls) and p (2 N_c,) or (k, 2 N_c).
 
     times: how often balance is restored: once, what is left of the unbalance is that of rounding
@@ -146,14 +153,14 @@ def moved(matrix, g, pulls=None, times=1, C=None):
     return found
 
 
-def rows(matrix, walls):
+def rows(matrix: WallMatrix, walls: Integers) -> Floats:
     """Rows (k, walls) of K for walls (k,)."""
     g = np.zeros((len(walls), len(matrix.contact)))
     g[np.arange(len(walls)), walls] = 1.0
     return moved(matrix, g)
 
 
-def balancing(matrix, rest, rest_border):
+def balancing(matrix: WallMatrix, rest: Floats, rest_border: Floats) -> Floats:
     """The change of slacks (walls,) by the forces of least weight that take up an unbalance."""
     at = make_scratch(matrix, 1)
     at.x[:, 0], at.y[:, 0] = rest, rest_border
@@ -161,7 +168,7 @@ def balancing(matrix, rest, rest_border):
     return at.out[:, 0].copy()
 
 
-def make_scratch(matrix, width):
+def make_scratch(matrix: WallMatrix, width: int) -> Scratch:
     """Scratch of `width` right-hand sides, all zero."""
     grains, m = len(matrix.network.layout.position), matrix.network.border.shape[1] // 2
     walls = len(matrix.contact)

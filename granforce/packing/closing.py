@@ -9,11 +9,12 @@ box that is free in its shape strains in three ways, not one (e_x, e_y, g as in 
 its networks have to carry the same pressure along x and y, and no shear stress.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
+from granforce.forces.contact_dynamics import Motion
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics import highs as programs
@@ -21,7 +22,12 @@ from granforce.numerics import quadratic
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import (
     Cell,
+    Contacts,
+    Floats,
+    Integers,
+    Mask,
     NotJammedError,
+    Packing,
     UndecidedError,
     make_contacts,
     make_packing,
@@ -48,12 +54,12 @@ STRAINS = {
 }
 
 
-def cell_of(motion):
+def cell_of(motion: Motion) -> Cell:
     """The periodic cell of a moving packing."""
     return Cell(motion.box, float(motion.tilt[0]))
 
 
-def jammed_network(motion, mu):
+def jammed_network(motion: Motion, mu: float) -> Packing | None:
     """The packing at rest, if an admissible network lies close to the dynamic forces.
 
     Its contacts are all pairs that touch once the carrying ones are closed. None, too, where a pair
@@ -78,12 +84,12 @@ def jammed_network(motion, mu):
     return _on_backbone(packing._replace(forces=found), **_asked(motion))
 
 
-def _rates(motion):
+def _rates(motion: Motion) -> int:
     """In how many ways the box may strain."""
     return motion.dilation.size
 
 
-def _asked(motion):
+def _asked(motion: Motion) -> dict[str, Any]:
     """What the ensemble prescribes besides the pressure, in units of it."""
     if _rates(motion) == 1:
         return {}
@@ -97,12 +103,12 @@ class Margin(NamedTuple):
     other: float  # least gap of any other pair of disks; SKIN / 2 where none is that near
 
     @property
-    def certain(self):
+    def certain(self) -> bool:
         """Whether no gap lies between rounding and what is clearly apart."""
         return self.contact < CLOSED and self.other > APART
 
 
-def margin(packing):
+def margin(packing: Packing) -> Margin:
     """The Margin of a packing's contacts, by the gaps of all its pairs.
 
     Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs 10⁻⁶ apart or more;
@@ -118,7 +124,7 @@ def margin(packing):
     )
 
 
-def _listed(contacts, i, j, normal, n):
+def _listed(contacts: Contacts, i: Integers, j: Integers, normal: Floats, n: int) -> Mask:
     """Which of the pairs i < j (P,) with their normals (P, 2) are contacts of a list."""
     turned = contacts.i > contacts.j
     direction = np.where(turned[:, None], -contacts.normal, contacts.normal)
@@ -134,7 +140,7 @@ def _listed(contacts, i, j, normal, n):
     return found
 
 
-def _near_forces(packing, **asked):
+def _near_forces(packing: Packing, **asked: Any) -> Floats | None:
     """The balanced network nearest to the packing's forces, or None if it is not close to them."""
     S = ensemble(packing, prune=False, **asked)
     forces = nearest(S, S.original, max_iterations=NETWORK_ITERATIONS).forces
@@ -142,7 +148,7 @@ def _near_forces(packing, **asked):
     return forces if S.admits(forces) and far <= JAMMED_DISTANCE else None
 
 
-def _on_backbone(packing, **asked):
+def _on_backbone(packing: Packing, **asked: Any) -> Packing | None:
     """The packing with forces on its backbone alone, balanced to the last digits; None if not."""
     try:
         S = ensemble(packing, **asked)
@@ -152,7 +158,9 @@ def _on_backbone(packing, **asked):
     return packing._replace(forces=S.expand(forces)) if S.admits(forces) else None
 
 
-def _packing_of(motion, x, cell, touching, force, mu):
+def _packing_of(
+    motion: Motion, x: Floats, cell: Cell, touching: Mask, force: Floats, mu: float
+) -> Packing:
     i, j, shift = motion.i[touching], motion.j[touching], motion.shift[touching]
     normal, length, _ = separations(x, motion.r, cell, i, j, shift)
     contacts = make_contacts(i, j, normal, np.maximum(length, 0), motion.r)
@@ -161,7 +169,9 @@ def _packing_of(motion, x, cell, touching, force, mu):
     return make_packing(x, motion.r, cell.box, contacts, force[touching], mu, 1.0, tilt=cell.tilt)
 
 
-def _close_contacts(motion, touching, gap):
+def _close_contacts(
+    motion: Motion, touching: Mask, gap: Floats
+) -> tuple[Floats, Cell, Mask] | None:
     """Centres, cell, contacts: moved as little as brings touching gaps to 0, others to 0 or more.
 
     Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box (of a free cell, ε² is
@@ -201,11 +211,11 @@ def _close_contacts(motion, touching, gap):
     return None
 
 
-def _own_cell(motion):
+def _own_cell(motion: Motion) -> Cell:
     return cell_of(motion)._replace(box=motion.box.copy())
 
 
-def _stretch(normal, length, rates):
+def _stretch(normal: Floats, length: Floats, rates: int) -> Floats:
     """First-order change (pairs, rates) of each gap with the strain of the box."""
     if rates == 1:
         return length[:, None]
@@ -213,7 +223,7 @@ def _stretch(normal, length, rates):
     return np.column_stack([n_x * n_x, n_y * n_y, n_x * n_y]) * length[:, None]
 
 
-def _strained(x, cell, strain):
+def _strained(x: Floats, cell: Cell, strain: Floats) -> tuple[Floats, Cell]:
     """Points (N, 2) and cell after a strain (1,) of a square box, or (3,) of a free cell."""
     if len(strain) == 1:
         return x * (1 + strain), Cell(cell.box * (1 + strain), cell.tilt)
@@ -223,7 +233,7 @@ def _strained(x, cell, strain):
     return x + x @ D.T, Cell(np.array([a[0], b[1]]), float(b[0]))
 
 
-def _approach(i, j, normal, n):
+def _approach(i: Integers, j: Integers, normal: Floats, n: int) -> sparse.csc_matrix:
     """Sparse (pairs, 2n) matrix: first-order change of each gap with the displacements."""
     row = np.repeat(np.arange(len(i)), 4)
     column = np.column_stack([2 * i, 2 * i + 1, 2 * j, 2 * j + 1]).ravel()
@@ -231,7 +241,9 @@ def _approach(i, j, normal, n):
     return sparse.csc_matrix((value, (row, column)), shape=(len(i), 2 * n))
 
 
-def _least_motion(R, gap, exact, force):
+def _least_motion(
+    R: sparse.csc_matrix, gap: Floats, exact: Mask, force: Floats
+) -> tuple[Floats, Mask]:
     """u with the least |u|² such that R u = −gap (exact) and R u ≥ −gap (others); who had to open.
 
     Overlap that piled up during the dynamics can leave more contacts than rigid disks can close
@@ -267,7 +279,7 @@ def _least_motion(R, gap, exact, force):
     return move * scale, opened
 
 
-def shrink_to_isostatic(motion, mu, work):
+def shrink_to_isostatic(motion: Motion, mu: float, work: dict[str, Any]) -> Packing | None:
     """Frictionless finish: linear programs that shrink the box until no grain can make room.
 
     minimise ε subject to gap_c + n_c·(u_j − u_i) + ε ℓ_c ≥ 0, |u| ≤ TRUST. Distances are convex
@@ -294,7 +306,7 @@ def shrink_to_isostatic(motion, mu, work):
     return _on_backbone(packing, **_asked(motion))
 
 
-def _without_overlap(motion):
+def _without_overlap(motion: Motion) -> tuple[Floats, Cell]:
     """Centres and cell, expanded until the largest overlap is gone: the programs start feasible."""
     pairs = motion.i, motion.j, motion.shift
     _, length, gap = separations(motion.x, motion.r, cell_of(motion), *pairs)
@@ -302,7 +314,9 @@ def _without_overlap(motion):
     return motion.x * growth, Cell(motion.box * growth, float(motion.tilt[0]) * growth)
 
 
-def _shrink_program(i, j, normal, stretch, gap, n):
+def _shrink_program(
+    i: Integers, j: Integers, normal: Floats, stretch: Floats, gap: Floats, n: int
+) -> tuple[Floats, Floats]:
     """Displacements (n, 2) and strain (1,) or (3,) of the box of the linear program, by HiGHS."""
     R = sparse.hstack([_approach(i, j, normal, n), sparse.csc_matrix(stretch)])
     # Two grains approach by at most 2√2 TRUST, and by TRUST with the box: within the pairs' reach.

@@ -7,9 +7,11 @@ Then the contacts are closed exactly (`closing`). At μ = 0 contact dynamics alo
 isostaticity, and below 1e-4 it takes ever longer to come to rest: there linear programs finish.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce.forces import contact_dynamics as dynamics
 from granforce.numerics.lanes import compiled
@@ -22,8 +24,13 @@ from granforce.packing.closing import (
 )
 from granforce.packing.neighbours import find_pairs
 from granforce.records import (
+    Cancel,
+    Floats,
     InputError,
+    Integers,
+    Mask,
     NotJammedError,
+    Packing,
     float_array,
     friction,
     make_packing,
@@ -57,13 +64,13 @@ class Glimpse(NamedTuple):
     """A packing while it is compressed, as `watch` of `pack` gets it; all arrays are its own."""
 
     step: int
-    x: np.ndarray  # (N, 2) centres inside the box, length
-    r: np.ndarray  # (N,)
-    box: np.ndarray  # (2,)
-    i: np.ndarray  # (k,) grains of the contacts that carry force
-    j: np.ndarray
-    reach: np.ndarray  # (k, 2) from the centre of grain i to that of grain j, length
-    forces: np.ndarray  # (k, 2) f_n, f_t, force
+    x: Floats  # (N, 2) centres inside the box, length
+    r: Floats  # (N,)
+    box: Floats  # (2,)
+    i: Integers  # (k,) grains of the contacts that carry force
+    j: Integers
+    reach: Floats  # (k, 2) from the centre of grain i to that of grain j, length
+    forces: Floats  # (k, 2) f_n, f_t, force
     packing_fraction: float
     unbalance: float  # largest change of a grain's momentum per step, ⟨f_n⟩
     tilt: float = 0.0  # of the cell, length
@@ -71,22 +78,22 @@ class Glimpse(NamedTuple):
 
 @cancelling.cancellable
 def pack(
-    n,
-    mu,
-    seed,
+    n: int,
+    mu: float,
+    seed: int,
     *,
-    radii="uniform:0.5,1",
-    pressure=1.0,
-    dt=0.1,
-    box_mass=100.0,
-    sweeps=600,
-    accuracy=0.01,
-    box="square",
-    max_steps=100_000,
-    progress=None,
-    watch=None,
-    cancel=None,
-):
+    radii: str | npt.ArrayLike = "uniform:0.5,1",
+    pressure: float = 1.0,
+    dt: float = 0.1,
+    box_mass: float = 100.0,
+    sweeps: int = 600,
+    accuracy: float = 0.01,
+    box: str = "square",
+    max_steps: int = 100_000,
+    progress: Callable[[int, str], object] | None = None,
+    watch: Callable[[Glimpse], object] | None = None,
+    cancel: Cancel | None = None,
+) -> Packing:
     """A jammed packing of n disks with friction coefficient μ in a doubly periodic box.
 
     radii: "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list of n radii.
@@ -164,7 +171,7 @@ def pack(
     return _in_users_units(finished, unit, pressure, info)
 
 
-def _check_repeated(packing):
+def _check_repeated(packing: Packing) -> None:
     """NotJammedError where two disks touch more than once: they are neighbours of themselves."""
     pairs = np.sort(np.stack([packing.contacts.i, packing.contacts.j]), axis=0)
     if np.unique(pairs, axis=1).shape[1] < pairs.shape[1]:
@@ -174,14 +181,14 @@ def _check_repeated(packing):
         )
 
 
-def check_box(box):
+def check_box(box: str) -> str:
     """The name of a box; InputError where there is none of this name."""
     if not isinstance(box, str) or box not in BOXES:
         raise InputError(f"box must be square or isotropic, got {box!r:.40}")
     return box
 
 
-def draw_radii(spec, n, rng):
+def draw_radii(spec: str | npt.ArrayLike, n: int, rng: np.random.Generator) -> Floats:
     """n radii from "uniform:LOW,HIGH", "bidisperse:SMALL,LARGE,FRACTION_LARGE" or a list."""
     if not isinstance(spec, str):
         r = float_array(spec, (n,), "radii")
@@ -192,7 +199,7 @@ def draw_radii(spec, n, rng):
         except ValueError:
             values = []
         if kind == "uniform" and len(values) == 2 and 0 < values[0] <= values[1] < np.inf:
-            r = rng.uniform(*values, n)
+            r = rng.uniform(values[0], values[1], n)
         elif kind == "bidisperse" and len(values) == 3 and 0 <= values[2] <= 1:
             r = np.full(n, values[0])
             r[rng.permutation(n)[: round(values[2] * n)]] = values[1]
@@ -206,7 +213,7 @@ def draw_radii(spec, n, rng):
     return r
 
 
-def _dilute_gas(r, rng, rates):
+def _dilute_gas(r: Floats, rng: np.random.Generator, rates: int) -> dynamics.Motion:
     fraction = INITIAL_FRACTION
     largest_first = np.argsort(-r, kind="stable")
     while True:
@@ -228,7 +235,7 @@ def _dilute_gas(r, rng, rates):
     )
 
 
-def _no_pairs():
+def _no_pairs() -> tuple[Integers, Integers, Integers, Floats]:
     return (
         np.zeros(0, np.int64),
         np.zeros(0, np.int64),
@@ -238,7 +245,14 @@ def _no_pairs():
 
 
 @compiled
-def _insert(r, order, side, rng, attempts, stop):
+def _insert(
+    r: Floats,
+    order: Integers,
+    side: float,
+    rng: np.random.Generator,
+    attempts: int,
+    stop: Mask,
+) -> tuple[Floats, bool]:
     """Random sequential insertion in a periodic square; False where a disk found no place.
 
     Ends early once stop[0] is raised.
@@ -268,7 +282,7 @@ def _insert(r, order, side, rng, attempts, stop):
     return x, True
 
 
-def _with_new_list(motion):
+def _with_new_list(motion: dynamics.Motion) -> dynamics.Motion:
     motion = _leant_back(motion)
     if cell_of(motion).shortest <= 2 * motion.r.max():
         raise NotJammedError(
@@ -282,7 +296,7 @@ def _with_new_list(motion):
     return motion._replace(i=i, j=j, shift=shift, force=force, drift=np.zeros(1))
 
 
-def _leant_back(motion):
+def _leant_back(motion: dynamics.Motion) -> dynamics.Motion:
     """The motion with a tilt between ∓L_x/2 that spans the same lattice."""
     times = np.round(motion.tilt[0] / motion.box[0])
     if times == 0:
@@ -296,7 +310,15 @@ def _leant_back(motion):
 
 
 @compiled
-def _carry_over(old_i, old_j, old_shift, old_force, i, j, shift):
+def _carry_over(
+    old_i: Integers,
+    old_j: Integers,
+    old_shift: Integers,
+    old_force: Floats,
+    i: Integers,
+    j: Integers,
+    shift: Integers,
+) -> Floats:
     """Forces of the old pairs on the new ones, by grain numbers and image."""
     grains = 0
     for a in old_i:
@@ -318,10 +340,15 @@ def _carry_over(old_i, old_j, old_shift, old_force, i, j, shift):
     return force
 
 
-def _looking(watch, unit, pressure, counters):
+def _looking(
+    watch: Callable[[Glimpse], object],
+    unit: float,
+    pressure: float,
+    counters: Integers,
+) -> Callable[[dynamics.Motion, float], object]:
     """look(motion, unbalance): have it watched, in the user's units."""
 
-    def look(motion, unbalance):
+    def look(motion: dynamics.Motion, unbalance: float) -> None:
         carrying = motion.force[:, 0] > 0
         i, j, shift = motion.i[carrying], motion.j[carrying], motion.shift[carrying]
         cell = cell_of(motion)
@@ -343,7 +370,14 @@ def _looking(watch, unit, pressure, counters):
     return look
 
 
-def _advance(motion, mu, pace, counters, work, look=None):
+def _advance(
+    motion: dynamics.Motion,
+    mu: float,
+    pace: dynamics.Pace,
+    counters: Integers,
+    work: dict[str, Any],
+    look: Callable[[dynamics.Motion, float], object] | None = None,
+) -> tuple[dynamics.Motion, float, float]:
     """CHECK_EVERY time steps; returns the motion, mean overlap and unbalance."""
     goal = counters[dynamics.STEPS] + CHECK_EVERY
     while (left := int(goal - counters[dynamics.STEPS])) > 0:
@@ -360,15 +394,17 @@ def _advance(motion, mu, pace, counters, work, look=None):
     return motion, overlap, unbalance
 
 
-def _fraction(motion):
+def _fraction(motion: dynamics.Motion) -> float:
     return float(np.pi * np.sum(motion.r**2) / np.prod(motion.box))
 
 
-def _fastest_strain(motion):
+def _fastest_strain(motion: dynamics.Motion) -> float:
     return float(np.abs(motion.dilation).max())
 
 
-def _finish(motion, mu, unbalance, work):
+def _finish(
+    motion: dynamics.Motion, mu: float, unbalance: float, work: dict[str, Any]
+) -> Packing | None:
     """The finished packing in natural units, or None while it is not jammed."""
     if mu <= NEARLY_FRICTIONLESS:
         if _fastest_strain(motion) * motion.pace[0] > BOX_AT_REST:
@@ -380,7 +416,9 @@ def _finish(motion, mu, unbalance, work):
     return jammed_network(motion, mu)
 
 
-def _in_users_units(packing, unit, pressure, info):
+def _in_users_units(
+    packing: Packing, unit: float, pressure: float, info: dict[str, Any]
+) -> Packing:
     contacts = packing.contacts
     lengths = {name: getattr(contacts, name) * unit for name in ("length", "gap", "arm_i", "arm_j")}
     return make_packing(

@@ -8,17 +8,23 @@ along itself, so that its forces f_t add up to 0, and does not tilt, since f_n a
 Such a set is a Packing like any other, and nothing else in granforce knows of scenes.
 """
 
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.packing.compaction import pack
 from granforce.records import (
+    Floats,
     InputError,
+    Integers,
+    Mask,
     NotJammedError,
+    Packing,
     UndecidedError,
     float_array,
     friction,
@@ -41,20 +47,20 @@ PACKED_AT, MOST_SEEDS = 0.5, 100
 class Sketch(NamedTuple):
     """Disks and walls of a scene."""
 
-    x: np.ndarray  # (N, 2) centres
-    r: np.ndarray  # (N,) radii
-    walls: np.ndarray  # (k, 4) both ends x, y, x, y of each wall
-    load: np.ndarray  # (N, 3) force and torque on each disk
-    pressing: np.ndarray | None = None  # (k,) force with which each wall presses; 0: it is held
+    x: Floats  # (N, 2) centres
+    r: Floats  # (N,) radii
+    walls: Floats  # (k, 4) both ends x, y, x, y of each wall
+    load: Floats  # (N, 3) force and torque on each disk
+    pressing: Floats | None = None  # (k,) force with which each wall presses; 0: it is held
 
 
 class _Scene(NamedTuple):
     title: str  # on screen
     mu: float  # unless another is asked for
-    make: object  # make(mu, **options) gives a Sketch, or a Packing
+    make: Callable[..., Sketch | Packing]  # make(mu, **options) gives a Sketch, or a Packing
 
 
-def scene(name, mu=None, **options):
+def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The Packing of the scene of this name, with the admissible network nearest to equal f_n.
 
     name: one of SCENES. mu: friction coefficient, by default the scene's. options: angle (degrees)
@@ -66,7 +72,7 @@ def scene(name, mu=None, **options):
     return with_network(sketched(name, mu, **options))
 
 
-def sketched(name, mu=None, **options):
+def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The same Packing, whether or not anything balances: its forces are 0, or of another μ."""
     if name not in SCENES:
         raise InputError(f"there is no scene {name!r:.40}; choose one of {', '.join(SCENES)}")
@@ -82,7 +88,16 @@ def sketched(name, mu=None, **options):
     return made._replace(info=made.info | {"scene": name})
 
 
-def assembled(x, r, walls, load, mu, *, pressing=None, tolerance=SNAPPED):
+def assembled(
+    x: npt.ArrayLike,
+    r: npt.ArrayLike,
+    walls: npt.ArrayLike,
+    load: npt.ArrayLike,
+    mu: Any,
+    *,
+    pressing: npt.ArrayLike | None = None,
+    tolerance: float = SNAPPED,
+) -> Packing:
     """The Packing of a Sketch, with a contact wherever disks and walls touch, without a network.
 
     Its info has the walls, as lists of four numbers, and which of them press; grains are the disks,
@@ -125,7 +140,7 @@ def assembled(x, r, walls, load, mu, *, pressing=None, tolerance=SNAPPED):
     )
 
 
-def with_network(packing):
+def with_network(packing: Packing) -> Packing:
     """The Packing with the admissible network nearest to its own, or to equal f_n without one.
 
     Raises NotJammedError where none exists, UndecidedError where none was reached.
@@ -145,21 +160,22 @@ def with_network(packing):
     return packing._replace(forces=S.expand(found.forces))
 
 
-def weights(r):
+def weights(r: npt.ArrayLike) -> Floats:
     """Loads (N, 3) of gravity: r² for radii r (N,), downwards."""
+    r = np.asarray(r)
     load = np.zeros((len(r), 3))
-    load[:, 1] = -(np.asarray(r) ** 2)
+    load[:, 1] = -(r**2)
     return load
 
 
-def _touching(gap, r, what, tolerance):
+def _touching(gap: Floats, r: Floats, what: str, tolerance: float) -> Mask:
     scale = r.max()
     for value in gap[gap < -tolerance * scale][:1]:
         raise InputError(f"{what} overlap by {-value / scale:.2g} of the largest radius")
     return gap <= tolerance * scale
 
 
-def _places(x, walls):
+def _places(x: Floats, walls: Floats) -> tuple[Integers, Integers, Floats]:
     """Each disk with each wall: disk and wall (k,) and the wall's nearest place (k, 2), each once.
 
     Walls that meet have one place for a disk in the open angle between them, their common end.
@@ -180,16 +196,16 @@ def _places(x, walls):
 class _Behind(NamedTuple):
     """Grains behind walls: those that press, then one for each place where another is touched."""
 
-    disk: np.ndarray  # (k,) that touches
-    grain: np.ndarray  # (k,) which it touches, among these
-    away: np.ndarray  # (k, 2) unit vector from one to the other
-    x: np.ndarray  # (m, 2) centres
-    r: np.ndarray  # (m,) radii
-    load: np.ndarray  # (m, 3) the force of walls that press, NaN else
-    lids: np.ndarray  # (l,) which walls press
+    disk: Integers  # (k,) that touches
+    grain: Integers  # (k,) which it touches, among these
+    away: Floats  # (k, 2) unit vector from one to the other
+    x: Floats  # (m, 2) centres
+    r: Floats  # (m,) radii
+    load: Floats  # (m, 3) the force of walls that press, NaN else
+    lids: Integers  # (l,) which walls press
 
 
-def _behind(x, r, walls, pressing, tolerance):
+def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: float) -> _Behind:
     disk, wall, place = _places(x, walls)
     away = place - x[disk]
     against = _touching(np.hypot(*away.T) - r[disk], r, "a disk and a wall", tolerance)
@@ -217,7 +233,7 @@ def _behind(x, r, walls, pressing, tolerance):
     )
 
 
-def _inwards(x, wall, away):
+def _inwards(x: Floats, wall: Floats, away: Floats) -> Floats:
     """Unit vector (2,) in which a wall presses: towards the disks, which touch it along away."""
     along = wall[2:] - wall[:2]
     across = np.array([-along[1], along[0]]) / np.hypot(*along)
@@ -234,33 +250,33 @@ def _inwards(x, wall, away):
 # The scenes: centres from school geometry, radius 1.
 
 
-def _resting(x, walls):
+def _resting(x: Sequence[Any] | Floats, walls: npt.ArrayLike) -> Sketch:
     r = np.ones(len(x))
     return Sketch(np.array(x, dtype=float), r, np.array(walls, dtype=float), weights(r))
 
 
-def _degrees(angle, least, most):
+def _degrees(angle: float, least: float, most: float) -> float:
     angle = positive(angle, "angle")
     if not least <= angle < most:
         raise InputError(f"angle must lie between {least:g} and {most:g} degrees, got {angle:g}")
     return np.radians(angle)
 
 
-def _groove(mu, angle=90.0):
+def _groove(mu: float, angle: float = 90.0) -> Sketch:
     half = _degrees(angle, 10, 180) / 2
     side = 2 / np.tan(half) + 1.2 * np.sin(half)
     left, height = side * np.sin(half), side * np.cos(half)
     return _resting([[0, 1 / np.sin(half)]], [[-left, height, 0, 0], [0, 0, left, height]])
 
 
-def _box(mu):
+def _box(mu: float) -> Sketch:
     offset = np.sqrt(2)  # the line of centres at 45°
     width = 2 + offset
     walls = [[0, 4.2, 0, 0], [0, 0, width, 0], [width, 0, width, 4.2]]
     return _resting([[1, 1], [1 + offset, 1 + offset]], walls)
 
 
-def _pyramid(mu, angle=30.0):
+def _pyramid(mu: float, angle: float = 30.0) -> Sketch:
     half = _degrees(angle, 30, 90)
     side, height = 2 * np.sin(half), 2 * np.cos(half)
     if angle == 30:
@@ -268,7 +284,7 @@ def _pyramid(mu, angle=30.0):
     return _resting([[-side, 1], [side, 1], [0, 1 + height]], [[-side - 1.8, 0, side + 1.8, 0]])
 
 
-def _press(mu):
+def _press(mu: float) -> Sketch:
     """The close pyramid without weight, under a wall that presses with 1."""
     made = _pyramid(mu)
     lid = 2 + np.sqrt(3)
@@ -276,12 +292,12 @@ def _press(mu):
     return made._replace(walls=np.array(walls), load=0 * made.load, pressing=np.array([0, 1.0]))
 
 
-def _leaning(mu):
+def _leaning(mu: float) -> Sketch:
     made = _pyramid(mu)
     return made._replace(walls=np.array([[-2, 4.2, -2, 0], [-2, 0, 2.8, 0]], dtype=float))
 
 
-def _column(mu, disks=10, angle=30.0):
+def _column(mu: float, disks: int = 10, angle: float = 30.0) -> Sketch:
     disks = whole(disks, "disks", 1, 1000)
     slope = _degrees(angle, 1, 60)
     number = np.arange(disks)
@@ -291,7 +307,7 @@ def _column(mu, disks=10, angle=30.0):
     return _resting(x, [[0, height, 0, 0], [0, 0, width, 0], [width, 0, width, height]])
 
 
-def _six(mu, dimension=2):
+def _six(mu: float, dimension: int = 2) -> Packing:
     """Six disks in a periodic box, pressed at PACKED_AT: the first seed with that many of h."""
     for seed in range(1, MOST_SEEDS):
         try:
@@ -303,7 +319,7 @@ def _six(mu, dimension=2):
     raise InputError(f"no six disks of {MOST_SEEDS} seeds have h = {dimension}")
 
 
-def _many(mu):
+def _many(mu: float) -> Packing:
     return pack(400, mu=mu, seed=1)
 
 

@@ -1,14 +1,17 @@
 """The study's tables in documents, renewed between two marks: no number is copied by hand."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import drawn
-from granforce.records import InputError
+from granforce.paper.tables import Table
+from granforce.records import InputError, Rows
 from granforce.system.files import written
 
 MARK = re.compile(r"(<!-- study: (\w+) -->\n).*?(<!-- end -->)", re.S)
@@ -23,7 +26,7 @@ _HEADS = {
 }
 
 
-def named(files):
+def named(files: str | None) -> list[Path]:
     """The paths of files separated by commas, or none; InputError for those without a mark."""
     paths = [Path(name) for name in (files or "").split(",") if name]
     for path in paths:
@@ -32,7 +35,7 @@ def named(files):
     return paths
 
 
-def renew(paths, table, claims):
+def renew(paths: Sequence[Path], table: Table, claims: Rows) -> None:
     """Write the tables of a `tables.Table` and its judged claims (dicts) into marked files."""
     known = {"measures": lambda: measures(table), "claims": lambda: claim_table(claims)}
     for path in paths:
@@ -44,7 +47,7 @@ def renew(paths, table, claims):
             file.write(renewed.encode())
 
 
-def measures(table):
+def measures(table: Table) -> str:
     """η1 to η3 against μ as a table: of the paper's sampler, and beside it of others."""
     columns = (
         ("z", "gauss_seidel", "coordination", 1.0, "{:.3f}"),
@@ -71,9 +74,9 @@ def measures(table):
     return _markdown(["μ", *(head for head, *_ in columns)], lines)
 
 
-def claim_table(claims):
+def claim_table(claims: Rows) -> str:
     """Claims with number, interval and verdict, a line for each and a column for each sampler."""
-    lines = {}
+    lines: dict[Any, Any] = {}
     for claim in claims:
         key = claim["statement"], claim["source"], claim["criterion"]
         lines.setdefault(key, {})[claim["sampler"]] = claim
@@ -85,7 +88,7 @@ def claim_table(claims):
     return _markdown(["claim", "from", "criterion", *_HEADS.values()], rows)
 
 
-def _verdict(claim):
+def _verdict(claim: dict[str, Any]) -> str:
     why = f" ({claim['why']})" if claim["why"] else ""
     if not np.isfinite(claim["value"]):
         return claim["verdict"] + why
@@ -93,13 +96,13 @@ def _verdict(claim):
     return f"{claim['value']:.3g}{ends}: {claim['verdict']}{why}"
 
 
-def _short(value):
+def _short(value: float) -> str:
     """Three decimals, or two digits of what is smaller."""
     if abs(value) < 1e-9:
         return "< 10⁻⁹"
     return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
 
 
-def _markdown(heads, rows):
+def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [heads, ["---"] * len(heads), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)

@@ -1,10 +1,16 @@
 """The study's figures, each as a page and as pictures."""
 
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from granforce import figures
 from granforce.paper import tails
 from granforce.paper.claims.groups import SAMPLERS, drawn
+from granforce.paper.tables import Table
+from granforce.records import Floats, Progress, Rows
 from granforce.system.files import make_folder
 
 SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
@@ -82,21 +88,27 @@ _RELAXED = {
 }
 
 
-def paper_sampler(table):
+def paper_sampler(table: Table) -> str:
     """Sampler of Figures 1 to 6: the paper's, if the table has it at every μ of its plan."""
     known = {row["mu"] for row in table.part(SAMPLERS["gauss_seidel"])}
     wanted = set(table.plan.get("frictions", ()))
     return "gauss_seidel" if wanted and wanted <= known else "nearest"
 
 
-def captions(table):
+def captions(table: Table) -> dict[str, str]:
     """{file name: caption} of the figures of a table."""
     walk = _RELAXED[paper_sampler(table)]
     told = tails.told(table) or "–"
     return {name: caption.format(walk=walk, tails=told) for name, caption in CAPTIONS.items()}
 
 
-def draw(table, folder, *, formats=FORMATS, progress=None):
+def draw(
+    table: Table,
+    folder: Path,
+    *,
+    formats: Sequence[str] = FORMATS,
+    progress: Progress | None = None,
+) -> list[Path]:
     """Draw every figure that a table has the data of into a folder; returns the paths.
 
     progress(figures drawn, figures in all).
@@ -114,12 +126,12 @@ def draw(table, folder, *, formats=FORMATS, progress=None):
     return paths
 
 
-def all_figures(table):
+def all_figures(table: Table) -> dict[str, Callable[..., Any]]:
     """{file name: figure(backend=…)} of all figures that a table has the data of."""
     return _of_the_paper(table) | _beyond(table)
 
 
-def _of_the_paper(table):
+def _of_the_paper(table: Table) -> dict[str, Callable[..., Any]]:
     """Figures 1 to 6, by one sampler."""
     sampler, made = paper_sampler(table), {}
     part = SAMPLERS[sampler]
@@ -143,7 +155,7 @@ def _of_the_paper(table):
     return made
 
 
-def _beyond(table):
+def _beyond(table: Table) -> dict[str, Callable[..., Any]]:
     """What the paper does not show."""
     walk, exact, uniform = (table.part(part) for part in ("walk", "exact", "uniform"))
     part, made = SAMPLERS[paper_sampler(table)], {}
@@ -191,7 +203,7 @@ def _beyond(table):
     return made
 
 
-def _densities(table):
+def _densities(table: Table) -> dict[str, dict[float, list[tuple[float, float]]]]:
     """{word: {μ: [(f, P), …]}} of uniform states of large packings."""
     return {
         word: {mu: tails.densities(packings) for mu, packings in known.items()}
@@ -199,9 +211,9 @@ def _densities(table):
     }
 
 
-def _chance(rows):
+def _chance(rows: Rows) -> dict[float, float]:
     """{μ: two standard deviations of the mean correlation of packings with shuffled forces}."""
-    free = {}
+    free: dict[Any, Any] = {}
     for row in rows:
         if row["mu"] > 0 and row.get("contacts"):
             free.setdefault(row["mu"], []).append(row["contacts"] - 1)
@@ -209,26 +221,26 @@ def _chance(rows):
     return {mu: 2 * np.sqrt(np.mean(1 / np.array(n)) / len(n)) for mu, n in free.items()}
 
 
-def _loose(groups):
+def _loose(groups: dict[float, list[Floats]]) -> dict[float, list[Floats]]:
     """Groups of ΔF_n in which anything is undetermined."""
     return {mu: group for mu, group in groups.items() if any(v.any() for v in group)}
 
 
-def _later(figure, *arguments, **options):
+def _later(figure: Callable[..., Any], *arguments: Any, **options: Any) -> Callable[..., Any]:
     return lambda backend: figure(*arguments, backend=backend, **options)
 
 
-def _some(groups):
+def _some(groups: dict[float, Any]) -> dict[float, Any]:
     few = {mu: group for mu, group in groups.items() if mu in SHOWN}
     return few or groups
 
 
-def _with_sizes(table):
+def _with_sizes(table: Table) -> list[dict[str, Any]]:
     frictions = {row["mu"] for row in table.part("size")}
     return [row for row in table.part("size", "walk") if row["mu"] in frictions]
 
 
-def _shown_contacts(table, part):
+def _shown_contacts(table: Table, part: str) -> Iterator[tuple[Any, ...]]:
     """(position in rows, row, contacts, f_n, least f_n, ΔF_n) of the walks that are shown."""
     contacts = {id(row): arrays for row, *arrays in table.contacts(part)}
     for k in sorted({k for k, _ in table.shown}):
@@ -237,7 +249,7 @@ def _shown_contacts(table, part):
             yield k, row, *contacts[id(row)]
 
 
-def _shown_forces(table, part):
+def _shown_forces(table: Table, part: str) -> dict[float, tuple[Any, ...]]:
     counts = dict(table.shown)
     return {
         row["mu"]: (normal, counts[k], least, extent)
@@ -245,7 +257,7 @@ def _shown_forces(table, part):
     }
 
 
-def _shown_places(table, part):
+def _shown_places(table: Table, part: str) -> dict[float, tuple[Any, ...]]:
     return {
         row["mu"]: (table.packings[k], contacts, normal, extent)
         for k, row, contacts, normal, _, extent in _shown_contacts(table, part)

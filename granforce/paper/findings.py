@@ -4,9 +4,12 @@ Numbers with 95 % confidence intervals over packings, without a verdict; ratios 
 packing. They tell why a claim holds or does not.
 """
 
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper import tails
 from granforce.paper.claims.figure4 import departure
 from granforce.paper.claims.groups import (
@@ -20,14 +23,18 @@ from granforce.paper.claims.groups import (
     within,
 )
 from granforce.paper.claims.verdicts import OURS, Claim, peak, slope
+from granforce.paper.tables import Table
+from granforce.records import Floats, Rows
+
+Values = Mapping[float, Any]  # {μ: a number of each packing}
 
 
-def found(table):
+def found(table: Table) -> list[Claim]:
     """All findings about a `tables.Table`; those without data are left out."""
     return [finding for family in FAMILIES for finding in family(table)]
 
 
-def sampled_part(table):
+def sampled_part(table: Table) -> Iterator[Claim]:
     """How much of the exact extent 1000 states see."""
     for source, word in (("walk", "the walk's"), ("uniform", "uniform")):
         yield from _by_range(
@@ -35,7 +42,7 @@ def sampled_part(table):
         )
 
 
-def measure(table):
+def measure(table: Table) -> Iterator[Claim]:
     """How the walk's measure differs from the uniform one."""
     for name, label in (("eta1", "η1"), ("eta2", "η2")):
         yield from _by_range(
@@ -49,7 +56,7 @@ def measure(table):
         )
 
 
-def solver(table):
+def solver(table: Table) -> Iterator[Claim]:
     """How the paper's relaxation walks, by where its sweeps end, and against nearest networks."""
     for sampler in ("gauss_seidel", "gauss_seidel_1e-4"):
         part = SAMPLERS[sampler]
@@ -66,7 +73,7 @@ def solver(table):
             yield from _by_range(_values(table.part(part), name), f"{word} of {part}")
 
 
-def exact_shape(table):
+def exact_shape(table: Table) -> Iterator[Claim]:
     """Maximum and small-μ slope of the exact and of the uniform indeterminacy."""
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
         groups = {mu: v for mu, v in _values(table.part(part), name).items() if mu > 0}
@@ -75,7 +82,7 @@ def exact_shape(table):
         yield from _growth(groups, label)
 
 
-def distribution(table):
+def distribution(table: Table) -> Iterator[Claim]:
     """How far P(ΔF_n) is from falling at each μ, in units of each packing's mean, and its width."""
     for sampler in SAMPLERS:
         groups = sampled(table, sampler)
@@ -94,13 +101,13 @@ def distribution(table):
                 )
 
 
-def opened(table):
+def opened(table: Table) -> Iterator[Claim]:
     """How η grows with the friction of the cones alone, in packings made without friction."""
     groups = _values(table.part("opened_exact"), "eta3")
     yield from _growth(groups, "exact η3, packings made at μ = 0,")
 
 
-def _growth(groups, label):
+def _growth(groups: Values, label: str) -> Iterator[Claim]:
     """Slopes on both sides of the crossover at 0.001."""
     for low, high in ((0, LEAST_DYNAMIC), (LEAST_DYNAMIC, SMALL[1])):
         few = {mu: groups[mu] for mu in groups if low <= mu <= high and mu > 0}
@@ -109,7 +116,7 @@ def _growth(groups, label):
             yield _trend(f"slope of log {label} against log μ, {ends}", slope, few)
 
 
-def size(table):
+def size(table: Table) -> Iterator[Claim]:
     """Whether exact η3 depends on N."""
     rows = table.part("size_exact", "exact")
     for mu in sorted({row["mu"] for row in table.part("size_exact")}):
@@ -118,7 +125,7 @@ def size(table):
             yield _trend(f"slope of log exact η3 against log N, μ = {mu:g}", slope, groups)
 
 
-def preparation(table):
+def preparation(table: Table) -> Iterator[Claim]:
     """What other time steps and more sweeps of the compaction change, in the same seeds."""
     parts = sorted({row["part"] for row in table.rows if row["part"].startswith("prepared")})
     for part in parts:
@@ -131,7 +138,7 @@ def preparation(table):
                 )
 
 
-def strength(table):
+def strength(table: Table) -> Iterator[Claim]:
     """How far the critical force stays below the limit load, and what the protocol does to it."""
     rows = [
         row | {"part_of_load": row["critical_force"] / row["limit_load"]}
@@ -147,7 +154,7 @@ def strength(table):
             yield from _by_range(_ratios(table, name, part, "response"), f"{label}: {word}")
     # Counted in the pressure or not, loads differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
     known = {(row["mu"], row["seed"]): row["contacts"] for row in table.part("walk")}
-    factors = {}
+    factors: dict[Any, Any] = {}
     for row in rows:
         contacts = known.get((row["mu"], row["seed"]))
         if contacts:
@@ -158,7 +165,7 @@ def strength(table):
     )
 
 
-def shear(table):
+def shear(table: Table) -> Iterator[Claim]:
     """Which shear stress the contacts can carry, and how much of it networks have."""
     rows, uniform = table.part("stress"), table.part("stress_uniform")
     groups = _values(rows, "friction")
@@ -173,7 +180,7 @@ def shear(table):
         (uniform, "mean_shear", "of uniform states, mean"),
         (uniform, "largest_shear", "of uniform states, largest"),
     ):
-        parts = {}
+        parts: dict[Any, Any] = {}
         for row in some:
             whole = largest.get((row["mu"], row["seed"]))
             if whole:
@@ -181,7 +188,7 @@ def shear(table):
         yield from _by_range(parts, f"{told} {word}, over the largest of the packing")
 
 
-def volume(table):
+def volume(table: Table) -> Iterator[Claim]:
     """How many networks there are: the width of S and the entropy of forces per grain."""
     rows = table.part("volume")
     for name, told in (
@@ -196,7 +203,7 @@ def volume(table):
         yield from _by_range(groups, told)
     known = {(row["mu"], row["seed"]): row for row in table.part("walk")}
     for name in ("eta1", "eta2"):
-        ratios = {}
+        ratios: dict[Any, Any] = {}
         for row in rows:
             walk = known.get((row["mu"], row["seed"]))
             if walk and walk.get(name) and row.get("extent"):
@@ -225,10 +232,10 @@ def volume(table):
         ]
         if all(groups):
             told = f"ln V per grain of {largest} disks less that of fewer, μ = {mu:g}"
-            yield _finding(told, lambda many, few: np.mean(many) - np.mean(few), groups)
+            yield _finding(told, lambda many, few: float(np.mean(many) - np.mean(few)), groups)
 
 
-def forces(table):
+def forces(table: Table) -> Iterator[Claim]:
     """How the normal forces of uniform states fall off, against an exponential and a Gaussian."""
     for word, known in tails.counts(table).items():
         for mu, packings in known.items():
@@ -245,7 +252,7 @@ def forces(table):
                 yield _finding(told, lambda some, name=name: _part(some, name), [packings])
 
 
-def _part(packings, name):
+def _part(packings: Any, name: str) -> float:
     """One number of the tail of some packings, NaN without one."""
     return getattr(tails.fitted(packings), name, np.nan)
 
@@ -256,14 +263,14 @@ FAMILIES = (
 )
 
 
-def _values(rows, name):
+def _values(rows: Rows, name: str) -> Values:
     return {mu: [v for _, v in group] for mu, group in items(rows, name).items()}
 
 
-def _ratios(table, name, above, below):
+def _ratios(table: Table, name: str, above: str, below: str) -> Values:
     """{μ: ratios of one number in the same packings}, where both parts have it."""
     known = {(row["mu"], row["seed"]): row.get(name) for row in table.part(below)}
-    ratios = {}
+    ratios: dict[Any, Any] = {}
     for row in table.part(above):
         value = known.get((row["mu"], row["seed"]))
         if value and row["dimension"] > 0 and name in row and row.get("reached_part", 1) > 0:
@@ -271,30 +278,32 @@ def _ratios(table, name, above, below):
     return ratios
 
 
-def _largest(frictions, means):
+def _largest(frictions: Floats, means: Floats) -> float:
     """μ of the grid where the means over packings are largest."""
     return float(frictions[int(np.argmax(means))])
 
 
-def _by_range(groups, statement):
+def _by_range(groups: Values, statement: str) -> Iterator[Claim]:
     for word, (low, high) in RANGES:
         values = [v for mu, group in groups.items() if low <= mu <= high for v in group]
         if values:
             yield _finding(f"{statement}, {word} μ", np.mean, [values])
 
 
-def _trend(statement, statistic, groups):
+def _trend(statement: str, statistic: Callable[..., float], groups: Values) -> Claim:
     """A number of all means over packings: statistic(keys, means)."""
     keys = np.array(list(groups), dtype=float)
     value = statistic(keys, np.array([np.mean(group) for group in groups.values()]))
-    drawn = [statistic(keys, means) for means in statistics.resampled_means(groups.values())]
-    return _told(statement, float(value), *statistics.percentile_ends(drawn)[0])
+    drawn = [statistic(keys, means) for means in statistics.resampled_means(list(groups.values()))]
+    return _told(statement, float(value), *statistics.percentile_ends(np.array(drawn))[0])
 
 
-def _finding(statement, statistic, groups, **options):
+def _finding(
+    statement: str, statistic: Callable[..., float], groups: Sequence[Any], **options: Any
+) -> Claim:
     groups = list(groups.values()) if isinstance(groups, dict) else list(groups)
     return _told(statement, *statistics.bootstrap(statistic, groups, **options))
 
 
-def _told(statement, value, low, high):
+def _told(statement: str, value: float, low: float, high: float) -> Claim:
     return Claim(statement, "", OURS, statement, value, low, high, "", "measured")

@@ -1,13 +1,18 @@
 """The command `granforce study`: compute, reduce, draw, judge."""
 
+import argparse
 import sys
 import time
+from collections.abc import Callable, Collection
 from pathlib import Path
+from typing import Any
 
 from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
+from granforce.paper.plan import Plan, Task
 from granforce.records import InputError, check_memory, friction, positive, whole
 from granforce.study import scan
+from granforce.study.cells import Cell
 from granforce.study.store import open_store
 from granforce.system.files import make_folder, written
 from granforce.system.plain import json_text
@@ -21,7 +26,7 @@ _NUMBERS = (
 )
 
 
-def main(arguments):
+def main(arguments: argparse.Namespace) -> int:
     """Run the study into a folder. Returns 1 if a cell failed.
 
     The folder gets cells.zarr (every cell), study.zarr (the reduced table), figures, and the claims
@@ -58,7 +63,7 @@ def main(arguments):
         tables.save(reduced, folder / "study.zarr")
     with Bar("figures", "figure") as progress:
         drawings.draw(reduced, folder / "figures", formats=formats, progress=progress)
-    told = {
+    told: dict[str, Any] = {
         "claims": [claim._asdict() for claim in claims.judged(reduced)],
         "findings": [finding._asdict() for finding in findings.found(reduced)],
         "skipped": reduced.skipped,
@@ -70,7 +75,7 @@ def main(arguments):
     return 1 if failed else 0
 
 
-def status(arguments):
+def status(arguments: argparse.Namespace) -> int:
     """What of the parts of the plan the folder has, on stdout; returns 0."""
     path = Path(arguments.out) / "cells.zarr"
     wanted = plans.chosen(plan_of(arguments), _parts(arguments))
@@ -79,7 +84,7 @@ def status(arguments):
     return 0
 
 
-def _parts(arguments):
+def _parts(arguments: argparse.Namespace) -> Collection[str] | None:
     """Families of parts that are computed; None for all."""
     if arguments.paper:
         if arguments.parts is not None:
@@ -88,14 +93,15 @@ def _parts(arguments):
     return None if arguments.parts is None else arguments.parts.split(",")
 
 
-def plan_of(arguments):
+def plan_of(arguments: argparse.Namespace) -> Plan:
     """The Plan of the command line's options; InputError for impossible ones."""
     plan = plans.QUICK if arguments.quick else plans.Plan()
     for name in _NUMBERS:
         value = getattr(arguments, name)
         if value is None:
             continue
-        plan = plan._replace(**{name: whole(value, name.replace("_", " "), _LEAST.get(name, 0))})
+        given: dict[str, Any] = {name: whole(value, name.replace("_", " "), _LEAST.get(name, 0))}
+        plan = plan._replace(**given)
     if arguments.packings is not None and arguments.many_packings is None:
         plan = plan._replace(many_packings=0)
     if arguments.n is not None:
@@ -111,9 +117,9 @@ def plan_of(arguments):
     return plan
 
 
-def _at(plan, frictions):
+def _at(plan: Plan, frictions: tuple[float, ...]) -> Plan:
     """The plan at other friction coefficients; what is added at some is added at those of them."""
-    some = {
+    some: dict[str, Any] = {
         name: tuple(mu for mu in getattr(plan, name) if mu in frictions)
         for name in (
             *("large_frictions", "frozen_large_frictions", "prepared_frictions"),
@@ -123,7 +129,7 @@ def _at(plan, frictions):
     return plan._replace(frictions=frictions, fine_frictions=(), **some)
 
 
-def _numbers(option, text, cast):
+def _numbers(option: str, text: str, cast: Callable[[str], Any]) -> tuple[Any, ...]:
     try:
         numbers = sorted({cast(part) for part in text.split(",")}) if text else []
     except InputError as error:
@@ -133,15 +139,17 @@ def _numbers(option, text, cast):
     return tuple(numbers)
 
 
-def compute(path, wanted, arguments):
+def compute(
+    path: str | Path, wanted: list[Task], arguments: argparse.Namespace
+) -> list[tuple[Cell, str]]:
     """Compute the tasks, with bars on stderr; returns what failed."""
     bars, begin = [], time.monotonic()
 
-    def enough():
+    def enough() -> bool:
         limit = arguments.minutes
         return limit is not None and time.monotonic() - begin > 60 * limit
 
-    def bar(what):
+    def bar(what: str) -> Any:
         bars.append(Bar(what, "cell"))
         return bars[-1]
 
@@ -163,7 +171,7 @@ def compute(path, wanted, arguments):
     return failed
 
 
-def report(told, as_json):
+def report(told: dict[str, Any], as_json: bool) -> None:
     """Claims with their verdicts, and findings, on stdout."""
     if as_json:
         print(json_text(told))

@@ -14,10 +14,15 @@ stresses that the contacts can carry), "stress_uniform" (uniform states, for the
 distribution of f_n).
 """
 
-from typing import NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import xarray as xr
 
 from granforce.numerics.lanes import LANES
-from granforce.records import InputError
+from granforce.perturb.critical_force import MOST_STEPS
+from granforce.records import InputError, Progress
 from granforce.study import kinds, scan
 from granforce.study.cells import Cell, load
 from granforce.study.store import open_store
@@ -55,14 +60,14 @@ class Plan(NamedTuple):
     """Size of the study; packings are those of seeds 1, 2, …, so smaller numbers are subsets."""
 
     n: int = 400
-    frictions: tuple = FRICTIONS
+    frictions: tuple[float, ...] = FRICTIONS
     packings: int = 10
     states: int = 1000
     gauss_seidel_packings: int = 10
     hardest_packings: int = 10  # with sweeps down to the smallest residual
     # More packings where the maximum is, and where packings differ most.
-    fine_frictions: tuple = (0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
-    large_frictions: tuple = (1, 2, 5, 10)
+    fine_frictions: tuple[float, ...] = (0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
+    large_frictions: tuple[float, ...] = (1, 2, 5, 10)
     many_packings: int = 30
     exact_packings: int = 3
     uniform_packings: int = 10
@@ -73,11 +78,11 @@ class Plan(NamedTuple):
     frozen_packings: int = 10
     frozen_from: float = LEAST_FOLLOWED  # smallest μ: bounds of thinner S end uncertified
     frozen_large: int = 1600  # disks
-    frozen_large_frictions: tuple = (0.01, 0.1, 0.5, 1, 10)
+    frozen_large_frictions: tuple[float, ...] = (0.01, 0.1, 0.5, 1, 10)
     prepared_packings: int = 10
-    prepared_frictions: tuple = (1, 10)
-    sizes: tuple = (100, 200, 800, 1600)
-    size_frictions: tuple = (0.1, 1.0)
+    prepared_frictions: tuple[float, ...] = (1, 10)
+    sizes: tuple[int, ...] = (100, 200, 800, 1600)
+    size_frictions: tuple[float, ...] = (0.1, 1.0)
     largest_exact: int = 800  # exact intervals of other sizes up to here
     stress_packings: int = 10
     stress_uniform_packings: int = 3
@@ -85,7 +90,7 @@ class Plan(NamedTuple):
     volume_packings: int = 10
     volume_accuracy: float = 0.1  # of ln V, which differs by far more from packing to packing
     tails_n: int = 1600
-    tails_frictions: tuple = (0.01, 0.1, 1)
+    tails_frictions: tuple[float, ...] = (0.01, 0.1, 1)
     tails_packings: int = 2
     tails_states: int = 200
 
@@ -136,7 +141,7 @@ class Task(NamedTuple):
     seed: int  # of the packing
 
 
-def tasks(plan):
+def tasks(plan: Plan) -> list[Task]:
     """All cells but the packings, those of the first packings first."""
     found = []
     for seed in range(1, max(plan.packings, plan.many_packings) + 1):
@@ -145,16 +150,22 @@ def tasks(plan):
     return found
 
 
-def packings(wanted):
+def packings(wanted: Iterable[Task]) -> list[Cell]:
     """The packing cells that tasks need, each once."""
-    unique = {}
+    unique: dict[Any, Any] = {}
     for task in wanted:
         named = task.cell.parameters["packing"]
         unique.setdefault(str(sorted(named.items())), Cell(kinds.PACKING, named))
     return list(unique.values())
 
 
-def compute(path, wanted, *, progress=None, **options):
+def compute(
+    path: str | Path,
+    wanted: Sequence[Task],
+    *,
+    progress: Callable[[str], Progress | None] | None = None,
+    **options: Any,
+) -> list[tuple[Cell, str]]:
     """Compute tasks into the store at path, packings first; options as for `scan.run`.
 
     progress(what) gives the progress callable of the packings and of the cells. Returns what failed
@@ -167,7 +178,18 @@ def compute(path, wanted, *, progress=None, **options):
     return failed + scan.run(path, cells, progress=progress("cells"), **options)
 
 
-def _walk(part, n, seed, mu, plan, *, packing_mu=None, states=None, made=None, **how):
+def _walk(
+    part: str,
+    n: int,
+    seed: int,
+    mu: float,
+    plan: Plan,
+    *,
+    packing_mu: float | None = None,
+    states: int | None = None,
+    made: dict[str, Any] | None = None,
+    **how: Any,
+) -> Task:
     packing = kinds.PACKING.parameters(
         n, mu if packing_mu is None else packing_mu, seed, **made or {}
     )
@@ -178,19 +200,27 @@ def _walk(part, n, seed, mu, plan, *, packing_mu=None, states=None, made=None, *
     return Task(part, Cell(kinds.WALK, named), n, mu, seed)
 
 
-def _exact(part, n, seed, mu, *, packing_mu=None, slice_=None):
+def _exact(
+    part: str,
+    n: int,
+    seed: int,
+    mu: float,
+    *,
+    packing_mu: float | None = None,
+    slice_: Sequence[float] | None = None,
+) -> Task:
     packing = kinds.PACKING.parameters(n, mu if packing_mu is None else packing_mu, seed)
     named = kinds.INTERVALS.parameters(packing, mu=mu, slice_=slice_)
     return Task(part, Cell(kinds.INTERVALS, named), n, mu, seed)
 
 
-def _frictions(plan, seed, packings, more=()):
+def _frictions(plan: Plan, seed: int, packings: int, more: Iterable[float] = ()) -> list[float]:
     """Those of the plan for the first packings, and some more for many."""
     wanted = set(plan.frictions) if seed <= min(packings, plan.packings) else set()
     return sorted(wanted | (set(more) if seed <= plan.many_packings else set()))
 
 
-def _sweeps(plan, seed):
+def _sweeps(plan: Plan, seed: int) -> list[Task]:
     found = []
     for mu in _frictions(plan, seed, plan.gauss_seidel_packings, plan.fine_frictions):
         for part, residual in SWEEPS.items():
@@ -203,27 +233,35 @@ def _sweeps(plan, seed):
     return found
 
 
-def _swept(part, residual, seed, mu, plan, states=None, n=None):
-    how = {"relax": "gauss_seidel_only", "residual": residual, "attempts": ATTEMPTS}
+def _swept(
+    part: str,
+    residual: float,
+    seed: int,
+    mu: float,
+    plan: Plan,
+    states: int | None = None,
+    n: int | None = None,
+) -> Task:
+    how: dict[str, Any] = {"relax": "gauss_seidel_only", "residual": residual, "attempts": ATTEMPTS}
     how["chains"] = min(CHAINS, states or plan.states)
     # Where S is one point, sweeps end beside it: how far is measured, but not to where none ends.
     how["skip"] = mu > 0 or part == HARDEST[0]
     return _walk(part, n or plan.n, seed, mu, plan, states=states, **how)
 
 
-def _walks(plan, seed):
+def _walks(plan: Plan, seed: int) -> list[Task]:
     many = plan.fine_frictions + plan.large_frictions
     frictions = _frictions(plan, seed, plan.packings, many)
     return [_walk("walk", plan.n, seed, mu, plan, skip=mu > 0) for mu in frictions]
 
 
-def _exacts(plan, seed):
+def _exacts(plan: Plan, seed: int) -> list[Task]:
     many = plan.fine_frictions + plan.large_frictions
     frictions = _frictions(plan, seed, plan.exact_packings, many)
     return [_exact("exact", plan.n, seed, mu) for mu in frictions]
 
 
-def _uniform(plan, seed):
+def _uniform(plan: Plan, seed: int) -> list[Task]:
     found = []
     if seed > min(plan.uniform_packings, plan.packings):
         return []
@@ -234,8 +272,8 @@ def _uniform(plan, seed):
     return found
 
 
-def _responses(plan, seed):
-    longer = {"max_steps": LONGER * kinds.MOST_STEPS}
+def _responses(plan: Plan, seed: int) -> list[Task]:
+    longer = {"max_steps": LONGER * MOST_STEPS}
     found = []
     for part, packings, contacts, protocol in (
         ("response", plan.response_packings, plan.response_contacts, {"rise": RISE}),
@@ -251,7 +289,7 @@ def _responses(plan, seed):
     return found
 
 
-def _frozen(plan, seed):
+def _frozen(plan: Plan, seed: int) -> list[Task]:
     if seed > min(plan.frozen_packings, plan.packings):
         return []
     frictions = [mu for mu in plan.frictions if mu >= plan.frozen_from]
@@ -262,7 +300,7 @@ def _frozen(plan, seed):
     return found
 
 
-def _prepared(plan, seed):
+def _prepared(plan: Plan, seed: int) -> list[Task]:
     if seed > min(plan.prepared_packings, plan.packings):
         return []
     return [
@@ -272,7 +310,7 @@ def _prepared(plan, seed):
     ]
 
 
-def _opened(plan, seed):
+def _opened(plan: Plan, seed: int) -> list[Task]:
     if seed > min(plan.exact_packings, plan.packings):
         return []
     frictions = [mu for mu in plan.frictions if mu > 0]
@@ -280,7 +318,7 @@ def _opened(plan, seed):
     return walks + [_exact("opened_exact", plan.n, seed, mu, packing_mu=0) for mu in frictions]
 
 
-def _sizes(plan, seed):
+def _sizes(plan: Plan, seed: int) -> list[Task]:
     found = []
     for n in plan.sizes:
         # Large packings average over more contacts: fewer of them are needed.
@@ -297,7 +335,7 @@ def _sizes(plan, seed):
     return found
 
 
-def _stresses(plan, seed):
+def _stresses(plan: Plan, seed: int) -> list[Task]:
     found = []
     for mu in plan.frictions if seed <= min(plan.stress_packings, plan.packings) else ():
         if mu == 0:
@@ -311,7 +349,7 @@ def _stresses(plan, seed):
     return found
 
 
-def _volumes(plan, seed):
+def _volumes(plan: Plan, seed: int) -> list[Task]:
     if seed > min(plan.volume_packings, plan.packings):
         return []
     found = [_volume("volume", plan.n, seed, mu, plan) for mu in plan.frictions if mu > 0]
@@ -322,13 +360,13 @@ def _volumes(plan, seed):
     return found
 
 
-def _volume(part, n, seed, mu, plan):
+def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:
     packing = kinds.PACKING.parameters(n, mu, seed)
     named = kinds.VOLUME.parameters(packing, plan.volume_accuracy)
     return Task(part, Cell(kinds.VOLUME, named), n, mu, seed)
 
 
-def _tails(plan, seed):
+def _tails(plan: Plan, seed: int) -> list[Task]:
     found = []
     for mu in plan.tails_frictions if seed <= min(plan.tails_packings, plan.packings) else ():
         packing = kinds.PACKING.parameters(plan.tails_n, mu, seed)
@@ -359,7 +397,7 @@ PARTS = tuple(_PARTS)
 PAPER = ("sweeps", "response")
 
 
-def chosen(plan, parts=None):
+def chosen(plan: Plan, parts: Collection[str] | None = None) -> list[Task]:
     """The tasks of some families of parts (names out of PARTS), or all."""
     unknown = set(parts or ()) - set(PARTS)
     if unknown:
@@ -368,17 +406,19 @@ def chosen(plan, parts=None):
     return wanted if parts is None else [task for task in wanted if _family(task.part) in parts]
 
 
-def _family(part):
+def _family(part: str) -> str:
     return "response" if part == "perturb" else part.split("_")[0]
 
 
-def remaining(path, wanted):
+def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:
     """A row for each part of some tasks: cells, how many are done, and the minutes they took.
 
     To these, minutes that the others will take: as the mean of those done of the same part and
     size, at the same μ where there are any; NaN where nothing is known.
     """
-    store, took, counts = open_store(path), {}, {}
+    store = open_store(path)
+    took: dict[Any, list[float]] = {}
+    counts: dict[str, list[tuple[Task, bool]]] = {}
     for task in wanted:
         dataset = load(store, *task.cell)
         counts.setdefault(task.part, []).append((task, dataset is not None))
@@ -399,7 +439,7 @@ def remaining(path, wanted):
     return rows
 
 
-def finished(path, plan):
+def finished(path: str | Path, plan: Plan) -> Iterator[tuple[Task, xr.Dataset]]:
     """Yield (task, dataset) for the tasks of a plan that the store at path has."""
     store = open_store(path)
     for task in tasks(plan):

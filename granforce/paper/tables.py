@@ -2,10 +2,13 @@
 
 import hashlib
 import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+import xarray as xr
 from scipy.spatial.distance import pdist
 
 from granforce import measures
@@ -13,10 +16,11 @@ from granforce.explore.stress_outline import plane_of
 from granforce.figures import ratio_counts
 from granforce.forces.ensemble import stress_of
 from granforce.paper import plan as plans
-from granforce.records import InputError, friction
+from granforce.paper.plan import Plan, Task
+from granforce.records import Floats, InputError, Integers, Packing, friction
 from granforce.study import cells, kinds
 from granforce.study.schema import dataset_packing, labelled
-from granforce.study.store import open_store
+from granforce.study.store import Entry, Store, open_store
 
 VERSION = 1
 
@@ -39,20 +43,24 @@ _SCALARS = (
 class Table(NamedTuple):
     """The reduced study."""
 
-    plan: dict  # fields of `plans.Plan`
-    rows: list  # dicts: part, n, mu, seed, and the columns of the schema's row_… that apply
-    samples: dict  # {name of SAMPLES: array}: row, contact, f_n, its least value, ΔF_n in ⟨f_n⟩
-    shown: list  # (row, counts of states (N_c, bins of `figures.ratio_counts`)) of some walks
-    packings: dict  # {row: Packing} of those walks
-    skipped: dict  # counts: cells of the plan that the store lacked
-    tails: dict = MappingProxyType({})  # {row: counts of f_n of its states, in bins up to FORCES}
+    plan: dict[str, Any]  # fields of `plans.Plan`
+    # part, n, mu, seed, and the columns of the schema's row_… that apply
+    rows: list[dict[str, Any]]
+    # {name of SAMPLES: array}: row, contact, f_n, its least value, ΔF_n in ⟨f_n⟩
+    samples: dict[str, Any]
+    # (row, counts of states (N_c, bins of `figures.ratio_counts`)) of some walks
+    shown: list[tuple[int, Integers]]
+    packings: dict[int, Packing]  # {row: Packing} of those walks
+    skipped: dict[str, int]  # counts: cells of the plan that the store lacked
+    # {row: counts of f_n of its states, in bins up to FORCES}
+    tails: Mapping[int, Floats] = MappingProxyType({})
     packing_version: int = kinds.PACKING.version  # of the algorithm that made its packings
 
-    def part(self, *names, n=None):
+    def part(self, *names: str, n: int | None = None) -> list[dict[str, Any]]:
         """Rows of some parts; n: only of this number of disks."""
         return [r for r in self.rows if r["part"] in names and n in (None, r["n"])]
 
-    def contacts(self, part):
+    def contacts(self, part: str) -> list[tuple[Any, ...]]:
         """[(row, contact numbers, f_n, least f_n, ΔF_n)] of a sampled part, forces in ⟨f_n⟩."""
         found = []
         # Samples lie row by row.
@@ -63,31 +71,36 @@ class Table(NamedTuple):
                 found.append((row, *(self.samples[name][chosen] for name in SAMPLES[1:])))
         return found
 
-    def extents(self, part):
+    def extents(self, part: str) -> dict[float, list[Floats]]:
         """{μ: list of ΔF_n (N_c,) of each packing} of a sampled part."""
-        found = {}
+        found: dict[Any, Any] = {}
         for row, *_, extent in self.contacts(part):
             found.setdefault(row["mu"], []).append(extent)
         return found
 
-    def responses(self):
+    def responses(self) -> list[dict[str, Any]]:
         """Rows of the perturbation with loads raised in tenths of the way, else of the other."""
         return self.part("response") or self.part("perturb")
 
-    def answers(self, part="walk", eta="eta2"):
+    def answers(self, part: str = "walk", eta: str = "eta2") -> list[dict[str, Any]]:
         """Rows of the perturbation, each with the η of a part in the same packing."""
         known = {(row["mu"], row["seed"]): row[eta] for row in self.part(part) if eta in row}
         keys = [(row, (row["mu"], row["seed"])) for row in self.responses()]
         return [row | {eta: known[key]} for row, key in keys if key in known]
 
 
-def reduce(path, plan, wanted=None):
+def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -> Table:
     """The Table of what the store at path has of a plan. InputError where it has nothing.
 
     wanted: the tasks whose lack is counted and told, by default all of the plan.
     """
     store = open_store(path, readonly=True)
-    rows, samples, shown, packings, centres, tails = [], [], [], {}, {}, {}
+    rows: list[dict[str, Any]] = []
+    samples: list[dict[str, Any]] = []
+    shown: list[tuple[int, Integers]] = []
+    packings: dict[int, Packing] = {}
+    centres: dict[tuple[float, int], tuple[Floats, dict[str, Any]]] = {}
+    tails: dict[int, Floats] = {}
     every = plans.tasks(plan)
     for task, dataset in plans.finished(path, plan):
         k = len(rows)
@@ -120,7 +133,7 @@ def reduce(path, plan, wanted=None):
     return Table(plan._asdict(), rows, joined, shown, packings, skipped, tails)
 
 
-def _compare_distances(store, wanted, centres):
+def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:
     """Distances of original and walk states from the mean of uniform states, beside those' own."""
     for task in wanted:
         key = task.mu, task.seed
@@ -137,9 +150,9 @@ def _compare_distances(store, wanted, centres):
                 row[name] = float(measures.distances(states, middle).mean() / unit)
 
 
-def row_of(task, dataset):
+def row_of(task: Task, dataset: xr.Dataset) -> dict[str, Any]:
     """The numbers of one cell: scalars of its dataset and what its contacts sum up to."""
-    row = {"part": task.part, "n": task.n, "mu": task.mu, "seed": task.seed}
+    row: dict[str, Any] = {"part": task.part, "n": task.n, "mu": task.mu, "seed": task.seed}
     for name in _SCALARS:
         if name in dataset and dataset[name].size:
             row[name] = float(dataset[name].max())
@@ -174,7 +187,7 @@ def row_of(task, dataset):
     return row
 
 
-def _shears(packing, dataset):
+def _shears(packing: Packing, dataset: xr.Dataset) -> dict[str, float]:
     """Shear stress over pressure of the states: its mean, and its largest."""
     states = dataset["states"].values
     forces = np.zeros((len(states), len(packing.contacts.i), 2))
@@ -183,18 +196,18 @@ def _shears(packing, dataset):
     return {"mean_shear": float(shear.mean()), "largest_shear": float(shear.max())}
 
 
-def _has_states(dataset):
+def _has_states(dataset: xr.Dataset) -> bool:
     """Whether there are any; a walk of which no attempt succeeded has none. True of bounds."""
     return dataset.sizes.get("state", 1) > 0
 
 
-def _pair_spread(states):
+def _pair_spread(states: Floats) -> float:
     """Standard deviation over mean of the distances between pairs of states."""
     apart = pdist(states.reshape(len(states), -1))
     return float(apart.std() / apart.mean())
 
 
-def _samples(k, dataset):
+def _samples(k: int, dataset: xr.Dataset) -> dict[str, Any]:
     scale = dataset["force_scale"].item()
     extent = measures.normal_extent(dataset["low"].values, dataset["high"].values)
     return {
@@ -206,13 +219,13 @@ def _samples(k, dataset):
     }
 
 
-def _counted(dataset):
+def _counted(dataset: xr.Dataset) -> Floats:
     """Counts of f_n of the states in the bins that end at FORCES."""
     normal = dataset["states"].values[..., 0] / dataset["force_scale"].item()
     return np.histogram(normal, np.append(0.0, FORCES))[0].astype(float)
 
 
-def merged(new, old):
+def merged(new: Table, old: Table) -> Table:
     """The Table `new` with the rows of its plan that it lacks and `old` has, after its own.
 
     Numbers of a row that hang on other cells (distances from the uniform centre) stay the old ones
@@ -244,11 +257,11 @@ def merged(new, old):
     )
 
 
-def _name(row):
+def _name(row: dict[str, Any]) -> tuple[Any, ...]:
     return row["part"], row["n"], row["mu"], row["seed"]
 
 
-def save(table, path):
+def save(table: Table, path: str | Path) -> None:
     """Keep a table, and the packings it shows, in a small store of its own at path."""
     store = open_store(path)
     dataset = _dataset(table)
@@ -268,19 +281,22 @@ def save(table, path):
         kinds.keep_packing(store, named, packing)
 
 
-def load(path):
+def load(path: str | Path) -> Table:
     """The Table kept at path. InputError where there is none."""
     store = open_store(path, readonly=True)
     for entry in store.find("study"):
         if entry.version == VERSION:
-            return _table(store, entry, store.load("study", entry.params, version=VERSION))
+            found = store.load("study", entry.params, version=VERSION)
+            return _table(store, entry, cast("xr.Dataset", found))
     raise InputError(f"the store at {path} holds no reduced study")
 
 
-def _dataset(table):
+def _dataset(table: Table) -> xr.Dataset:
     names = sorted({name for row in table.rows for name in row} - {"part"})
     parts = sorted({row["part"] for row in table.rows})
-    arrays = {f"row_{name}": [_number(row.get(name)) for row in table.rows] for name in names}
+    arrays: dict[str, Any] = {
+        f"row_{name}": [_number(row.get(name)) for row in table.rows] for name in names
+    }
     arrays["row_part"] = [parts.index(row["part"]) for row in table.rows]
     arrays |= {f"sample_{name}": values for name, values in table.samples.items()}
     if table.shown:
@@ -293,15 +309,15 @@ def _dataset(table):
     return labelled(arrays, told | {"packing_version": table.packing_version})
 
 
-def _number(value):
+def _number(value: Any) -> Any:
     return np.nan if value is None else value
 
 
-def _table(store, entry, dataset):
+def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> Table:
     parts = json.loads(dataset.attrs["parts"])
     columns = {
         name.removeprefix("row_"): dataset[name].values
-        for name in dataset
+        for name in map(str, dataset)
         if name.startswith("row_")
     }
     rows = []
@@ -330,7 +346,7 @@ def _table(store, entry, dataset):
     return Table(plan, rows, samples, shown, packings, skipped, tails, version)
 
 
-def _packing(store, row):
+def _packing(store: Store, row: dict[str, Any]) -> Packing:
     """The Packing of a row, of whatever version of the algorithm the table's store has."""
     named = {"n": row["n"], "mu": friction(row["mu"]), "seed": row["seed"]}
     return dataset_packing(store[store.find("packing", **named)[0].name])

@@ -6,11 +6,13 @@ has in two dimensions where the whole stress is prescribed (Tighe, Snoeijer, Vlu
 Matter 6, 2908 (2010)).
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.paper.tables import FORCES
+from granforce.paper.tables import FORCES, Table
+from granforce.records import Floats
 
 # What uniform states of large packings are drawn for, in words.
 PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress prescribed"}
@@ -32,9 +34,9 @@ class Tail(NamedTuple):
     off_gaussian: float  # and of b = 2
 
 
-def counts(table):
+def counts(table: Table) -> dict[str, dict[float, list[Floats]]]:
     """{words: {μ: [counts of f_n in the bins that end at FORCES, of each packing]}}."""
-    found = {}
+    found: dict[Any, Any] = {}
     for k, counted in table.tails.items():
         row = table.rows[k]
         known = found.setdefault(PRESCRIBED[row["part"]], {})
@@ -42,14 +44,14 @@ def counts(table):
     return {word: dict(sorted(known.items())) for word, known in found.items()}
 
 
-def densities(packings):
+def densities(packings: Sequence[Floats]) -> list[tuple[float, float]]:
     """[(f, P)] of the counts of some packings, where there are forces."""
     counted, width = np.sum(packings, axis=0), FORCES[0]
     parts = counted / (counted.sum() * width)
     return [(f - width / 2, p) for f, p in zip(FORCES, parts, strict=True) if p]
 
 
-def fitted(packings):
+def fitted(packings: Sequence[Floats]) -> Tail | None:
     """The Tail of the counts of some packings, None where too few forces are large."""
     counted = np.sum(packings, axis=0)
     begins = FORCES - FORCES[0]
@@ -67,7 +69,7 @@ def fitted(packings):
     return Tail(float(_POWERS[best]), *ends, *(float(off[k]) for k in (best, one, two)))
 
 
-def told(table):
+def told(table: Table) -> str:
     """All fits in words."""
     fits = (
         (f"{word}, μ = {mu:g}", fitted(packings))

@@ -15,7 +15,8 @@ F_crit ≤ limit load. They are not equal: sliding contacts do not dilate (the l
 associated), so grains can set off although an equilibrium exists.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -23,7 +24,16 @@ from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.nearest import starting_network
 from granforce.perturb import flow as exact_step
-from granforce.records import InputError, UndecidedError, positive
+from granforce.records import (
+    Cancel,
+    Floats,
+    InputError,
+    Integers,
+    Mask,
+    Packing,
+    UndecidedError,
+    positive,
+)
 from granforce.system import cancelling
 
 # Part of the way from the last load at rest to the limit load that the next load goes.
@@ -45,12 +55,12 @@ class CriticalForce(NamedTuple):
     low: float  # F_crit, force: largest load that ended at rest
     high: float  # least load above that did not, or the limit load if none was tried
     limit_load: float  # force
-    forces: np.ndarray  # (N_c, 2) equilibrium under `low`, on the ensemble's contacts
+    forces: Floats  # (N_c, 2) equilibrium under `low`, on the ensemble's contacts
     residual: float  # its unbalance with the load, ⟨f_n⟩, by Ensemble.residual
     violation: float  # ⟨f_n⟩, by Ensemble.violation
     moving: exact_step.Outcome | None  # the end under `high`; None where that was not tried
     converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
-    counts: dict  # COUNTS
+    counts: dict[str, float]  # COUNTS
     seconds: float  # of following flows, shared among those side by side
 
 
@@ -59,16 +69,21 @@ class Response(NamedTuple):
 
     contact: int
     force: float  # the load
-    displacement: np.ndarray  # (N, 2) u, intrinsic (without dilation); NaN for rattlers
-    rotation: np.ndarray  # (N,) rotation times radius; NaN for rattlers
+    displacement: Floats  # (N, 2) u, intrinsic (without dilation); NaN for rattlers
+    rotation: Floats  # (N,) rotation times radius; NaN for rattlers
     dilation: float  # of the box, ΔL/L per unit of u, 1/length
-    opening: np.ndarray  # (N_c,) normal relative displacement of the ensemble's contacts
-    opened: np.ndarray  # (N_c,) bool, contacts without force
-    slid: np.ndarray  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
-    kept: np.ndarray  # (N_c,) bool, all others
+    opening: Integers  # (N_c,) normal relative displacement of the ensemble's contacts
+    opened: Mask  # (N_c,) bool, contacts without force
+    slid: Mask  # (N_c,) bool, pressed contacts at |f_t| = μ f_n
+    kept: Mask  # (N_c,) bool, all others
     breach: float  # of Coulomb's law, relative to the fastest relative velocity
     fastest: float  # largest relative displacement at a contact
     converged: bool  # breach ≤ STEADY
+
+
+# Work for `exact_step.follow` that asks for flows, is sent their outcomes, and returns a result.
+T = TypeVar("T")
+Asking = Generator[exact_step.Push, exact_step.Outcome, T]
 
 
 class Protocol(NamedTuple):
@@ -80,7 +95,15 @@ class Protocol(NamedTuple):
 
 
 @cancelling.cancellable
-def critical_force(packing, contact, *, mu=None, limit_load=None, cancel=None, **protocol):
+def critical_force(
+    packing: Packing | Ensemble,
+    contact: int,
+    *,
+    mu: float | None = None,
+    limit_load: float | None = None,
+    cancel: Cancel | None = None,
+    **protocol: Any,
+) -> CriticalForce:
     """F_crit of one contact (its number in the packing) with its bracket.
 
     packing: a Packing, or its Ensemble. mu: friction coefficient, by default the packing's.
@@ -97,8 +120,15 @@ def critical_force(packing, contact, *, mu=None, limit_load=None, cancel=None, *
 
 @cancelling.cancellable
 def critical_forces(
-    ensemble, contacts, *, limit_loads=None, workers=1, finished=None, cancel=None, **protocol
-):
+    ensemble: Ensemble,
+    contacts: Sequence[int] | Integers,
+    *,
+    limit_loads: Sequence[float] | Floats | None = None,
+    workers: int = 1,
+    finished: Callable[[int, CriticalForce], object] | None = None,
+    cancel: Cancel | None = None,
+    **protocol: Any,
+) -> list[CriticalForce]:
     """F_crit of contacts (numbers in the packing), several side by side: a list of CriticalForce.
 
     limit_loads (k,): force, computed if not given. workers: threads; no result depends on their
@@ -123,7 +153,7 @@ def critical_forces(
     ]
     found = {}
 
-    def ended(k, critical):
+    def ended(k: int, critical: CriticalForce) -> None:
         found[k] = critical
         if finished is not None:
             finished(k, critical)
@@ -132,9 +162,17 @@ def critical_forces(
     return [found[k] for k in range(len(works))]
 
 
-def _raised(S, step, contact, position, limit, start, protocol):
+def _raised(
+    S: Ensemble,
+    step: exact_step.Step,
+    contact: int,
+    position: int,
+    limit: float,
+    start: Floats,
+    protocol: Protocol,
+) -> Asking[CriticalForce]:
     """Work for `exact_step.follow`: the CriticalForce of a contact."""
-    counts = dict.fromkeys((*COUNTS, "seconds"), 0)
+    counts: dict[str, float] = dict.fromkeys((*COUNTS, "seconds"), 0)
     forces, low, high = start, 0.0, limit
     while True:
         low, high, forces, moving = yield from _bracket(
@@ -166,7 +204,14 @@ def _raised(S, step, contact, position, limit, start, protocol):
     )
 
 
-def _bracket(position, low, high, forces, protocol, counts):
+def _bracket(
+    position: int,
+    low: float,
+    high: float,
+    forces: Floats,
+    protocol: Protocol,
+    counts: dict[str, float],
+) -> Asking[tuple[float, float, Floats, exact_step.Outcome | None]]:
     """Loads raised from `low` until rest and motion are `precision` apart, or rest reaches `high`.
 
     Returns the bracket, the last equilibrium and the motion above it, None where there was none.
@@ -184,7 +229,7 @@ def _bracket(position, low, high, forces, protocol, counts):
     return low, high, forces, moving
 
 
-def _relaxed(asked, counts):
+def _relaxed(asked: exact_step.Push, counts: dict[str, float]) -> Asking[exact_step.Outcome]:
     """The outcome of what is asked, counted."""
     outcome = yield asked
     counts["flow_steps"] += outcome.steps
@@ -198,7 +243,16 @@ def _relaxed(asked, counts):
 
 
 @cancelling.cancellable
-def response(packing, contact, force=None, *, mu=None, critical=None, precision=0.01, cancel=None):
+def response(
+    packing: Packing | Ensemble,
+    contact: int,
+    force: float | None = None,
+    *,
+    mu: float | None = None,
+    critical: CriticalForce | None = None,
+    precision: float = 0.01,
+    cancel: Cancel | None = None,
+) -> Response:
     """The first motion under a force pair on one contact, beyond its critical force.
 
     force: the load, by default the upper end of the critical force's bracket (`precision` ⟨f_n⟩
@@ -231,7 +285,14 @@ def response(packing, contact, force=None, *, mu=None, critical=None, precision=
     return _response(S, step, int(contact), position, load * scale, moving)
 
 
-def _response(S, step, contact, position, load, moving):
+def _response(
+    S: Ensemble,
+    step: exact_step.Step,
+    contact: int,
+    position: int,
+    load: float,
+    moving: exact_step.Outcome,
+) -> Response:
     velocity = exact_step.grain_velocities(S, moving.velocity)
     unit = np.sqrt(np.mean(np.sum(velocity[:, :2] ** 2, axis=1)))
     relative = exact_step.relative_velocities(step, moving.velocity) / unit

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
+from granforce.records import Floats, Packing
 
 FIT_INNER, FIT_OUTER = 1.5, 0.4
 FIT_RANGES = tuple(itertools.product((1.0, 1.5, 2.0, 3.0), (0.3, 0.4, 0.5)))
@@ -24,25 +25,25 @@ class Decay(NamedTuple):
     exponent: float  # α
     low: float  # 95 % interval of α, from contacts drawn anew
     high: float
-    fit: tuple  # smallest and largest r of the fit, length
-    ranges: np.ndarray  # (fits, 2) the same of other fits
-    exponents: np.ndarray  # (fits,) α of those
+    fit: tuple[float, float]  # smallest and largest r of the fit, length
+    ranges: Floats  # (fits, 2) the same of other fits
+    exponents: Floats  # (fits,) α of those
 
 
-def distances(packing, contact):
+def distances(packing: Packing, contact: int) -> Floats:
     """Distance (N,) of every grain from the point of contact, by the nearest periodic image."""
     c = packing.contacts
     centre = packing.x[c.i[contact]] + c.arm_i[contact] * c.normal[contact]
     return np.linalg.norm(packing.cell.nearest(packing.x - centre), axis=1)
 
 
-def shells(packing):
+def shells(packing: Packing) -> Floats:
     """Edges of shells half a mean diameter wide, out to half the distance between images."""
     width = float(packing.r.mean())
-    return width * np.arange(int(_side(packing) / 2 / width) + 1)
+    return width * np.arange(int(_side(packing) / 2 / width) + 1, dtype=np.float64)
 
 
-def _side(packing):
+def _side(packing: Packing) -> float:
     """The shorter side of the box; in a tilted cell the distance between nearest images."""
     if packing.tilt:
         return packing.cell.shortest
@@ -50,7 +51,7 @@ def _side(packing):
     return float(extent.min())
 
 
-def profile(packing, displacement, contact, edges):
+def profile(packing: Packing, displacement: Floats, contact: int, edges: Floats) -> Floats:
     """Mean |u| of the grains in shells around a contact, (shells,); NaN where there are none.
 
     displacement (N, 2), NaN for grains that do not count; edges (shells + 1,): `distances`.
@@ -64,13 +65,13 @@ def profile(packing, displacement, contact, edges):
     return np.where(grains > 0, total / np.maximum(grains, 1), np.nan)
 
 
-def decay(packing, radius, profiles):
+def decay(packing: Packing, radius: Floats, profiles: Floats) -> Decay:
     """The Decay of profiles (contacts, shells) with the middles (shells,) of their shells."""
     diameter, side = 2 * float(packing.r.mean()), _side(packing)
     ranges = np.array([(a * diameter, b * side) for a, b in FIT_RANGES])
     fit = FIT_INNER * diameter, FIT_OUTER * side
 
-    def exponent(*rows):
+    def exponent(*rows: Floats) -> float:
         return decay_exponent(radius, np.array(rows), *fit)
 
     alpha, low, high = statistics.bootstrap(lambda rows: exponent(*rows), [profiles])
@@ -78,7 +79,7 @@ def decay(packing, radius, profiles):
     return Decay(alpha, low, high, fit, ranges, others)
 
 
-def decay_exponent(radius, profiles, inner, outer):
+def decay_exponent(radius: Floats, profiles: Floats, inner: float, outer: float) -> float:
     """α of ⟨|u|⟩ ~ r^−α over inner ≤ r ≤ outer; radius (shells,), profiles (contacts, shells).
 
     NaN where fewer than three shells hold grains.

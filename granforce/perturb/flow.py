@@ -25,10 +25,13 @@ LANES of flows go side by side (see `lanes`), each with its own network, load, p
 none changes a bit of another.
 """
 
+from __future__ import annotations
+
 import threading
 import time
 from collections import deque
-from typing import NamedTuple
+from collections.abc import Callable, Generator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -50,9 +53,12 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import InputError
+from granforce.records import Floats, InputError, Integers, Mask
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
 
 # Pace τ: the first step's, its growth after a step, and its cut where Newton's method failed.
 FIRST, GROWTH, CUT = 1e2, 4.0, 0.2
@@ -78,20 +84,20 @@ class Step(NamedTuple):
     """
 
     network: Network
-    b: np.ndarray  # (rows,)
-    b_border: np.ndarray  # (m,)
-    mass: np.ndarray  # (rows,) M
-    mass_border: np.ndarray  # (m,)
-    stiffness: np.ndarray  # (N_c, 2) D: effective masses of the contacts
+    b: Floats  # (rows,)
+    b_border: Floats  # (m,)
+    mass: Floats  # (rows,) M
+    mass_border: Floats  # (m,)
+    stiffness: Floats  # (N_c, 2) D: effective masses of the contacts
     mu: float
-    place: np.ndarray  # (rows of the ensemble,) where they are among rows and border
+    place: Integers  # (rows of the ensemble,) where they are among rows and border
 
 
 class Motion(NamedTuple):
     """Rows of W flows: velocities, or what is out of balance."""
 
-    rows: np.ndarray  # (rows, W)
-    border: np.ndarray  # (m, W)
+    rows: Floats  # (rows, W)
+    border: Floats  # (m, W)
 
 
 class Flows(NamedTuple):
@@ -99,37 +105,37 @@ class Flows(NamedTuple):
 
     factors: Factors
     load: Motion  # b, the pair included
-    forces: np.ndarray  # (2 N_c, W) f
-    following: np.ndarray  # (2 N_c, W) f⁺
-    state: np.ndarray  # (N_c, W) OPEN, STICKING, ±SLIDING
-    before: np.ndarray  # (N_c, W) the states that the last linear system was made for
+    forces: Floats  # (2 N_c, W) f
+    following: Floats  # (2 N_c, W) f⁺
+    state: Floats  # (N_c, W) OPEN, STICKING, ±SLIDING
+    before: Floats  # (N_c, W) the states that the last linear system was made for
     velocity: Motion  # U
     base: Motion  # U before the Newton step
     kept: Motion  # U before the implicit step
     rest: Motion  # A f⁺ − b − M U
     direction: Motion  # the Newton step
-    pace: np.ndarray  # τ
-    length: np.ndarray  # of the Newton step
-    least: np.ndarray  # squared unbalance over masses, now,
-    merit: np.ndarray  # and before the Newton step
-    changed: np.ndarray  # largest |state − before|
-    heaviest: np.ndarray  # largest |M U|
-    breach: np.ndarray  # of Coulomb's law, relative to the fastest contact
-    lately: np.ndarray  # breach of the last implicit step
-    steady: np.ndarray  # breach at which motion counts as steady
-    newton: np.ndarray  # linear systems of the implicit step
-    steps: np.ndarray  # implicit steps
-    most: np.ndarray  # implicit steps that are allowed
-    iterations: np.ndarray  # linear systems
-    found: np.ndarray  # SOLVED, FELL, FAILED
-    going: np.ndarray  # bool
-    ended: np.ndarray  # bool: at rest, or in steady motion
+    pace: Floats  # τ
+    length: Floats  # of the Newton step
+    least: Floats  # squared unbalance over masses, now,
+    merit: Floats  # and before the Newton step
+    changed: Floats  # largest |state − before|
+    heaviest: Floats  # largest |M U|
+    breach: Floats  # of Coulomb's law, relative to the fastest contact
+    lately: Floats  # breach of the last implicit step
+    steady: Floats  # breach at which motion counts as steady
+    newton: Integers  # linear systems of the implicit step
+    steps: Integers  # implicit steps
+    most: Integers  # implicit steps that are allowed
+    iterations: Integers  # linear systems
+    found: Integers  # SOLVED, FELL, FAILED
+    going: Mask  # bool
+    ended: Mask  # bool: at rest, or in steady motion
 
 
 class Push(NamedTuple):
     """What is asked of a flow: from forces, under a pair of `load` on a contact (its position)."""
 
-    forces: np.ndarray  # (N_c, 2) ⟨f_n⟩
+    forces: Floats  # (N_c, 2) ⟨f_n⟩
     contact: int
     load: float  # ⟨f_n⟩
     max_steps: int
@@ -139,8 +145,8 @@ class Push(NamedTuple):
 class Outcome(NamedTuple):
     """Where the forces went."""
 
-    forces: np.ndarray  # (N_c, 2) ⟨f_n⟩
-    velocity: np.ndarray  # (rows,) U, by the ensemble's rows; 0 at rest
+    forces: Floats  # (N_c, 2) ⟨f_n⟩
+    velocity: Floats  # (rows,) U, by the ensemble's rows; 0 at rest
     at_rest: bool
     converged: bool  # at rest, or in steady motion
     breach: float  # of Coulomb's law, relative to the fastest contact; 0 at rest
@@ -149,7 +155,11 @@ class Outcome(NamedTuple):
     seconds: float  # its part of those that it was carried for beside others
 
 
-def make_step(ensemble):
+# What asks for one flow after another: it is sent the outcome of each.
+Work = Generator[Push, Outcome, Any]
+
+
+def make_step(ensemble: Ensemble) -> Step:
     """The step problem of an ensemble with the inertia of contact dynamics: m, I and box.
 
     Raises InputError where forces are known: contact dynamics does not hold to that.
@@ -172,7 +182,7 @@ def make_step(ensemble):
     return Step(network, b, b_border, mass, mass_border, stiffness, ensemble.mu, place)
 
 
-def _inertia(ensemble):
+def _inertia(ensemble: Ensemble) -> Floats:
     packing, size = ensemble.packing, 1 + ensemble.per_contact
     longest = float(packing.r.max())
     # The velocity that goes with a torque/r is r ω: its inertia is I/r² = m/2.
@@ -186,14 +196,14 @@ def _inertia(ensemble):
     return np.append(mass, np.full(ensemble.A.shape[0] - ensemble.pressure_row, box))
 
 
-def grain_velocities(ensemble, velocity):
+def grain_velocities(ensemble: Ensemble, velocity: Floats) -> Floats:
     """Velocities (M, 3) of the backbone grains: intrinsic v_x, v_y and r ω."""
     size = 1 + ensemble.per_contact
     grains = velocity[: size * len(ensemble.grains)].reshape(-1, size)
     return np.column_stack([grains, np.zeros((len(grains), 3 - size))])
 
 
-def relative_velocities(step, velocity):
+def relative_velocities(step: Step, velocity: Floats) -> Floats:
     """Normal (opening > 0) and tangential relative velocity (N_c, 2) of the contacts, box included.
 
     They are the work conjugates of the forces: Aᵀ U. velocity (rows,) by the ensemble's rows.
@@ -212,18 +222,23 @@ def _relative(network, velocity, border, relative):
         relative[c, 0], relative[c, 1] = pulled
 
 
-def relax(step, asked):
+def relax(step: Step, asked: Push) -> Outcome:
     """The Outcome of the flow that a Push asks for."""
 
-    def one():
+    def one() -> Generator[Push, Outcome, Outcome]:
         return (yield asked)
 
-    found = []
+    found: list[Outcome] = []
     follow(step, [one()], lambda _, outcome: found.append(outcome))
     return found[0]
 
 
-def follow(step, works, finished, workers=1):
+def follow(
+    step: Step,
+    works: Sequence[Work],
+    finished: Callable[[int, Any], object],
+    workers: int = 1,
+) -> None:
     """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
 
     A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
@@ -233,11 +248,11 @@ def follow(step, works, finished, workers=1):
     """
     waiting, told, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
 
-    def tell(number, value):
+    def tell(number: int, value: Any) -> None:
         with told:
             finished(number, value)
 
-    def carry():
+    def carry() -> None:
         try:
             _carry(step, waiting, tell, failed)
         except BaseException:
@@ -252,16 +267,22 @@ def follow(step, works, finished, workers=1):
             task.result()
 
 
-def _carry(step, waiting, finished, failed):
+def _carry(
+    step: Step,
+    waiting: deque[tuple[int, Work]],
+    finished: Callable[[int, Any], object],
+    failed: threading.Event,
+) -> None:
     """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
     if not waiting:
         return
     lanes = lanes_for(len(waiting))
     flows, stop = _make_flows(step, len(lanes)), cancelling.flag()
-    carried, seconds = [None] * len(lanes), np.zeros(len(lanes))
+    seconds = np.zeros(len(lanes))
+    carried: list[tuple[int, Work] | None] = [None] * len(lanes)
     while True:
-        for lane in np.flatnonzero(~flows.going):
-            sent = carried[lane] and _outcome(step, flows, lane, seconds[lane])
+        for lane in np.flatnonzero(~flows.going).tolist():
+            sent = _outcome(step, flows, lane, seconds[lane]) if carried[lane] else None
             carried[lane] = _go_on(step, flows, lane, carried[lane], sent, waiting, finished)
             seconds[lane] = 0.0
         going = flows.going.copy()
@@ -273,7 +294,15 @@ def _carry(step, waiting, finished, failed):
         seconds[going] += (time.perf_counter() - begin) / going.sum()
 
 
-def _go_on(step, flows, lane, carried, sent, waiting, finished):
+def _go_on(
+    step: Step,
+    flows: Flows,
+    lane: int,
+    carried: tuple[int, Work] | None,
+    sent: Outcome | None,
+    waiting: deque[tuple[int, Work]],
+    finished: Callable[[int, Any], object],
+) -> tuple[int, Work] | None:
     """Send a lane's work its outcome and start what it asks for next, or else what waits first.
 
     carried: number and work of the lane; it and what is sent are None without. Returns the same.
@@ -284,7 +313,7 @@ def _go_on(step, flows, lane, carried, sent, waiting, finished):
         except IndexError:
             return None
         try:
-            _start(step, flows, lane, work.send(sent))
+            _start(step, flows, lane, next(work) if sent is None else work.send(sent))
         except StopIteration as ended:
             finished(number, ended.value)
             carried = sent = None
@@ -292,26 +321,51 @@ def _go_on(step, flows, lane, carried, sent, waiting, finished):
             return number, work
 
 
-def _make_flows(step, width):
+def _make_flows(step: Step, width: int) -> Flows:
     """The Flows of `width` lanes that rest."""
     contacts, (rows, m) = len(step.stiffness), (len(step.b), len(step.b_border))
 
-    def motion():
+    def motion() -> Motion:
         return Motion(room(rows, width), room(m, width))
 
+    def one() -> Floats:
+        return room(1, width, value=1.0)
+
+    def count() -> Integers:
+        return np.zeros(width, dtype=np.int64)
+
     return Flows(
-        contact_matrix.make_factors(step.network, width, symmetric=False),
-        motion(),
-        *(room(2 * contacts, width) for _ in range(2)),
-        *(room(contacts, width) for _ in range(2)),
-        *(motion() for _ in range(5)),
-        *(room(1, width, value=1.0) for _ in range(9)),
-        *(np.zeros(width, dtype=np.int64) for _ in range(5)),
-        *(np.zeros(width, dtype=bool) for _ in range(2)),
+        factors=contact_matrix.make_factors(step.network, width, symmetric=False),
+        load=motion(),
+        forces=room(2 * contacts, width),
+        following=room(2 * contacts, width),
+        state=room(contacts, width),
+        before=room(contacts, width),
+        velocity=motion(),
+        base=motion(),
+        kept=motion(),
+        rest=motion(),
+        direction=motion(),
+        pace=one(),
+        length=one(),
+        least=one(),
+        merit=one(),
+        changed=one(),
+        heaviest=one(),
+        breach=one(),
+        lately=one(),
+        steady=one(),
+        newton=count(),
+        steps=count(),
+        most=count(),
+        iterations=count(),
+        found=count(),
+        going=np.zeros(width, dtype=bool),
+        ended=np.zeros(width, dtype=bool),
     )
 
 
-def _start(step, flows, lane, asked):
+def _start(step: Step, flows: Flows, lane: int, asked: Push) -> None:
     """Put what is asked into a lane."""
     flows.load.rows[:, lane], flows.load.border[:, lane] = step.b, step.b_border
     pair = np.ascontiguousarray(flows.load.rows[:, [lane]])
@@ -331,7 +385,7 @@ def _pushed(network, contact, force, rows, border):
     contact_matrix.push(network, contact, force, 0.0, rows, border, ONE)
 
 
-def _outcome(step, flows, lane, seconds):
+def _outcome(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
     rows = np.concatenate([flows.velocity.rows[:, lane], flows.velocity.border[:, lane]])
     ended, breach = bool(flows.ended[lane]), float(flows.lately[0, lane])
     return Outcome(

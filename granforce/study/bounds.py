@@ -2,14 +2,23 @@
 
 import json
 
+import xarray as xr
+
 from granforce import measures
+from granforce.explore.informative import Informative
+from granforce.explore.intervals import Intervals, LimitLoads
+from granforce.explore.outline import Outline
+from granforce.explore.stress_outline import StressOutline
+from granforce.explore.volume import Volume
+from granforce.forces.ensemble import Ensemble
+from granforce.records import Floats
 from granforce.study.schema import labelled
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
 UNDETERMINED = 1e-6
 
 
-def intervals_dataset(S, bounds, *, seconds=0.0):
+def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -> xr.Dataset:
     """Intervals as a dataset, with their measures and the clusters of undetermined contacts."""
     low, high = bounds.lower, bounds.upper
     place = S.positions(bounds.contacts)
@@ -40,7 +49,7 @@ def intervals_dataset(S, bounds, *, seconds=0.0):
     )
 
 
-def informative_dataset(S, found, *, seconds=0.0):
+def informative_dataset(S: Ensemble, found: Informative, *, seconds: float = 0.0) -> xr.Dataset:
     """An Informative as a dataset; its contacts are its backbone, the best first."""
     return labelled(
         {
@@ -55,7 +64,7 @@ def informative_dataset(S, found, *, seconds=0.0):
     )
 
 
-def limit_loads_dataset(S, loads, *, seconds=0.0):
+def limit_loads_dataset(S: Ensemble, loads: LimitLoads, *, seconds: float = 0.0) -> xr.Dataset:
     """LimitLoads as a dataset."""
     return labelled(
         {
@@ -71,7 +80,7 @@ def limit_loads_dataset(S, loads, *, seconds=0.0):
     )
 
 
-def stress_dataset(S, found, *, seconds=0.0):
+def stress_dataset(S: Ensemble, found: StressOutline, *, seconds: float = 0.0) -> xr.Dataset:
     """A StressOutline as a dataset."""
     return labelled(
         {
@@ -90,7 +99,7 @@ def stress_dataset(S, found, *, seconds=0.0):
     )
 
 
-def volume_dataset(S, found):
+def volume_dataset(S: Ensemble, found: Volume) -> xr.Dataset:
     """A Volume as a dataset."""
     return labelled(
         {
@@ -110,7 +119,9 @@ def volume_dataset(S, found):
     )
 
 
-def outline_dataset(S, axes, found, *, seconds=0.0):
+def outline_dataset(
+    S: Ensemble, axes: Floats, found: Outline, *, seconds: float = 0.0
+) -> xr.Dataset:
     """An Outline in the plane of these axes (2, N_c, 2) as a dataset."""
     return labelled(
         {

@@ -4,9 +4,14 @@ A cell is one result of one kind (`granforce.study.kinds`), named by plain param
 independent and seeded: they may be computed anywhere and in any order (`granforce.study.scan`).
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
+import xarray as xr
+
+from granforce.records import Cancel, Progress
+from granforce.study.keys import Parameters
+from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 
 
@@ -17,8 +22,9 @@ class Kind(NamedTuple):
     version: int  # raised when the algorithm gives other numbers: older entries are not used
     title: str  # in words
     unit: str  # what progress counts: progress(done, total), but of a packing (step, message)
-    parameters: Callable  # (…) → the plain parameters that name one; InputError for what is wrong
-    compute: Callable  # (store, parameters, *, workers, progress, …) → its dataset
+    # (…) → the plain parameters that name one; InputError for what is wrong
+    parameters: Callable[..., Parameters]
+    compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset
     holds_states: bool = False
 
 
@@ -26,11 +32,21 @@ class Cell(NamedTuple):
     """One dataset of a study."""
 
     kind: Kind
-    parameters: dict  # that name it in the store
+    parameters: Parameters  # that name it in the store
 
 
 @cancelling.cancellable
-def get(store, kind, parameters, *, workers=2, dtypes=None, progress=None, cancel=None, **options):
+def get(
+    store: Store,
+    kind: Kind,
+    parameters: Parameters,
+    *,
+    workers: int = 2,
+    dtypes: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+    **options: Any,
+) -> tuple[xr.Dataset, bool]:
     """The dataset of a kind and parameters, and whether the store had it; if not, it is kept.
 
     workers: threads, which change nothing in the result. dtypes: as for Store.save, of states.
@@ -39,33 +55,41 @@ def get(store, kind, parameters, *, workers=2, dtypes=None, progress=None, cance
     found = load(store, kind, parameters)
     if found is not None:
         return found, True
+    store.refuse_unwritable()
     dataset = kind.compute(store, parameters, workers=workers, progress=progress, **options)
     save(store, kind, parameters, dataset, dtypes=dtypes if kind.holds_states else None)
     return dataset, False
 
 
-def load(store, kind, parameters):
+def load(store: Store, kind: Kind, parameters: Parameters) -> xr.Dataset | None:
     """The dataset of a kind and parameters, or None where the store has none."""
     return store.load(kind.name, parameters, version=kind.version)
 
 
-def save(store, kind, parameters, dataset, *, dtypes=None):
+def save(
+    store: Store,
+    kind: Kind,
+    parameters: Parameters,
+    dataset: xr.Dataset,
+    *,
+    dtypes: Mapping[str, str] | None = None,
+) -> str:
     """Keep a dataset under its kind and parameters; returns the entry's name."""
     return store.save(kind.name, parameters, dataset, version=kind.version, dtypes=dtypes)
 
 
-def entry_name(store, kind, parameters):
+def entry_name(store: Store, kind: Kind, parameters: Parameters) -> str:
     """Name of the entry of a kind and parameters, whether the store has it or not."""
     return store.name(kind.name, parameters, version=kind.version)
 
 
-def entries(store, kind, **parameters):
+def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
     """Entries of a kind with these parameters, of its current version, as Store.find."""
     found = store.find(kind.name, **parameters)
     return [entry for entry in found if is_current(kind, entry)]
 
 
-def is_current(kind, entry):
+def is_current(kind: Kind, entry: Entry) -> bool:
     """Whether an entry is of the current version of its kind, and of its packing's."""
     packing = entry.params.get("packing")
     # Packings of version 1 did not name the accuracy of their steps.
@@ -77,7 +101,7 @@ ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", 
 ROW_COUNTS = ("accepted", "rejected", "unconverged", "skipped", "rattlers", "unloaded_contacts")
 
 
-def row(parameters, dataset, cached):
+def row(parameters: Parameters, dataset: xr.Dataset, cached: bool) -> dict[str, Any]:
     """One line of a table of walks: plain numbers of one cell."""
     packing = parameters["packing"]
     return {

@@ -1,14 +1,20 @@
 """What is prescribed and known, as parameters of entries: plain, and absent where it is usual."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from granforce.forces.knowledge import Known
 from granforce.records import InputError, float_array, whole
+from granforce.study.keys import Parameters
 
 PRESCRIBED = "pressure", "stress", "none"
 
 
-def conditions(prescribed="pressure", stress=None, known=None):
+def conditions(
+    prescribed: str = "pressure", stress: Sequence[float] | None = None, known: Any = None
+) -> Parameters:
     """The parameters of conditions other than the pressure alone.
 
     known: a Known, or rows [contact, least f_n, largest f_n, least f_t, largest f_t] with None
@@ -25,7 +31,7 @@ def conditions(prescribed="pressure", stress=None, known=None):
     return named | ({"known": rows} if rows else {})
 
 
-def _rows(known):
+def _rows(known: Known | Sequence[Any]) -> list[list[Any]]:
     """Rows of bounds, sorted by contact."""
     if isinstance(known, Known):
         contacts, low, high = known
@@ -44,9 +50,11 @@ def _rows(known):
     return sorted(named, key=lambda row: row[0])
 
 
-def of(parameters):
+def of(parameters: Parameters) -> dict[str, Any]:
     """Arguments of `ensemble` for the conditions among the parameters of an entry."""
-    given = {name: parameters[name] for name in ("prescribed", "stress") if name in parameters}
+    given: dict[str, Any] = {
+        name: parameters[name] for name in ("prescribed", "stress") if name in parameters
+    }
     if "known" in parameters:
         rows = np.array(parameters["known"], dtype=np.float64)  # None becomes NaN
         bounds = rows[:, 1:].reshape(-1, 2, 2)

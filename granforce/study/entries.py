@@ -4,8 +4,11 @@ import functools
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib import metadata
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,16 +22,18 @@ from granforce.study.schema import VARIABLES, declared, to_builtin
 
 STATES_PER_CHUNK = 100  # frames are read one by one; 100 × 700 contacts are 1.1 MB
 
+Variables = Mapping[Any, xr.Variable]  # of a dataset, by name
+
 _LIBRARIES = ("granforce", "numpy", "numba", "xarray", "zarr")
 _IDENTITY = ("kind", "parameters", "seed", "algorithm_version", "schema_version")
 _PROVENANCE = ("created", "checksum", *(f"{library}_version" for library in _LIBRARIES))
 
 
-def conforming(dataset, dtypes):
+def conforming(dataset: xr.Dataset, dtypes: Mapping[Any, str]) -> dict[Any, xr.Variable]:
     """The dataset's variables as they will be stored; ValueError where VARIABLES says otherwise."""
-    stored = {}
+    stored: dict[Any, xr.Variable] = {}
     for name, variable in dataset.variables.items():
-        row = declared(name)
+        row = declared(str(name))
         dtype = np.dtype(dtypes.get(name, row.dtype))
         if variable.dims != row.dims:
             raise ValueError(f"{name!r} must have dims {row.dims}, got {variable.dims}")
@@ -40,7 +45,13 @@ def conforming(dataset, dtypes):
     return stored
 
 
-def attributes(kind, params, version, given, variables):
+def attributes(
+    kind: str,
+    params: Mapping[str, Any],
+    version: int | str,
+    given: Mapping[str, Any],
+    variables: Variables,
+) -> dict[str, Any]:
     """Attributes of an entry: the caller's own, what it is, what made it when, its checksum."""
     attrs = {key: value for key, value in given.items() if key not in (*_IDENTITY, *_PROVENANCE)}
     attrs |= {"kind": kind, "parameters": keys.canonical(params)}
@@ -54,11 +65,11 @@ def attributes(kind, params, version, given, variables):
 
 
 @functools.cache
-def _library_versions():
+def _library_versions() -> dict[str, str]:
     return {f"{library}_version": metadata.version(library) for library in _LIBRARIES}
 
 
-def _checksum(variables, attrs):
+def _checksum(variables: Variables, attrs: Mapping[str, Any]) -> str:
     """sha256 over arrays and attributes; the same for the same result made elsewhere or later."""
     lasting = {key: value for key, value in attrs.items() if key not in _PROVENANCE}
     digest = hashlib.sha256(json.dumps(lasting, sort_keys=True).encode())
@@ -66,13 +77,13 @@ def _checksum(variables, attrs):
         variable = variables[name]
         header = [name, variable.dims, variable.dtype.str, variable.shape]
         digest.update(json.dumps(header).encode())
-        digest.update(np.ascontiguousarray(variable.values))
+        digest.update(np.ascontiguousarray(variable.values).data)
     return digest.hexdigest()
 
 
-def write(folder, variables, attrs):
+def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
     """Write an entry into a new folder."""
-    group = zarr.create_group(folder, zarr_format=3, attributes=attrs)
+    group = zarr.create_group(folder, zarr_format=3, attributes=dict(attrs))
     for name, variable in variables.items():
         array = group.create_array(
             name,
@@ -80,14 +91,14 @@ def write(folder, variables, attrs):
             dtype=variable.dtype,
             chunks=_chunks(variable),
             compressors=(ZstdCodec(level=3),),
-            dimension_names=variable.dims,
+            dimension_names=[str(name) for name in variable.dims],
             attributes={"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
             config={"write_empty_chunks": True},  # else Zarr 3.0 loses a chunk of −0.0
         )
         array[...] = variable.values
 
 
-def _chunks(variable):
+def _chunks(variable: xr.Variable) -> tuple[int, ...]:
     """Whole arrays, but a hundred states at a time."""
     chunks = [max(1, size) for size in variable.shape]
     if variable.ndim > 1 and variable.dims[0] == "state":
@@ -95,7 +106,7 @@ def _chunks(variable):
     return tuple(chunks)
 
 
-def read_attributes(folder):
+def read_attributes(folder: Path) -> dict[str, Any] | None:
     """An entry's attributes, or None where they are unreadable or belong to another name."""
     try:
         attrs = json.loads((folder / "zarr.json").read_bytes())["attributes"]
@@ -107,7 +118,7 @@ def read_attributes(folder):
         return None
 
 
-def opened(folder):
+def opened(folder: Path) -> xr.Dataset:
     """The dataset of an entry, its arrays not read yet; InputError where it is damaged."""
     damaged = _damaged_array(folder)
     if damaged:
@@ -115,12 +126,12 @@ def opened(folder):
     return _lazily(folder)
 
 
-def _lazily(folder):
+def _lazily(folder: Path) -> xr.Dataset:
     # Not decoded: what was saved are plain numbers, and "units" must not turn them into times.
     return xr.open_zarr(folder, consolidated=False, chunks=None, decode_cf=False)
 
 
-def checked(folder):
+def checked(folder: Path) -> tuple[xr.Dataset | None, str]:
     """(dataset in memory, "") if the entry is whole, else (None, reason)."""
     if read_attributes(folder) is None:
         return None, "its metadata cannot be read"
@@ -136,7 +147,7 @@ def checked(folder):
     return dataset, ""
 
 
-def _damaged_array(folder):
+def _damaged_array(folder: Path) -> str:
     """Which array's metadata is damaged, in words, or "" if none is seen to be.
 
     Asked before zarr reads them all at once: of several that fail it tells one, and asyncio prints

@@ -5,7 +5,8 @@ affine space, x = A⁺ b + u · axes. Cones of any μ cut S out of it, which who
 for every μ and, b being linear in the loads, for every load.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from granforce.explore import outline as outlines
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import ensemble
 from granforce.numerics import certificates
-from granforce.records import InputError, are_whole
+from granforce.records import Floats, InputError, Integers, Packing, are_whole
 
 # Singular values of A below this, relative to the largest, are 0.
 _RANK = 1e-10
@@ -25,15 +26,15 @@ _OUTLINED = 1e-4
 class Hull(NamedTuple):
     """The affine space of all networks on the N_c contacts of a packing that are in balance."""
 
-    A: np.ndarray  # (rows, 2 N_c): forces and torque/r of each grain that must balance, then P
-    b: np.ndarray  # (rows,)
-    lift: np.ndarray  # (2 N_c, rows) the pseudoinverse A⁺
-    axes: np.ndarray  # (h, 2 N_c) orthonormal
-    grains: np.ndarray  # (M,) whose three rows come one after the other
+    A: Floats  # (rows, 2 N_c): forces and torque/r of each grain that must balance, then P
+    b: Floats  # (rows,)
+    lift: Floats  # (2 N_c, rows) the pseudoinverse A⁺
+    axes: Floats  # (h, 2 N_c) orthonormal
+    grains: Integers  # (M,) whose three rows come one after the other
     equations: int  # independent rows
 
 
-def hull(packing):
+def hull(packing: Packing) -> Hull:
     """The Hull of a packing whose every contact may carry, whatever its friction."""
     whole = ensemble(packing, 1.0, prune=False)
     A = whole.A.toarray()
@@ -43,12 +44,12 @@ def hull(packing):
     return Hull(A, whole.b, lift, right[rank:], whole.grains, rank)
 
 
-def fall(packing):
+def fall(packing: Packing) -> Floats | None:
     """The motion (N, 3) that proves that nothing balances, or None; see `bodies.fall`."""
     return bodies.fall(packing)
 
 
-def bounds(packing):
+def bounds(packing: Packing) -> Floats | None:
     """Least and largest f_n (N_c, 2) of every contact, NaN where not certified; 0 where idle.
 
     None where S has no end, by a certificate.
@@ -62,7 +63,7 @@ def bounds(packing):
     return both
 
 
-def outline(packing, plane):
+def outline(packing: Packing, plane: Sequence[Any]) -> Floats:
     """Corners (k, 2) of the outline of S on two force components, in force; none without an area.
 
     plane: two numbers, 2 c for f_n and 2 c + 1 for f_t of contact c of the packing. Its certified

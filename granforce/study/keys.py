@@ -5,10 +5,13 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from granforce.tolerances import MU_DIGITS
+
+Parameters = dict[str, Any]  # of a result: plain values by name, that a key is made of
 
 # Raised when the meaning of a stored array changes; entries of another schema are never found.
 SCHEMA_VERSION = 1
@@ -17,7 +20,7 @@ KEY_DIGITS = 20  # 80 bits: no collision among any number of entries that fits a
 ENTRY = re.compile(rf"[a-z][a-z0-9_]*-[0-9a-f]{{{KEY_DIGITS}}}")
 
 
-def canonical(value):
+def canonical(value: Any) -> str:
     """Canonical JSON of parameters: equal values give equal text.
 
     Floats are rounded to 9 significant digits and 1.0 is 1; numpy scalars, tuples and nested
@@ -26,7 +29,7 @@ def canonical(value):
     return json.dumps(_plain(value, "parameters"), sort_keys=True, separators=(",", ":"))
 
 
-def _plain(value, where):
+def _plain(value: Any, where: str) -> Any:
     if value is None or isinstance(value, (bool, str)):
         return value
     if isinstance(value, np.bool_):
@@ -45,16 +48,16 @@ def _plain(value, where):
     )
 
 
-def _quantised(value, where):
+def _quantised(value: float | np.floating[Any], where: str) -> int | float:
     # The shortest text first: a float32 0.1 means 0.1, not 0.100000001.
-    number = float(str(value)) if isinstance(value, np.floating) else value
+    number = float(str(value)) if isinstance(value, np.floating) else float(value)
     if not math.isfinite(number):
         raise TypeError(f"{where} cannot enter a key: {value} is not finite")
     number = float(f"{number:.{MU_DIGITS}g}")
     return int(number) if number.is_integer() and abs(number) < 2**53 else number
 
 
-def entry_name(kind, params, version, schema):
+def entry_name(kind: str, params: Mapping[str, Any], version: int | str, schema: int) -> str:
     """Name of an entry: <kind>-<20 hexadecimal digits>; TypeError as for `canonical`."""
     content = canonical({"kind": kind, "params": params, "version": version, "schema": schema})
     name = f"{kind}-{hashlib.sha256(content.encode()).hexdigest()[:KEY_DIGITS]}"

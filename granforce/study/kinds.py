@@ -6,8 +6,11 @@ page take it from `KINDS`.
 
 import hashlib
 import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from granforce.explore import remeasured
 from granforce.explore.carrying import carrying
@@ -19,14 +22,31 @@ from granforce.explore.random_walk import walk
 from granforce.explore.stress_outline import stress_outline
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import volume
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.packing.compaction import check_box, draw_radii, pack
-from granforce.perturb.critical_force import MOST_STEPS, RISE, critical_force, critical_forces
-from granforce.records import InputError, check_memory, friction, positive, random_seed, whole
+from granforce.packing.compaction import Glimpse, check_box, draw_radii, pack
+from granforce.perturb.critical_force import (
+    MOST_STEPS,
+    RISE,
+    CriticalForce,
+    critical_force,
+    critical_forces,
+)
+from granforce.records import (
+    Floats,
+    InputError,
+    Integers,
+    Packing,
+    Progress,
+    check_memory,
+    friction,
+    positive,
+    random_seed,
+    whole,
+)
 from granforce.study import slices
 from granforce.study.bounds import (
     informative_dataset,
@@ -39,9 +59,11 @@ from granforce.study.bounds import (
 from granforce.study.cells import Kind, get, load, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
+from granforce.study.keys import Parameters
 from granforce.study.responses import contact_dataset, perturbation_dataset
 from granforce.study.samples import inference_dataset, uniform_dataset, walk_dataset
 from granforce.study.schema import dataset_packing, packing_dataset
+from granforce.study.store import Store
 from granforce.system import cancelling
 from granforce.tolerances import EQUILIBRIUM
 
@@ -54,7 +76,7 @@ STATE_BYTES = 48
 # What names how loads on a contact are raised.
 PROTOCOL = ("precision", "rise", "max_steps")
 
-RELAXATIONS = {
+RELAXATIONS: dict[str, dict[str, Any]] = {
     "gauss_seidel": {"relax": gauss_seidel},
     "gauss_seidel_only": {"relax": gauss_seidel, "rest": None, "tolerance": EQUILIBRIUM},
     "nearest": {"relax": nearest_piqp},
@@ -66,18 +88,18 @@ RELAXATIONS = {
 
 
 def _packing_parameters(
-    n,
-    mu,
-    seed,
+    n: int,
+    mu: Any,
+    seed: int,
     *,
-    radii="uniform:0.5,1",
-    pressure=1.0,
-    dt=0.1,
-    box_mass=100.0,
-    sweeps=600,
-    accuracy=0.01,
-    box="square",
-):
+    radii: Any = "uniform:0.5,1",
+    pressure: float = 1.0,
+    dt: float = 0.1,
+    box_mass: float = 100.0,
+    sweeps: int = 600,
+    accuracy: float = 0.01,
+    box: str = "square",
+) -> Parameters:
     """The parameters that name a packing in the store; as for `pack`.
 
     Raises InputError for what `pack` would refuse, and for more disks than fit into memory.
@@ -102,7 +124,7 @@ def _packing_parameters(
     }
 
 
-def imported_parameters(packing):
+def imported_parameters(packing: Packing) -> Parameters:
     """The parameters that name a packing made elsewhere: a hash of its arrays."""
     arrays = (packing.x, packing.r, packing.box, packing.forces, packing.load, *packing.contacts)
     # The tilt only where there is one: keys of packings in straight cells stay what they were.
@@ -111,7 +133,7 @@ def imported_parameters(packing):
     return {"imported": digest, "mu": packing.mu}
 
 
-def _digest(*arrays):
+def _digest(*arrays: Any) -> str:
     """A hash of arrays."""
     digest = hashlib.sha256()
     for array in arrays:
@@ -119,20 +141,28 @@ def _digest(*arrays):
     return digest.hexdigest()
 
 
-def _packing(store, parameters, *, workers, progress, max_steps=100_000, watch=None):
+def _packing(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    max_steps: int = 100_000,
+    watch: Callable[[Glimpse], object] | None = None,
+) -> xr.Dataset:
     if "imported" in parameters:
         raise InputError("the imported packing is not in this store: import it again")
-    told = {"progress": progress, "watch": watch}
+    told: dict[str, Any] = {"progress": progress, "watch": watch}
     return packing_dataset(pack(**parameters, max_steps=max_steps, **told))
 
 
-def get_packing(store, parameters, **options):
+def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:
     """The Packing of these parameters, found or made, and whether it was found; as `cells.get`."""
     dataset, cached = get(store, PACKING, parameters, **options)
     return dataset_packing(dataset), cached
 
 
-def keep_packing(store, parameters, packing):
+def keep_packing(store: Store, parameters: Parameters, packing: Packing) -> str:
     """Save a packing under its parameters; returns the entry's name."""
     return save(store, PACKING, parameters, packing_dataset(packing))
 
@@ -140,7 +170,7 @@ def keep_packing(store, parameters, packing):
 # Ensembles
 
 
-def _cones(packing, mu, **asked):
+def _cones(packing: Parameters, mu: Any, **asked: Any) -> Parameters:
     """What names an ensemble: its packing, friction coefficient (that of it, if none), conditions.
 
     asked: prescribed, stress and known, as for `conditions`.
@@ -149,7 +179,7 @@ def _cones(packing, mu, **asked):
     return cones | conditions(**asked)
 
 
-def _ensemble(store, parameters):
+def _ensemble(store: Store, parameters: Parameters) -> Ensemble:
     """The ensemble of a named packing and friction, with the forces outside a slice frozen."""
     packing, _ = get_packing(store, parameters["packing"])
     slice_ = parameters.get("slice")
@@ -161,19 +191,19 @@ def _ensemble(store, parameters):
 
 
 def _walk_parameters(
-    packing,
-    states,
-    seed=0,
+    packing: Parameters,
+    states: Any,
+    seed: int = 0,
     *,
-    mu=None,
-    relax="accelerated",
-    chains=1,
-    keep=None,
-    residual=None,
-    attempts=None,
-    skip=True,
-    **asked,
-):
+    mu: Any = None,
+    relax: str = "accelerated",
+    chains: int = 1,
+    keep: int | None = None,
+    residual: float | None = None,
+    attempts: int | None = None,
+    skip: bool = True,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name a walk: those of its packing, and how it goes.
 
     mu: friction coefficient of the ensemble, by default the packing's. keep: number of evenly
@@ -207,7 +237,9 @@ def _walk_parameters(
     return named
 
 
-def _size(packing, states, seed, chains, keep, least=1):
+def _size(
+    packing: Parameters, states: Any, seed: Any, chains: Any, keep: int | None, least: float = 1
+) -> Parameters:
     """What walks and samples have in common; InputError where `least` states are too many."""
     states = whole(states, "the number of states", 1, most=None)
     chains = whole(chains, "the number of chains", 1)
@@ -221,10 +253,18 @@ def _size(packing, states, seed, chains, keep, least=1):
     }
 
 
-def _walk(store, parameters, *, workers, progress, watch=None, begun=None):
+def _walk(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    watch: Any = None,
+    begun: Callable[[Ensemble], object] | None = None,
+) -> xr.Dataset:
     """Dataset of a walk with all its measures; begun(S) is called before its first step."""
     S = _ensemble(store, parameters)
-    options = dict(RELAXATIONS[parameters["relax"]])
+    options: dict[str, Any] = dict(RELAXATIONS[parameters["relax"]])
     if "residual" in parameters:
         options["tolerance"] = parameters["residual"]
     if "attempts" in parameters:
@@ -249,8 +289,16 @@ def _walk(store, parameters, *, workers, progress, watch=None, begun=None):
 
 
 def _uniform_parameters(
-    packing, states, seed=0, *, mu=None, chains=4, effective=None, keep=None, **asked
-):
+    packing: Parameters,
+    states: Any,
+    seed: int = 0,
+    *,
+    mu: Any = None,
+    chains: int = 4,
+    effective: float | None = None,
+    keep: int | None = None,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name a uniform sample: those of its packing, and how it is drawn.
 
     mu, keep, asked: as of a walk; states, chains, effective: as for `sample_uniform`.
@@ -261,7 +309,9 @@ def _uniform_parameters(
     return {**_cones(packing, mu, **asked), **size, "effective": effective}
 
 
-def _uniform(store, parameters, *, workers, progress):
+def _uniform(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
     """Dataset of a uniform sample with all its measures.
 
     A sample that did not reach the wanted effective size is kept too, and says so in `reached`.
@@ -282,7 +332,9 @@ def _uniform(store, parameters, *, workers, progress):
     return uniform_dataset(S, drawn, keep=parameters["keep"], seconds=seconds)
 
 
-def _volume_parameters(packing, accuracy=0.05, seed=0, *, mu=None, **asked):
+def _volume_parameters(
+    packing: Parameters, accuracy: float = 0.05, seed: int = 0, *, mu: Any = None, **asked: Any
+) -> Parameters:
     """The parameters that name a volume of S.
 
     accuracy, seed: as for `volume`. mu: friction coefficient of the ensemble, by default the
@@ -292,7 +344,9 @@ def _volume_parameters(packing, accuracy=0.05, seed=0, *, mu=None, **asked):
     return {**_cones(packing, mu, **asked), **named}
 
 
-def _volume(store, parameters, *, workers, progress):
+def _volume(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
     """Dataset of the volume of S; one whose error is larger than wanted says so in `reached`."""
     S = _ensemble(store, parameters)
     options = {name: parameters[name] for name in ("accuracy", "seed")}
@@ -301,19 +355,19 @@ def _volume(store, parameters, *, workers, progress):
 
 
 def _inference_parameters(
-    packing,
-    measured,
-    states=0,
-    seed=0,
+    packing: Parameters,
+    measured: Any,
+    states: Any = 0,
+    seed: int = 0,
     *,
-    unmeasured=None,
-    again=False,
-    certain=False,
-    mu=None,
-    chains=4,
-    keep=None,
-    **asked,
-):
+    unmeasured: float | None = None,
+    again: bool = False,
+    certain: bool = False,
+    mu: Any = None,
+    chains: int = 4,
+    keep: int | None = None,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name an inference: its packing, its measurement, and its draws.
 
     measured: a Measurement, which is named by a hash of its arrays; mu, keep: as of a walk; states,
@@ -329,7 +383,14 @@ def _inference_parameters(
     return {**_cones(packing, mu, **asked), **size, **named, "certain": bool(certain)}
 
 
-def _inference(store, parameters, *, workers, progress, measured=None):
+def _inference(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    measured: Any = None,
+) -> xr.Dataset:
     """Dataset of the likeliest network of a measurement, and of draws around it.
 
     measured: the Measurement that the parameters name.
@@ -361,7 +422,14 @@ def _inference(store, parameters, *, workers, progress, measured=None):
 # Bounds
 
 
-def _exact_parameters(packing, *, mu=None, contacts=None, slice_=None, **asked):
+def _exact_parameters(
+    packing: Parameters,
+    *,
+    mu: Any = None,
+    contacts: Iterable[int] | None = None,
+    slice_: Sequence[float] | None = None,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name exact bounds or limit loads of one packing.
 
     mu: friction coefficient of the ensemble, by default the packing's. contacts: numbers in the
@@ -377,7 +445,7 @@ def _exact_parameters(packing, *, mu=None, contacts=None, slice_=None, **asked):
     }
 
 
-def _chosen(contacts):
+def _chosen(contacts: Iterable[int] | None) -> list[int] | None:
     """Numbers of contacts, sorted, each once; None for all that carry."""
     if contacts is None:
         return None
@@ -387,7 +455,15 @@ def _chosen(contacts):
     return chosen
 
 
-def _intervals(store, parameters, *, workers, progress, begun=None, **options):
+def _intervals(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    begun: Callable[[Ensemble], object] | None = None,
+    **options: Any,
+) -> xr.Dataset:
     """Dataset of exact bounds and η3, and of clusters of undetermined contacts.
 
     begun(S) is called before the first program. options: widths and watch, as for `intervals`.
@@ -402,7 +478,9 @@ def _intervals(store, parameters, *, workers, progress, begun=None, **options):
     return intervals_dataset(S, bounds, seconds=seconds)
 
 
-def _limit_loads(store, parameters, *, workers, progress):
+def _limit_loads(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
     """Dataset of the limit loads of contacts."""
     S = _ensemble(store, parameters)
     begin = time.perf_counter()
@@ -412,14 +490,22 @@ def _limit_loads(store, parameters, *, workers, progress):
     return limit_loads_dataset(S, loads, seconds=seconds)
 
 
-def _complete(result, what):
+def _complete(result: Any, what: str) -> None:
     """Only finished results are kept: Cancelled or InputError for others."""
     cancelling.check(what)
     if not result.converged:
         raise InputError(f"{what} not certified: largest duality gap {result.max_gap:.1e} ⟨f_n⟩")
 
 
-def _outline_parameters(packing, *, mu=None, components=None, states=None, tolerance=1e-3, **asked):
+def _outline_parameters(
+    packing: Parameters,
+    *,
+    mu: Any = None,
+    components: Any = None,
+    states: Any = None,
+    tolerance: float = 1e-3,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name the outline of S in a plane.
 
     mu: friction coefficient of the ensemble, by default the packing's. components: two pairs
@@ -434,7 +520,7 @@ def _outline_parameters(packing, *, mu=None, components=None, states=None, toler
     return named | {"components": chosen, "states": states}
 
 
-def _components(components):
+def _components(components: Any) -> list[list[int]]:
     """Two pairs [contact, 0 or 1] as ints."""
     try:
         pairs = [(contact, part) for contact, part in components]
@@ -447,7 +533,14 @@ def _components(components):
     ]
 
 
-def _outline(store, parameters, *, workers, progress, axes=None):
+def _outline(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    axes: Floats | None = None,
+) -> xr.Dataset:
     """Dataset of the outline of S in a plane.
 
     axes (2, N_c, 2): principal axes of the states that the parameters name; not used for
@@ -464,7 +557,7 @@ def _outline(store, parameters, *, workers, progress, axes=None):
     return outline_dataset(S, plane, found, seconds=seconds)
 
 
-def _component_axes(S, components):
+def _component_axes(S: Ensemble, components: Sequence[Sequence[int]]) -> Floats:
     """Axes (2, N_c, 2) along two components (contact in the packing, 0 or 1)."""
     axes = np.zeros((2, len(S.index), 2))
     for k, (contact, part) in enumerate(components or ()):
@@ -472,7 +565,9 @@ def _component_axes(S, components):
     return axes
 
 
-def _stress_parameters(packing, *, mu=None, angles=64, known=None):
+def _stress_parameters(
+    packing: Parameters, *, mu: Any = None, angles: int = 64, known: Any = None
+) -> Parameters:
     """The parameters that name the outline of the stresses that a packing can carry.
 
     mu: friction coefficient of the ensemble, by default the packing's. angles: how many directions.
@@ -482,7 +577,9 @@ def _stress_parameters(packing, *, mu=None, angles=64, known=None):
     return cones | {"angles": whole(angles, "the number of angles", 1, 4096)}
 
 
-def _stress(store, parameters, *, workers, progress):
+def _stress(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
     """Dataset of the outline of stresses."""
     S = _ensemble(store, parameters)
     begin = time.perf_counter()
@@ -494,7 +591,16 @@ def _stress(store, parameters, *, workers, progress):
     return stress_dataset(S, found, seconds=seconds)
 
 
-def _informative_parameters(packing, k=10, check=10, states=400, seed=0, *, mu=None, **asked):
+def _informative_parameters(
+    packing: Parameters,
+    k: int = 10,
+    check: int = 10,
+    states: int = 400,
+    seed: int = 0,
+    *,
+    mu: Any = None,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name a ranking of contacts by what measuring them would tell.
 
     mu: friction coefficient of the ensemble, by default the packing's. k, check, states, seed: as
@@ -506,7 +612,14 @@ def _informative_parameters(packing, k=10, check=10, states=400, seed=0, *, mu=N
     return {**_cones(packing, mu, **asked), **counts, **drawn}
 
 
-def _informative(store, parameters, *, workers, progress, watch=None):
+def _informative(
+    store: Store,
+    parameters: Parameters,
+    *,
+    workers: int,
+    progress: Progress | None,
+    watch: Any = None,
+) -> xr.Dataset:
     """Dataset of the most informative contacts; watch as for `informative`."""
     S = _ensemble(store, parameters)
     begin = time.perf_counter()
@@ -520,17 +633,17 @@ def _informative(store, parameters, *, workers, progress, watch=None):
 
 
 def _perturbation_parameters(
-    packing,
+    packing: Parameters,
     *,
-    mu=None,
-    contacts=None,
-    random=None,
-    seed=0,
-    precision=0.01,
-    rise=RISE,
-    max_steps=MOST_STEPS,
-    **asked,
-):
+    mu: Any = None,
+    contacts: Iterable[int] | None = None,
+    random: int | None = None,
+    seed: int = 0,
+    precision: float = 0.01,
+    rise: float = RISE,
+    max_steps: int = MOST_STEPS,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name the local perturbation of contacts of one packing.
 
     mu: friction coefficient of the ensemble, by default the packing's. contacts: numbers in the
@@ -554,7 +667,7 @@ def _perturbation_parameters(
     }
 
 
-def _protocol(precision, rise, max_steps):
+def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
     """What names how loads are raised; `rise` and `max_steps` only where they are not the usual."""
     named = {"precision": positive(precision, "precision")}
     if rise != RISE:
@@ -566,7 +679,9 @@ def _protocol(precision, rise, max_steps):
     return named
 
 
-def _perturbation(store, parameters, *, workers, progress):
+def _perturbation(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
     """Dataset of critical forces, first motions and α; each contact is kept as it ends."""
     S = _ensemble(store, parameters)
     chosen = S.index if parameters["contacts"] is None else np.array(parameters["contacts"])
@@ -580,7 +695,14 @@ def _perturbation(store, parameters, *, workers, progress):
     return perturbation_dataset(S, parts)
 
 
-def _perturbed(store, S, chosen, parameters, workers, progress):
+def _perturbed(
+    store: Store,
+    S: Ensemble,
+    chosen: Integers,
+    parameters: Parameters,
+    workers: int,
+    progress: Progress | None,
+) -> list[xr.Dataset]:
     """Datasets of the single contacts, in order; those of the store are found."""
     shared = ("packing", "mu", *PROTOCOL, "prescribed", "stress")
     common = {name: parameters[name] for name in shared if name in parameters}
@@ -594,7 +716,7 @@ def _perturbed(store, S, chosen, parameters, workers, progress):
     _complete(loads, "limit loads")
     tell = progress or (lambda done, total: None)
 
-    def ended(k, critical):
+    def ended(k: int, critical: CriticalForce) -> None:
         contact = missing[k]
         parts[contact] = contact_dataset(S, critical, parameters["precision"])
         save(store, PERTURBED_CONTACT, named[contact], parts[contact])
@@ -605,13 +727,20 @@ def _perturbed(store, S, chosen, parameters, workers, progress):
     return [parts[c] for c in chosen]
 
 
-def _named_protocol(parameters):
+def _named_protocol(parameters: Parameters) -> dict[str, Any]:
     return {name: parameters[name] for name in PROTOCOL if name in parameters}
 
 
 def _perturbed_contact_parameters(
-    packing, contact, *, mu=None, precision=0.01, rise=RISE, max_steps=MOST_STEPS, **asked
-):
+    packing: Parameters,
+    contact: Any,
+    *,
+    mu: Any = None,
+    precision: float = 0.01,
+    rise: float = RISE,
+    max_steps: int = MOST_STEPS,
+    **asked: Any,
+) -> Parameters:
     """The parameters that name one perturbed contact (its number in the packing)."""
     return {
         **_cones(packing, mu, **asked),
@@ -620,7 +749,9 @@ def _perturbed_contact_parameters(
     }
 
 
-def _perturbed_contact(store, parameters, *, workers, progress):
+def _perturbed_contact(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
     """Dataset of one perturbed contact."""
     S = _ensemble(store, parameters)
     critical = critical_force(S, parameters["contact"], **_named_protocol(parameters))

@@ -3,7 +3,7 @@
 Nothing is kept in a store: a rail or a fan takes some tenths of a second at 400 disks.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -12,7 +12,7 @@ from granforce.explore.outline import extremes
 from granforce.explore.pull import pull, reach
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
-from granforce.records import InputError
+from granforce.records import Floats, InputError, Mask, Packing
 from granforce.study import conditions
 
 STOPS = 17  # networks along a rail
@@ -24,29 +24,29 @@ class Rail(NamedTuple):
 
     lower: float  # exact bounds, force
     upper: float
-    values: np.ndarray  # (k,) f_n of the contact in the states, force, ascending
-    states: np.ndarray  # (k, N_c, 2) the networks nearest to the one pulled, force
-    residual: np.ndarray  # (k,) in ⟨f_n⟩
-    opened: np.ndarray  # (2, N_c) bool, contacts without force at the lower and the upper end
-    sliding: np.ndarray  # (2, N_c) bool, contacts at the limit of friction there
+    values: Floats  # (k,) f_n of the contact in the states, force, ascending
+    states: Floats  # (k, N_c, 2) the networks nearest to the one pulled, force
+    residual: Floats  # (k,) in ⟨f_n⟩
+    opened: Mask  # (2, N_c) bool, contacts without force at the lower and the upper end
+    sliding: Mask  # (2, N_c) bool, contacts at the limit of friction there
 
 
 class Fan(NamedTuple):
     """Networks of S at the corners of a convex polygon, almost the outline of S in a plane."""
 
-    points: np.ndarray  # (k, 2) corners, left about: (axes[0]·F, axes[1]·F)/⟨f_n⟩
-    states: np.ndarray  # (k, N_c, 2) networks that lie there, force
-    residual: np.ndarray  # (k,) in ⟨f_n⟩
+    points: Floats  # (k, 2) corners, left about: (axes[0]·F, axes[1]·F)/⟨f_n⟩
+    states: Floats  # (k, N_c, 2) networks that lie there, force
+    residual: Floats  # (k,) in ⟨f_n⟩
 
 
 class Puller:
     """Pulls contacts of one packing at one friction; keeps what all pulls have in common."""
 
-    def __init__(self, packing, mu, known=None):
+    def __init__(self, packing: Packing, mu: float, known: Any = None) -> None:
         """known: forces that no pull changes, as for `conditions.conditions`."""
         self._S = ensemble(packing, mu, **conditions.of(conditions.conditions(known=known)))
 
-    def rail(self, contact, state, stops=STOPS):
+    def rail(self, contact: int, state: Floats, stops: int = STOPS) -> Rail:
         """The Rail of a contact (its number in the packing) for the network `state` (N_c, 2).
 
         Raises what `pull` and `reach` raise.
@@ -61,7 +61,7 @@ class Puller:
         bounds = ends.lower, ends.upper
         return Rail(*bounds, found.values, found.states, found.residual, ends.opened, sliding)
 
-    def at(self, contact, value, state):
+    def at(self, contact: int, value: float, state: Floats) -> tuple[Floats, float]:
         """The network (N_c, 2) nearest to `state` with f_n = value on a contact, and its residual.
 
         Raises what `pull` raises.
@@ -69,7 +69,7 @@ class Puller:
         found = pull(self._S, contact, [value], state)
         return found.states[0], float(found.residual[0])
 
-    def fan(self, axes):
+    def fan(self, axes: Floats) -> Fan:
         """The Fan of the plane of two axes (2, N_c, 2).
 
         Raises InputError where S is a line or a point in this plane, and what `outline` raises.
@@ -87,10 +87,10 @@ class Puller:
             raise InputError("S is no area in this plane: the point cannot be pulled") from None
         return Fan(points[corners], states[corners], S.residual(states[corners]))
 
-    def _points(self, axes, states):
+    def _points(self, axes: Floats, states: Floats) -> Floats:
         return np.tensordot(states, axes, ((1, 2), (1, 2))) / self._S.force_scale
 
-    def mixed(self, fan, axes, point, state):
+    def mixed(self, fan: Fan, axes: Floats, point: Floats, state: Floats) -> tuple[Floats, float]:
         """The network (N_c, 2) at a point (2,) of a fan, and its residual.
 
         On a straight line with `state` and a network of the polygon's edge behind it, all of which
@@ -105,7 +105,7 @@ class Puller:
         return forces, float(self._S.residual(forces[None])[0])
 
 
-def _inside(corners, point):
+def _inside(corners: Floats, point: Floats) -> Floats:
     """The point, or the nearest one of the polygon's edge where it lies outside."""
     edge = np.roll(corners, -1, axis=0) - corners
     away = point - corners
@@ -116,7 +116,7 @@ def _inside(corners, point):
     return nearest[np.argmin(((nearest - point) ** 2).sum(axis=1))]
 
 
-def _triangle(corners, here, point):
+def _triangle(corners: Floats, here: Floats, point: Floats) -> tuple[int, Floats]:
     """(k, weights (2,)): in which triangle of `here` and corners k, k + 1 a point lies, and how."""
     first, second, away = corners - here, np.roll(corners, -1, axis=0) - here, point - here
     area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]

@@ -1,16 +1,20 @@
 """What perturbed contacts say, as datasets: critical forces, first motions, |u|(r) and α."""
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
+from granforce.forces.ensemble import Ensemble
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
+from granforce.perturb.critical_force import CriticalForce
+from granforce.records import Floats, Packing
 from granforce.study.schema import labelled
 
 
-def contact_dataset(S, critical, precision):
+def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> xr.Dataset:
     """One perturbed contact as a dataset: its CriticalForce, known to `precision`, and response."""
     contact = critical.contact
     moved = perturb.response(S, contact, critical=critical, precision=precision)
@@ -38,7 +42,7 @@ def contact_dataset(S, critical, precision):
     )
 
 
-def perturbation_dataset(S, parts):
+def perturbation_dataset(S: Ensemble, parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """The datasets of single contacts as one, with ⟨F_crit⟩, ⟨|u|⟩(r) and α."""
     whole = xr.concat(parts, "contact", data_vars="minimal", coords="minimal", compat="override")
     found = decay.decay(S.packing, whole["shell_radius"].values, whole["profile"].values)
@@ -61,7 +65,7 @@ def perturbation_dataset(S, parts):
     return whole.merge(scalars, combine_attrs="drop_conflicts")
 
 
-def moved_grains(packing, dataset):
+def moved_grains(packing: Packing, dataset: xr.Dataset) -> tuple[Floats, Floats]:
     """Distance (k,) from the first contact's point, and |u| (k,), of the grains that count."""
     u = dataset["displacement"].values[0]
     counts = np.isfinite(u).all(axis=1)

@@ -1,12 +1,22 @@
 """States of S, from whatever sampler, as datasets with all their measures."""
 
+from typing import Any
+
 import numpy as np
+import xarray as xr
 
 from granforce import measures
+from granforce.explore.infer import Inference
+from granforce.explore.random_walk import Walk
+from granforce.explore.uniform import UniformSample
+from granforce.forces.ensemble import Ensemble
+from granforce.records import Floats, Integers
 from granforce.study.schema import labelled
 
 
-def walk_dataset(S, done, *, keep=None, seconds=0.0):
+def walk_dataset(
+    S: Ensemble, done: Walk, *, keep: int | None = None, seconds: float = 0.0
+) -> xr.Dataset:
     """A Walk with its measures as a dataset; `keep` evenly spaced states are kept, or all."""
     pick = _picked(len(done.states), keep)
     return labelled(
@@ -25,7 +35,9 @@ def walk_dataset(S, done, *, keep=None, seconds=0.0):
     )
 
 
-def uniform_dataset(S, drawn, *, keep=None, seconds=0.0):
+def uniform_dataset(
+    S: Ensemble, drawn: UniformSample, *, keep: int | None = None, seconds: float = 0.0
+) -> xr.Dataset:
     """A UniformSample with its measures as a dataset; states kept as in `walk_dataset`."""
     pick = _picked(len(drawn.flat), keep)
     mixing = drawn.mixing
@@ -51,12 +63,21 @@ def uniform_dataset(S, drawn, *, keep=None, seconds=0.0):
     )
 
 
-def inference_dataset(S, found, measured, sigma, sure=None, *, keep=None, seconds=0.0):
+def inference_dataset(
+    S: Ensemble,
+    found: Inference,
+    measured: Floats,
+    sigma: Floats,
+    sure: Any = None,
+    *,
+    keep: int | None = None,
+    seconds: float = 0.0,
+) -> xr.Dataset:
     """An Inference and what it came from as a dataset; draws kept as in `walk_dataset`.
 
     sure: a Carrying of contacts that were not measured, if it was asked for.
     """
-    arrays = {
+    arrays: dict[str, Any] = {
         "backbone": S.index,
         "original": S.original,
         "measured": measured,
@@ -95,13 +116,13 @@ def inference_dataset(S, found, measured, sigma, sure=None, *, keep=None, second
     return labelled(arrays)
 
 
-def _picked(count, keep):
+def _picked(count: int, keep: int | None) -> slice | Integers:
     if keep is None or keep >= count:
         return slice(None)
     return np.linspace(0, count - 1, keep).astype(int)
 
 
-def _measured(S, states, pick):
+def _measured(S: Ensemble, states: Floats, pick: slice | Integers) -> dict[str, Any]:
     """What any states say: measures of all, and those that are picked; NaN where there are none."""
     known = {
         "states": states[pick],

@@ -10,20 +10,25 @@ import signal
 import socket
 import threading
 import warnings
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NoReturn, cast
+
+from xarray import Dataset
 
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
-from granforce.records import InputError
+from granforce.records import InputError, Progress
 from granforce.study import kinds
 from granforce.study.cells import Cell, get, load, row
+from granforce.study.keys import Parameters
 from granforce.study.store import open_store
 from granforce.system.terminal import one_line
 
@@ -31,20 +36,30 @@ CELL_BYTES = 2000  # of memory, that a cell takes until it is computed
 
 TRIES = 3  # a cell under way when a worker died is begun anew so often: it may have been its fault
 
+# What workers are to run: path of the store, cell, dtypes.
+Tasks = dict[int, tuple[str, Cell, Mapping[str, str] | None]]
+
 _SINGLE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def scan(path, cells, *, on_row=None, **options):
+def scan(
+    path: str | Path,
+    cells: Sequence[Parameters],
+    *,
+    on_row: Callable[[dict[str, Any]], object] | None = None,
+    **options: Any,
+) -> tuple[list[dict[str, Any]], list[tuple[Parameters, str]]]:
     """Run walks (their parameters); see `run` for the options.
 
     on_row(row) after each walk. Returns the rows in the order of the cells and a list of (walk
     parameters, error message).
     """
-    store, rows = open_store(path), {}
+    store = open_store(path)
+    rows: dict[int, dict[str, Any]] = {}
     named = [Cell(kinds.WALK, parameters) for parameters in cells]
 
-    def done(k, cached):
-        rows[k] = row(cells[k], load(store, *named[k]), cached)
+    def done(k: int, cached: bool) -> None:
+        rows[k] = row(cells[k], cast("Dataset", load(store, *named[k])), cached)
         if on_row is not None:
             on_row(rows[k])
 
@@ -53,16 +68,16 @@ def scan(path, cells, *, on_row=None, **options):
 
 
 def run(
-    path,
-    cells,
+    path: str | Path,
+    cells: Sequence[Cell],
     *,
-    workers=2,
-    scheduler=None,
-    dtypes=None,
-    progress=None,
-    on_done=None,
-    enough=None,
-):
+    workers: int = 2,
+    scheduler: str | None = None,
+    dtypes: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+    on_done: Callable[[int, bool], object] | None = None,
+    enough: Callable[[], bool] | None = None,
+) -> list[tuple[Cell, str]]:
     """Compute cells into the store at path, on one processor each; finished ones are found.
 
     workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
@@ -84,7 +99,7 @@ def run(
     failed = {}
     ended, reached = 0, 0.0
 
-    def tell(parts):
+    def tell(parts: float) -> None:
         # Cells may be counted as ended before they are seen to be, and anew where a worker died:
         # progress goes forward only, in quarters of cells, which add up exactly.
         nonlocal reached
@@ -92,7 +107,7 @@ def run(
         if progress is not None:
             progress(reached, len(todo))
 
-    def finished(k, get_result):
+    def finished(k: int, get_result: Callable[[], bool]) -> None:
         nonlocal ended
         try:
             cached = get_result()
@@ -113,7 +128,13 @@ def run(
     return [(cells[k], failed[k]) for k in sorted(failed)]
 
 
-def _over_processes(tasks, workers, finished, advanced, enough):
+def _over_processes(
+    tasks: Tasks,
+    workers: int,
+    finished: Callable[[int, Callable[[], bool]], object],
+    advanced: Callable[[float], object],
+    enough: Callable[[], bool],
+) -> None:
     warm_up({cell.kind for _, cell, _ in tasks.values()})
     count = len(tasks)
     for _ in range(TRIES):
@@ -125,15 +146,23 @@ def _over_processes(tasks, workers, finished, advanced, enough):
         finished(k, _lost)
 
 
-def _lost():
+def _lost() -> NoReturn:
     raise InputError(f"worker processes died {TRIES} times at it, or at cells beside it")
 
 
-def _one_pool(tasks, workers, finished, advanced, before, enough):
+def _one_pool(
+    tasks: Tasks,
+    workers: int,
+    finished: Callable[[int, Callable[[], bool]], object],
+    advanced: Callable[[float], object],
+    before: int,
+    enough: Callable[[], bool],
+) -> Tasks:
     """Run tasks over processes, `before` have ended; those that a dead worker left are returned."""
     context = multiprocessing.get_context("spawn")
     counter = context.Value("d", 0.0)
-    left, todo, waiting, broken = dict(tasks), list(tasks), {}, False
+    left, todo, broken = dict(tasks), list(tasks), False
+    waiting: dict[Future[bool], int] = {}
     workers = min(workers, len(tasks))
     pool = ProcessPoolExecutor(workers, context, initializer=_share, initargs=(counter,))
     try:
@@ -168,7 +197,7 @@ def _one_pool(tasks, workers, finished, advanced, before, enough):
 
 
 @contextmanager
-def _single_threaded():
+def _single_threaded() -> Iterator[None]:
     """Processes started meanwhile use one thread in linear algebra: cells, not rows, are shared."""
     before = {name: os.environ.get(name) for name in _SINGLE}
     os.environ.update(dict.fromkeys(_SINGLE, "1"))
@@ -185,7 +214,7 @@ def _single_threaded():
 _counter = None
 
 
-def _share(counter):
+def _share(counter: Any) -> None:
     global _counter
     _counter = counter
     # Ctrl-C goes to the whole process group: the parent ends the workers, each without a word.
@@ -194,19 +223,21 @@ def _share(counter):
     warnings.formatwarning = one_line
 
 
-def _end_with_parent():
+def _end_with_parent() -> None:
     """A worker whose parent was killed has nobody to compute for."""
-    multiprocessing.parent_process().join()
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
     os._exit(1)
 
 
-def run_cell(path, cell, dtypes=None):
+def run_cell(path: str | Path, cell: Cell, dtypes: Mapping[str, str] | None = None) -> bool:
     """Compute one cell into the store at path; whether it was there. Runs in a worker process."""
     if not Path(path, "zarr.json").exists():
         raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
     seen = 0.0
 
-    def count(done, total):
+    def count(done: float, total: float | None) -> None:
         nonlocal seen
         if _counter is not None and total:
             part = min(done / total, 1.0)
@@ -221,7 +252,9 @@ def run_cell(path, cell, dtypes=None):
     return cached
 
 
-def _over_dask(tasks, scheduler, finished):
+def _over_dask(
+    tasks: Tasks, scheduler: str, finished: Callable[[int, Callable[[], bool]], object]
+) -> None:
     """Run tasks over the workers of a dask scheduler, which begins those of lost workers anew."""
     try:
         from dask.distributed import Client, KilledWorker, as_completed
@@ -242,7 +275,7 @@ def _over_dask(tasks, scheduler, finished):
             raise
 
 
-def warm_up(needed=None):
+def warm_up(needed: Any = None) -> None:
     """Compile (or load from numba's cache) kernels once, before workers do it each.
 
     needed: the kinds that they are compiled for, by default all.
@@ -253,7 +286,7 @@ def warm_up(needed=None):
             run(S)
 
 
-def _push(S):
+def _push(S: Ensemble) -> None:
     # A single contact, and several side by side.
     for contacts in (S.index[:1], S.index[:3]):
         critical_forces(S, contacts)

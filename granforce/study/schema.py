@@ -1,7 +1,8 @@
 """The schema: every array that granforce keeps, declared once, and packings as datasets."""
 
 import json
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -305,7 +306,7 @@ VARIABLES |= {
 }
 
 
-def labelled(arrays, attrs=None):
+def labelled(arrays: Mapping[str, Any], attrs: Mapping[str, Any] | None = None) -> xr.Dataset:
     """A dataset from {name: array-like}, with dims, dtype, units and long_name from VARIABLES.
 
     Raises ValueError for an undeclared name or a wrong number of dimensions.
@@ -321,14 +322,14 @@ def labelled(arrays, attrs=None):
     return xr.Dataset(variables, attrs=attrs)
 
 
-def declared(name):
+def declared(name: str) -> Variable:
     """The schema's row for this name; ValueError where there is none."""
     if name not in VARIABLES:
         raise ValueError(f"{name!r} is not declared: add a row to granforce.study.schema.VARIABLES")
     return VARIABLES[name]
 
 
-def packing_dataset(packing):
+def packing_dataset(packing: Packing) -> xr.Dataset:
     """A Packing as a dataset with dims grain, contact, axis, component; info as JSON in attrs."""
     arrays = packing._asdict()
     info, contacts = arrays.pop("info"), arrays.pop("contacts")
@@ -336,7 +337,7 @@ def packing_dataset(packing):
     return labelled(arrays, {"info": json.dumps(info, default=to_builtin)})
 
 
-def dataset_packing(dataset):
+def dataset_packing(dataset: xr.Dataset) -> Packing:
     """The Packing that packing_dataset made this dataset from, to the last bit.
 
     Tuples in info come back as lists.
@@ -352,7 +353,7 @@ def dataset_packing(dataset):
     )
 
 
-def to_builtin(value):
+def to_builtin(value: Any) -> Any:
     """Numpy values as plain ones, for json.dumps(default=…)."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()

@@ -11,21 +11,33 @@ import re
 import secrets
 import shutil
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import xarray as xr
 
 from granforce.explore.remeasured import remeasured
 from granforce.forces.ensemble import ensemble
-from granforce.packing.importers.pegs import open_frames, take_frame
+from granforce.packing.importers.pegs import Photoelastic, open_frames, take_frame
 from granforce.packing.importers.repair import KINDS
-from granforce.records import InputError, friction, positive, random_seed, whole
+from granforce.records import (
+    Contacts,
+    Floats,
+    InputError,
+    Integers,
+    Progress,
+    friction,
+    positive,
+    random_seed,
+    whole,
+)
 from granforce.study.cells import Cell, Kind, load
+from granforce.study.keys import Parameters
 from granforce.study.scan import run
 from granforce.study.schema import labelled, packing_dataset, to_builtin
-from granforce.study.store import open_store
+from granforce.study.store import Store, open_store
 from granforce.system.files import expanded
 
 # Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
@@ -47,7 +59,7 @@ class Frame(NamedTuple):
     number: float
 
 
-def frames_of(*paths):
+def frames_of(*paths: str | Path) -> list[Frame]:
     """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
 
     In order of their numbers. Raises InputError where there are none, or two of one number.
@@ -84,22 +96,22 @@ def frames_of(*paths):
     return found
 
 
-def _is_folder(path):
+def _is_folder(path: str | Path) -> bool:
     return expanded(path).is_dir()
 
 
-def _numbers(one, two, count):
+def _numbers(one: Path, two: Path | None, count: int) -> list[float]:
     """Numbers of the frames in one pair of files; by the name where each file has one frame."""
     inside = open_frames(one, two).frames
     by_name = _digits(one) if count > 1 and two is not None else []
-    return [float(by_name[-1])] if by_name and len(inside) == 1 else inside
+    return [float(by_name[-1])] if by_name and len(inside) == 1 else inside.tolist()
 
 
-def _digits(path):
+def _digits(path: Path) -> list[str]:
     return [part for part in re.findall(r"\d+", path.stem) if len(part) < 16]
 
 
-def _paired(files):
+def _paired(files: Sequence[Path]) -> list[tuple[Path, Path]]:
     """Pairs (positions, contacts) that have the same number, or none, in their names."""
     positions = [one for one in files if _POSITIONS.search(one.name)]
     contacts = [one for one in files if _CONTACTS.search(one.name)]
@@ -115,7 +127,15 @@ def _paired(files):
     return []
 
 
-def parameters(frame, *, mu, states=STATES, seed=0, unmeasured=UNMEASURED, **options):
+def parameters(
+    frame: Frame,
+    *,
+    mu: Any,
+    states: int = STATES,
+    seed: int = 0,
+    unmeasured: float = UNMEASURED,
+    **options: Any,
+) -> Parameters:
     """The parameters that name the inference of a Frame; options as for `read_pegs`."""
     forces = options.pop("wall_forces", None) or {}
     return {
@@ -132,9 +152,9 @@ def parameters(frame, *, mu, states=STATES, seed=0, unmeasured=UNMEASURED, **opt
     }
 
 
-def _digest(*paths):
+def _digest(*paths: str | Path | None) -> str:
     total = hashlib.blake2b(digest_size=16)
-    for path in filter(None, paths):
+    for path in (one for one in paths if one):
         try:
             total.update(Path(path).read_bytes())
         except OSError as error:
@@ -142,7 +162,9 @@ def _digest(*paths):
     return total.hexdigest()
 
 
-def _inferred(store, parameters, *, workers, progress):
+def _inferred(
+    store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
+) -> xr.Dataset:
     """Dataset of one frame: its packing, measured and inferred forces with errors, its account."""
     frames = open_frames(parameters["positions"], parameters["adjacency"])
     number = parameters["frame"] if len(frames.frames) > 1 else None
@@ -164,7 +186,14 @@ def _inferred(store, parameters, *, workers, progress):
     )
 
 
-def infer_frame(found, *, states=STATES, unmeasured=UNMEASURED, number=None, **options):
+def infer_frame(
+    found: Photoelastic,
+    *,
+    states: int = STATES,
+    unmeasured: float = UNMEASURED,
+    number: float | None = None,
+    **options: Any,
+) -> xr.Dataset:
     """Dataset of a Photoelastic: its packing, forces, errors, stresses by region, its account.
 
     Forces are those of `remeasured`, on all contacts (0 where nothing can carry); options as there.
@@ -203,14 +232,14 @@ def infer_frame(found, *, states=STATES, unmeasured=UNMEASURED, number=None, **o
     )
     findings = [one._asdict() for one in found.findings]
     report = found.report if number is None else found.report | {"frame": number}
-    told = {"report": report, "findings": findings}
+    told: dict[str, Any] = {"report": report, "findings": findings}
     told |= {"walls": list(found.walls), "left_open": found.left_open.tolist()}
     told |= {"at_wall": np.flatnonzero(found.at_wall).tolist()}
     dataset.attrs["account"] = json.dumps(told, default=to_builtin)
     return dataset
 
 
-def regional_stress(contacts, x, grains, forces):
+def regional_stress(contacts: Contacts, x: Floats, grains: Any, forces: Floats) -> Floats:
     """Stresses (…, 9, 3) xx, yy, xy in 3 × 3 parts of the frame, of forces (…, N_c, 2).
 
     σ_ab = (1/A) Σ F_a ℓ_b over the contacts whose point lies in a part of the area A; of a contact
@@ -229,7 +258,7 @@ def regional_stress(contacts, x, grains, forces):
     return total / np.prod(side)
 
 
-def regions(at, x):
+def regions(at: Floats, x: Floats) -> tuple[Integers, Floats]:
     """Parts (k,) of the frame in which points (k, 2) lie, column by column, and a part's sides.
 
     x (N, 2): centres of the grains.
@@ -242,7 +271,15 @@ def regions(at, x):
 FRAME = Kind("frame", 1, "frames", "frame", parameters, _inferred)
 
 
-def infer_series(path, frames, *, workers=2, scheduler=None, progress=None, **options):
+def infer_series(
+    path: str | Path,
+    frames: Sequence[Frame],
+    *,
+    workers: int = 2,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Any:
     """All frames inferred into the store at path, found there where they are: (dataset, failed).
 
     options: as for `parameters`. The dataset is that of `combined`; failed: (frame, message) of
@@ -253,7 +290,7 @@ def infer_series(path, frames, *, workers=2, scheduler=None, progress=None, **op
     lost = {id(cell): message for cell, message in failed}
     store = open_store(path)
     done = [
-        (frame.number, load(store, *cell))
+        (frame.number, cast("xr.Dataset", load(store, *cell)))
         for frame, cell in zip(frames, cells, strict=True)
         if id(cell) not in lost
     ]
@@ -265,7 +302,7 @@ def infer_series(path, frames, *, workers=2, scheduler=None, progress=None, **op
     return (combined(done) if done else None), told
 
 
-def combined(done):
+def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     """One dataset (frame, contact, component) of [(number, dataset of a frame), …].
 
     A contact is a pair of names, over all frames; NaN where a frame does not have it. change: its
@@ -281,7 +318,7 @@ def combined(done):
     added = np.zeros(shape[:2], dtype=bool)
     for k, ((_, one), names) in enumerate(zip(done, named, strict=True)):
         here = [c for c, pair in enumerate(names) if pair is not None]
-        into = [row[names[c]] for c in here]
+        into = [row[pair] for pair in names if pair is not None]
         for name, values in arrays.items():
             values[k, into] = one[name].values[here]
         added[k, into] = one["added"].values[here]
@@ -290,7 +327,9 @@ def combined(done):
     change_error[1:] = np.hypot(arrays["standard_error"][1:], arrays["standard_error"][:-1])
     accounts = [json.loads(one.attrs["account"])["report"] for _, one in done]
     forces, single = ("frame", "contact", "component"), ("frame",)
-    variables = {name: (forces, values, {"units": "force"}) for name, values in arrays.items()}
+    variables: dict[str, Any] = {
+        name: (forces, values, {"units": "force"}) for name, values in arrays.items()
+    }
     variables |= {
         "added": (forces[:2], added, {"long_name": "contact was not listed"}),
         "change": (forces, change, {"units": "force", "long_name": "since the frame before"}),
@@ -313,11 +352,12 @@ def combined(done):
     )
 
 
-def _names(one):
+def _names(one: xr.Dataset) -> list[tuple[float, float] | None]:
     """Names of a frame's contacts: pairs of ids, None for a second contact of one pair."""
     ids = one["grain_id"].values
     i, j = ids[one["contact_i"].values], ids[one["contact_j"].values]
-    seen, names = set(), []
+    seen: set[tuple[float, float]] = set()
+    names: list[tuple[float, float] | None] = []
     for a, b in zip(i.tolist(), j.tolist(), strict=True):
         # Grains before walls, whose names are below 0.
         pair = (a, b) if b < 0 or (a >= 0 and a <= b) else (b, a)
@@ -326,7 +366,7 @@ def _names(one):
     return names
 
 
-def check_folder(path):
+def check_folder(path: str | Path) -> Path:
     """The path, if a Zarr folder can be put there; InputError otherwise."""
     path = expanded(path)
     if path.exists() and not (path / "zarr.json").is_file():
@@ -336,7 +376,7 @@ def check_folder(path):
     return path
 
 
-def save_series(dataset, path):
+def save_series(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a dataset as a Zarr folder, whole or not at all; one that is there is replaced."""
     path = check_folder(path)
     aside = path.with_name(f".granforce-{secrets.token_hex(8)}.part")

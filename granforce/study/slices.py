@@ -1,11 +1,13 @@
 """The inner part of a packing, whose surroundings are frozen at their original forces."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from granforce.records import InputError
+from granforce.records import InputError, Mask, Packing
 
 
-def edges(given):
+def edges(given: Sequence[float]) -> list[float]:
     """x0, x1, y0, y1 of a slice as floats; InputError unless 0 ≤ x0 < x1 ≤ 1, y alike."""
     try:
         x0, x1, y0, y1 = (float(edge) for edge in given)
@@ -18,7 +20,7 @@ def edges(given):
     return [x0, x1, y0, y1]
 
 
-def outside(packing, slice_):
+def outside(packing: Packing, slice_: Sequence[float]) -> Mask:
     """Mask (N_c,) of contacts with a grain centre outside x0 … x1, y0 … y1 (parts of a and b).
 
     Raises InputError unless 0 ≤ x0 < x1 ≤ 1 and 0 ≤ y0 < y1 ≤ 1.

@@ -5,6 +5,9 @@ xarray open too. The key is a hash of kind, parameters (seed among them), algori
 version, so an entry is never changed: it is there and whole, or it is not there.
 """
 
+from __future__ import annotations
+
+import errno
 import json
 import os
 import re
@@ -14,15 +17,17 @@ import socket
 import stat
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import platformdirs
+import xarray as xr
 
 from granforce.records import InputError
 from granforce.study import entries, keys
+from granforce.study.keys import Parameters
 from granforce.system.files import expanded
 
 LOCATION_VARIABLE = "GRANFORCE_CACHE"  # environment variable naming the store's folder
@@ -34,7 +39,7 @@ class Entry(NamedTuple):
 
     name: str  # folder in the store: <kind>-<key>
     kind: str
-    params: dict  # as they entered the key: floats to 9 significant digits
+    params: Parameters  # as they entered the key: floats to 9 significant digits
     version: int | str  # of the algorithm
     bytes: int  # on disk
     created: str  # UTC, ISO 8601
@@ -48,13 +53,13 @@ class Verdict(NamedTuple):
     reason: str
 
 
-def default_path():
+def default_path() -> Path:
     """$GRANFORCE_CACHE if set, else the user's cache folder for granforce."""
     location = os.environ.get(LOCATION_VARIABLE) or platformdirs.user_cache_dir("granforce")
     return Path(location)
 
 
-def open_store(path=None, *, readonly=False):
+def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Store:
     """The store in a folder (by default `default_path()`), made if missing unless readonly.
 
     A folder that cannot be written is opened all the same; saving to it raises InputError.
@@ -81,7 +86,7 @@ def open_store(path=None, *, readonly=False):
     return store
 
 
-def _located(path):
+def _located(path: str | Path | None) -> Path:
     """The absolute path of a store; InputError for a file and for what cannot be a path."""
     path = expanded(default_path() if path is None else path).absolute()
     try:
@@ -95,7 +100,7 @@ def _located(path):
     return path
 
 
-def _schema(path):
+def _schema(path: Path) -> int | None:
     """The schema version of the store in a folder, or None where it holds no root of a store."""
     try:
         version = json.loads((path / "zarr.json").read_bytes())["attributes"]["granforce_store"]
@@ -104,7 +109,7 @@ def _schema(path):
     return version if isinstance(version, int) else None
 
 
-def _refuse_newer(path):
+def _refuse_newer(path: Path) -> None:
     """Raise InputError for a store of a newer schema: what it may hold is not known here."""
     schema = _schema(path)
     if schema is not None and schema > keys.SCHEMA_VERSION:
@@ -114,7 +119,7 @@ def _refuse_newer(path):
         )
 
 
-def _refuse_foreign(path):
+def _refuse_foreign(path: Path) -> None:
     """Raise InputError if the folder holds anything that is neither hidden nor an entry.
 
     A damaged zarr.json among nothing but entries is ours.
@@ -133,7 +138,7 @@ def _refuse_foreign(path):
         )
 
 
-def _create_root(path):
+def _create_root(path: Path) -> None:
     path.mkdir(parents=True, exist_ok=True)
     root = {
         "zarr_format": 3,
@@ -145,41 +150,43 @@ def _create_root(path):
     os.replace(temporary, path / "zarr.json")
 
 
-class Store(Mapping):
+class Store(Mapping[str, xr.Dataset]):
     """A folder of entries as a mapping from entry name to lazily opened xr.Dataset.
 
     Made by `open_store`. Entries whose metadata cannot be read are left out.
     """
 
-    def __init__(self, path, *, readonly=False):
+    def __init__(self, path: Path, *, readonly: bool = False) -> None:
         self.path = path
         self.readonly = readonly
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"Store({str(self.path)!r}, readonly={self.readonly})"
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         return (name for name in self._names() if self._attrs(name) is not None)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return sum(1 for _ in self)
 
-    def __contains__(self, name):
+    def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and self._attrs(name) is not None
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> xr.Dataset:
         if name not in self:
             raise KeyError(name)
         return entries.opened(self.path / name)
 
-    def name(self, kind, params, *, version):
+    def name(self, kind: str, params: Mapping[str, Any], *, version: int | str) -> str:
         """Name of the entry for these parameters: <kind>-<20 hexadecimal digits>.
 
         Raises TypeError for parameters that have no canonical form (see `keys.canonical`).
         """
         return keys.entry_name(kind, params, version, keys.SCHEMA_VERSION)
 
-    def load(self, kind, params, *, version):
+    def load(
+        self, kind: str, params: Mapping[str, Any], *, version: int | str
+    ) -> xr.Dataset | None:
         """The entry's dataset, read and checked in full, or None where there is none.
 
         A damaged entry is reported as a warning and counts as missing; saving replaces it.
@@ -193,7 +200,15 @@ class Store(Mapping):
             self._warn(name, reason)
         return dataset
 
-    def save(self, kind, params, dataset, *, version, dtypes=None):
+    def save(
+        self,
+        kind: str,
+        params: Mapping[str, Any],
+        dataset: xr.Dataset,
+        *,
+        version: int | str,
+        dtypes: Mapping[str, str] | None = None,
+    ) -> str:
         """Store a dataset under its parameters and return the entry's name.
 
         An intact entry of that name is kept as it is. dtypes: {variable: dtype} to store floats
@@ -212,7 +227,14 @@ class Store(Mapping):
                 self._publish(name, variables, attrs)
         return name
 
-    def entry(self, name):
+    def refuse_unwritable(self) -> None:
+        """Raise InputError where nothing can be saved, before anything is computed for it."""
+        with self._writing():
+            own = os.access in os.supports_effective_ids
+            if self.path.is_dir() and not os.access(self.path, os.W_OK, effective_ids=own):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def entry(self, name: str) -> Entry | None:
         """The `Entry` of this name, or None if there is none that can be read; reads no arrays."""
         attrs = self._attrs(name)
         if attrs is None:
@@ -223,7 +245,7 @@ class Store(Mapping):
             name, attrs["kind"], params, attrs["algorithm_version"], size, attrs["created"]
         )
 
-    def entries(self):
+    def entries(self) -> list[Entry]:
         """A list of `Entry`, one for each readable entry; arrays are not read."""
         found = []
         for name in self._names():
@@ -234,7 +256,7 @@ class Store(Mapping):
                 found.append(entry)
         return found
 
-    def find(self, kind=None, **params):
+    def find(self, kind: str | None = None, **params: Any) -> list[Entry]:
         """The entries of a kind whose parameters include the given ones (compared as in keys)."""
         wanted = {key: keys.canonical(value) for key, value in params.items()}
         return [
@@ -247,11 +269,11 @@ class Store(Mapping):
             )
         ]
 
-    def size(self):
+    def size(self) -> int:
         """Bytes on disk, temporaries of running writers included."""
         return _folder_bytes(self.path)
 
-    def clear(self, kind=None):
+    def clear(self, kind: str | None = None) -> int:
         """Remove all entries, or those of one kind; returns how many.
 
         Raises InputError if the store cannot be written.
@@ -262,7 +284,7 @@ class Store(Mapping):
                 self._retire(name)
         return len(names)
 
-    def clean(self):
+    def clean(self) -> int:
         """Remove temporaries that killed writers left behind; returns how many.
 
         Raises InputError if the store cannot be written.
@@ -273,7 +295,7 @@ class Store(Mapping):
                 _remove(item)
         return len(stale)
 
-    def verify(self):
+    def verify(self) -> list[Verdict]:
         """A list of `Verdict`: every entry read in full and compared with its checksum."""
         verdicts = []
         for name in self._names():
@@ -281,21 +303,23 @@ class Store(Mapping):
             verdicts.append(Verdict(name, not reason, reason))
         return verdicts
 
-    def _names(self):
+    def _names(self) -> list[str]:
         """Folders that are named like entries, readable or not, sorted."""
         if not self.path.is_dir():
             return []
         with os.scandir(self.path) as items:
             return sorted(i.name for i in items if keys.ENTRY.fullmatch(i.name) and i.is_dir())
 
-    def _attrs(self, name):
+    def _attrs(self, name: str) -> dict[str, Any] | None:
         return entries.read_attributes(self.path / name) if keys.ENTRY.fullmatch(name) else None
 
-    def _warn(self, name, reason):
+    def _warn(self, name: str, reason: str) -> None:
         message = f"entry {name} in {self.path} is damaged ({reason}) and counts as missing"
         warnings.warn(message, stacklevel=3)
 
-    def _publish(self, name, variables, attrs):
+    def _publish(
+        self, name: str, variables: Mapping[str, xr.Variable], attrs: Mapping[str, Any]
+    ) -> None:
         """Write under a temporary name, then rename: at no moment is a part of it visible."""
         temporary = self.path / _temporary_name()
         try:
@@ -314,7 +338,7 @@ class Store(Mapping):
         finally:
             _remove(temporary)
 
-    def _retire(self, name):
+    def _retire(self, name: str) -> None:
         """Remove an entry: renamed first, so that it vanishes as a whole."""
         temporary = self.path / _temporary_name()
         try:
@@ -324,7 +348,7 @@ class Store(Mapping):
         _remove(temporary)
 
     @contextmanager
-    def _writing(self):
+    def _writing(self) -> Iterator[None]:
         if self.readonly:
             raise InputError(f"the store {self.path} was opened read-only")
         _refuse_newer(self.path)
@@ -338,15 +362,15 @@ class Store(Mapping):
             ) from error
 
 
-def _host():
+def _host() -> str:
     return re.sub(r"\W", "_", socket.gethostname())
 
 
-def _temporary_name():
+def _temporary_name() -> str:
     return f".tmp-{_host()}-{os.getpid()}-{secrets.token_hex(4)}"
 
 
-def _is_stale(temporary):
+def _is_stale(temporary: Path) -> bool:
     """Whether its writer is dead: known on this host, judged by age elsewhere."""
     try:
         age = time.time() - temporary.stat().st_mtime
@@ -357,7 +381,7 @@ def _is_stale(temporary):
     return age > STALE_SECONDS or (here and not _is_alive(int(pid)))
 
 
-def _is_alive(pid):
+def _is_alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -367,7 +391,7 @@ def _is_alive(pid):
     return not _is_zombie(pid)
 
 
-def _is_zombie(pid):
+def _is_zombie(pid: int) -> bool:
     """Whether the process has ended but was not yet collected by its parent (Linux)."""
     try:
         told = Path(f"/proc/{pid}/stat").read_text()
@@ -376,14 +400,14 @@ def _is_zombie(pid):
     return told.rpartition(")")[2].split()[:1] == ["Z"]
 
 
-def _remove(path):
+def _remove(path: Path) -> None:
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
 
 
-def _folder_bytes(path):
+def _folder_bytes(path: str | Path) -> int:
     """Bytes of all files below a folder; those that vanish meanwhile count nothing."""
     total = 0
     for parent, _, files in os.walk(path):

@@ -2,9 +2,10 @@
 
 from granforce.explore import stress_outline
 from granforce.forces.ensemble import ensemble
+from granforce.records import Floats, Packing
 
 
-def stress_axes(packing, mu):
+def stress_axes(packing: Packing, mu: float) -> Floats:
     """Axes (2, N_c, 2) of ((σ_xx − σ_yy)/2P, σ_xy/P) for the forces of a packing's S in ⟨f_n⟩.
 
     Raises what `stress_outline` raises.

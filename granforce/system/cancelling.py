@@ -13,14 +13,17 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from typing import NamedTuple
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from granforce.records import Cancelled
+from granforce.records import Cancel, Cancelled, Mask
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 # Seconds between two askings of cancel().
 _ASK_EVERY = 0.1
@@ -38,8 +41,8 @@ pickle.dump(function(*arguments), sys.stdout.buffer)
 
 
 class _Scope(NamedTuple):
-    flag: np.ndarray  # (1,) bool
-    cancel: Callable | None
+    flag: Mask  # (1,)
+    cancel: Cancel | None
 
 
 # Set once the process is about to end.
@@ -49,7 +52,7 @@ _scope = contextvars.ContextVar("scope", default=_NEVER)
 
 
 @contextmanager
-def watched(cancel=None):
+def watched(cancel: Cancel | None = None) -> Iterator[None]:
     """Within, all work ends soon after cancel() → True, or after Ctrl-C in the main thread.
 
     Kernels return early and `check` raises Cancelled. Scopes nest: the outer ones count as well.
@@ -81,28 +84,28 @@ def watched(cancel=None):
         mouth.close()
 
 
-def cancellable(function):
+def cancellable(function: Callable[P, T]) -> Callable[P, T]:
     """The function `watched` with its own keyword argument `cancel`."""
 
     @functools.wraps(function)
-    def inside(*arguments, cancel=None, **options):
-        with watched(cancel):
+    def inside(*arguments: P.args, **options: P.kwargs) -> T:
+        with watched(cast("Cancel | None", options.pop("cancel", None))):
             return function(*arguments, **options)
 
     return inside
 
 
-def _either(outer, cancel):
+def _either(outer: _Scope, cancel: Cancel | None) -> Cancel:
     asked = [one for one in (outer.cancel, cancel) if one is not None]
     return lambda: bool(outer.flag[0]) or _ending.is_set() or any(ask() for ask in asked)
 
 
-def end_everything():
+def end_everything() -> None:
     """All work that can be cancelled ends, now and later: for a process that is about to end."""
     _ending.set()
 
 
-def _wake_by_signals(mouth):
+def _wake_by_signals(mouth: socket.socket) -> bool:
     """Have signals write their number to the socket, unless an event loop has them already."""
     before = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
     if before != -1:
@@ -110,7 +113,7 @@ def _wake_by_signals(mouth):
     return before == -1
 
 
-def _watch(scope, ears, asks):
+def _watch(scope: _Scope, ears: socket.socket, asks: bool) -> None:
     while not scope.flag[0]:
         heard, _, _ = select.select([ears], [], [], _ASK_EVERY if asks else None)
         numbers = ears.recv(64) if heard else b""
@@ -119,19 +122,19 @@ def _watch(scope, ears, asks):
         if 0 in numbers:
             return
         try:
-            cancelled_now = scope.cancel()
+            cancelled_now = scope.cancel is not None and scope.cancel()
         except Exception:
             return  # the working thread, which asks it too, meets the same error
         if cancelled_now:
             scope.flag[0] = True
 
 
-def flag():
+def flag() -> Mask:
     """The flag (1,) of the work under way, for kernels: they return early once it is True."""
     return _scope.get().flag
 
 
-def cancelled():
+def cancelled() -> bool:
     """Whether the work under way was asked to end."""
     scope = _scope.get()
     if not scope.flag[0] and scope.cancel is not None and scope.cancel():
@@ -139,27 +142,30 @@ def cancelled():
     return bool(scope.flag[0])
 
 
-def check(what="work"):
+def check(what: str = "work") -> None:
     """Raise Cancelled if the work under way was asked to end."""
     if cancelled():
         raise Cancelled(f"{what} cancelled")
 
 
-def threads(workers):
+def threads(workers: int) -> ThreadPoolExecutor:
     """A ThreadPoolExecutor whose work is cancelled with the caller's."""
     return ThreadPoolExecutor(workers, initializer=_scope.set, initargs=(_scope.get(),))
 
 
-def apart(call, *arguments, interrupt=None):
+def apart(
+    call: Callable[..., T], *arguments: Any, interrupt: Callable[[], object] | None = None
+) -> T:
     """call(*arguments), which cannot read the flag, in a thread that is left behind if need be.
 
     interrupt(): asks it to end, where that is possible.
     """
     if _scope.get().cancel is None:
         return call(*arguments)
-    result, context = Future(), contextvars.copy_context()
+    result: Future[T] = Future()
+    context = contextvars.copy_context()
 
-    def work():
+    def work() -> None:
         try:
             result.set_result(context.run(call, *arguments))
         except BaseException as error:
@@ -178,7 +184,7 @@ def apart(call, *arguments, interrupt=None):
             check()
 
 
-def in_child(function, *arguments):
+def in_child(function: Callable[..., T], *arguments: Any) -> T:
     """function(*arguments), which holds the interpreter, in a process that is killed if need be.
 
     The function must stand in a module of its own that imports little, as the child does so, too.

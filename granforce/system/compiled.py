@@ -9,10 +9,12 @@ import stat
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 
-def find_a_place():
+def find_a_place() -> None:
     """Name a temporary folder to numba where it could write neither beside us nor at home.
 
     Without one numba refuses to compile for keeping, and so every module with kernels.
@@ -30,22 +32,22 @@ def find_a_place():
     )
 
 
-def tell_when_compiling(say):
+def tell_when_compiling(say: Callable[[], object]) -> None:
     """Call say() once, as soon as a kernel is compiled that is not kept from an earlier run."""
     from numba.core import event
 
-    class Listener(event.Listener):
-        def on_start(self, happening):
+    class Listener(event.Listener):  # type: ignore[misc]  # numba says no types
+        def on_start(self, happening: Any) -> None:
             event.unregister("numba:compile", self)
             say()
 
-        def on_end(self, happening):
+        def on_end(self, happening: Any) -> None:
             pass
 
     event.register("numba:compile", Listener())
 
 
-def compile_ahead(statement, last):
+def compile_ahead(statement: str, last: str) -> bool:
     """Run a statement that compiles kernels in a process of its own, where none are kept yet.
 
     last: "module.kernel" that is compiled last. The process ends with this one at the latest.
@@ -60,7 +62,7 @@ def compile_ahead(statement, last):
     return False
 
 
-def _usual_places():
+def _usual_places() -> Iterator[Path]:
     """Where numba looks first: beside the sources, then the user's folder of caches."""
     yield Path(__file__).parent / "__pycache__"
     if os.name == "nt":
@@ -71,7 +73,7 @@ def _usual_places():
         yield Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser() / "numba"
 
 
-def _writable(folder):
+def _writable(folder: Path) -> bool:
     """Whether files can be made in a folder, or in the first one above it that there is."""
     while not folder.exists():
         if folder == folder.parent:
@@ -80,7 +82,7 @@ def _writable(folder):
     return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
 
 
-def _temporary_place():
+def _temporary_place() -> str:
     """The same folder each time, so that kernels are compiled once; a new one if it is not ours."""
     if not hasattr(os, "getuid"):
         return tempfile.mkdtemp(prefix="granforce-")

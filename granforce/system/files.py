@@ -5,8 +5,10 @@ import os
 import re
 import secrets
 import stat
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO
 
 from granforce.records import InputError
 
@@ -15,7 +17,7 @@ _OPEN_FILE = re.compile(r"/dev/(stdin|stdout|stderr|fd/.*)|/proc/[^/]+/fd/.*")
 
 
 @contextmanager
-def written(path):
+def written(path: str | Path) -> Iterator[IO[bytes]]:
     """An open binary file; what was written to it stands at path when the block ends, or nothing.
 
     A new file gets the mode that the umask leaves, an existing one keeps its own; links are
@@ -44,7 +46,7 @@ def written(path):
             raise
 
 
-def check_file(path):
+def check_file(path: str | Path) -> None:
     """InputError unless a file can be written at path; nothing is opened or changed."""
     path = expanded(path)
     with _refusing(path):
@@ -53,7 +55,7 @@ def check_file(path):
             raise PermissionError(errno.EACCES, f"the folder {kept[0].parent} is not writable")
 
 
-def make_folder(path):
+def make_folder(path: str | Path) -> Path:
     """The folder at path, made with its parents if missing; InputError unless it can be written."""
     path = expanded(path)
     with _refusing(path):
@@ -63,7 +65,7 @@ def make_folder(path):
     return path
 
 
-def expanded(path):
+def expanded(path: str | Path) -> Path:
     """The path with ~ and ~user replaced; InputError where it cannot be a path."""
     try:
         found = Path(path).expanduser()
@@ -74,7 +76,7 @@ def expanded(path):
     return found
 
 
-def _regular(path):
+def _regular(path: str | Path) -> tuple[Path, int | None] | None:
     """(file that path leads to, its mode or None if missing), or None for what is no file."""
     path = os.path.abspath(path)
     if _OPEN_FILE.fullmatch(path):
@@ -94,12 +96,12 @@ def _regular(path):
     return target, stat.S_IMODE(found.st_mode)
 
 
-def _may_write(path):
+def _may_write(path: Path) -> bool:
     return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
 
 
 @contextmanager
-def _refusing(path):
+def _refusing(path: Path) -> Iterator[None]:
     """Errors of the operating system become one line; a reader who has gone is no error."""
     try:
         yield

@@ -2,14 +2,15 @@
 
 import json
 import math
+from typing import Any
 
 
-def json_text(value, *, ascii_only=True):
+def json_text(value: Any, *, ascii_only: bool = True) -> str:
     """JSON text of plain values; numbers that are not finite become null."""
     return json.dumps(_finite(value), indent=1, ensure_ascii=ascii_only, allow_nan=False)
 
 
-def _finite(value):
+def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: _finite(part) for name, part in value.items()}
     if isinstance(value, (list, tuple)):

@@ -2,20 +2,22 @@
 
 import math
 import sys
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 from tqdm import tqdm
 
 from granforce.system.plain import json_text
 
 
-def print_list(rows, names, as_json):
+def print_list(rows: Sequence[Mapping[str, Any]], names: Sequence[str], as_json: bool) -> None:
     if as_json:
         print(json_text(rows))
     else:
         table(rows, names, {})
 
 
-def report(lines, as_json):
+def report(lines: Mapping[str, Any], as_json: bool) -> None:
     """A report on stdout: names and numbers in two columns, sentences line by line, or JSON."""
     if as_json:
         print(json_text(lines))
@@ -29,7 +31,9 @@ def report(lines, as_json):
             name = ""
 
 
-def table(rows, names, heads):
+def table(
+    rows: Sequence[Mapping[str, Any]], names: Sequence[str], heads: Mapping[str, str]
+) -> None:
     cells = [[heads.get(name, name) for name in names]]
     cells += [[text(line[name]) for name in names] for line in rows]
     widths = [max(len(line[k]) for line in cells) for k in range(len(names))]
@@ -37,7 +41,7 @@ def table(rows, names, heads):
         print("  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)))
 
 
-def text(value):
+def text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, (list, tuple)):
@@ -45,38 +49,52 @@ def text(value):
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def one_line(message, category, filename, lineno, line=None):
+def one_line(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
     """A warning as one line without the place in the code, for warnings.formatwarning."""
     return f"granforce: {' '.join(str(message).split())}\n"
 
 
-class Bar:
-    """A tqdm bar on stderr that a progress(done, total) callable drives; unseen when not used."""
+class _Line:
+    """A tqdm bar on stderr; unseen when not used."""
 
-    def __init__(self, label, unit):
+    def __init__(self, label: str, unit: str) -> None:
         # Made at once, so that its rate counts from the beginning, and shown from the first call.
         self.bar = tqdm(desc=label, unit=f" {unit}", file=sys.stderr, delay=math.inf)
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: Any) -> None:
         self.bar.close()
 
-    def __call__(self, done, total):
+    def show(self, done: float, total: float | None) -> None:
+        """So much is done of a total, if that is known."""
         self.bar.delay, self.bar.total = 0, total
         # Set, not added: quarters of cells would leave whole numbers as 2.0.
         self.bar.n = int(done) if done == int(done) else done
         self.bar.update(0)
 
-    def note(self, text):
+    def note(self, text: str) -> None:
         """What stands behind the bar when it is next drawn."""
         self.bar.set_postfix_str(text, refresh=False)
 
 
-class Steps(Bar):
+class Bar(_Line):
+    """A bar that a progress(done, total) callable drives."""
+
+    def __call__(self, done: float, total: float | None) -> None:
+        self.show(done, total)
+
+
+class Steps(_Line):
     """The same for work whose end is not known: progress(step, message)."""
 
-    def __call__(self, step, message):
+    def __call__(self, step: int, message: str) -> None:
         self.note(message)
-        super().__call__(step, None)
+        self.show(step, None)

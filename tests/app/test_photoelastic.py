@@ -47,7 +47,7 @@ def test_exact_measurements_are_taken_as_they_are(state):
     view = dropped(state, new)
     assert view.task.running and view.reverse.visible and not view.pressure.visible
     settled(state, done=lambda: len(view.frame) > 0)
-    player, body = view.frame
+    player, *body = view.frame
     account, _, _, _, _, _, compared, stress, save = body
     assert not player.visible and "σₓₓ" in stress.object and save.files
     for words in ("60 grains", "at walls", "every inner grain is balanced", "not measured"):
@@ -111,7 +111,7 @@ def test_the_picture_shows_measured_inferred_and_differences(state):
     new, _ = files(n=80, missing=0.2, noise=0.2)
     view = dropped(state, new)
     settled(state, done=lambda: len(view.frame) > 0)
-    _, body = view.frame
+    _, *body = view.frame
     choice, pictures = body[1], body[2]
     picture, seen = pictures[0].object, {}
     for shown, words in (
@@ -207,7 +207,7 @@ def test_frames_of_a_series_are_turned(state):
     joined = [(one[0], one[1] + b"\n" + two[1]) for one, two in zip(*both, strict=True)]
     view = dropped(state, joined)
     settled(state, done=lambda: len(view.frame) > 0)
-    player, body = view.frame
+    player, *body = view.frame
     assert player.visible and player.options == [3, 4] and player.value == 4
     assert "frame 4" in body[0].object
     player.value = 3

@@ -46,7 +46,7 @@ def ready(page):
 
 @pytest.mark.parametrize("query", ["", "?contact=3&second=8"])
 def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
-    page = visit(query, 1600, 1000)
+    page = visit(query, 1920, 1000)
     ready(page)
     if not query:  # a chain first; in the plane of a pair it would become one of the two
         pulled(page)
@@ -85,7 +85,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
-@pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1600)])
+@pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
 def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     """Every state that has arrived has its place, on axes of those found before."""
     page = visit(f"?mu=0.44&n=30&states=20000&relax=nearest{query}", width, 1000)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper import claims, findings, tables, tails
 from granforce.paper.claims import figure1, figure2, figure4, groups, verdicts
 

@@ -552,6 +552,8 @@ def test_folder_that_cannot_be_written_can_be_read(nobody):
             with pytest.raises(InputError, match=r"cannot write to the store .*Permission denied"):
                 unwritable.save("walk", {}, walk_dataset(), version=1)
             with pytest.raises(InputError, match="cannot write"):
+                unwritable.refuse_unwritable()
+            with pytest.raises(InputError, match="cannot write"):
                 unwritable.clear()
             with pytest.raises(InputError, match="cannot write"):
                 open_store(path / "below")

@@ -16,12 +16,25 @@ Both are three-dimensional; a layer of disks (spheres) is taken, in the plane in
 lie. What walls and gravity do to grains becomes their load.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from granforce.packing.importers.geometry import check_disks, listed
 from granforce.packing.importers.network import adopt
-from granforce.packing.importers.text import check_grains, make_table, read_text
-from granforce.records import InputError, friction, make_cell, make_packing
+from granforce.packing.importers.text import Source, Table, check_grains, make_table, read_text
+from granforce.records import (
+    Cell,
+    Floats,
+    InputError,
+    Integers,
+    Packing,
+    friction,
+    make_cell,
+    make_packing,
+)
 
 # Centres lie in a plane where they leave it by less than this part of a radius.
 _FLAT = 1e-3
@@ -36,7 +49,14 @@ _DATA = {
 }
 
 
-def read_yade(bodies, interactions, mu, *, box=None, most_grains=None):
+def read_yade(
+    bodies: Source,
+    interactions: Source,
+    mu: Any,
+    *,
+    box: npt.ArrayLike | None = None,
+    most_grains: int | None = None,
+) -> Packing:
     """A Packing from YADE's bodies and interactions (paths or open files).
 
     box: (L_x, L_y) of the plane, inf for an open direction; None: open. Raises InputError naming
@@ -54,7 +74,15 @@ def read_yade(bodies, interactions, mu, *, box=None, most_grains=None):
     return _packing(grains, plane, links, i, j, force, friction(mu), box, most_grains, "yade")
 
 
-def read_mercury(data, fstat, mu, *, step=None, box=None, most_grains=None):
+def read_mercury(
+    data: Source,
+    fstat: Source,
+    mu: Any,
+    *,
+    step: int | None = None,
+    box: npt.ArrayLike | None = None,
+    most_grains: int | None = None,
+) -> Packing:
     """A Packing from MercuryDPM's .data and .fstat (paths or open files).
 
     step: number of the time step in the files, from 0; by default the last. box: as for
@@ -92,7 +120,18 @@ def read_mercury(data, fstat, mu, *, step=None, box=None, most_grains=None):
     )
 
 
-def _packing(grains, plane, links, i, j, force, mu, box, most_grains, source):
+def _packing(
+    grains: Table,
+    plane: str,
+    links: Table,
+    i: Integers,
+    j: Integers,
+    force: Floats,
+    mu: float,
+    box: npt.ArrayLike | None,
+    most_grains: int | None,
+    source: str,
+) -> Packing:
     """The packing of disks and of the forces (N_c, 2) on j."""
     check_grains(len(grains.rows), most_grains, grains.name)
     cell = _cell(box)
@@ -111,16 +150,16 @@ def _packing(grains, plane, links, i, j, force, mu, box, most_grains, source):
     return adopt(make_packing(x, r, cell.box, joined, forces, mu, info=info), forces="given")
 
 
-def _cell(box):
+def _cell(box: npt.ArrayLike | None) -> Cell:
     return make_cell((np.inf, np.inf) if box is None else box, 0.0)
 
 
-def _plane(table, dimensions):
+def _plane(table: Table, dimensions: int) -> str:
     """The two axes of the plane in which centres lie."""
     if dimensions == 2:
         return "xy"
-    spread = {axis: np.ptp(table.numbers(axis)) for axis in "xyz"}
-    thin = min("zyx", key=spread.get)
+    spread = {axis: float(np.ptp(table.numbers(axis))) for axis in "xyz"}
+    thin = min("zyx", key=spread.__getitem__)
     if spread[thin] > _FLAT * table.numbers("r").mean():
         raise InputError(
             f"{table.name}: centres do not lie in a plane (x, y, z reach over "
@@ -129,7 +168,7 @@ def _plane(table, dimensions):
     return "".join(axis for axis in "xyz" if axis != thin)
 
 
-def _split(source):
+def _split(source: Source) -> tuple[str, list[tuple[int, list[str]]], list[str]]:
     """Name, [(line number, fields)], and the comments before the first line of numbers."""
     name, text = read_text(source)
     rows, comments = [], []
@@ -143,7 +182,7 @@ def _split(source):
     return name, rows, comments
 
 
-def _lines_of(source, header):
+def _lines_of(source: Source, header: Sequence[str]) -> Table:
     """A Table of lines with these columns, a first line with names left out."""
     name, rows, _ = _split(source)
     if not rows[0][1][0].lstrip("+-").replace(".", "").isdigit():
@@ -151,7 +190,7 @@ def _lines_of(source, header):
     return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
 
 
-def _yade_bodies(source):
+def _yade_bodies(source: Source) -> Table:
     name, rows, comments = _split(source)
     header = ["x", "y", "z", "r"]
     width = len(rows[0][1])
@@ -164,7 +203,7 @@ def _yade_bodies(source):
     return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
 
 
-def _mercury_particles(source, step):
+def _mercury_particles(source: Source, step: int | None) -> tuple[Table, float]:
     """A Table of the particles of one step, and its time."""
     name, rows, _ = _split(source)
     at, steps = 0, []
@@ -195,7 +234,7 @@ def _mercury_particles(source, step):
     return make_table(name, header, [f for _, f in lines], [k for k, _ in lines]), time
 
 
-def _mercury_contacts(source, time):
+def _mercury_contacts(source: Source, time: float) -> Table:
     """A Table of the contacts at a time, as nearly as files with few digits have it."""
     name, rows, _ = _split(source)
     table = make_table(name, _FSTAT, [fields for _, fields in rows], [k for k, _ in rows])

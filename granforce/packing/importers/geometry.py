@@ -1,10 +1,21 @@
 """Contacts of given disks in a cell, and the checks that contacts and positions of a file agree."""
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from granforce.packing.neighbours import find_pairs, separations
-from granforce.records import Cell, InputError, make_contacts, make_packing, positive
+from granforce.records import (
+    Cell,
+    Contacts,
+    Floats,
+    InputError,
+    Integers,
+    make_contacts,
+    make_packing,
+    positive,
+)
 
 # Contacts may overlap, or gape, by this part of the smaller radius before the file must be wrong.
 OVERLAP_ALLOWED = 0.2
@@ -24,7 +35,7 @@ CLOSE_PAIRS = 20_000_000
 OPEN = Cell(np.full(2, np.inf), 0.0)
 
 
-def touching(x, r, cell, tolerance):
+def touching(x: Floats, r: Floats, cell: Cell, tolerance: float) -> Contacts:
     """Contacts between all grains whose gap is below tolerance (in largest radii, at most 1)."""
     tolerance = positive(tolerance, "tolerance")
     if tolerance > 1:
@@ -34,13 +45,21 @@ def touching(x, r, cell, tolerance):
     return make_contacts(i, j, normal, length, r)
 
 
-def overlapping(x, r, cell):
+def overlapping(x: Floats, r: Floats, cell: Cell) -> tuple[Integers, Integers, Floats]:
     """Grains i, j (P,) of all pairs that overlap, and their gaps (P,) < 0; centres may coincide."""
     i, j, shift = find_pairs(x, r, cell, 0.0)
     return i, j, np.hypot(*(x[j] - x[i] + shift @ cell.vectors).T) - r[i] - r[j]
 
 
-def listed(x, r, cell, i, j, place, branch=None):
+def listed(
+    x: Floats,
+    r: Floats,
+    cell: Cell,
+    i: Integers,
+    j: Integers,
+    place: Callable[[int], str],
+    branch: Floats | None = None,
+) -> Contacts:
     """Contacts between grains i, j (N_c,), their branch vectors (N_c, 2) given or nearest images.
 
     place(c) names contact c in messages. Raises InputError where a given branch does not lead
@@ -52,14 +71,16 @@ def listed(x, r, cell, i, j, place, branch=None):
     else:
         _check_branches(cell.nearest(branch - nearest), r.max(), place)
     length = np.hypot(*branch.T)
-    for c in np.flatnonzero((i == j) | (length == 0)):
+    for c in np.flatnonzero((i == j) | (length == 0)).tolist():
         raise InputError(f"{place(c)}: {_pair(i, j, c)} join one point; correct the grains")
     contacts = make_contacts(i, j, branch / length[:, None], length, r)
     check_contacts(contacts, r, place)
     return contacts
 
 
-def check_contacts(contacts, r, place, allowed=OVERLAP_ALLOWED):
+def check_contacts(
+    contacts: Contacts, r: Floats, place: Callable[[int], str], allowed: float = OVERLAP_ALLOWED
+) -> None:
     """InputError naming a contact whose disks overlap or gape too much, or that is given twice."""
     i, j, gap = contacts.i, contacts.j, contacts.gap
     for c in np.flatnonzero(np.abs(gap) > allowed * np.minimum(r[i], r[j]))[:1]:
@@ -71,7 +92,9 @@ def check_contacts(contacts, r, place, allowed=OVERLAP_ALLOWED):
     _check_repeated(contacts, place)
 
 
-def check_disks(x, r, cell, place, allowed=OVERLAP_ALLOWED):
+def check_disks(
+    x: Floats, r: Floats, cell: Cell, place: Callable[[int], str], allowed: float = OVERLAP_ALLOWED
+) -> None:
     """InputError where radii, positions or cell cannot be a packing; place(g) names grain g."""
     for g in np.flatnonzero(r <= 0)[:1]:
         raise InputError(
@@ -97,14 +120,14 @@ def check_disks(x, r, cell, place, allowed=OVERLAP_ALLOWED):
         )
 
 
-def _check_crowding(x, r, cell):
+def _check_crowding(x: Floats, r: Floats, cell: Cell) -> None:
     # Without pairs across a side, as the tree knows no tilted cell: a crowd shows without them.
     tree = cKDTree(cell.wrapped(x))
     if tree.count_neighbors(tree, 2 * r.max()) > CLOSE_PAIRS:
         raise InputError("too many grains lie within one diameter of each other; check the unit")
 
 
-def _check_branches(misfit, largest, place):
+def _check_branches(misfit: Floats, largest: float, place: Callable[[int], str]) -> None:
     """A given branch may lead to any image: misfit is what is left without vectors of the cell."""
     for c in np.flatnonzero(np.hypot(*misfit.T) > MISFIT * largest)[:1]:
         raise InputError(
@@ -113,13 +136,13 @@ def _check_branches(misfit, largest, place):
         )
 
 
-def _check_repeated(contacts, place):
+def _check_repeated(contacts: Contacts, place: Callable[[int], str]) -> None:
     """Two grains touch twice only through different images, whose normals differ by 60° or more."""
     swapped = contacts.i > contacts.j
     low = np.minimum(contacts.i, contacts.j)
     high = np.maximum(contacts.i, contacts.j)
     normal = np.where(swapped[:, None], -contacts.normal, contacts.normal)
-    seen = {}
+    seen: dict[tuple[int, int], list[int]] = {}
     for c, pair in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
         for other in seen.setdefault(pair, []):
             if normal[c] @ normal[other] > 0.75:
@@ -130,5 +153,5 @@ def _check_repeated(contacts, place):
         seen[pair].append(c)
 
 
-def _pair(i, j, c):
+def _pair(i: Integers, j: Integers, c: int) -> str:
     return f"grains {i[c]} and {j[c]} (counted from 0)"

@@ -3,13 +3,13 @@
 import numpy as np
 
 from granforce.forces.knowledge import Known
-from granforce.packing.importers.text import read_csv
-from granforce.records import InputError
+from granforce.packing.importers.text import Source, Table, read_csv
+from granforce.records import Floats, InputError
 
 _COMPONENTS = "f_n", "f_t"
 
 
-def read_known(source):
+def read_known(source: Source) -> Known:
     """A Known from CSV with a column `contact` (numbers in the packing) and any of these.
 
     f_n, f_t: known exactly; f_n_min, f_n_max, f_t_min, f_t_max: bounds, as `granforce intervals
@@ -41,7 +41,7 @@ def read_known(source):
     return Known(contacts, low, high)
 
 
-def _numbers(table, column):
+def _numbers(table: Table, column: str) -> tuple[list[int], Floats]:
     """Rows with an entry in a column, and their numbers."""
     given = [row for row, text in enumerate(table.fields(column)) if text]
     part = table._replace(

@@ -1,13 +1,30 @@
 """Packings from LAMMPS: ``dump custom`` of the particles, ``dump local`` of the contacts."""
 
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from granforce.packing.importers.geometry import MISFIT, check_disks, listed
 from granforce.packing.importers.network import adopt
-from granforce.packing.importers.text import check_grains, make_table, read_text, some_of
-from granforce.records import InputError, friction, make_cell, make_packing
+from granforce.packing.importers.text import (
+    Source,
+    Table,
+    check_grains,
+    make_table,
+    read_text,
+    some_of,
+)
+from granforce.records import (
+    Cell,
+    Contacts,
+    Floats,
+    InputError,
+    Packing,
+    friction,
+    make_cell,
+    make_packing,
+)
 
 # Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
 CONTACT_COLUMNS = ("atom1", "atom2", "distance", "fx", "fy", "px", "py")
@@ -21,11 +38,18 @@ _TITLES = ("TIMESTEP", "NUMBER OF", "BOX BOUNDS", "ATOMS", "ENTRIES", "UNITS", "
 
 class _Item(NamedTuple):
     line: int  # line number of its title
-    words: list  # what follows the title on its line
-    body: list  # the lines below, as lists of words
+    words: list[str]  # what follows the title on its line
+    body: list[list[str]]  # the lines below, as lists of words
 
 
-def read_lammps(particles, contacts, mu, *, columns=None, most_grains=None):
+def read_lammps(
+    particles: Source,
+    contacts: Source,
+    mu: Any,
+    *,
+    columns: Sequence[str] | None = None,
+    most_grains: int | None = None,
+) -> Packing:
     """A Packing from a particle dump and a contact dump (paths or open files), in LAMMPS' units.
 
     particles: ``dump custom`` with id, x y (or xu yu) and radius (or diameter), in any order.
@@ -59,10 +83,12 @@ def read_lammps(particles, contacts, mu, *, columns=None, most_grains=None):
     return adopt(packing, timestep=step, contacts_skipped=skipped)
 
 
-def _snapshots(source):
+def _snapshots(source: Source) -> tuple[str, dict[int, dict[str, _Item]]]:
     """Name of the file and its snapshots: {timestep: {title: _Item}}, in the file's order."""
     name, text = read_text(source)
-    snapshots, items, item = {}, {}, None
+    snapshots: dict[int, dict[str, _Item]] = {}
+    items: dict[str, _Item] = {}
+    item = None
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split()
         if line.startswith("ITEM:"):
@@ -81,26 +107,26 @@ def _snapshots(source):
     return name, snapshots
 
 
-def _title(heading):
+def _title(heading: str) -> tuple[str, list[str]]:
     for title in _TITLES:
         if heading == title or heading.startswith(title + " "):
             return title, heading[len(title) :].split()
     return heading, []
 
 
-def _whole(word, name, line):
+def _whole(word: str, name: str, line: int) -> int:
     if not word.isdecimal() or len(word) > 18:
         raise InputError(f"{name}, line {line}: {word[:40]!r} is not a whole number")
     return int(word)
 
 
-def _item(name, items, title):
+def _item(name: str, items: dict[str, _Item], title: str) -> _Item:
     if title not in items:
         raise InputError(f"{name}: no 'ITEM: {title}' in the timestep; is the right file given?")
     return items[title]
 
 
-def _table(name, items, title):
+def _table(name: str, items: dict[str, _Item], title: str) -> Table:
     item, number = _item(name, items, title), _item(name, items, "NUMBER OF")
     count = _whole(number.body[0][0] if number.body else "", name, number.line + 1)
     if count != len(item.body):
@@ -114,7 +140,7 @@ def _table(name, items, title):
     return make_table(name, item.words, item.body, lines)
 
 
-def _cell(name, items):
+def _cell(name: str, items: dict[str, _Item]) -> tuple[Floats, Cell]:
     """Origin (2,) and Cell of the box, open along directions that are not periodic.
 
     Bounds of a tilted box (title ``xy xz yz``, tilts in a third column) are those of the rectangle
@@ -151,7 +177,7 @@ def _cell(name, items):
         raise InputError(f"{place}: {error}") from None
 
 
-def _disks(table, low, cell):
+def _disks(table: Table, low: Floats, cell: Cell) -> tuple[Floats, Floats, dict[int | str, int]]:
     ids = table.numbers("id")
     order = np.argsort(ids, kind="stable")
     rank = np.argsort(order)
@@ -167,7 +193,14 @@ def _disks(table, low, cell):
     return x, r, index
 
 
-def _contacts(table, columns, x, r, cell, index):
+def _contacts(
+    table: Table,
+    columns: Sequence[str] | None,
+    x: Floats,
+    r: Floats,
+    cell: Cell,
+    index: Mapping[Any, int],
+) -> tuple[Contacts, Floats, int]:
     """Contacts that carry force, their forces (N_c, 2), and how many pairs carry none."""
     names = _force_columns(table, columns)
     i, j = (table.lookup(names[k], index) for k in ("atom1", "atom2"))
@@ -180,7 +213,7 @@ def _contacts(table, columns, x, r, cell, index):
     if not len(active):
         raise InputError(f"{table.name}: no contact carries force; is the packing compressed?")
 
-    def place(c):
+    def place(c: int) -> str:
         return table.place(active[c])
 
     joined = listed(x, r, cell, i[active], j[active], place)
@@ -190,7 +223,7 @@ def _contacts(table, columns, x, r, cell, index):
     return joined, forces, len(i) - len(active)
 
 
-def _force_columns(table, columns):
+def _force_columns(table: Table, columns: Sequence[str] | None) -> dict[str, str]:
     if columns is None:
         columns = CONTACT_COLUMNS if set(CONTACT_COLUMNS) <= set(table.header) else table.header
     if len(columns) != len(CONTACT_COLUMNS):
@@ -202,7 +235,9 @@ def _force_columns(table, columns):
     return dict(zip(CONTACT_COLUMNS, columns, strict=True))
 
 
-def _check_distances(length, distance, largest, place):
+def _check_distances(
+    length: Floats, distance: Floats, largest: float, place: Callable[[int], str]
+) -> None:
     for c in np.flatnonzero(np.abs(length - distance) > MISFIT * largest)[:1]:
         raise InputError(
             f"{place(c)}: centre distance {distance[c]:.6g}, but {length[c]:.6g} by the positions; "
@@ -210,7 +245,9 @@ def _check_distances(length, distance, largest, place):
         )
 
 
-def _components(n, normal_force, tangential_force, place):
+def _components(
+    n: Floats, normal_force: Floats, tangential_force: Floats, place: Callable[[int], str]
+) -> Floats:
     t = np.column_stack([-n[:, 1], n[:, 0]])
     total = normal_force + tangential_force
     skew = np.abs(np.sum(normal_force * t, axis=1))

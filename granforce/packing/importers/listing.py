@@ -12,13 +12,16 @@ The formats of PeGS are those of its README (github.com/photoelasticity), module
 adjacencyMatrix. Angles and signs are in the axes of the files: **t** is **n** turned from x to y.
 """
 
+from __future__ import annotations
+
 import re
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, SupportsIndex
 
 import numpy as np
 
-from granforce.packing.importers.text import LARGEST, read_text
-from granforce.records import InputError
+from granforce.packing.importers.text import LARGEST, Source, read_text
+from granforce.records import Floats, InputError, Integers, Mask
 
 _GRAINS = ("frame", "id", "x", "y", "radius", "flag")
 _CONTACTS = ("frame", "id1", "id2", "tangential", "normal")
@@ -41,50 +44,59 @@ _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 class Listing(NamedTuple):
     """Grains and contacts of one frame as listed; NaN where a field was no finite number."""
 
-    ids: np.ndarray  # (N,) names of the grains
-    x: np.ndarray  # (N, 2) centres
-    r: np.ndarray  # (N,) radii
-    flag: np.ndarray  # (N,) not 0 for grains at a wall
-    ends: np.ndarray  # (k, 2) names of the two grains of each line; below 0: a wall
-    forces: np.ndarray  # (k, 2) f_n, f_t
-    beta: np.ndarray  # (k,) angle from the first grain to the contact, rad; NaN: not listed
-    weight: np.ndarray  # (k,) 1/σ² of the line's forces relative to a usual line
-    names: tuple  # of the two files
-    lines: tuple  # (N,), (k,): where they stand in them
+    ids: Floats  # (N,) names of the grains
+    x: Floats  # (N, 2) centres
+    r: Floats  # (N,) radii
+    flag: Floats  # (N,) not 0 for grains at a wall
+    ends: Floats  # (k, 2) names of the two grains of each line; below 0: a wall
+    forces: Floats  # (k, 2) f_n, f_t
+    beta: Floats  # (k,) angle from the first grain to the contact, rad; NaN: not listed
+    weight: Floats  # (k,) 1/σ² of the line's forces relative to a usual line
+    names: tuple[str, str]  # of the two files
+    lines: tuple[Integers, Integers]  # (N,), (k,): where they stand in them
     both_ways: bool  # two lines of one contact are two independent measurements
     frame: float
     said: str  # which columns were recognised
 
-    def place(self, kind, row):
+    def place(self, kind: int, row: SupportsIndex) -> str:
         """'file, line n' of a grain (kind 0) or a contact (1)."""
         return f"{self.names[kind]}, line {int(self.lines[kind][row])}"
 
-    def with_grains(self, rows):
+    def with_grains(self, rows: Integers | Mask) -> Listing:
         """The listing with some of its grains, in this order."""
         kept = {name: getattr(self, name)[rows] for name in ("ids", "x", "r", "flag")}
         return self._replace(**kept, lines=(self.lines[0][rows], self.lines[1]))
 
-    def with_contacts(self, rows):
+    def with_contacts(self, rows: Integers | Mask) -> Listing:
         """The listing with some of its contacts, in this order."""
         kept = {name: getattr(self, name)[rows] for name in ("ends", "forces", "beta", "weight")}
         return self._replace(**kept, lines=(self.lines[0], self.lines[1][rows]))
+
+
+class Frames(Protocol):
+    """What frames are read from: their numbers, and the Listing of one, by default the last."""
+
+    @property
+    def frames(self) -> Floats: ...
+
+    def listing(self, frame: float | None = None) -> Listing: ...
 
 
 class Columns(NamedTuple):
     """A text file as numbers under the names that were recognised."""
 
     name: str  # of the file
-    values: dict  # {column: (rows,)}
-    lines: np.ndarray  # (rows,) line numbers
+    values: dict[str, Floats]  # {column: (rows,)}
+    lines: Integers  # (rows,) line numbers
     said: str
 
     @property
-    def frames(self):
+    def frames(self) -> Floats:
         """Numbers of the frames, ascending; empty where there is no such column."""
         found = self.values.get("frame", np.zeros(0))
         return np.unique(found[np.isfinite(found)])
 
-    def of(self, frame):
+    def of(self, frame: float) -> Columns:
         """The rows of one frame, or all where frames are not told apart."""
         if "frame" not in self.values:
             return self
@@ -100,7 +112,7 @@ class TextFrames(NamedTuple):
     contacts: Columns
 
     @property
-    def frames(self):
+    def frames(self) -> Floats:
         """Numbers of the frames that both files have, ascending, at least one."""
         one, two = self.grains.frames, self.contacts.frames
         if len(one) and len(two):
@@ -118,7 +130,7 @@ class TextFrames(NamedTuple):
             )
         return one if len(one) else two if len(two) else np.ones(1)
 
-    def listing(self, frame=None):
+    def listing(self, frame: float | None = None) -> Listing:
         """The Listing of a frame, by default the last."""
         there = self.frames
         if frame is None:
@@ -148,17 +160,17 @@ class TextFrames(NamedTuple):
         )
 
 
-def read_frames(positions, adjacency):
+def read_frames(positions: Source, adjacency: Source) -> TextFrames:
     """The TextFrames in two files, paths or open files; InputError for what is no such file."""
     return TextFrames(_columns(positions, _GRAINS), _columns(adjacency, _CONTACTS))
 
 
-def plain(number):
+def plain(number: float) -> int | float:
     """A number as people write it: whole where it is whole."""
     return int(number) if float(number).is_integer() else float(number)
 
 
-def _columns(source, wanted):
+def _columns(source: Source, wanted: Sequence[str]) -> Columns:
     """The Columns of a text file of grains or contacts."""
     name, text = read_text(source)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
@@ -177,13 +189,13 @@ def _columns(source, wanted):
         # A line of another length is no line of this table: nothing in it is taken.
         if len(fields) == width:
             row[:] = [_number(field) for field in fields]
-    named = _named(header, wanted, width) or _by_content(name, numbers, wanted)
+    named = (header and _named(header, wanted, width)) or _by_content(name, numbers, wanted)
     values = {column: numbers[:, k] for k, column in enumerate(named) if column}
     told = f"{name}: {', '.join(filter(None, named))}, separated by {_SEPARATORS[separator]}"
     return Columns(name, values, np.array([k for k, _ in rows]), told)
 
 
-def _number(text):
+def _number(text: str) -> float:
     """The finite number that is written, or NaN."""
     try:
         value = float(text)
@@ -192,7 +204,7 @@ def _number(text):
     return value if abs(value) <= LARGEST else np.nan
 
 
-def _named(header, wanted, width):
+def _named(header: Sequence[str], wanted: Sequence[str], width: int) -> list[str] | None:
     """Names of the columns by a header line, "" for others; None where it does not tell."""
     if header is None or len(header) != width:
         return None
@@ -203,7 +215,7 @@ def _named(header, wanted, width):
     return named if needed <= set(told) and len(told) == len(set(told)) else None
 
 
-def _by_content(name, numbers, wanted):
+def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[str]:
     """Names of the columns by their number and what is in them."""
     width = numbers.shape[1]
     found = _as_contacts(numbers) if "id1" in wanted else _as_grains(numbers)
@@ -216,7 +228,7 @@ def _by_content(name, numbers, wanted):
     return found
 
 
-def _as_contacts(numbers):
+def _as_contacts(numbers: Floats) -> Sequence[str] | None:
     columns = {4: _CONTACTS[1:], 5: _CONTACTS}.get(numbers.shape[1])
     if columns is None:
         return None
@@ -224,7 +236,7 @@ def _as_contacts(numbers):
     return columns if all(whole) else None
 
 
-def _as_grains(numbers):
+def _as_grains(numbers: Floats) -> Sequence[str] | None:
     width = numbers.shape[1]
     if width < 3:
         return None
@@ -245,12 +257,12 @@ def _as_grains(numbers):
     return _GRAINS[2:5]
 
 
-def _whole(column):
+def _whole(column: Floats) -> bool:
     """Whether nearly all are whole numbers: what is not may be a damaged line."""
     seen = column[np.isfinite(column)]
-    return len(seen) > 0 and np.mean(seen == np.round(seen)) > 0.9
+    return len(seen) > 0 and bool(np.mean(seen == np.round(seen)) > 0.9)
 
 
-def _flags(column):
+def _flags(column: Floats) -> bool:
     seen = column[np.isfinite(column)]
-    return len(seen) > 0 and np.mean(np.isin(seen, (-1, 0, 1))) > 0.9
+    return len(seen) > 0 and bool(np.mean(np.isin(seen, (-1, 0, 1))) > 0.9)

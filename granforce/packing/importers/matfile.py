@@ -9,9 +9,11 @@ ends the whole process on some damaged files, and unpacks the images beside what
 
 import struct
 import zlib
-from typing import NamedTuple
+from collections.abc import Collection
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 _MATRIX, _PACKED = 14, 15
 _STRUCT, _NUMBERS = 2, range(6, 16)
@@ -31,10 +33,10 @@ class _Element(NamedTuple):
 class _Reader:
     """Elements of some bytes; ValueError where they are not as the format has them."""
 
-    def __init__(self, data, order):
+    def __init__(self, data: bytes, order: str) -> None:
         self.data, self.order = data, order
 
-    def element(self, at, end):
+    def element(self, at: int, end: int) -> _Element:
         """The _Element whose tag is at a place, before `end`."""
         if at + 8 > end:
             raise ValueError("cut off")
@@ -50,16 +52,16 @@ class _Reader:
             raise ValueError("cut off")
         return _Element(kind, start, size, min(after, end))
 
-    def values(self, element):
+    def values(self, element: _Element) -> npt.NDArray[Any]:
         """An element's plain numbers."""
         code = np.dtype(self.order + _TYPES[element.kind])
         return np.frombuffer(self.data, code, element.size // code.itemsize, element.start)
 
-    def text(self, element):
+    def text(self, element: _Element) -> str:
         """An element's characters."""
         return bytes(self.data[element.start : element.start + element.size]).decode("latin-1")
 
-    def head(self, matrix):
+    def head(self, matrix: _Element) -> tuple[int, npt.NDArray[Any], str, int]:
         """Class, dimensions and name of a variable, and where what it holds begins."""
         end = matrix.start + matrix.size
         flags = self.element(matrix.start, end)
@@ -68,7 +70,7 @@ class _Reader:
         word = int(self.values(flags)[0])
         return word & 0xFF, self.values(shape), self.text(name), name.end
 
-    def numbers(self, matrix):
+    def numbers(self, matrix: _Element) -> npt.NDArray[Any]:
         """The real part of a numeric variable, flat; an empty array for what is not one."""
         if not matrix.size:
             return np.zeros(0)
@@ -80,7 +82,7 @@ class _Reader:
             raise ValueError("dimensions")
         return found
 
-    def parts(self, matrix, wanted):
+    def parts(self, matrix: _Element, wanted: Collection[str]) -> list[dict[str, npt.NDArray[Any]]]:
         """Parts of a struct array: a list of {field: flat numbers} of the wanted fields."""
         kind, shape, _, at = self.head(matrix)
         end = matrix.start + matrix.size
@@ -108,7 +110,9 @@ class _Reader:
         return found
 
 
-def read_struct(content, name, wanted, most):
+def read_struct(
+    content: bytes, name: str, wanted: Collection[str], most: int
+) -> list[dict[str, npt.NDArray[Any]]]:
     """Parts of the struct array `name` in a file's bytes: a list of {field: flat numbers}.
 
     An empty list where there is none. most: bytes that may be unpacked. Raises ValueError,

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.packing.importers.text import LARGEST, read_csv
-from granforce.records import InputError
+from granforce.packing.importers.text import LARGEST, Source, read_csv
+from granforce.records import Floats, InputError, Integers
 
 COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
 
@@ -14,11 +14,11 @@ COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
 class Measurement(NamedTuple):
     """Forces measured on k contacts; NaN where a component was not."""
 
-    contacts: np.ndarray  # (k,) their numbers in the packing
-    forces: np.ndarray  # (k, 2) f_n, f_t, force
-    sigma: np.ndarray  # (k, 2) their standard errors
+    contacts: Integers  # (k,) their numbers in the packing
+    forces: Floats  # (k, 2) f_n, f_t, force
+    sigma: Floats  # (k, 2) their standard errors
 
-    def on(self, count):
+    def on(self, count: int) -> tuple[Floats, Floats]:
         """Forces and σ (count, 2) of all contacts of a packing; InputError for others."""
         if self.contacts.max(initial=0) >= count:
             raise InputError(
@@ -30,7 +30,7 @@ class Measurement(NamedTuple):
         return forces, sigma
 
 
-def read_measurement(source):
+def read_measurement(source: Source) -> Measurement:
     """The Measurement in a CSV file (a path or an open file).
 
     Columns: contact (its number in the packing), f_n, f_t, sigma_n, sigma_t; empty or nan where a
@@ -53,7 +53,7 @@ def read_measurement(source):
     return Measurement(contacts, forces, sigma)
 
 
-def _value(text, name, place):
+def _value(text: str, name: str, place: str) -> float:
     """One number, NaN where nothing was measured."""
     try:
         value = float(text or "nan")

@@ -1,13 +1,15 @@
 """The force network of an imported packing: taken as given or found, judged, and reported."""
 
+from typing import Any
+
 import numpy as np
 
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
 from granforce.packing.closing import margin
 from granforce.packing.importers.geometry import overlapping
-from granforce.records import InputError, NotJammedError, UndecidedError
+from granforce.records import Floats, InputError, Integers, NotJammedError, Packing, UndecidedError
 from granforce.tolerances import CARRYING, RIGID_OVERLAP
 
 # The loads of an open set may miss balance by this part of ⟨f_n⟩ (digits lost in the file); the
@@ -15,7 +17,7 @@ from granforce.tolerances import CARRYING, RIGID_OVERLAP
 LOAD_MISFIT = 1e-3
 
 
-def adopt(packing, **info):
+def adopt(packing: Packing, **info: Any) -> Packing:
     """The packing with the pressure (or, in an open box, the boundary loads) its forces carry.
 
     P = Σ f_n ℓ / (2V); a grain's load is what its contact forces leave over, unless loads were
@@ -35,7 +37,7 @@ def adopt(packing, **info):
     return packing._replace(info={**packing.info, **info, **judged(packing)})
 
 
-def alone(packing, count, forces, **info):
+def alone(packing: Packing, count: int, forces: Floats, **info: Any) -> Packing:
     """The first `count` bodies under what all others, and what was left open, do to them.
 
     forces (N_c, 2): a network of all contacts in which those bodies are to stay as they are. It
@@ -63,7 +65,7 @@ def alone(packing, count, forces, **info):
     )
 
 
-def find(packing, **info):
+def find(packing: Packing, **info: Any) -> Packing:
     """The packing with the admissible force network nearest to equal normal forces.
 
     Needs a pressure, or loads in an open box; loads that miss balance by rounding are corrected
@@ -87,7 +89,7 @@ def find(packing, **info):
     return packing._replace(info={**packing.info, **info, **judged(packing)})
 
 
-def report(packing, ens=None):
+def report(packing: Packing, ens: Ensemble | None = None) -> dict[str, Any]:
     """What a packing is, as a dict of plain numbers (None where a quantity is not defined).
 
     ens: the packing's ensemble if known. Lengths in largest radii, residual and violation of the
@@ -119,7 +121,7 @@ def report(packing, ens=None):
     }
 
 
-def judged(packing):
+def judged(packing: Packing) -> dict[str, Any]:
     """Residual and violation of the packing's own forces, and the grains they leave without load.
 
     Without pruning, so that it can be said of any network, also where S is empty.
@@ -132,24 +134,27 @@ def judged(packing):
     }
 
 
-def _held(whole):
+def _held(whole: Ensemble) -> Integers:
     """Grains on which the packing's own network presses by more than its noise."""
     pressing = whole.original[:, 0] > CARRYING * whole.force_scale
     return np.union1d(whole.contacts.i[pressing], whole.contacts.j[pressing])
 
 
-def _margin(packing):
+def _margin(packing: Packing) -> dict[str, float | None]:
     soft = packing.contacts.gap.min(initial=0.0) < -RIGID_OVERLAP * packing.r.max()
-    apart = (None, None) if soft else margin(packing)
-    return dict(zip(("largest_contact_gap", "least_other_gap"), apart, strict=True))
+    apart = None if soft else margin(packing)
+    return {
+        "largest_contact_gap": apart and apart.contact,
+        "least_other_gap": apart and apart.other,
+    }
 
 
-def _largest_overlap(packing):
+def _largest_overlap(packing: Packing) -> float:
     gap = overlapping(packing.x, packing.r, packing.cell)[2]
     return float(-gap.min(initial=0.0) / packing.r.max())
 
 
-def _left_over(packing):
+def _left_over(packing: Packing) -> Floats:
     """Loads (N, 3) that balance every grain under the packing's own contact forces.
 
     All that carry force, not only those with a large rest: then the network lies in S to rounding,
@@ -165,7 +170,7 @@ def _left_over(packing):
     return load
 
 
-def _under_loads(packing):
+def _under_loads(packing: Packing) -> tuple[Packing, Ensemble]:
     """The packing of an open set, its loads in balance to rounding, and its ensemble.
 
     Lever arms meet midway: with a_i + a_j = ℓ the balance of all grains implies that of the loads,
@@ -177,11 +182,13 @@ def _under_loads(packing):
             "(columns fn, ft of the contacts); a periodic one its box"
         )
     contacts, r = packing.contacts, packing.r
-    arms = {"arm_i": r[contacts.i] + contacts.gap / 2, "arm_j": r[contacts.j] + contacts.gap / 2}
+    contacts = contacts._replace(
+        arm_i=r[contacts.i] + contacts.gap / 2, arm_j=r[contacts.j] + contacts.gap / 2
+    )
     force = np.abs(packing.load / [1.0, 1.0, r.max()]).max(axis=1)
     forces = np.zeros_like(packing.forces)
     forces[:, 0] = force[force > 0].mean()  # the scale that tolerances are relative to
-    packing = packing._replace(contacts=contacts._replace(**arms), forces=forces)
+    packing = packing._replace(contacts=contacts, forces=forces)
     settled = _settled(packing)
     try:
         return packing, ensemble(packing)
@@ -189,7 +196,7 @@ def _under_loads(packing):
         return settled, ensemble(settled)
 
 
-def _settled(packing):
+def _settled(packing: Packing) -> Packing:
     """The packing with the loads nearest to its own that contact forces can balance.
 
     info["load_change"] is the largest change, in ⟨f_n⟩.

@@ -2,12 +2,23 @@
 
 import json
 from contextlib import nullcontext
+from pathlib import Path
+from typing import IO, Any, cast
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce.packing.importers.geometry import OVERLAP_ALLOWED, check_contacts
-from granforce.packing.importers.text import check_grains
-from granforce.records import InputError, float_array, make_contacts, make_packing
+from granforce.packing.importers.text import Source, check_grains
+from granforce.records import (
+    Contacts,
+    Floats,
+    InputError,
+    Packing,
+    float_array,
+    make_contacts,
+    make_packing,
+)
 from granforce.system.files import written
 
 _GRAINS = ("x", "r", "P", "mu")
@@ -18,7 +29,9 @@ _CONTACTS = ("i", "j", "nx", "ny", "branch", "fn", "ft")
 _UNPACKED = 10**9
 
 
-def load_packing(source, *, unpacked=_UNPACKED, most_grains=None):
+def load_packing(
+    source: Source, *, unpacked: int = _UNPACKED, most_grains: int | None = None
+) -> Packing:
     """The Packing in an NPZ file (a path or an open binary file), its contacts as they are.
 
     Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if none), mu, i, j, nx, ny, branch, fn, ft;
@@ -37,7 +50,7 @@ def load_packing(source, *, unpacked=_UNPACKED, most_grains=None):
         raise InputError(f"{name}: {error}") from None
 
 
-def save_packing(packing, target):
+def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
     """Write a packing as NPZ to be read by load_packing, exactly, to a path or an open binary file.
 
     A path gets the whole file or none, see `granforce.system.files.written`.
@@ -77,20 +90,22 @@ def save_packing(packing, target):
             np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
-def _seed(info):
+def _seed(info: dict[str, Any]) -> dict[str, Any]:
     """The seed as an array of its own, for other readers; one that int64 cannot hold is in info."""
     seed = np.array(info.get("seed"))
     return {"seed": seed} if seed.dtype.kind in "iu" else {}
 
 
-def _arrays(source, name, unpacked, most_grains):
+def _arrays(
+    source: Source, name: str, unpacked: int, most_grains: int | None
+) -> dict[str, npt.NDArray[Any]]:
     """The archive's arrays but those that loading ignores, {name: array}."""
     ignored = {"lo", "hi", "fcrit", "gap"}
     try:
         # Opened here: of an archive that it cannot read, numpy would leave the file open.
         with (
             nullcontext(source) if hasattr(source, "read") else open(source, "rb") as file,
-            np.load(file, allow_pickle=False) as archive,
+            np.load(cast("IO[bytes]", file), allow_pickle=False) as archive,
         ):
             if sum(member.file_size for member in archive.zip.infolist()) > unpacked:
                 raise InputError(
@@ -108,7 +123,7 @@ def _arrays(source, name, unpacked, most_grains):
         raise InputError(f"{name}: not an NPZ archive of plain arrays, or damaged") from None
 
 
-def _packing(arrays):
+def _packing(arrays: dict[str, npt.NDArray[Any]]) -> Packing:
     for key, array in arrays.items():
         kind = "iu" if key in ("i", "j") else "U" if key == "info" else "iuf"
         if array.dtype.kind not in kind:
@@ -135,7 +150,7 @@ def _packing(arrays):
     )
 
 
-def _contacts(arrays, r, info):
+def _contacts(arrays: dict[str, npt.NDArray[Any]], r: Floats, info: dict[str, Any]) -> Contacts:
     i, j = arrays["i"], arrays["j"]
     normal = [float_array(arrays[key], i.shape[:1], key) for key in ("nx", "ny")]
     normal = np.column_stack(normal)
@@ -154,22 +169,24 @@ def _contacts(arrays, r, info):
         if np.any(far & (arms[key] != 0)):
             raise InputError(f"lever arms {key} do not fit the radii; remove them")
     # A file written by save_packing: its normals have been divided by their length before.
-    return contacts._replace(**arms | ({"normal": normal} if exact else {}))
+    if exact:
+        contacts = contacts._replace(normal=normal)
+    return contacts._replace(arm_i=arms["arm_i"], arm_j=arms["arm_j"])
 
 
-def _gap_allowed(info):
+def _gap_allowed(info: dict[str, Any]) -> float:
     """Where radii were measured only roughly, the importer noted how far contacts gape."""
     noted = info.get("largest_gap")
     return max(OVERLAP_ALLOWED, noted) if isinstance(noted, float) else OVERLAP_ALLOWED
 
 
-def _scalar(arrays, key):
+def _scalar(arrays: dict[str, npt.NDArray[Any]], key: str) -> float:
     if arrays[key].shape != ():
         raise InputError(f"array {key} must be one number, got shape {arrays[key].shape}")
     return float(arrays[key])
 
 
-def _info(arrays):
+def _info(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
     if "info" not in arrays:
         return {"seed": int(_scalar(arrays, "seed"))} if "seed" in arrays else {}
     try:

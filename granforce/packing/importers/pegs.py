@@ -7,7 +7,8 @@ that still cannot be balanced, and their balance is left open. So is that of gra
 the directions of their contacts with the walls are known (`walls`).
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy import sparse
@@ -15,18 +16,20 @@ from scipy.spatial import cKDTree
 
 from granforce import notebook
 from granforce.forces.ensemble import ensemble
-from granforce.forces.likeliest import likeliest
+from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
 from granforce.packing.importers import solved
 from granforce.packing.importers.geometry import OPEN, check_disks
-from granforce.packing.importers.listing import plain, read_frames
+from granforce.packing.importers.listing import Frames, Listing, plain, read_frames
 from granforce.packing.importers.network import judged
-from granforce.packing.importers.repair import KINDS, OVERLAP, repaired, rows_of
-from granforce.packing.importers.text import check_grains
-from granforce.packing.importers.walls import bodies, read_outline, wall_contacts
+from granforce.packing.importers.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
+from granforce.packing.importers.text import Source, check_grains
+from granforce.packing.importers.walls import Bodies, bodies, read_outline, wall_contacts
 from granforce.records import (
-    Contacts,
+    Floats,
     InputError,
+    Integers,
+    Mask,
     Packing,
     UndecidedError,
     friction,
@@ -51,50 +54,50 @@ class Photoelastic(NamedTuple):
     """A packing with measured forces; contacts: those listed, candidates, those of walls."""
 
     packing: Packing  # its own network is the likeliest one; loads are NaN where balance is open
-    measured: np.ndarray  # (N_c, 2) f_n, f_t as listed, force; NaN for candidates
-    sigma: np.ndarray  # (N_c, 2) their standard errors
-    added: np.ndarray  # (N_c,) mask of contacts that were not listed
-    left_open: np.ndarray  # (k,) grains that no admissible forces balance, walls apart
-    at_wall: np.ndarray  # (N,) mask of grains at walls, and of the walls themselves
-    ids: np.ndarray  # (N,) their names in the files; −1, −2, … for the walls
-    walls: tuple  # names of the walls, which are the last bodies of the packing
-    findings: list  # of repair.Finding: what was mended, and where
-    report: dict  # plain numbers and words: the account of what was found and what was done
+    measured: Floats  # (N_c, 2) f_n, f_t as listed, force; NaN for candidates
+    sigma: Floats  # (N_c, 2) their standard errors
+    added: Mask  # (N_c,) mask of contacts that were not listed
+    left_open: Integers  # (k,) grains that no admissible forces balance, walls apart
+    at_wall: Mask  # (N,) mask of grains at walls, and of the walls themselves
+    ids: Floats  # (N,) their names in the files; −1, −2, … for the walls
+    walls: tuple[str, ...]  # names of the walls, which are the last bodies of the packing
+    findings: list[Finding]  # of repair.Finding: what was mended, and where
+    report: dict[str, Any]  # what was found and what was done, in plain numbers and words
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """The import as notebooks show it."""
         lines = {name.replace("_", " "): value for name, value in self.report.items()}
         return notebook.table("Photoelastic frame", lines)
 
 
-def open_frames(positions, adjacency=None):
+def open_frames(positions: Source | Frames, adjacency: Source | None = None) -> Frames:
     """Frames to read: `frames` (their numbers) and `listing(frame)`.
 
     From two text files, or, without adjacency, from a *_solved.mat of PeGS 2; a frame that is one
     already (`synthetic_frame`) is taken as it is.
     """
     if hasattr(positions, "listing"):
-        return positions
+        return cast("Frames", positions)
     if adjacency is None:
         return solved.read_solved(positions)
     return read_frames(positions, adjacency)
 
 
 def read_pegs(
-    positions,
-    adjacency=None,
+    positions: Source | Frames,
+    adjacency: Source | None = None,
     *,
-    mu,
-    frame=None,
-    reach=0.5,
-    scale=1.0,
-    error=None,
-    reverse=False,
-    repair=True,
-    walls=None,
-    wall_forces=None,
-    most_grains=None,
-):
+    mu: float,
+    frame: float | None = None,
+    reach: float = 0.5,
+    scale: float = 1.0,
+    error: float | None = None,
+    reverse: bool = False,
+    repair: bool = True,
+    walls: str | None = None,
+    wall_forces: Mapping[str, Sequence[float]] | None = None,
+    most_grains: int | None = None,
+) -> Photoelastic:
     """A Photoelastic of one frame, from files or open files of positions and contacts.
 
     Without adjacency, positions is a *_solved.mat of PeGS 2. frame: its number, by default the last
@@ -131,19 +134,19 @@ def read_pegs(
 
 
 def take_frame(
-    frames,
-    frame=None,
+    frames: Frames,
+    frame: float | None = None,
     *,
-    mu,
-    reach=0.5,
-    scale=1.0,
-    error=None,
-    reverse=False,
-    repair=True,
-    walls=None,
-    wall_forces=None,
-    most_grains=None,
-):
+    mu: float,
+    reach: float = 0.5,
+    scale: float = 1.0,
+    error: float | None = None,
+    reverse: bool = False,
+    repair: bool = True,
+    walls: str | None = None,
+    wall_forces: Mapping[str, Sequence[float]] | None = None,
+    most_grains: int | None = None,
+) -> Photoelastic:
     """The Photoelastic of one frame of `open_frames`; everything else as for `read_pegs`."""
     mu, scale = friction(mu), positive(scale, "scale")
     if not 0 <= reach <= 2:
@@ -228,12 +231,20 @@ def take_frame(
     packing = packing._replace(info=info | judged(packing))
     open_or_wall = np.concatenate([at_wall, np.ones(len(names), dtype=bool)])
     return Photoelastic(
-        *(packing, measured, sigma, added, left_open, open_or_wall, ids, names),
-        *(account.findings, report),
+        packing=packing,
+        measured=measured,
+        sigma=sigma,
+        added=added,
+        left_open=left_open,
+        at_wall=open_or_wall,
+        ids=ids,
+        walls=names,
+        findings=account.findings,
+        report=report,
     )
 
 
-def _told(account):
+def _told(account: Account) -> list[str]:
     """What was found of each kind, in lines of words, the first ones of many."""
     lines = []
     for kind, (words, *_) in KINDS.items():
@@ -248,15 +259,15 @@ def _told(account):
 class _Listed(NamedTuple):
     """Contacts between two grains, each once."""
 
-    pairs: np.ndarray  # (k, 2) grains, the first before the second
-    forces: np.ndarray  # (k, 2) mean of what is listed; NaN where that was no measurement
-    spread: np.ndarray  # (k, 2) half of the largest difference
-    factor: np.ndarray  # (k,) variance of the mean, in that of a usual line
+    pairs: Integers  # (k, 2) grains, the first before the second
+    forces: Floats  # (k, 2) mean of what is listed; NaN where that was no measurement
+    spread: Floats  # (k, 2) half of the largest difference
+    factor: Floats  # (k,) variance of the mean, in that of a usual line
     twice: int
     unequal: int  # listed twice, with different forces
 
 
-def _listed(listing, rows):
+def _listed(listing: Listing, rows: Integers) -> _Listed:
     """The _Listed of a listing that was repaired; rows (k, 2) of its ends."""
     inner = np.all(rows >= 0, axis=1)
     # f_t is that of n and t turned together: it keeps its sign when i and j change places.
@@ -281,7 +292,7 @@ def _listed(listing, rows):
     return _Listed(pairs, mean, spread, factor, int(np.sum(times > 1)), unequal)
 
 
-def _gain_by_reversing(x, listed, at_wall):
+def _gain_by_reversing(x: Floats, listed: _Listed, at_wall: Mask) -> float:
     """By what part the unbalance of inner grains falls if all f_t change sign; below 0: it grows.
 
     Programs that fit forces differ in the sign of f_t.
@@ -301,7 +312,7 @@ def _gain_by_reversing(x, listed, at_wall):
     return float(1 - off[1] / off[0]) if off[0] > 0 else 0.0
 
 
-def _candidates(x, r, listed, left_open, reach):
+def _candidates(x: Floats, r: Floats, listed: _Listed, left_open: Mask, reach: float) -> Integers:
     """Pairs (k, 2) that are not listed, with a gap up to `reach`, one of them to be balanced."""
     far = 2 * r.max() + reach * r.mean()
     pairs = cKDTree(x).query_pairs(far, output_type="ndarray") if reach else np.zeros((0, 2), int)
@@ -312,7 +323,15 @@ def _candidates(x, r, listed, left_open, reach):
     return pairs[(gap <= reach * r.mean()) & ~known & ~left_open[pairs].all(axis=1)]
 
 
-def _packing(x, r, listed, pairs, at_wall, mu, walls=None):
+def _packing(
+    x: Floats,
+    r: Floats,
+    listed: _Listed,
+    pairs: Integers,
+    at_wall: Mask,
+    mu: float,
+    walls: Bodies | None = None,
+) -> Packing:
     """The packing of listed and candidate contacts, and those with walls; forces as listed, else 0.
 
     Contact points lie midway between the disks, whose radii are not known well.
@@ -321,8 +340,7 @@ def _packing(x, r, listed, pairs, at_wall, mu, walls=None):
     branch = x[j] - x[i]
     length = np.hypot(*branch.T)
     contacts = make_contacts(i, j, branch / length[:, None], length, r)
-    arms = {"arm_i": r[i] + contacts.gap / 2, "arm_j": r[j] + contacts.gap / 2}
-    contacts = contacts._replace(**arms)
+    contacts = contacts._replace(arm_i=r[i] + contacts.gap / 2, arm_j=r[j] + contacts.gap / 2)
     forces = [np.nan_to_num(listed.forces), np.zeros((len(pairs), 2))]
     load = np.where(at_wall[:, None], np.nan, np.zeros((len(r), 3)))
     if walls is not None:
@@ -330,14 +348,14 @@ def _packing(x, r, listed, pairs, at_wall, mu, walls=None):
         x, r, load = (
             np.concatenate(both) for both in ((x, walls.x), (r, walls.r), (load, walls.load))
         )
-        contacts = Contacts(*map(np.concatenate, zip(contacts, walls.contacts, strict=True)))
+        contacts = contacts.joined(walls.contacts)
         forces.append(np.nan_to_num(walls.measured))
-    return make_packing(
-        *(x, r, np.full(2, np.inf), contacts, np.concatenate(forces), mu), load=load
-    )
+    return make_packing(x, r, np.full(2, np.inf), contacts, np.concatenate(forces), mu, load=load)
 
 
-def _measurement(listed, candidates, walls):
+def _measurement(
+    listed: _Listed, candidates: int, walls: Bodies | None
+) -> tuple[Floats, Floats, Floats, Mask]:
     """Measured forces (N_c, 2), errors that are known, factors of the variance, what was added."""
     nothing = np.full((candidates, 2), np.nan)
     measured, factor = [listed.forces, nothing], [listed.factor, np.ones(candidates)]
@@ -348,10 +366,15 @@ def _measurement(listed, candidates, walls):
         factor.append(walls.factor)
         sigma.append(walls.sigma)
         added.append(np.isnan(walls.measured[:, 0]))
-    return tuple(map(np.concatenate, (measured, sigma, factor, added)))
+    return (
+        np.concatenate(measured),
+        np.concatenate(sigma),
+        np.concatenate(factor),
+        np.concatenate(added),
+    )
 
 
-def _unbalance(packing, m, unit):
+def _unbalance(packing: Packing, m: Floats, unit: float) -> Floats:
     """(N,) what of each grain's balance no admissible forces near the measured ones can meet.
 
     By the least Σ |unbalance| + _CHANGE Σ |f − m|, in units of `unit`: sums of absolute values
@@ -381,7 +404,15 @@ def _unbalance(packing, m, unit):
     return np.where(unbalance > _BALANCED, unbalance, 0.0)
 
 
-def _inferred(packing, m, sigma, factor, spread, error, unit):
+def _inferred(
+    packing: Packing,
+    m: Floats,
+    sigma: Floats,
+    factor: Floats,
+    spread: Floats,
+    error: float | None,
+    unit: float,
+) -> tuple[Likeliest, Floats]:
     """The Likeliest network, and σ (N_c, 2): that of load cells as given, else of the factors."""
     S = ensemble(packing, prune=False)
     relative = np.sqrt(factor)[:, None] * np.ones(2)

@@ -5,13 +5,14 @@ be are left out; forces that cannot be are taken as not measured. Beyond a tenth
 the contacts nothing is mended any more: then the files do not belong together, or a unit is wrong.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
-from granforce.packing.importers.listing import plain
-from granforce.records import InputError
+from granforce.packing.importers.listing import Listing, plain
+from granforce.records import Floats, InputError, Integers
 
 # Kind of finding → what it is called, whether it is of grains (0) or contacts (1), and how much of
 # the data it spoils: 1 what is left out or not measured any more, 0 what is only told.
@@ -56,27 +57,27 @@ class Finding(NamedTuple):
 class Account(NamedTuple):
     """What was found in a frame, in the order in which it was looked for."""
 
-    findings: list
+    findings: list[Finding]
     strict: bool  # the first thing to mend is an error
     most: float  # part of grains and of contacts that may be mended
 
-    def note(self, kind, texts, places):
+    def note(self, kind: str, texts: Sequence[str], places: Floats) -> None:
         """Findings of one kind: texts, and where (k, 2). InputError where nothing may be mended."""
         if self.strict and texts and KINDS[kind][2] and kind != "negative_normal_forces":
             raise InputError(f"{texts[0]}; correct or remove the line, or read it with repair")
         for text, (x, y) in zip(texts, places, strict=True):
             self.findings.append(Finding(kind, text, float(x), float(y)))
 
-    def of(self, kind):
+    def of(self, kind: str) -> list[Finding]:
         """The findings of one kind."""
         return [one for one in self.findings if one.kind == kind]
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, int]:
         """{kind: how many}, of all kinds."""
         return {kind: len(self.of(kind)) for kind in KINDS}
 
-    def check(self, grains, contacts):
+    def check(self, grains: int, contacts: int) -> None:
         """InputError where more was mended than may be, of so many grains and contacts."""
         for which, (count, what) in enumerate(((grains, "grains"), (contacts, "contacts"))):
             spoilt = [one for one in self.findings if KINDS[one.kind][1:] == (which, 1)]
@@ -93,7 +94,7 @@ class Account(NamedTuple):
                 )
 
 
-def repaired(listing, mu, repair=True):
+def repaired(listing: Listing, mu: float, repair: bool = True) -> tuple[Listing, Account, str]:
     """The Listing, mended, each contact between two grains that are there or with a wall.
 
     repair: True, False (the first error is raised), or the part of the data that may be mended.
@@ -122,7 +123,7 @@ def repaired(listing, mu, repair=True):
     return listing, account, said
 
 
-def rows_of(listing):
+def rows_of(listing: Listing) -> Integers:
     """Rows (k, 2) of the grains that contacts name; −1 for a wall, −2 for one that is not there."""
     order = np.argsort(listing.ids, kind="stable")
     place = np.searchsorted(listing.ids, listing.ends, sorter=order)
@@ -131,7 +132,7 @@ def rows_of(listing):
     return np.where(listing.ends < 0, -1, rows)
 
 
-def gaps_of(listing, rows):
+def gaps_of(listing: Listing, rows: Integers) -> Floats:
     """Gaps (k,) of the disks that contacts join; NaN where one is a wall or not there."""
     there = np.all(rows >= 0, axis=1)
     i, j = np.where(there[:, None], rows, 0).T
@@ -139,7 +140,7 @@ def gaps_of(listing, rows):
     return np.where(there, gap, np.nan)
 
 
-def _fitting(listing):
+def _fitting(listing: Listing) -> float:
     """Part of the contacts between grains that join grains that are there and near."""
     inner = np.all(listing.ends >= 0, axis=1)
     if not inner.any():
@@ -148,12 +149,12 @@ def _fitting(listing):
     return float(np.mean(gap <= FAR * _mean_radius(listing)))
 
 
-def _mean_radius(listing):
+def _mean_radius(listing: Listing) -> float:
     good = listing.r[np.isfinite(listing.r) & (listing.r > 0)]
     return good.mean() if len(good) else np.nan
 
 
-def _named(listing, account):
+def _named(listing: Listing, account: Account) -> tuple[Listing, str]:
     """The listing with names under which contacts join neighbours, and what was done for it.
 
     Where the ids of one file were given anew (by tracking, say), contacts may still count the
@@ -185,7 +186,7 @@ def _named(listing, account):
     raise InputError(_strangers(listing, share))
 
 
-def _strangers(listing, share):
+def _strangers(listing: Listing, share: float) -> str:
     """Why names and places do not belong together, and what to do."""
     rows = rows_of(listing)
     gap, radius = gaps_of(listing, rows), _mean_radius(listing)
@@ -210,7 +211,7 @@ def _strangers(listing, share):
     )
 
 
-def _without_unreadable_grains(listing, account):
+def _without_unreadable_grains(listing: Listing, account: Account) -> Listing:
     fields = np.column_stack([listing.ids, listing.x, listing.r])
     bad = ~np.isfinite(fields).all(axis=1) | ~(listing.r > 0)
     texts = [
@@ -226,7 +227,7 @@ def _without_unreadable_grains(listing, account):
     return listing.with_grains(np.flatnonzero(~bad))
 
 
-def _without_doubled_names(listing, account):
+def _without_doubled_names(listing: Listing, account: Account) -> Listing:
     """Of lines of one name, the first."""
     _, first, which = np.unique(listing.ids, return_index=True, return_inverse=True)
     again = np.flatnonzero(first[which] != np.arange(len(which)))
@@ -239,7 +240,7 @@ def _without_doubled_names(listing, account):
     return listing.with_grains(np.sort(first))
 
 
-def _without_false_detections(listing, account):
+def _without_false_detections(listing: Listing, account: Account) -> Listing:
     """Of two disks in one place, the one that fits more contacts and sizes."""
     x, r, ids = listing.x, listing.r, listing.ids
     if not len(r):
@@ -247,7 +248,7 @@ def _without_false_detections(listing, account):
     check_disks(x, r, OPEN, lambda g: listing.place(0, g), np.inf)
     i, j, gap = overlapping(x, r, OPEN)
     deep = np.flatnonzero(-gap > OVERLAP * np.minimum(r[i], r[j]))
-    fit = _fits(listing) if len(deep) else None
+    fit = _fits(listing) if len(deep) else np.zeros(len(r))
     gone, ends = {}, listing.ends.copy()
     for c in deep[np.argsort(gap[deep], kind="stable")]:
         a, b = int(i[c]), int(j[c])
@@ -272,7 +273,7 @@ def _without_false_detections(listing, account):
     return listing._replace(ends=ends).with_grains(kept)
 
 
-def _fits(listing):
+def _fits(listing: Listing) -> Floats:
     """(N,) how well each grain fits: contacts with a usual gap count 1, others down to −1, and an
     unusual radius takes off up to 2."""
     rows = rows_of(listing)
@@ -290,10 +291,10 @@ def _fits(listing):
     return fit + 2 * alike / alike.max()
 
 
-def _without_unreadable_contacts(listing, account):
+def _without_unreadable_contacts(listing: Listing, account: Account) -> Listing:
     """Lines without two names go; forces that are no numbers are not measured."""
-    named = np.isfinite(listing.ends).all(axis=1)
-    finite = np.isfinite(listing.forces).all(axis=1)
+    named = np.all(np.isfinite(listing.ends), axis=1)
+    finite = np.all(np.isfinite(listing.forces), axis=1)
     size = np.abs(np.where(finite[:, None], listing.forces, 0.0)).max(axis=1, initial=0.0)
     usual = np.median(size[size > 0]) if np.any(size > 0) else np.inf
     told = finite & (size <= HUGE * usual)
@@ -312,7 +313,7 @@ def _without_unreadable_contacts(listing, account):
     return listing._replace(forces=forces).with_contacts(np.flatnonzero(named))
 
 
-def _without_missing_grains(listing, account):
+def _without_missing_grains(listing: Listing, account: Account) -> Listing:
     own = np.flatnonzero(listing.ends[:, 0] == listing.ends[:, 1])
     texts = [f"{listing.place(1, k)}: the grain touches itself" for k in own]
     account.note("contacts_with_themselves", texts, _places(listing, own))
@@ -331,7 +332,7 @@ def _without_missing_grains(listing, account):
     return listing.with_contacts(np.setdiff1d(np.arange(len(rows)), bad))
 
 
-def _without_long_contacts(listing, account):
+def _without_long_contacts(listing: Listing, account: Account) -> Listing:
     rows = rows_of(listing)
     gap = gaps_of(listing, rows)
     with np.errstate(invalid="ignore"):
@@ -345,7 +346,7 @@ def _without_long_contacts(listing, account):
     return listing.with_contacts(np.setdiff1d(np.arange(len(rows)), bad))
 
 
-def _without_tension(listing, account):
+def _without_tension(listing: Listing, account: Account) -> Listing:
     """Contacts of grains without glue only press: a negative normal force is a bad fit."""
     bad = np.flatnonzero(listing.forces[:, 0] < 0)
     texts = [f"{listing.place(1, k)}: f_n = {listing.forces[k, 0]:.3g} pulls" for k in bad]
@@ -357,7 +358,7 @@ def _without_tension(listing, account):
     return listing._replace(forces=forces)
 
 
-def _note_friction(listing, account, mu):
+def _note_friction(listing: Listing, account: Account, mu: float) -> None:
     normal, tangential = listing.forces.T
     with np.errstate(invalid="ignore"):
         beyond = np.abs(tangential) > mu * normal * (1 + _ROUNDING)
@@ -370,7 +371,7 @@ def _note_friction(listing, account, mu):
     account.note("beyond_friction", texts, _places(listing, bad))
 
 
-def _places(listing, contacts):
+def _places(listing: Listing, contacts: Integers) -> Floats:
     """(k, 2) where contacts are: between their grains, or at the one that is there."""
     rows = rows_of(listing)[contacts]
     there = rows >= 0

@@ -16,14 +16,16 @@ fitError/r².
 import io
 import os
 import re
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.matfile import read_struct
-from granforce.packing.importers.text import LARGEST
-from granforce.records import InputError
+from granforce.packing.importers.text import LARGEST, Source
+from granforce.records import Floats, InputError
 
 _NEEDED = ("id", "x", "y", "r", "neighbours", "forces", "alphas")
 _FIELDS = (*_NEEDED, "betas", "fitError", "edge")
@@ -35,10 +37,10 @@ _LARGEST_FILE = 10**9
 class SolvedFrame(NamedTuple):
     """One frame, ready to be taken."""
 
-    frames: np.ndarray  # (1,) its number
+    frames: Floats  # (1,) its number
     only: Listing
 
-    def listing(self, frame=None):
+    def listing(self, frame: float | None = None) -> Listing:
         """Its Listing; InputError for another frame."""
         if frame is not None and frame != self.frames[0]:
             raise InputError(
@@ -47,7 +49,7 @@ class SolvedFrame(NamedTuple):
         return self.only
 
 
-def read_solved(source):
+def read_solved(source: Source) -> SolvedFrame:
     """The SolvedFrame in a *_solved.mat (a path or an open binary file); its number by its name.
 
     Raises InputError for what is no such file.
@@ -74,7 +76,7 @@ def read_solved(source):
     return SolvedFrame(np.array([number]), _listing(name, number, columns))
 
 
-def _content(source):
+def _content(source: Source) -> tuple[str, bytes]:
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
     else:
@@ -93,7 +95,7 @@ def _content(source):
     return name, content
 
 
-def _version_73(name, content):
+def _version_73(name: str, content: bytes) -> list[dict[str, Any]]:
     """The particles of a file of version 7.3, which is HDF5: each field a column of references."""
     try:
         import h5py
@@ -123,14 +125,14 @@ def _version_73(name, content):
         return [{field: columns[field][k] for field in columns} for k in range(*counts)]
 
 
-def _own(group, name):
+def _own(group: Any, name: str) -> Any:
     """What the group holds by this name; ValueError for a link to another file."""
     if hasattr(group.get(name, getlink=True), "filename"):
         raise ValueError("link")
     return group[name]
 
 
-def _value(dataset):
+def _value(dataset: Any) -> npt.NDArray[Any]:
     """A dataset as MATLAB holds it: empty arrays are kept as their shape.
 
     ValueError for one whose data lie in other files, which are not the sender's to show.
@@ -143,7 +145,7 @@ def _value(dataset):
     return value["real"] if value.dtype.names else value
 
 
-def _columns(particles):
+def _columns(particles: Sequence[Mapping[str, Any]]) -> dict[str, list[Floats]] | None:
     """{field: per particle, a flat float array}, or None where a needed field is missing."""
     if not particles:
         return None
@@ -153,7 +155,7 @@ def _columns(particles):
     return {field: [_numbers(one[field]) for one in particles] for field in there}
 
 
-def _numbers(value):
+def _numbers(value: Any) -> Floats:
     """A flat array; what is no finite number is NaN."""
     flat = np.real(np.ravel(np.asarray(value)))
     if flat.dtype.kind not in "iufb":
@@ -162,7 +164,7 @@ def _numbers(value):
     return np.where(np.abs(flat) <= LARGEST, flat, np.nan)
 
 
-def _listing(name, number, columns):
+def _listing(name: str, number: float, columns: dict[str, list[Floats]]) -> Listing:
     """The Listing: a line for each contact of each particle."""
     single = {field: _first(columns, field) for field in ("id", "x", "y", "r", "edge", "fitError")}
     count = len(columns["id"])
@@ -208,7 +210,7 @@ def _listing(name, number, columns):
     )
 
 
-def _first(columns, field):
+def _first(columns: dict[str, list[Floats]], field: str) -> Floats:
     """The one number of each particle, NaN where there is none."""
     return (
         np.array([one[0] if len(one) else np.nan for one in columns[field]])

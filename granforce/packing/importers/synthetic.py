@@ -1,5 +1,6 @@
 """Photoelastic frames made from packings whose forces are known, with the errors of real ones."""
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,17 @@ from scipy.spatial import cKDTree
 
 from granforce.forces.ensemble import ensemble
 from granforce.packing.importers.listing import Listing
-from granforce.records import InputError, positive, random_seed, whole
+from granforce.packing.importers.pegs import Photoelastic
+from granforce.records import (
+    Contacts,
+    Floats,
+    InputError,
+    Integers,
+    Packing,
+    positive,
+    random_seed,
+    whole,
+)
 from granforce.system.files import written
 
 
@@ -15,22 +26,22 @@ class SyntheticFrame(NamedTuple):
     """A frame as files would hold it, and the truth; `gf.read_pegs` takes it in place of files."""
 
     only: Listing
-    pairs: np.ndarray  # (k, 2) names of the grains that touch inside the frame
-    forces: np.ndarray  # (k, 2) their true f_n, f_t
+    pairs: Integers  # (k, 2) names of the grains that touch inside the frame
+    forces: Floats  # (k, 2) their true f_n, f_t
     unit: float  # mean true normal force
 
     @property
-    def frames(self):
+    def frames(self) -> Floats:
         """Its number."""
         return np.array([self.only.frame])
 
-    def listing(self, frame=None):
+    def listing(self, frame: float | None = None) -> Listing:
         """Its Listing; InputError for another frame."""
         if frame is not None and frame != self.only.frame:
             raise InputError(f"the frame is {self.only.frame:g}, and frame {frame:g} is wanted")
         return self.only
 
-    def truth(self, found):
+    def truth(self, found: Photoelastic) -> Floats:
         """True forces (N_c, 2) of a Photoelastic's contacts: 0 of pairs that do not touch, NaN of
         contacts with walls."""
         c, ids = found.packing.contacts, found.ids
@@ -41,7 +52,7 @@ class SyntheticFrame(NamedTuple):
             true[row] = np.nan if j < 0 else 0.0 if k is None else self.forces[k]
         return true
 
-    def write(self, positions, adjacency):
+    def write(self, positions: str | Path, adjacency: str | Path) -> None:
         """Write it as PeGS does: frame, id, x, y, radius, flag; frame, id1, id2, f_t, f_n."""
         one, number = self.only, self.only.frame
         grains = np.column_stack([one.ids, one.x, one.r, one.flag])
@@ -53,18 +64,18 @@ class SyntheticFrame(NamedTuple):
 
 
 def synthetic_frame(
-    packing,
+    packing: Packing,
     *,
-    noise=0.1,
-    missed=0.0,
-    false=0.0,
-    blur=0.0,
-    walls=True,
-    pixels=50.0,
-    newton=0.01,
-    number=1,
-    seed=0,
-):
+    noise: float = 0.1,
+    missed: float = 0.0,
+    false: float = 0.0,
+    blur: float = 0.0,
+    walls: bool = True,
+    pixels: float = 50.0,
+    newton: float = 0.01,
+    number: int = 1,
+    seed: int = 0,
+) -> SyntheticFrame:
     """A SyntheticFrame of a packing and its own forces, cut out where its box ends.
 
     noise: standard error of a component, in ⟨f_n⟩, different from either side of a contact. missed:
@@ -117,7 +128,7 @@ def synthetic_frame(
         x=size * x,
         r=size * r,
         flag=flag,
-        ends=ends + 1.0,
+        ends=np.asarray(ends, dtype=np.float64) + 1.0,
         forces=values,
         beta=beta,
         weight=np.ones(len(ends)),
@@ -131,7 +142,7 @@ def synthetic_frame(
     return SyntheticFrame(listing, true, forces[inside], unit)
 
 
-def _near_pairs(packing, contacts, count):
+def _near_pairs(packing: Packing, contacts: Contacts, count: int) -> Integers:
     """The `count` nearest pairs inside the box that are no contacts."""
     pairs = cKDTree(packing.x).query_pairs(2.5 * packing.r.max(), output_type="ndarray")
     pairs = np.sort(pairs.astype(np.int64))

@@ -1,11 +1,25 @@
 """Packings from tables of grains and contacts (CSV)."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from granforce.packing.importers.geometry import check_disks, listed, touching
 from granforce.packing.importers.network import adopt, find
-from granforce.packing.importers.text import check_grains, read_csv
-from granforce.records import InputError, friction, make_cell, make_packing, positive
+from granforce.packing.importers.text import Source, Table, check_grains, read_csv
+from granforce.records import (
+    Cell,
+    Contacts,
+    Floats,
+    InputError,
+    Packing,
+    friction,
+    make_cell,
+    make_packing,
+    positive,
+)
 from granforce.tolerances import TOUCHING
 
 # Columns of grains, then of contacts.
@@ -14,18 +28,18 @@ NAMES += ("i", "j", "nx", "ny", "length", "fn", "ft")
 
 
 def read_table(
-    grains,
-    contacts=None,
+    grains: Source,
+    contacts: Source | None = None,
     *,
-    mu,
-    box=None,
-    tilt=0.0,
-    columns=None,
-    forces=None,
-    pressure=1.0,
-    tolerance=TOUCHING,
-    most_grains=None,
-):
+    mu: Any,
+    box: npt.ArrayLike | None = None,
+    tilt: float = 0.0,
+    columns: Mapping[str, str] | None = None,
+    forces: bool | None = None,
+    pressure: float = 1.0,
+    tolerance: float = TOUCHING,
+    most_grains: int | None = None,
+) -> Packing:
     """A Packing from a CSV of grains and, if there is one, a CSV of contacts (paths or open files).
 
     grains: columns x, y, r; optionally id, and fx, fy, torque (external load in an open set).
@@ -71,7 +85,7 @@ def read_table(
     return adopt(packing, forces="given")
 
 
-def renamed(table, columns):
+def renamed(table: Table, columns: Mapping[str, str] | None) -> Table:
     """The table with columns under the names that are used here; those that it lacks are none."""
     for name, theirs in (columns or {}).items():
         if name not in NAMES:
@@ -84,7 +98,7 @@ def renamed(table, columns):
     return table
 
 
-def read_columns(text):
+def read_columns(text: str) -> dict[str, str]:
     """{name here: name in the file} of 'x=…,y=…'; InputError for anything else."""
     pairs = [part.split("=", 1) for part in text.split(",")]
     if not all(len(pair) == 2 and pair[1].strip() for pair in pairs):
@@ -92,7 +106,7 @@ def read_columns(text):
     return {name.strip(): theirs.strip() for name, theirs in pairs}
 
 
-def _disks(table, cell):
+def _disks(table: Table, cell: Cell) -> tuple[Floats, Floats]:
     r = table.numbers("r")
     x = np.column_stack([table.numbers("x"), table.numbers("y")])
     x = cell.wrapped(x)
@@ -100,7 +114,7 @@ def _disks(table, cell):
     return x, r
 
 
-def _loads(table, cell):
+def _loads(table: Table, cell: Cell) -> Floats:
     load = np.zeros((len(table.rows), 3))
     for k, column in enumerate(("fx", "fy", "torque")):
         if column in table.header:
@@ -114,7 +128,9 @@ def _loads(table, cell):
     return load
 
 
-def _joined(table, grains, x, r, cell, forces, mu):
+def _joined(
+    table: Table, grains: Table, x: Floats, r: Floats, cell: Cell, forces: bool | None, mu: float
+) -> tuple[Contacts, Floats | None]:
     """Contacts of a table and their forces (N_c, 2), or None without."""
     count = len(grains.rows)
     index = grains.index("id") if "id" in grains.header else {row: row for row in range(count)}
@@ -130,7 +146,7 @@ def _joined(table, grains, x, r, cell, forces, mu):
     return joined, np.column_stack([normal, tangential])
 
 
-def _given_branches(table):
+def _given_branches(table: Table) -> Floats | None:
     """Branch vectors (N_c, 2) from columns nx, ny, length, or None where there is none of them."""
     if not {"nx", "ny", "length"} & set(table.header):
         return None

@@ -4,29 +4,32 @@ import csv
 import math
 import os
 from collections import Counter
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from granforce.records import InputError, are_whole
+from granforce.records import Floats, InputError, Integers, are_whole
 
 # Numbers beyond this size cannot be lengths or forces, and their squares would overflow.
 LARGEST = 1e100
+
+Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 
 
 class Table(NamedTuple):
     """Rows of text fields under named columns."""
 
     name: str  # of the file, for messages
-    header: tuple  # column names
-    rows: list  # of lists of fields, as many as columns
-    lines: list  # line number of each row in the file
+    header: tuple[str, ...]  # column names
+    rows: list[list[str]]  # as many fields as columns
+    lines: list[int]  # line number of each row in the file
 
-    def place(self, row):
+    def place(self, row: int) -> str:
         """'file, line n' of a row."""
         return f"{self.name}, line {self.lines[row]}"
 
-    def require(self, *columns):
+    def require(self, *columns: str) -> None:
         """InputError unless all these columns are there."""
         missing = [column for column in columns if column not in self.header]
         if missing:
@@ -35,13 +38,13 @@ class Table(NamedTuple):
                 f"the columns are {some_of(self.header)}"
             )
 
-    def fields(self, column):
+    def fields(self, column: str) -> list[str]:
         """The text of one column, a list."""
         self.require(column)
         position = self.header.index(column)
         return [row[position] for row in self.rows]
 
-    def numbers(self, column):
+    def numbers(self, column: str) -> Floats:
         """One column as float64 (rows,); InputError names the line of what is not a number."""
         values = np.empty(len(self.rows))
         for row, text in enumerate(self.fields(column)):
@@ -56,7 +59,7 @@ class Table(NamedTuple):
                 )
         return values
 
-    def whole(self, column):
+    def whole(self, column: str) -> Integers:
         """One column as int64 (rows,) ≥ 0; InputError names the line of what is not whole."""
         values = self.numbers(column)
         for row in np.flatnonzero(~are_whole(values))[:1]:
@@ -66,9 +69,9 @@ class Table(NamedTuple):
             )
         return values.astype(np.int64)
 
-    def index(self, column):
+    def index(self, column: str) -> dict[int | str, int]:  # type: ignore[override]
         """Row number of each label in a column, a dict; InputError for a label given twice."""
-        rows = {}
+        rows: dict[int | str, int] = {}
         for row, text in enumerate(self.fields(column)):
             first = rows.setdefault(_label(text), row)
             if first != row:
@@ -78,7 +81,7 @@ class Table(NamedTuple):
                 )
         return rows
 
-    def lookup(self, column, index):
+    def lookup(self, column: str, index: Mapping[Any, int]) -> Integers:
         """Row numbers (rows,) int64 of the labels in a column; InputError for an unknown one."""
         found = np.empty(len(self.rows), dtype=np.int64)
         for row, text in enumerate(self.fields(column)):
@@ -92,7 +95,7 @@ class Table(NamedTuple):
         return found
 
 
-def make_table(name, header, rows, lines):
+def make_table(name: str, header: Sequence[str], rows: list[list[str]], lines: list[int]) -> Table:
     """A Table, once every row is seen to have as many fields as there are column names.
 
     Raises InputError naming the row that has not, or the column name that is there twice.
@@ -112,19 +115,19 @@ def make_table(name, header, rows, lines):
     return table
 
 
-def some_of(columns):
+def some_of(columns: Sequence[str]) -> str:
     """The names of columns for a message, the first where there are many."""
     names = [name if len(name) <= 40 else name[:37] + "…" for name in columns[:12]]
     return ", ".join([*names, *(["…"] if len(columns) > len(names) else [])])
 
 
-def check_grains(count, most, name):
+def check_grains(count: int, most: int | None, name: str) -> None:
     """InputError for a file of more grains than are taken (most; None: any number)."""
     if most is not None and count > most:
         raise InputError(f"{name}: {count} grains, where at most {most} are taken")
 
 
-def read_text(source):
+def read_text(source: Source) -> tuple[str, str]:
     """Name and text (UTF-8) of a path or of an open text or bytes file; InputError otherwise."""
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
@@ -140,7 +143,7 @@ def read_text(source):
     return name, text
 
 
-def read_csv(source):
+def read_csv(source: Source) -> Table:
     """A Table from text with a header line, separated by commas, semicolons, tabs or blanks.
 
     Column names are taken in lower case; blank lines are skipped. Raises InputError.
@@ -164,7 +167,7 @@ def read_csv(source):
     return make_table(name, [column.lower() for column in rows[0]], rows[1:], numbers[1:])
 
 
-def _bytes(path):
+def _bytes(path: str | os.PathLike[str]) -> bytes:
     try:
         with open(path, "rb") as file:
             return file.read()
@@ -173,7 +176,7 @@ def _bytes(path):
         raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
 
 
-def _label(text):
+def _label(text: str) -> int | str:
     """Grain names compare as whole numbers where they are ('7', '7.0', '+7'), else as text."""
     try:
         number = float(text)
@@ -185,5 +188,5 @@ def _label(text):
     return int(number) if abs(number) < 2**53 else text
 
 
-def _shown(text):
+def _shown(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "…")

@@ -10,13 +10,15 @@ Directions come from the angles that a solver lists, or from the nearest side of
 or an annulus (a circle where no grain is flagged −1, for the inner wall).
 """
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy import optimize
 
+from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.repair import rows_of
-from granforce.records import InputError, make_contacts, positive
+from granforce.records import Contacts, Floats, InputError, Integers, Mask, make_contacts, positive
 
 SIDES = ("left", "right", "bottom", "top")  # least and largest x, least and largest y
 _NORMALS = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
@@ -31,14 +33,14 @@ class Outline(NamedTuple):
     """Walls about a frame."""
 
     shape: str  # box: x0, x1, y0, y1; annulus: centre x, y, inner and outer radius; circle: x, y, R
-    numbers: tuple
+    numbers: tuple[float, ...]
 
     @property
-    def names(self):
+    def names(self) -> tuple[str, ...]:
         """What its walls are called."""
         return {"box": SIDES, "annulus": ("inner", "outer"), "circle": ("outer",)}[self.shape]
 
-    def gaps(self, x, r):
+    def gaps(self, x: Floats, r: Floats) -> tuple[Floats, Floats]:
         """Gaps (N, walls) of disks, and the unit vectors (N, walls, 2) from them to the walls."""
         if self.shape == "box":
             low, high = np.array(self.numbers[::2]), np.array(self.numbers[1::2])
@@ -53,7 +55,7 @@ class Outline(NamedTuple):
             ways.insert(0, -out)
         return np.stack(gaps, axis=1), np.stack(ways, axis=1)
 
-    def place(self, wall, reach):
+    def place(self, wall: int, reach: float) -> Floats:
         """Where the body of a wall is drawn: `reach` outside of its middle."""
         if self.shape == "box":
             x0, x1, y0, y1 = self.numbers
@@ -67,16 +69,16 @@ class Outline(NamedTuple):
 class WallContacts(NamedTuple):
     """Contacts of grains with walls."""
 
-    grain: np.ndarray  # (w,) int64
-    wall: np.ndarray  # (w,) int64, number of the wall
-    normal: np.ndarray  # (w, 2) from the grain to the wall
-    forces: np.ndarray  # (w, 2) f_n, f_t as measured; NaN where they were not
-    factor: np.ndarray  # (w,) of the variance
-    names: tuple  # of the walls
+    grain: Integers  # (w,) int64
+    wall: Integers  # (w,) int64, number of the wall
+    normal: Floats  # (w, 2) from the grain to the wall
+    forces: Floats  # (w, 2) f_n, f_t as measured; NaN where they were not
+    factor: Floats  # (w,) of the variance
+    names: tuple[str, ...]  # of the walls
     outline: Outline | None
 
 
-def read_outline(text):
+def read_outline(text: str) -> str | Outline:
     """'open', 'box', 'annulus' or 'circle' (found from the grains), or an Outline with its numbers.
 
     Such as box:0,100,0,80 or annulus:500,500,200,450. Raises InputError.
@@ -86,8 +88,10 @@ def read_outline(text):
         return "open"
     if shape not in _SHAPES:
         raise InputError(f"walls are open, {', '.join(_SHAPES)}, got {str(text)[:40]!r}")
-    if not numbers:
-        return shape
+    return _outline(shape, numbers) if numbers else shape
+
+
+def _outline(shape: str, numbers: str) -> Outline:
     try:
         values = tuple(float(part) for part in numbers.split(","))
     except ValueError:
@@ -103,7 +107,7 @@ def read_outline(text):
     return Outline(shape, values)
 
 
-def read_wall_force(text):
+def read_wall_force(text: str) -> tuple[str, tuple[float, ...]]:
     """(name, (f_x, f_y, σ)) of 'right: fx fy sigma', the force that grains exert on a wall."""
     name, _, numbers = str(text).partition(":")
     try:
@@ -116,7 +120,9 @@ def read_wall_force(text):
     return name.strip(), values
 
 
-def wall_contacts(listing, x, r, at_wall, walls, reach):
+def wall_contacts(
+    listing: Listing, x: Floats, r: Floats, at_wall: Mask, walls: str | Outline | None, reach: float
+) -> WallContacts | None:
     """The WallContacts of a frame, or None where its walls stay open.
 
     at_wall (N,): grains at walls. walls: as `read_outline` gives it, or None for angles where they
@@ -155,7 +161,7 @@ def wall_contacts(listing, x, r, at_wall, walls, reach):
     return WallContacts(g, w, ways[g, w], m, f, outline.names, outline)
 
 
-def _occurrence(grain):
+def _occurrence(grain: Integers) -> Integers:
     """(w,) how often the grain came before: two contacts of one grain are with two bodies."""
     order = np.argsort(grain, kind="stable")
     new = np.concatenate([[True], np.diff(grain[order]) != 0])
@@ -165,7 +171,7 @@ def _occurrence(grain):
     return which
 
 
-def _fitted(shape, x, r, at_wall, flag):
+def _fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
     """The Outline of a shape that the grains at walls touch."""
     if at_wall.sum() < 4:
         raise InputError(
@@ -186,7 +192,7 @@ def _fitted(shape, x, r, at_wall, flag):
     if shape == "circle":
         inner[:] = False
 
-    def misses(p):
+    def misses(p: Floats) -> Floats:
         distance = np.hypot(*(x - p[:2]).T)
         return np.where(inner, distance - r - p[2], p[3] - distance - r)
 
@@ -195,23 +201,25 @@ def _fitted(shape, x, r, at_wall, flag):
     start = [*centre, away[inner].mean() if inner.any() else 0.0, away[~inner].mean()]
     found = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
     cut = found if shape == "annulus" else found[[0, 1, 3]]
-    return read_outline(f"{shape}:" + ",".join(repr(float(value)) for value in cut))
+    return _outline(shape, ",".join(repr(float(value)) for value in cut))
 
 
 class Bodies(NamedTuple):
     """Walls as bodies after the N grains, their contacts, and what load cells measured."""
 
-    x: np.ndarray  # (b, 2)
-    r: np.ndarray  # (b,)
-    load: np.ndarray  # (b, 3) 0 where a load cell holds the wall, else NaN
-    contacts: object  # Contacts with walls, then those that load cells hold
-    measured: np.ndarray  # (w + cells, 2)
-    sigma: np.ndarray  # (w + cells, 2) NaN, and the errors of load cells
-    factor: np.ndarray  # (w + cells,)
-    names: tuple  # (b,)
+    x: Floats  # (b, 2)
+    r: Floats  # (b,)
+    load: Floats  # (b, 3) 0 where a load cell holds the wall, else NaN
+    contacts: Contacts  # Contacts with walls, then those that load cells hold
+    measured: Floats  # (w + cells, 2)
+    sigma: Floats  # (w + cells, 2) NaN, and the errors of load cells
+    factor: Floats  # (w + cells,)
+    names: tuple[str, ...]  # (b,)
 
 
-def bodies(found, x, r, forces):
+def bodies(
+    found: WallContacts, x: Floats, r: Floats, forces: Mapping[str, Sequence[float]]
+) -> Bodies:
     """The Bodies of WallContacts; forces: {name: (f_x, f_y, σ)} of load cells.
 
     Raises InputError for a force on a wall that is not there, or not straight.

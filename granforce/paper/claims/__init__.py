@@ -31,7 +31,8 @@ from granforce.paper.claims.figure4 import elongation, shape, tails, widths
 from granforce.paper.claims.figure5 import counts, enrichment, frozen, place
 from granforce.paper.claims.figure6 import correlation, error_bars
 from granforce.paper.claims.groups import SAMPLERS
-from granforce.paper.claims.verdicts import FEW, MISSING
+from granforce.paper.claims.verdicts import FEW, MISSING, Claim
+from granforce.paper.tables import Table
 
 BY_STATES = ("gauss_seidel", "gauss_seidel_1e-4", "nearest", "uniform")  # have η1 and η2
 BY_WALKS = ("gauss_seidel", "gauss_seidel_1e-4", "nearest")
@@ -62,7 +63,7 @@ FAMILIES = {
 }
 
 
-def judged(table):
+def judged(table: Table) -> list[Claim]:
     """All claims about a `tables.Table`, the paper's sampler first; those without data say so.
 
     Samplers of which the table has no row are left out, except the paper's.

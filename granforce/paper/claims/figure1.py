@@ -1,11 +1,16 @@
 """Claims about η1, η2 and η3 against μ (Figure 1), about z, and about the number of disks."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.groups import (
     LEAST_DYNAMIC,
     SMALL,
+    Ends,
+    Groups,
     drawn,
     dynamic,
     items,
@@ -16,17 +21,19 @@ from granforce.paper.claims.verdicts import (
     PRE,
     PRL,
     UNMEASURED,
+    Claim,
     at_each,
     over_all,
     peak,
     slope,
 )
+from granforce.paper.tables import Table
 
 PEAK = f"μ of the maximum (parabola in log μ through what lies within a factor {NEAR_PEAK:g} of it)"
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
 
 
-def agreement(table, sampler):
+def agreement(table: Table, sampler: str) -> Iterator[Claim]:
     """η1 ≈ η2 ≈ 0.15 η3 over all μ, up to a constant factor."""
     rows = dynamic(drawn(table, sampler))
     for above, below, word, good, fair in (
@@ -61,27 +68,34 @@ def agreement(table, sampler):
         )
 
 
-def peaked(claim, sampler, groups, what=PEAK, good=(0.05, 0.2), fair=(0.02, 0.5)):
+def peaked(
+    claim: str,
+    sampler: str,
+    groups: Groups,
+    what: str = PEAK,
+    good: Ends = (0.05, 0.2),
+    fair: Ends = (0.02, 0.5),
+) -> Claim:
     """A claim of the paper that what is grouped by μ is largest near 0.1."""
     return over_all(claim, sampler, PRE, what, peak, groups, good=good, fair=fair, least=3)
 
 
-def maximum(table, sampler):
+def maximum(table: Table, sampler: str) -> Iterator[Claim]:
     """η(μ) is largest near μ = 0.1."""
     rows = drawn(table, sampler)
     names = (("eta3", "η3"),) if sampler == "exact" else _MEASURES
     for name, label in names:
         groups = positive_friction(items(rows, name, positive=(name,)))
-        rises_and_falls = {"good": (0.02, 0.5), "fair": (0.005, 2)}
+        rises_and_falls: dict[str, Any] = {"good": (0.02, 0.5), "fair": (0.005, 2)}
         yield peaked(f"{label}(μ) is not monotonic", sampler, groups, **rises_and_falls)
         yield peaked(f"{label}(μ) is largest near μ = 0.1", sampler, groups)
 
 
-def _measure_of(sampler):
+def _measure_of(sampler: str) -> tuple[str, str]:
     return ("eta3", "η3") if sampler == "exact" else ("eta2", "η2")
 
 
-def small_friction(table, sampler):
+def small_friction(table: Table, sampler: str) -> Iterator[Claim]:
     """η ∝ μ at small μ."""
     name, label = _measure_of(sampler)
     groups = positive_friction(items(drawn(table, sampler), name, positive=(name,)))
@@ -104,7 +118,7 @@ def small_friction(table, sampler):
         )
 
 
-def vanishing(table, sampler):
+def vanishing(table: Table, sampler: str) -> list[Claim]:
     """η vanishes at μ = 0, where S is one point: as measured, not as it must be."""
     name, label = _measure_of(sampler)
     at_rest = [row for row in drawn(table, sampler) if row["mu"] == 0]
@@ -123,12 +137,12 @@ def vanishing(table, sampler):
     return [claim]
 
 
-def skipped(row):
+def skipped(row: dict[str, Any]) -> bool:
     """Whether a row's states are the one point that S is, without any relaxation."""
     return row.get("skipped_part", float(row["dimension"] == 0)) > 0
 
 
-def measure(table, sampler):
+def measure(table: Table, sampler: str) -> Iterator[Claim]:
     """η3, from largest and smallest forces, does not depend on how states are drawn."""
     exact = {(row["mu"], row["seed"]): row.get("eta3", 0) for row in table.part("exact")}
     rows = [
@@ -147,7 +161,7 @@ def measure(table, sampler):
     )
 
 
-def coordination(table, sampler):
+def coordination(table: Table, sampler: str) -> Iterator[Claim]:
     """z falls from 4 towards 3."""
     rows = table.part("walk") or drawn(table, "gauss_seidel")
     groups = items(rows, "coordination")
@@ -170,7 +184,7 @@ def coordination(table, sampler):
     )
 
 
-def size(table, sampler):
+def size(table: Table, sampler: str) -> Iterator[Claim]:
     """η hardly depends on N."""
     name, label = _measure_of(sampler)
     part = {"exact": "size_exact", "nearest": "size", "gauss_seidel": "size_sweeps"}[sampler]

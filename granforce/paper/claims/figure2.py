@@ -1,23 +1,27 @@
 """Claims about the response to a local force, against η (Figure 2)."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.figure1 import peaked
 from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
-from granforce.paper.claims.verdicts import PRE, over_all
+from granforce.paper.claims.verdicts import PRE, Claim, over_all
+from granforce.paper.tables import Table
 
 _ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
 
 
-def perturbation(table, sampler):
+def perturbation(table: Table, sampler: str) -> Iterator[Claim]:
     """F_crit and α are largest near μ = 0.1."""
     for name, label in _ANSWERS:
         groups = positive_friction(items(table.responses(), name))
         yield peaked(f"{label} is largest near μ = 0.1", sampler, groups)
 
 
-def response(table, sampler):
+def response(table: Table, sampler: str) -> Iterator[Claim]:
     """F_crit and α rise with η, and are similar where η is."""
     eta, word = ("eta3", "exact η3") if sampler == "exact" else ("eta2", "η2")
     rows = table.answers(SAMPLERS[sampler], eta)
@@ -49,7 +53,7 @@ def response(table, sampler):
         )
 
 
-def branches(means):
+def branches(means: Any) -> float:
     """Ratio of answers at equal η beyond and below the maximum of η(μ): means (k, 2) of both.
 
     NaN where no η beyond the maximum is reached below it.

@@ -1,12 +1,15 @@
 """Claims about where states lie (Figure 3): how far from each other, how far from the centre."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from granforce.paper.claims.groups import LEAST_DYNAMIC, drawn, dynamic, items, positive_friction
-from granforce.paper.claims.verdicts import PRE, PRL, at_each
+from granforce.paper.claims.verdicts import PRE, PRL, Claim, at_each
+from granforce.paper.tables import Table
 
 
-def pairs(table, sampler):
+def pairs(table: Table, sampler: str) -> Iterator[Claim]:
     """Distances of pairs of states are sharply peaked."""
     yield at_each(
         "distances between pairs of states are sharply peaked",
@@ -19,7 +22,7 @@ def pairs(table, sampler):
     )
 
 
-def centre(table, sampler):
+def centre(table: Table, sampler: str) -> Iterator[Claim]:
     """The original network lies closer to the centre of S than sampled states."""
     name = "original_ratio" if sampler == "uniform" else "centre_ratio"
     rows = [

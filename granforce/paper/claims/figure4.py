@@ -1,27 +1,33 @@
 """Claims about the distribution P(ΔF_n) (Figure 4): its shape, its tail, its width."""
 
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
 from granforce.paper.claims.figure1 import PEAK, peaked
 from granforce.paper.claims.groups import (
     LARGE,
     MIDDLE,
     SMALL,
+    Ends,
     each,
     positive_friction,
     sampled,
     told,
     within,
 )
-from granforce.paper.claims.verdicts import PRE, at_each, over_all
+from granforce.paper.claims.verdicts import PRE, Claim, at_each, over_all
+from granforce.paper.tables import Table
+from granforce.records import Floats
 
 # Of `statistics.departure`: 0.05 is that of a Weibull distribution with exponent 1.5.
 FLAT, RAISED = 0.05, 0.1
 TAILS = ((0.5, "median"), (0.75, "upper quartile"), (0.9, "upper decile"))
 
 
-def shape(table, sampler):
+def shape(table: Table, sampler: str) -> Iterator[Claim]:
     """P(ΔF_n) falls monotonically at small and large μ and has a peak between."""
     everywhere = sampled(table, sampler)
     scaled = each(everywhere, lambda values: values / values.mean())
@@ -45,7 +51,7 @@ def shape(table, sampler):
             )
 
 
-def departure(values, level):
+def departure(values: Sequence[Floats], level: float) -> tuple[float, float, float]:
     """Departure of the values of all packings from a falling density, with its interval.
 
     The interval reaches down to 0 where chance makes as much of as many values.
@@ -58,7 +64,7 @@ def departure(values, level):
     return value, max(low, 0.0), high
 
 
-def tails(table, sampler):
+def tails(table: Table, sampler: str) -> Iterator[Claim]:
     """How the tail of P(ΔF_n) falls at each μ, beyond several quantiles."""
     everywhere = sampled(table, sampler)
     for quantile, beyond in TAILS:
@@ -79,16 +85,16 @@ def tails(table, sampler):
             )
 
 
-def _exponents(quantile):
+def _exponents(quantile: float) -> Callable[[Any, float], Any]:
     """The exponent b beyond a quantile with its interval, that of log b."""
 
-    def log_exponent(groups):
+    def log_exponent(groups: Sequence[Floats]) -> float:
         return np.log(statistics.tail_exponent(np.concatenate(groups), quantile))
 
     return lambda values, level: np.exp(statistics.jackknife(log_exponent, values, level))
 
 
-def widths(table, sampler):
+def widths(table: Table, sampler: str) -> Iterator[Claim]:
     """ΔF_n and the width of its distribution are largest at intermediate μ."""
     everywhere = positive_friction(sampled(table, sampler))
     for measure, statement, what in (
@@ -99,7 +105,7 @@ def widths(table, sampler):
         yield peaked(statement, sampler, groups, f"{PEAK}, of {what}", good=(0.05, 0.3))
 
 
-def elongation(table, sampler):
+def elongation(table: Table, sampler: str) -> Iterator[Claim]:
     """S is elongated at small and at large μ: some of its extents are much larger than others."""
     ratio = each(sampled(table, sampler), lambda values: values.std() / values.mean())
     middle = within(ratio, MIDDLE)
@@ -116,7 +122,7 @@ def elongation(table, sampler):
         )
 
 
-def _over_middle(keys, means, span):
+def _over_middle(keys: Floats, means: Floats, span: Ends) -> float:
     """The mean of a range of μ over that of the intermediate ones; NaN where one is empty."""
     outer, inner = ((keys >= low) & (keys <= high) for low, high in (span, MIDDLE))
     return means[outer].mean() / means[inner].mean() if outer.any() and inner.any() else np.nan

@@ -1,22 +1,27 @@
 """Claims about where the strong and the undetermined contacts are (Figure 5)."""
 
+from collections.abc import Callable, Iterator
+from typing import Any
+
 import numpy as np
 
 from granforce.paper.claims.groups import (
     BARELY_RIGID,
     MIDDLE,
     SAMPLERS,
+    Groups,
     enough,
     items,
     told,
     within,
 )
-from granforce.paper.claims.verdicts import PRE, PRL, at_each
+from granforce.paper.claims.verdicts import PRE, PRL, Claim, at_each
+from granforce.paper.tables import Table
 
 
-def _marked(table, sampler, measure):
+def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:
     """{μ: [(disks, measure(strong, loose))]}, masks (N_c,) of f_n > 2⟨f_n⟩, ΔF_n > ⟨ΔF_n⟩."""
-    found = {}
+    found: dict[Any, Any] = {}
     for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
         if enough(row) and row["mu"] > 0 and len(extent):
             value = measure(normal > 2 * normal.mean(), extent > extent.mean())
@@ -25,7 +30,7 @@ def _marked(table, sampler, measure):
     return dict(sorted(found.items()))
 
 
-def counts(table, sampler):
+def counts(table: Table, sampler: str) -> Iterator[Claim]:
     """As many strong forces as large extents at μ = 0.1."""
     groups = _marked(
         table,
@@ -43,7 +48,7 @@ def counts(table, sampler):
     )
 
 
-def enrichment(table, sampler):
+def enrichment(table: Table, sampler: str) -> Iterator[Claim]:
     """Strong contacts are less determined than others at intermediate μ."""
     groups = _marked(
         table,
@@ -63,7 +68,7 @@ def enrichment(table, sampler):
     )
 
 
-def place(table, sampler):
+def place(table: Table, sampler: str) -> Iterator[Claim]:
     """Indeterminacy is everywhere in a periodic packing."""
     rows = [row for row in table.part("exact") if row["mu"] > 0 and row.get("contacts")]
     yield at_each(
@@ -86,7 +91,7 @@ def place(table, sampler):
     )
 
 
-def frozen(table, sampler):
+def frozen(table: Table, sampler: str) -> Iterator[Claim]:
     """Inside a frozen boundary indeterminacy is everywhere at small μ, in clusters at large μ."""
     for part in ("frozen", "frozen_large"):
         rows = [row for row in table.part(part) if row.get("contacts")]

@@ -1,12 +1,16 @@
 """Claims about the correlation of a contact's force with its extent (Figure 6)."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from granforce.paper.claims.groups import LARGE, MIDDLE, SMALL, drawn, items, told, within
-from granforce.paper.claims.verdicts import PRE, at_each, over_all
+from granforce.paper.claims.groups import LARGE, MIDDLE, SMALL, Ends, drawn, items, told, within
+from granforce.paper.claims.verdicts import PRE, Claim, at_each, over_all
+from granforce.paper.tables import Table
+from granforce.records import Floats
 
 
-def correlation(table, sampler):
+def correlation(table: Table, sampler: str) -> Iterator[Claim]:
     """corr(f_n, ΔF_n): significant at intermediate μ, weaker at small, vanishing at large μ."""
     rows = [row for row in drawn(table, sampler) if row["mu"] > 0]
     everywhere = items(rows, "correlation")
@@ -50,13 +54,13 @@ def correlation(table, sampler):
         )
 
 
-def _mean_difference(keys, means, span):
+def _mean_difference(keys: Floats, means: Floats, span: Ends) -> float:
     """Mean of a range of μ less that of the intermediate ones; NaN where one is empty."""
     outer, inner = ((keys >= low) & (keys <= high) for low, high in (span, MIDDLE))
     return means[outer].mean() - means[inner].mean() if outer.any() and inner.any() else np.nan
 
 
-def error_bars(table, sampler):
+def error_bars(table: Table, sampler: str) -> Iterator[Claim]:
     """The paper's error bars, the range over all other networks of the walk."""
     rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
     for word, span, test in (

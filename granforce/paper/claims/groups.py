@@ -1,6 +1,15 @@
 """What claims are judged on: {μ: [(disks, value) of each packing]}, and the ranges of μ."""
 
+from collections.abc import Callable, Collection
+from typing import Any
+
 import numpy as np
+
+from granforce.paper.tables import Table
+from granforce.records import Rows
+
+Ends = tuple[float, float]  # of a range or of an interval
+Groups = dict[float, list[tuple[int, Any]]]  # {μ: [(disks, value) of each packing]}
 
 SAMPLERS = {  # parts of the table
     "gauss_seidel": "sweeps_1e-3",
@@ -19,27 +28,32 @@ WHOLE_WALK = 0.3
 DETERMINED = 1e-9  # ⟨f_n⟩: mean extents below this are rounding
 
 
-def drawn(table, sampler):
+def drawn(table: Table, sampler: str) -> list[dict[str, Any]]:
     """Rows of a sampler; walks that reached too few of their states are left out."""
     return [row for row in table.part(SAMPLERS[sampler]) if enough(row)]
 
 
-def enough(row):
+def enough(row: dict[str, Any]) -> bool:
     """Whether a row's walk, if it has one, reached the states that it takes to be judged."""
     return row.get("reached_part", 1.0) >= WHOLE_WALK
 
 
-def dynamic(rows):
+def dynamic(rows: Rows) -> list[dict[str, Any]]:
     """Rows of packings that contact dynamics made."""
     return [row for row in rows if row["mu"] >= LEAST_DYNAMIC]
 
 
-def items(rows, what, by="mu", positive=()):
+def items(
+    rows: Rows,
+    what: str | Callable[..., Any],
+    by: str = "mu",
+    positive: Collection[str] = (),
+) -> Groups:
     """{μ: [(disks, value)]} in order of μ; what: a name, or a function of the row.
 
     Rows whose value is unknown, or that lack a positive value of some names, are left out.
     """
-    found = {}
+    found: dict[Any, Any] = {}
     for row in rows:
         if not all(row.get(name, 0) > 0 for name in positive):
             continue
@@ -49,31 +63,31 @@ def items(rows, what, by="mu", positive=()):
     return {key: found[key] for key in sorted(found)}
 
 
-def sampled(table, sampler):
+def sampled(table: Table, sampler: str) -> Groups:
     """{μ: [(disks, ΔF_n (N_c,) in ⟨f_n⟩)]} of packings with indeterminacy."""
-    found = {}
+    found: dict[Any, Any] = {}
     for row, *_, extent in table.contacts(SAMPLERS[sampler]):
         if enough(row) and len(extent) and extent.mean() > DETERMINED:
             found.setdefault(row["mu"], []).append((row["n"], extent))
     return {mu: found[mu] for mu in sorted(found)}
 
 
-def each(groups, measure):
+def each(groups: Groups, measure: Callable[..., Any]) -> Groups:
     """The groups with a number in place of each packing's value."""
     return {key: [(n, measure(value)) for n, value in group] for key, group in groups.items()}
 
 
-def within(groups, span):
+def within(groups: Groups, span: Ends) -> Groups:
     """The groups of a range of μ."""
     return {mu: group for mu, group in groups.items() if span[0] <= mu <= span[1]}
 
 
-def positive_friction(groups):
+def positive_friction(groups: Groups) -> Groups:
     """The groups but that of μ = 0."""
     return {mu: group for mu, group in groups.items() if mu > 0}
 
 
-def told(span):
+def told(span: Ends) -> str:
     """A range of μ in words."""
     low, high = span
     return f"{low:g} … {high:g}" if np.isfinite(high) else f"{low:g} …"

@@ -9,11 +9,14 @@ Student's interval over its packings, which no draw moves; together they hold wi
 (Bonferroni).
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce import statistics
+from granforce.measures import statistics
+from granforce.paper.claims.groups import Ends, Groups
+from granforce.records import Floats
 
 REPRODUCED, UNDECIDED, DIFFERS = "reproduced", "undecided", "differs"
 FAILED, FEW, MISSING = "not reproduced", "too few data", "no data"
@@ -45,10 +48,10 @@ PRE, PRL, OURS = "PRE", "PRL", "ours"
 class Ranges(NamedTuple):
     """What a claim's words are taken to mean, and a wider range around it."""
 
-    good: tuple
-    fair: tuple
+    good: Ends
+    fair: Ends
 
-    def verdict(self, low, high):
+    def verdict(self, low: float, high: float) -> str:
         """The verdict of an interval: UNDECIDED across an end of the good range.
 
         What lies outside of that for certain differs, and failed where it lies outside of the wider
@@ -62,12 +65,12 @@ class Ranges(NamedTuple):
             return DIFFERS
         return UNDECIDED
 
-    def __str__(self):
+    def __str__(self) -> str:
         good, fair = _range(self.good), _range(self.fair)
         return good if self.fair == self.good else f"{good} [{fair}]"
 
 
-def _range(ends):
+def _range(ends: Ends) -> str:
     low, high = ends
     if not np.isfinite(high):
         return f"≥ {low:g}"
@@ -76,7 +79,18 @@ def _range(ends):
     return f"{low:.3g} … {high:.3g}"
 
 
-def over_all(statement, sampler, source, measured, statistic, groups, *, good, fair=None, least=2):
+def over_all(
+    statement: str,
+    sampler: str,
+    source: str,
+    measured: str,
+    statistic: Callable[..., float],
+    groups: Groups,
+    *,
+    good: Ends,
+    fair: Ends | None = None,
+    least: int = 2,
+) -> Claim:
     """The Claim about one number, statistic(keys, means over packings), of all groups.
 
     groups: {μ: [(disks, value)]}, with values of any shape; least: so many it takes.
@@ -115,7 +129,7 @@ def over_all(statement, sampler, source, measured, statistic, groups, *, good, f
     return Claim(*said, value, low, high, str(ranges), verdict, why)
 
 
-def _turns(turned, verdict):
+def _turns(turned: Any, verdict: str) -> str:
     """What other verdicts there are, in words, and by which cause."""
     why = []
     for other in sorted(set(turned.values()) - {verdict}):
@@ -129,34 +143,51 @@ def _turns(turned, verdict):
     return ", ".join(why)
 
 
-def at_each(statement, sampler, source, measured, groups, *, good, fair=None, interval=None):
+def at_each(
+    statement: str,
+    sampler: str,
+    source: str,
+    measured: str,
+    groups: Groups,
+    *,
+    good: Ends,
+    fair: Ends | None = None,
+    interval: Callable[[Any, float], tuple[float, float, float]] | None = None,
+) -> Claim:
     """The Claim about a number at each μ: what is told is the one farthest from the good range.
 
     groups: {μ: [(disks, value)]}. interval: (values, level) → (value, low, high), by default the
     mean and Student's interval.
     """
     ranges = Ranges(good, good if fair is None else fair)
-    said, interval = (statement, sampler, source), interval or statistics.mean_interval
+    interval = interval or statistics.mean_interval
     if not groups:
-        unknown = (float("nan"),) * 3
-        return Claim(*said, measured, *unknown, str(ranges), MISSING)
+        lost = float("nan")
+        return Claim(
+            statement, sampler, source, measured, lost, lost, lost, str(ranges), verdict=MISSING
+        )
     level = 1 - (1 - statistics.LEVEL) / len(groups)
     found, verdicts = {}, {}
     for mu, group in groups.items():
-        found[mu] = tuple(map(float, interval([value for _, value in group], level)))
+        value, low, high = interval([value for _, value in group], level)
+        found[mu] = float(value), float(low), float(high)
         few = sum(n for n, _ in group) < LEAST_DISKS or not np.isfinite(found[mu][1])
         verdicts[mu] = FEW if few else ranges.verdict(*found[mu][1:])
     place = max(found, key=lambda mu: _beyond(found[mu][0], ranges.good))
     where = f"{measured}, at the worst μ ({place:g})" if len(found) > 1 else measured
-    return Claim(*said, where, *found[place], str(ranges), *_together(verdicts))
+    value, low, high = found[place]
+    verdict, why = _together(verdicts)
+    return Claim(
+        statement, sampler, source, where, value, low, high, str(ranges), verdict=verdict, why=why
+    )
 
 
-def _beyond(value, ends):
+def _beyond(value: float, ends: Ends) -> float:
     """How far a number lies outside of a range, or how near its ends it is inside: negative."""
     return max(ends[0] - value, value - ends[1])
 
 
-def _together(verdicts):
+def _together(verdicts: Any) -> tuple[str, str]:
     """The verdict of a claim from those at each μ, and where it is another one."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
@@ -173,12 +204,12 @@ def _together(verdicts):
 # Statistics of keys (k,) and means over packings (k, …)
 
 
-def slope(keys, means):
+def slope(keys: Floats, means: Floats) -> float:
     """Slope of the logarithm of the means against that of the keys."""
     return np.polyfit(np.log(keys), np.log(means), 1)[0]
 
 
-def peak(keys, means):
+def peak(keys: Floats, means: Floats) -> float:
     """μ where the means are largest, between grid values; the end of the grid if they rise there.
 
     The top of a parabola in log μ through the means within a factor NEAR_PEAK of the largest one,

@@ -1,15 +1,22 @@
 """Statistics over packings: means, intervals, bootstraps, and the shape of distributions."""
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
+from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from scipy import optimize, stats
+
+from granforce.records import Floats
+
+T = TypeVar("T")
 
 LEVEL = 0.95  # of every confidence interval
 RESAMPLES = 999
 
 
-def mean_interval(values, level=LEVEL):
+def mean_interval(values: Iterable[float], level: float = LEVEL) -> tuple[float, float, float]:
     """Mean and its confidence interval (Student's t): (mean, low, high); NaN where unknown.
 
     values: one number per packing; NaN are left out. One packing has no interval.
@@ -24,7 +31,9 @@ def mean_interval(values, level=LEVEL):
     return mean, float(mean - reach), float(mean + reach)
 
 
-def jackknife(statistic, items, level=LEVEL):
+def jackknife(
+    statistic: Callable[[list[T]], float], items: Iterable[T], level: float = LEVEL
+) -> tuple[float, float, float]:
     """(value, low, high) of statistic(items), by leaving out each item once (Student's t).
 
     items: one per packing. The interval is a function of the data alone, and wants a statistic
@@ -39,12 +48,12 @@ def jackknife(statistic, items, level=LEVEL):
     return value, float(value - reach), float(value + reach)
 
 
-def grouped(rows, name, by="mu"):
+def grouped(rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu") -> dict[float, Floats]:
     """{μ: array of the values of one name over packings}, in order of μ; NaN left out.
 
     rows: dicts with μ (or what else to group by) and the name; rows without it are passed over.
     """
-    found = {}
+    found: dict[Any, list[float]] = {}
     for row in rows:
         value = row.get(name)
         if value is not None and np.isfinite(value):
@@ -52,7 +61,9 @@ def grouped(rows, name, by="mu"):
     return {key: np.array(found[key]) for key in sorted(found)}
 
 
-def means(rows, name, by="mu", factor=1.0):
+def means(
+    rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu", factor: float = 1.0
+) -> list[tuple[float, float, float]]:
     """Points [(μ, mean, standard error over packings)] of one name, times a factor."""
     points = []
     for key, values in grouped(rows, name, by).items():
@@ -61,7 +72,12 @@ def means(rows, name, by="mu", factor=1.0):
     return points
 
 
-def bootstrap(statistic, groups, seed=0, resamples=RESAMPLES):
+def bootstrap(
+    statistic: Callable[..., float],
+    groups: Sequence[Sequence[Any] | Floats],
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+) -> tuple[float, float, float]:
     """(value, low, high) of statistic(*groups) with a percentile interval.
 
     groups: sequences, one item per packing; each group is resampled on its own. Groups of one
@@ -70,7 +86,7 @@ def bootstrap(statistic, groups, seed=0, resamples=RESAMPLES):
     """
     rng = np.random.default_rng(seed)
     groups = [list(group) for group in groups]
-    if max(map(len, groups)) < 2:
+    if max(len(group) for group in groups) < 2:
         return float(statistic(*groups)), float("nan"), float("nan")
     drawn = np.empty(resamples)
     for k in range(resamples):
@@ -83,7 +99,9 @@ def bootstrap(statistic, groups, seed=0, resamples=RESAMPLES):
     return float(statistic(*groups)), float(low), float(high)
 
 
-def resampled_means(groups, seed=0, resamples=RESAMPLES):
+def resampled_means(
+    groups: Sequence[npt.ArrayLike], seed: int = 0, resamples: int = RESAMPLES
+) -> Floats:
     """Means (resamples, groups, …) of groups whose items, one per packing, are drawn anew."""
     rng = np.random.default_rng(seed)
     drawn = []
@@ -93,7 +111,7 @@ def resampled_means(groups, seed=0, resamples=RESAMPLES):
     return np.stack(drawn, axis=1)
 
 
-def percentile_ends(drawn):
+def percentile_ends(drawn: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
     """Percentile interval of draws, (low, high), and the farthest that chance may put its ends.
 
     With other draws from the same distribution an end would have another rank among these: it is
@@ -105,19 +123,19 @@ def percentile_ends(drawn):
     return (float(low), float(high)), (float(drawn[rank]), float(drawn[-1 - rank]))
 
 
-def rank_correlation(x, y):
+def rank_correlation(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
     """Spearman's rank correlation; ties share their rank."""
     ranks = stats.rankdata(x), stats.rankdata(y)
     return float(np.corrcoef(*ranks)[0, 1])
 
 
-def density(values, edges):
+def density(values: Floats, edges: Floats) -> Floats:
     """Probability density of values in the bins of edges; values outside count in the norm."""
     counts = np.histogram(values, edges)[0]
     return counts / (len(values) * np.diff(edges))
 
 
-def departure(values):
+def departure(values: npt.ArrayLike) -> float:
     """How far a density on x ≥ 0 is from falling everywhere: sup of Ĉ − F over x.
 
     F is the distribution function of the values (n,), Ĉ its least concave majorant, whose slope
@@ -137,7 +155,7 @@ def departure(values):
     return float((majorant[1:] - reached[:-1]).max(initial=0.0))
 
 
-def chance_departure(number, level=LEVEL):
+def chance_departure(number: float, level: float = LEVEL) -> float:
     """The departure that so many values of a falling density exceed in 1 − level of cases.
 
     The uniform density comes nearest to rising, so it is the null; √n times its departure has a
@@ -147,12 +165,12 @@ def chance_departure(number, level=LEVEL):
 
 
 @cache
-def _uniform_departures(size=1000, repeats=4999):
+def _uniform_departures(size: int = 1000, repeats: int = 4999) -> Floats:
     rng = np.random.default_rng(0)
     return np.sqrt(size) * np.array([departure(rng.random(size)) for _ in range(repeats)])
 
 
-def effective_number(groups):
+def effective_number(groups: Sequence[Sequence[float] | Floats]) -> float:
     """How many independent values groups of values, one per packing, are worth for their F.
 
     The variance of F over packings at its deciles, over that of as many independent values: values
@@ -169,7 +187,7 @@ def effective_number(groups):
     return len(joined) / max(1.0, float(excess))
 
 
-def tail_exponent(values, quantile=0.5):
+def tail_exponent(values: npt.ArrayLike, quantile: float = 0.5) -> float:
     """Exponent b of P(X > x) ∝ exp(−(λ x)^b) beyond a quantile, by maximum likelihood.
 
     b = 1 is an exponential tail, b > 1 falls faster, b < 1 slower. The likelihood is that of a
@@ -183,7 +201,7 @@ def tail_exponent(values, quantile=0.5):
         return float("nan")
     logs = np.log(tail)
 
-    def minus_likelihood(log_b):
+    def minus_likelihood(log_b: float) -> float:
         b = np.exp(log_b)
         excess = np.expm1(b * logs).sum()
         return np.log(excess) - log_b - b * logs.mean()
@@ -192,6 +210,6 @@ def tail_exponent(values, quantile=0.5):
     return float(np.exp(found.x))
 
 
-def _finite(values):
+def _finite(values: Iterable[float]) -> Floats:
     values = np.asarray(list(values), float)
     return values[np.isfinite(values)]

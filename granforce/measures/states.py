@@ -7,28 +7,28 @@ import numpy as np
 from scipy import sparse, stats
 from scipy.sparse import csgraph
 
-from granforce.records import InputError
+from granforce.records import Floats, InputError, Integers
 
 
-def _some(states):
+def _some(states: Floats) -> Floats:
     if not states.size:
         raise InputError("nothing to measure: there are no states, or no contacts")
     return states
 
 
-def mean_network(states):
+def mean_network(states: Floats) -> Floats:
     """G_c = ⟨F_c⟩, the mean force of each contact over states, shape (N_c, 2)."""
     return _some(states).mean(axis=0)
 
 
-def eta1(states):
+def eta1(states: Floats) -> float:
     """η1 = ⟨δF_c⟩_c / ⟨|G_c|⟩_c with δF_c = sqrt⟨|F_c − G_c|²⟩ over states."""
     mean = mean_network(states)
     spread = np.sqrt(((states - mean) ** 2).sum(axis=2).mean(axis=0))
     return float(spread.mean() / np.linalg.norm(mean, axis=1).mean())
 
 
-def eta2(states):
+def eta2(states: Floats) -> float:
     """η2 = sqrt(⟨Σ_c |F_c − F'_c|²⟩ / Σ_c |G_c|²) over all pairs of different states.
 
     The mean over pairs is 2 S/(S − 1) times the variance, so no pair is ever formed; 0 for S = 1.
@@ -41,7 +41,7 @@ def eta2(states):
     return float(np.sqrt(2 * count / (count - 1) * variance / (mean**2).sum()))
 
 
-def eta3(low, high):
+def eta3(low: Floats, high: Floats) -> float:
     """η3 = ⟨F_max − F_min⟩ / ⟨(F_max + F_min)/2⟩ over all 2N_c components.
 
     low, high (N_c, 2): smallest and largest f_n, f_t, over states or exact.
@@ -49,24 +49,24 @@ def eta3(low, high):
     return float((high - low).mean() / ((high + low) / 2).mean())
 
 
-def intervals_seen(states):
+def intervals_seen(states: Floats) -> tuple[Floats, Floats]:
     """Smallest and largest value of each component over states, two arrays (N_c, 2)."""
     return _some(states).min(axis=0), states.max(axis=0)
 
 
-def normal_extent(low, high):
+def normal_extent(low: Floats, high: Floats) -> Floats:
     """ΔF_n, the length of the interval of f_n of each contact, shape (N_c,)."""
     return high[:, 0] - low[:, 0]
 
 
-def correlation(normal_forces, extent):
+def correlation(normal_forces: Floats, extent: Floats) -> float:
     """corr(f_n, ΔF_n) over contacts (Pearson); nan where one of them does not vary."""
     if np.ptp(extent) <= 1e-12 * np.abs(normal_forces).max(initial=0) or np.ptp(normal_forces) == 0:
         return float("nan")
     return float(stats.pearsonr(normal_forces, extent).statistic)
 
 
-def correlation_range(states, extent):
+def correlation_range(states: Floats, extent: Floats) -> tuple[float, float]:
     """Smallest and largest corr(f_n, ΔF_n) with any state in place of the original network.
 
     The paper's error bar of the correlation.
@@ -75,12 +75,12 @@ def correlation_range(states, extent):
     return float(np.min(values)), float(np.max(values))
 
 
-def distances(states, centre):
+def distances(states: Floats, centre: Floats) -> Floats:
     """Distance |F − centre| of each state in force space, shape (S,)."""
     return np.sqrt(((states - centre) ** 2).sum(axis=(1, 2)))
 
 
-def principal_axes(states, count=2):
+def principal_axes(states: Floats, count: int = 2) -> tuple[Floats, Floats]:
     """Directions along which states vary most: axes (count, N_c, 2), and their share of variance.
 
     Axes have length 1 and a positive largest component; those along which nothing varies are zero.
@@ -100,10 +100,10 @@ def principal_axes(states, count=2):
 class Growth:
     """η1, η2 and η3 of states that are added one by one."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.count = 0
 
-    def add(self, state):
+    def add(self, state: Floats) -> tuple[float, float, float]:
         """One more state (N_c, 2); (η1, η2, η3) of all until now."""
         if not self.count:
             self._first, self._low, self._high = state, state, state
@@ -125,14 +125,14 @@ class Growth:
         )
 
 
-def growing(states):
+def growing(states: Floats) -> dict[str, Floats]:
     """η1, η2 and η3 of the first 1, 2, … S states: {"eta1": (S,), "eta2": (S,), "eta3": (S,)}."""
     growth = Growth()
     values = np.array([growth.add(state) for state in _some(states)])
     return dict(zip(("eta1", "eta2", "eta3"), values.T, strict=True))
 
 
-def position_in_interval(normal_forces, low, high):
+def position_in_interval(normal_forces: Floats, low: Floats, high: Floats) -> Floats:
     """Where each f_n lies in its interval, 0 at the least and 1 at the largest; nan where ΔF_n = 0.
 
     normal_forces (N_c,); low, high (N_c, 2).
@@ -142,7 +142,9 @@ def position_in_interval(normal_forces, low, high):
         return np.where(extent > 0, (normal_forces - low[:, 0]) / extent, np.nan)
 
 
-def undetermined_clusters(i, j, extent, tolerance):
+def undetermined_clusters(
+    i: Integers, j: Integers, extent: Floats, tolerance: float
+) -> tuple[Integers, Integers]:
     """Clusters of contacts whose forces are not fixed: connected through shared grains.
 
     i, j (N_c,) grains; extent (N_c, 2) lengths of the intervals of f_n and f_t; a contact is

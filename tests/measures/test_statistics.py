@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from granforce import statistics
+from granforce.measures import statistics
 
 
 def test_mean_intervals_cover_as_often_as_they_say(rng):

@@ -1,0 +1,37 @@
+"""Measures of states, and statistics over packings: of any arrays, wherever they come from."""
+
+from granforce.measures import statistics
+from granforce.measures.states import (
+    Growth,
+    correlation,
+    correlation_range,
+    distances,
+    eta1,
+    eta2,
+    eta3,
+    growing,
+    intervals_seen,
+    mean_network,
+    normal_extent,
+    position_in_interval,
+    principal_axes,
+    undetermined_clusters,
+)
+
+__all__ = [
+    "Growth",
+    "correlation",
+    "correlation_range",
+    "distances",
+    "eta1",
+    "eta2",
+    "eta3",
+    "growing",
+    "intervals_seen",
+    "mean_network",
+    "normal_extent",
+    "position_in_interval",
+    "principal_axes",
+    "statistics",
+    "undetermined_clusters",
+]
