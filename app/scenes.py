@@ -90,6 +90,7 @@ def geometry(packing):
         "idle": not loaded,  # nothing says how large forces are
         "packed": packing.info.get("packed_mu"),
         "box": box,
+        "pressure": float(np.nan_to_num(packing.pressure)),
         "i": contacts.i.astype(np.int32),
         "j": contacts.j.astype(np.int32),
         "normal": contacts.normal.ravel(),

@@ -1,11 +1,21 @@
 // The small scene itself: disks, walls, the force on each disk at each contact as an arrow within its
 // cone, and, for a disk that is looked at, its forces put one after the other: they close.
 
+const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
+const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
+const NAMED = 3 // contacts up to which the forces on a single disk have their names beside them
+
+/** Whether a scene is so much higher than wide that it needs a picture like that. */
+function tall({ name, x, box }) {
+  const extent = (k) => { const all = x.filter((_, n) => n % 2 === k); return Math.max(...all) - Math.min(...all) }
+  return name !== "own" && !box[0] && extent(1) > 4 * extent(0) && extent(0) > 0
+}
+
 class Arrows {
-  constructor(root, told) {
+  constructor(root, told, ratio) {
     this.told = told // told(what, …): of a hand on it
     this.canvas = root
-    this.context = root.getContext("2d")
+    this.easel = new Easel(root, ratio)
     this.hover = null
     this.held = null
     const at = (event) => {
@@ -18,9 +28,12 @@ class Arrows {
     for (const name of ["pointerup", "pointercancel"]) root.addEventListener(name, () => { this.held = null; told("release") })
   }
 
+  get context() { return this.easel.g }
+
   /** Fit disks and walls into the canvas. */
   fit(body, same = false) {
     this.body = body
+    this.easel.measure()
     const mean = body.sumAt(body.u) / body.count
     this.forceUnit = (0.75 * Math.max(...body.scene.r)) / (Math.max(Math.abs(mean), 1e-6) || 1)
     if (same) return // where it is built, nothing moves but what the hand moves
@@ -34,16 +47,17 @@ class Arrows {
     for (const { from } of this.pressing()) { xs.push(from[0]); ys.push(from[1]) }
     if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
-    const width = this.canvas.clientWidth, height = this.canvas.clientHeight
-    const room = box[0] ? 0.12 : 0.1
-    this.unit = Math.min(width / ((right - left) * (1 + 2 * room)), height / ((high - low) * (1 + 2 * room)))
+    const { wide: width, high: height } = this.easel
+    const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
+    const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
+    this.unit = Math.min(width / across, height / up)
     this.unit = Math.min(this.unit, 0.27 * Math.min(width, height) / Math.max(...r))
     this.x0 = width / 2 - (this.unit * (left + right)) / 2
     this.y0 = height / 2 + (this.unit * (low + high)) / 2
   }
 
   /** What is in the middle of the canvas. */
-  get middle() { return this.back(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2) }
+  get middle() { return this.back(this.easel.wide / 2, this.easel.high / 2) }
 
   px(x, y) { return [this.x0 + this.unit * x, this.y0 - this.unit * y] }
   back(px, py) { return [(px - this.x0) / this.unit, (this.y0 - py) / this.unit] }
@@ -61,6 +75,8 @@ class Arrows {
   /** Both ends of every contact: {contact, disk, at, inward: force on the disk of f_n = 1, across}. */
   ends() {
     const { scene } = this.body, disks = scene.r.length, found = []
+    if (this.endsOf === scene) return this.found
+    Object.assign(this, { endsOf: scene, found, places: [] })
     for (let c = 0; c < scene.i.length; c++) {
       const [nx, ny] = [scene.normal[2 * c], scene.normal[2 * c + 1]]
       for (const [disk, sign, arm] of [[scene.i[c], -1, scene.arm_i[c]], [scene.j[c], 1, scene.arm_j[c]]]) {
@@ -73,21 +89,21 @@ class Arrows {
   }
 
   draw(look) {
-    const { context: g, canvas, body } = this, ratio = window.devicePixelRatio || 1
-    const width = canvas.clientWidth, height = canvas.clientHeight
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio)
-      canvas.height = Math.round(height * ratio)
-    }
-    g.setTransform(ratio, 0, 0, ratio, 0, 0)
-    g.clearRect(0, 0, width, height)
+    const { body } = this
     this.look = look
-    this.drawWalls(look.wall ?? [])
-    this.drawDisks()
+    this.easel.measure()
+    this.shafts = [] // of arrows, where no number is to be
+    const wall = look.wall ?? []
+    this.easel.begin(look.paper, [body.scene, this.unit, this.x0, this.y0, look.disk, wall.join()], () => {
+      this.drawWalls(wall)
+      this.drawDisks()
+    })
     const F = body.empty ? null : body.forces()
     if (F) for (const end of this.ends()) this.drawEnd(end, F)
     if (look.fall) this.drawFall(look.fall)
     this.drawLoads()
+    if (body.scene.r.length > 1) this.drawNumbers()
+    else if (F && body.count <= NAMED) this.drawNames(F)
     if (look.cursor) this.drawCursor(this.px(...look.cursor))
     if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
@@ -124,10 +140,11 @@ class Arrows {
 
   drawDisks() {
     const { context: g, body, look } = this, { x, r, box } = body.scene
-    const shifts = box[0] ? [-1, 0, 1] : [0]
+    const shifts = box[0] ? [-1, 0, 1] : [0], { wide, high } = this.easel
     for (let d = 0; d < r.length; d++) {
       for (const a of shifts) for (const b of shifts) {
         const [px, py] = this.px(x[2 * d] + a * box[0], x[2 * d + 1] + b * box[1]), R = r[d] * this.unit
+        if (px < -R || py < -R || px > wide + R || py > high + R) continue
         g.beginPath()
         g.arc(px, py, R, 0, 7)
         g.globalAlpha = a || b ? 0.3 : 1
@@ -137,14 +154,57 @@ class Arrows {
         g.lineWidth = 1.5
         g.stroke()
         g.globalAlpha = 1
-        if (a || b || r.length < 2) continue
-        g.fillStyle = look.ink
-        g.font = "12px sans-serif"
-        g.textAlign = "center"
-        g.textBaseline = "middle"
-        g.fillText(String(d + 1), px - 0.42 * R, py - 0.42 * R)
       }
     }
+  }
+
+  /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
+  drawNumbers() {
+    const { context: g, body, look } = this, { r } = body.scene
+    this.ends() // a new scene forgets the places of the one before
+    g.fillStyle = look.ink
+    g.font = "12px sans-serif"
+    g.textAlign = "center"
+    g.textBaseline = "middle"
+    for (let d = 0; d < r.length; d++) {
+      const clear = (k) => { const at = this.numberAt(d, k); return Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...at))) }
+      if (clear((this.places[d] ??= 1)) < CLEAR) {
+        const room = NUMBERS.map(clear)
+        this.places[d] = room.indexOf(Math.max(...room))
+      }
+      g.fillText(String(d + 1), ...this.numberAt(d, this.places[d]))
+    }
+  }
+
+  /** Place k of a disk's number: 0 its middle, else around that. */
+  numberAt(d, k) {
+    const { x, r } = this.body.scene, [px, py] = this.px(x[2 * d], x[2 * d + 1])
+    const R = k ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
+    return [px + R * Math.cos(angle), py + R * Math.sin(angle)]
+  }
+
+  /** Beside the only disk: what each wall does, in numbers, and the weight. */
+  drawNames(F) {
+    const { context: g, body, look } = this, { scene } = body
+    g.font = "13px sans-serif"
+    g.textBaseline = "middle"
+    const write = (x, y, lines, align) => {
+      g.textAlign = align
+      lines.forEach((line, k) => {
+        g.fillStyle = k ? look.cold : look.ink
+        g.fillText(line, x, y + 17 * (k - (lines.length - 1) / 2))
+      })
+    }
+    for (const { contact, at, inward, across } of this.ends()) {
+      const [px, py] = this.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
+      const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
+      const rubs = ["tangential force", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.easel.wide - x : x
+      const both = g.measureText(rubs.join(" ")).width < room - 4 ? [rubs.join(" ")] : rubs
+      const lines = [scene.names[contact].replace("at the ", "force of the "), `normal force ${number(n)}`, ...both]
+      write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
+    }
+    const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = this.px(scene.x[0], scene.x[1])
+    if (load > 1e-9) write(cx, cy - 13, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
   }
 
   drawEnd({ contact, disk, at, inward, across }, F) {
@@ -176,11 +236,12 @@ class Arrows {
   arrow(px, py, force, colour, thick) {
     const { context: g } = this, unit = this.unit * this.forceUnit
     let [dx, dy] = [force[0] * unit, -force[1] * unit], size = Math.hypot(dx, dy)
-    const most = 0.45 * Math.min(this.canvas.clientWidth, this.canvas.clientHeight)
+    const most = 0.45 * Math.min(this.easel.wide, this.easel.high)
     if (size < 1.5) return
     const cut = size > most
     if (cut) { dx *= most / size; dy *= most / size; size = most }
     const head = Math.min(11, 0.5 * size + 2), [ux, uy] = [dx / size, dy / size]
+    this.shafts.push([[px, py], [px + dx, py + dy]])
     g.strokeStyle = g.fillStyle = colour
     g.lineWidth = thick
     g.lineCap = "butt"
@@ -246,9 +307,9 @@ class Arrows {
     }
     let [sx, sy] = [0, 0], corners = [[0, 0]]
     for (const [x, y] of forces) corners.push([(sx += x), (sy += y)])
-    const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.canvas.clientWidth)
+    const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.easel.wide)
     const span = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys), 1e-9)
-    const unit = (side - 34) / span, left = this.canvas.clientWidth - side - 8, top = 8
+    const unit = (side - 34) / span, left = this.easel.wide - side - 8, top = 8
     g.fillStyle = look.paper
     g.strokeStyle = look.edge
     g.lineWidth = 1

@@ -1,30 +1,56 @@
-// The exact intervals of all normal forces in a small scene, and where each force is in its own.
+// The exact intervals of all normal forces in a small scene, and where each force is in its own. What
+// has not changed is not touched, and nothing that moves is laid out anew: a frame is to be cheap.
 
 class Bars {
-  constructor(host) { this.host = host }
+  constructor(host) { this.host = host; this.rows = [] }
 
   /** ends: [least, largest] of each contact, known otherwise where S is not drawn whole. */
   draw(body, lit, ends) {
-    const { host } = this
-    host.hidden = body.empty
+    this.host.hidden = body.empty
     if (body.empty) return
-    if (host.children.length !== body.count) {
-      host.innerHTML = Array.from({ length: body.count }, (_, c) => `
-        <div role="listitem" data-contact="${c}"><span class="label"></span><span class="rail"><i class="span"></i><i class="dot"></i></span><span class="value"></span></div>`).join("")
-    }
-    const F = body.forces(), both = Array.from({ length: body.count }, (_, c) => (body.whole ? body.interval(2 * c) : ends?.[c] ?? [NaN, NaN]))
+    if (this.rows.length !== body.count) this.begin(body.count)
+    const F = body.forces(), both = this.rows.map((_, c) => (body.whole ? this.exact(body)[c] : ends?.[c] ?? [NaN, NaN]))
     const finite = [...both.flat().filter(Number.isFinite), ...F.filter((_, k) => k % 2 === 0)]
-    const most = Math.max(...finite, 1e-9) * 1.1, at = (v) => `${(100 * Math.min(v, most)) / most}%`
-    ;[...host.children].forEach((row, c) => {
-      const [low, high] = both[c], value = F[2 * c], part = (name) => row.querySelector(name)
-      row.classList.toggle("lit", lit.has(c))
-      part(".label").textContent = `fₙ ${body.scene.names[c]}`
-      part(".span").hidden = Number.isNaN(low)
-      part(".span").style.left = at(low)
-      part(".span").style.right = `${100 - (100 * Math.min(high, most)) / most}%`
-      part(".dot").style.left = at(value)
-      const range = Number.isNaN(low) ? "" : ` in ${number(low)} … ${Number.isFinite(high) ? number(high) : "∞"}`
-      part(".value").textContent = `${number(value)}${range}`
+    const most = Math.max(...finite, 1e-9) * 1.1, at = (v) => Number(((100 * Math.min(v, most)) / most).toFixed(2))
+    this.rows.forEach((row, c) => {
+      const [low, high] = both[c], value = F[2 * c]
+      row.tell("class", lit.has(c) ? "lit" : "")
+      row.tell("label", forceName(body.scene, 2 * c))
+      row.tell("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${Math.max(0.004, (at(high) - at(low)) / 100)})`)
+      row.tell("dot", `translateX(${at(value)}%)`)
+      row.tell("value", `${number(value)}${range(low, high, body.scaleOf())}`)
     })
   }
+
+  /** Intervals of a body that is drawn whole, until it is cut anew. */
+  exact(body) {
+    if (this.corners !== body.corners) {
+      this.corners = body.corners
+      this.known = Array.from({ length: body.count }, (_, c) => body.interval(2 * c))
+    }
+    return this.known
+  }
+
+  begin(count) {
+    this.host.innerHTML = Array.from({ length: count }, (_, c) => `
+      <div role="listitem" data-contact="${c}"><span class="label"></span><span class="rail"><i class="span"></i><i class="dot"></i></span><span class="value"></span></div>`).join("")
+    this.rows = [...this.host.children].map((row) => {
+      const told = {}, part = (name) => row.querySelector(`.${name}`)
+      const tells = {
+        class: (text) => { row.className = text },
+        label: (text) => { part("label").textContent = part("label").title = text },
+        value: (text) => { part("value").textContent = text },
+        span: (text) => { part("span").style.transform = text },
+        dot: (text) => { part("dot").style.transform = text },
+      }
+      return { tell: (what, text) => { if (told[what] !== text) tells[what]((told[what] = text)) } }
+    })
+  }
+}
+
+/** Between which values a force may lie, in words. */
+function range(low, high, scale) {
+  if (Number.isNaN(low)) return ""
+  if (high - low < 1e-9 * scale) return " (fixed)"
+  return Number.isFinite(high) ? ` (possible ${number(low)} to ${number(high)})` : ` (possible from ${number(low)} on)`
 }

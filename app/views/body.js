@@ -118,6 +118,18 @@ class Body {
     this.middle = this.u.map((_, k) => corners.reduce((s, corner) => s + corner.u[k], 0) / corners.length)
   }
 
+  /** A friction, in hundredths, under which S of the present loads has a point; null where none up to `most` has. */
+  enough(most) {
+    const trial = new Body(this.scene)
+    trial.load = this.load
+    trial.reload()
+    if (!this.whole || trial.cut(most).empty) return null
+    let [low, high] = [this.mu, most]
+    while (high - low > 1e-3) { const mu = (low + high) / 2; if (trial.cut(mu).empty) low = mu; else high = mu }
+    const found = Math.ceil(100 * high) / 100
+    return trial.cut(found).empty ? null : found
+  }
+
   /** Outwards along the sides that meet in a corner far outside, to rounding; null without one. */
   along(u, total) {
     const { h } = this, met = this.rows.filter((row) => Math.abs(dot(row.slope, u) + row.rest) < 1e-7 * (1 + Math.hypot(...u)))

@@ -2,6 +2,8 @@
 
 const NEAR = 0.45 // of the largest radius, within which a disk is drawn into contact
 const MOST_DISKS = 30, MOST_WALLS = 12
+// One disk on the floor, by its weight or under a wall that presses.
+const BARE = "2,1,1|0,0,4,0", BARE_UNDER_PRESS = "2,1,1|0,0,4,0;0.4,2,3.6,2|p1"
 // What those begin with who let walls press: three disks under one that does.
 const UNDER_PRESS = "1,1,1;3,1,1;2,2.732050807569,1|0,0,4,0;0.4,3.732050807569,3.6,3.732050807569|p1"
 
@@ -25,20 +27,20 @@ class Builder {
         <button type="button" role="radio" data-load="pressure">Pressure</button>
       </span>
       <span role="radiogroup" aria-label="What the hand does">
-        <button type="button" role="radio" data-tool="disk">Put or move disks</button>
+        <button type="button" role="radio" data-tool="disk">Add or move</button>
         <button type="button" role="radio" data-tool="wall">Draw a wall</button>
-        <button type="button" role="radio" data-tool="press" title="Click a wall: it presses, or no longer does">Let a wall press</button>
+        <button type="button" role="radio" data-tool="press" title="Click a wall: it presses, or no longer does">Make a wall press</button>
         <button type="button" role="radio" data-tool="remove">Remove</button>
-        <button type="button" role="radio" data-tool="pull">Pull forces</button>
+        <button type="button" role="radio" data-tool="pull">Drag arrows</button>
       </span>
       <label>radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
-      <button type="button" class="anew">Start again</button>
-      <span class="fixed packed presses">no weight; a wall that presses does so with a force as large as it is long</span>`
+      <button type="button" class="anew" title="Begin anew, with one disk on the floor">Clear</button>
+      <span class="presses">No gravity. A pressing wall pushes with a force equal to its length.</span>`
     host.addEventListener("click", (event) => {
       const { tool, load } = event.target.dataset
       if (tool) { this.tool = tool; this.tell() }
       if (load) this.choose(load === "pressure")
-      if (event.target.classList.contains("anew")) this.begin()
+      if (event.target.classList.contains("anew")) this.begin(this.pressure ? BARE_UNDER_PRESS : BARE)
     })
     host.querySelector(".size").addEventListener("input", (event) => { this.size = Number(event.target.value) })
     this.tell()
@@ -64,10 +66,10 @@ class Builder {
     else this.publish()
   }
 
-  /** The scene to begin with, under the load that is chosen. */
-  begin() {
+  /** Another scene in place of this one, by default that to begin with under the load that is chosen. */
+  begin(text = this.pressure ? UNDER_PRESS : "") {
     this.text = null // whatever comes is taken over
-    this.changed(this.pressure ? UNDER_PRESS : "")
+    this.changed(text)
   }
 
   /** Take over a scene from its text, unless the hand is ahead of it; whether it is another one. */

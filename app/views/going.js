@@ -14,7 +14,7 @@ class Going {
   }
 
   tell() {
-    this.button.textContent = this.frame ? "Stop" : "Walk"
+    this.button.textContent = this.frame ? "Stop" : "Random walk"
     this.button.classList.toggle("on", Boolean(this.frame))
   }
 

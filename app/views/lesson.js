@@ -36,16 +36,17 @@ function lesson() {
     <ol>${QUESTIONS.map(([asked, answer]) => `<li>${asked}<details><summary>Answer</summary>${answer}</details></li>`).join("")}</ol>`
 }
 
-/** Have it printed alone, with the picture on screen; open: with its answers. */
-function printed(picture, open) {
+/** Have it printed alone, with the pictures of the disk and of S; open: with its answers. */
+function printed(pictures, open) {
   const sheet = document.createElement("iframe")
   sheet.title = "The lesson, to be printed"
   sheet.style.cssText = "position: fixed; width: 0; height: 0; border: 0"
   sheet.srcdoc = `<!doctype html><meta charset="utf-8"><title>The groove</title><style>
-    body { font: 11.5pt/1.4 sans-serif; max-width: 17cm; margin: 0 auto; } img { float: right; width: 6.5cm; margin-left: 6mm; }
-    td, th { padding: 1px 14px 1px 0; text-align: left; } h2 { margin: 0; } .formula { text-align: center; }
+    body { font: 10.5pt/1.35 sans-serif; max-width: 17cm; margin: 0 auto; } figure { display: flex; gap: 4mm; margin: 3mm 0; } img { flex: 1; min-width: 0; border: 1px solid #ccc; }
+    sub { line-height: 0; } td, th { padding: 1px 14px 1px 0; text-align: left; } h2 { margin: 0; } .formula { text-align: center; }
     ${open ? "" : "details { height: 1.2cm; overflow: hidden; color: transparent; }"}</style>
-    <img src="${picture}" alt="">${open ? lesson().replaceAll("<details>", "<details open>") : lesson()}`
+    ${open ? lesson().replaceAll("<details>", "<details open>") : lesson()}`.replace(
+      "</h2>", `</h2><figure>${pictures.map((picture) => `<img src="${picture}" alt="">`).join("")}</figure>`)
   sheet.addEventListener("load", () => {
     sheet.contentWindow.addEventListener("afterprint", () => sheet.remove())
     sheet.contentWindow.print()

@@ -2,13 +2,20 @@
 
 const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) < 10 ? 3 : 1))
 const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
+const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
 
-/** What happens at a side of S, in words: which contacts slide or open there. */
+/** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
+function forceName({ names }, index) {
+  const place = names[index >> 1]
+  return `${index % 2 ? "tangential" : "normal"} force ${place.startsWith("disk") ? "on " : ""}${place}`
+}
+
+/** What happens at a side of S, in words: which contacts are about to slide or to open there. */
 function stopping({ scene }, side) {
   const kinds = new Map()
   for (const [contact, what] of side.stops) {
     const [, disk, place] = scene.names[contact].match(/^(disk \d+ )?(.*)$/)
-    const verb = `${disk ?? ""}${what === OPENS ? "opens" : `slides${way(scene, contact, what)}`}`
+    const verb = `${disk ?? ""}${what === OPENS ? "would lose contact" : `about to slide${way(scene, contact, what)}`}`
     kinds.set(verb, [...(kinds.get(verb) ?? []), place])
   }
   return [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ").replace("at the left wall and at the right wall", "at both walls")
@@ -21,12 +28,36 @@ function way(scene, contact, what) {
   return Math.abs(y) > 0.3 ? (y > 0 ? " up" : " down") : x > 0 ? " right" : " left"
 }
 
-/** Forces less equations, as HTML. */
-function counted({ h, count, scene }) {
-  const walls = scene.pressing.length ? "every disk's forces and torque must balance, and the forces on every wall that presses"
-    : `every disk's forces and torque must balance${scene.box[0] ? ", and the pressure is given" : ""}`
-  return `<b>${2 * count} forces − ${scene.equations ?? 0} equations = ${h} free</b> ` +
-    `<span>(${plural(count, "contact")} with a normal and a tangential force each; ${walls})</span>`
+/** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
+function counted({ h, count, scene, empty, consistent, whole, corners }) {
+  const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
+  const forces = plural(count, "contact") + " with a normal and a tangential force each"
+  if (empty && !scene.idle) {
+    const none = consistent ? "none of their solutions is allowed" : "they have no solution"
+    const because = consistent ? "; in each, some contact would have to pull, or to rub with more than μ times its normal force" : ""
+    return `<b>${2 * count} forces, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
+  }
+  const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
+  return `<b>${2 * count} forces − ${equations} equations = ${h} free${point}</b> <span>(${forces}; ${sum}${why})</span>`
+}
+
+/** The sum that gives the number of equations, and what its parts are. */
+function equationsOf({ grains, r, pressing, box, equations }) {
+  const disks = [...(grains ?? [])].filter((grain) => grain < r.length).length, walls = 2 * pressing.length
+  const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
+  const said = "no force sideways, none up or down, and no turning, of every disk"
+  if (whole !== equations) return [said, ""]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `${said}; two of these follow from the others, as a shift of all disks changes nothing; one more for the pressure`]
+  return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
+}
+
+/** What is special about a scene, besides its forces; empty for most. */
+function special({ scene }) {
+  if (!scene.box[0]) return ""
+  const touched = new Set([...scene.i, ...scene.j])
+  const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
+  const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
+  return `There are no walls: the dashed square repeats on all sides, and pale disks are copies of the same ${scene.r.length}. What leaves it on one side comes in on the other, forces too. It is pressed together from all sides, with pressure ${Number(scene.pressure.toPrecision(3))}; there is no weight. It was packed at μ = ${scene.packed}.${rattles}`
 }
 
 /** What the picture of S is. */
@@ -42,30 +73,32 @@ function pictured(body) {
 /** The sentence over a scene. */
 function sentence(body, mu, now) {
   const { h, scene } = body, several = scene.r.length > 1
-  if (scene.idle) return "Nothing presses on these disks yet: choose “Let a wall press”, then click a wall."
+  if (scene.idle) return "Nothing presses on these disks yet: choose “Make a wall press”, then click a wall."
   if ([...scene.pressing].some((_, k) => !scene.j.includes(scene.r.length + k))) return "A wall presses on no disk, and nothing holds it: put a disk against it."
-  if (body.empty) return falling(scene, mu, now.fall)
-  if (!h) return "Everything is determined: there is one network of forces, and mechanics finds it."
+  if (body.empty) return falling(body, mu, now)
+  if (!h) return "Everything is determined: there is one set of forces, and mechanics finds it."
   if (body.whole && body.corners.length === 1) {
-    return mu ? "S is one point: of all forces in balance, only these stay in their cones. Everything is determined."
-      : "Without friction S is one point: everything is determined. Open the cones with the slider."
+    return mu ? "S is one point: of all forces in balance, only these stay in their wedges. Everything is determined."
+      : "Without friction S is one point: everything is determined. Open the wedges with the slider."
   }
   if (!body.bounded) {
     const wedged = several ? "the disks have wedged themselves" : "the disk has wedged itself"
-    const full = now.filled ? " Nothing can fill it evenly: what has no end has no volume to draw from." : ""
-    return `S has no end in some direction: ${wedged}, and the forces may be as large as you like. (Proof: a change of forces that is in balance by itself and stays in every cone.)${full}`
+    return `S has no end in some direction: ${wedged}, and the forces may be as large as you like. S is infinite, so evenly spread random points are impossible. (Proof: a change of forces that is in balance by itself and stays in every wedge.)`
   }
-  if (h > 3) return `${h} free numbers: infinitely many networks of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many networks. Drag the point or an arrow: all forces follow, and everything stays in balance.`
+  if (h > 3) return `${h} free numbers: infinitely many sets of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many sets. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
-  const determined = fixed ? ` ${fixed} of ${body.count} normal forces are determined all the same.` : ""
-  return `Every point of this ${["", "line", "polygon", "body"][h]} is one way to hold the same ${several ? "disks" : "disk"}, in balance, within friction. Drag the point, or an arrow.${determined}`
+  const determined = fixed ? ` ${fixed} of ${body.count} normal forces ${fixed > 1 ? "are" : "is"} fixed all the same.` : ""
+  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}`
 }
 
-/** Why S is empty: which disks and walls give way in the motion that proves it. */
-function falling({ r }, mu, motion) {
-  const moving = motion ? Array.from({ length: motion.length / 3 }, (_, k) => k).filter((k) => Math.hypot(...motion.slice(3 * k, 3 * k + 3)) > 0.05) : []
+/** Why S is empty: which disks and walls give way in the motion that proves it, and which friction would do. */
+function falling({ scene: { r, pressing, load: own }, load }, mu, { fall, enough }) {
+  const moving = fall ? Array.from({ length: fall.length / 3 }, (_, k) => k).filter((k) => Math.hypot(...fall.slice(3 * k, 3 * k + 3)) > 0.05) : []
   const disks = moving.filter((k) => k < r.length).map((k) => k + 1), pressed = disks.length < moving.length
-  const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${disks.join(", ")}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
-  const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way: along that motion the loads do work, and no force allowed at any contact takes it up. That proves it.` : ""
-  return `Nothing balances at μ = ${Number(mu.toPrecision(4))}: S is empty.${why}`
+  const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${listed(disks)}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
+  const pushed = load.some((v, k) => v !== own[k]) ? " and the push" : ""
+  const loads = pressing.length ? "the press does" : `the weights${pushed} do`
+  const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. Proof: forces in balance do no work together in any small motion, but in this one ${loads} some, and no force that friction allows takes it back.` : ""
+  const mended = enough ? ` With friction μ = ${enough} it would hold.` : ""
+  return `Nothing balances at μ = ${Number(mu.toPrecision(4))}: S is empty.${mended}${why}`
 }

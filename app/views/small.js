@@ -7,42 +7,44 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "desk"
   root.innerHTML = `
+    <p class="whole">The same disks at rest can be held by many different sets of forces. S is the set of them all; more friction makes S larger, and moves no disk.</p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${MOST_MU}" step="0.005" aria-label="friction μ">
         <input class="typed" inputmode="decimal" aria-label="μ"></label>
-      <span class="fixed" title="Changing μ moves no disk: S is cut anew out of all networks in balance"></span>
       <span class="buttons">
-        <button type="button" class="play" title="Go at random through S">Walk</button>
-        <button type="button" class="fill" title="Networks of S, by a walk that in the end is everywhere equally often">Fill S</button>
+        <button type="button" class="play" title="Go at random through S, from one set of forces to the next">Random walk</button>
+        <button type="button" class="fill" title="Fill S with points, everywhere equally many">Random points</button>
         <button type="button" class="undo" title="Take the last pull back (Z)" disabled>Undo</button>
-        <button type="button" class="push" title="Drag a disk, or use the arrow keys, to push it" aria-pressed="false">Push a disk</button>
-        <button type="button" class="save" title="This scene as a file for granforce: gf.load_packing">Save NPZ</button>
+        <button type="button" class="push" title="Drag a disk, or use the arrow keys, to push it" aria-pressed="false">Test push</button>
+        <button type="button" class="save" title="This scene as a file for granforce: gf.load_packing">Download data</button>
         <button type="button" class="tourist">Tour</button>
       </span>
     </div>
-    <p class="says" aria-live="polite"></p>
+    <p class="says" aria-live="polite"></p><button type="button" class="mend" hidden></button>
     <div class="own" hidden></div>
+    <section class="card" role="dialog" aria-labelledby="small-title" hidden>
+      <div><h2 id="small-title" tabindex="-1"></h2><p></p></div>
+      <div class="row"><span class="of"></span><button type="button" class="earlier">Back</button>
+        <button type="button" class="next">Next</button><button type="button" class="close">Close</button></div>
+    </section>
+    <div class="board">
     <div class="pair">
-      <figure><figcaption>forces on each disk, each within its wedge (friction cone)</figcaption>
+      <figure><figcaption>blue: forces at contacts, within wedges (friction cones); grey: weight, press</figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
       <figure><figcaption class="what"></figcaption>
-        <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one network of forces. Arrow keys move the point"></canvas>
+        <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one set of forces. Arrow keys move the point"></canvas>
         <div class="plane" hidden><label>across <select aria-label="force shown across"></select></label>
           <label>up <select aria-label="force shown upwards"></select></label></div></figure>
+      <div class="sums"><p class="special"></p><p class="count"></p><div class="bars" role="list"></div></div>
     </div>
-    <p class="count"></p>
-    <div class="bars" role="list"></div>
     <details class="lesson" hidden><summary>The groove: a lesson of one page, with three questions</summary>
       <button type="button" class="print">Print</button> <button type="button" class="print answered">Print with answers</button>
       <article></article></details>
-    <section class="card" role="dialog" aria-labelledby="small-title" hidden>
-      <h2 id="small-title" tabindex="-1"></h2><p></p>
-      <div class="row"><span class="of"></span><button type="button" class="earlier">Back</button>
-        <button type="button" class="next">Next</button><button type="button" class="close">Close</button></div>
-    </section>`
-  const part = (name) => root.querySelector(`.${name}`)
-  const now = { contact: null, disk: null, side: null, contacts: new Set(), fall: null, filled: false, path: [], undo: [] }
+    </div>`
+  const parts = {}, told = {}
+  const part = (name) => (parts[name] ??= root.querySelector(`.${name}`))
+  const now = { contact: null, disk: null, side: null, contacts: new Set(), fall: null, enough: null, filled: false, path: [], undo: [] }
   let body = null, mu = model.scene.mu, chosenMu = false, waiting = 0, asleep = 0, returning = false
 
   const gone = goneBanner(view, "What is in the page still moves.")
@@ -58,15 +60,7 @@ export function render({ model, view }) {
 
   // What is seen
 
-  function colours(dark = model.dark) {
-    return {
-      ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#181b20" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",
-      fill: dark ? "rgba(150,172,200,0.25)" : "rgba(139,160,187,0.3)", lit: dark ? "rgba(150,172,200,0.45)" : "rgba(139,160,187,0.55)",
-      cold: dark ? "#5fa2e8" : "#1464c8", warm: "#e8710a", hand: dark ? "#ff5ca8" : "#b5236b", weight: dark ? "#aab4c2" : "#4a5563",
-      cone: dark ? "rgba(95,162,232,0.16)" : "rgba(20,100,200,0.12)", coneLit: dark ? "rgba(255,92,168,0.3)" : "rgba(181,35,107,0.22)",
-      coneFull: "rgba(232,113,10,0.28)", shade: dark ? "rgba(95,162,232,0.2)" : "rgba(20,100,200,0.14)", state: dark ? "#8fbfee" : "#3d8bd4",
-    }
-  }
+  const colours = (dark = model.dark) => palette(dark)
 
   const dress = () => { root.style.colorScheme = model.dark ? "dark" : "light" } // for the browser's own controls
 
@@ -83,16 +77,24 @@ export function render({ model, view }) {
     }
     arrows.draw(look)
     if (space.draw(body, look, now.path)) soon()
-    bars.draw(body, now.contacts, now.bounds)
     root.painted = (root.painted ?? 0) + 1
+    if (!going.frame || root.painted % 2) bars.draw(body, now.contacts, now.bounds) // numbers on a walk: every second frame
   }
 
   const soon = () => { waiting ||= requestAnimationFrame(paint) }
 
+  /** Words into a part of the page, if they are others: what stays the same is not laid out anew. */
+  function tell(name, text, how = "textContent") {
+    if (told[name] !== text) part(name)[how] = told[name] = text
+  }
+
   function say(note = pushed.on ? now.note : "") {
-    part("count").innerHTML = counted(body)
-    part("what").textContent = pictured(body)
-    part("says").textContent = note || sentence(body, mu, now)
+    tell("count", counted(body), "innerHTML")
+    tell("what", pictured(body))
+    tell("special", special(body))
+    tell("says", note || sentence(body, mu, now))
+    tell("mend", `Set μ = ${now.enough}`)
+    part("mend").hidden = !now.enough
     part("says").classList.toggle("bad", body.empty && !body.scene.idle)
     part("undo").disabled = !now.undo.length
   }
@@ -101,7 +103,7 @@ export function render({ model, view }) {
 
   function heard(what, given) {
     if (what === "words") return stopping(body, given)
-    if (what === "name") return `${given % 2 ? "fₜ" : "fₙ"} ${body.scene.names[given >> 1]}`
+    if (what === "name") return forceName(body.scene, given)
     if (what === "hover" || what === "select") {
       now.disk = given ? given.disk : null
       if (what === "select" || !now.chosen) choose(given && !given.loose ? given.contact : null)
@@ -143,7 +145,7 @@ export function render({ model, view }) {
   /** Cones of another μ, or other loads, on the same disks: S is cut anew, the point stays if it can. */
   function cut() {
     body.cut(mu)
-    now.fall = now.bounds = null
+    now.fall = now.bounds = now.enough = null
     space.outline.stale = true
     if (!body.empty && !body.goTo(body.u)) body.empty = true
     if (!body.empty && body.whole && !Number.isFinite(body.u[0] ?? 0)) body.u = body.middle
@@ -159,6 +161,7 @@ export function render({ model, view }) {
   function rest() {
     address() // first: where the server is gone, asking it fails
     if (!body.empty && now.filled && !space.dots.length && body.bounded) { space.fill(); soon() }
+    if (body.empty && !body.scene.idle && !now.enough) { now.enough = body.enough(MOST_MU); say(); soon() }
     if (body.empty && !body.scene.idle) ask(model, view, { fall: { mu, load: [...body.load] } })
     measure()
   }
@@ -207,8 +210,9 @@ export function render({ model, view }) {
     const { scene } = model, same = scene.name === "own" && body?.scene.name === "own"
     part("own").hidden = scene.name !== "own"
     part("lesson").hidden = scene.name !== "groove"
-    if (!scene.i) return void (part("says").textContent = "The disks are being pressed together …")
-    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), fall: null, path: [], undo: [], chosen: false, bounds: null })
+    part("board").classList.toggle("reading", part("lesson").open && scene.name === "groove")
+    if (!scene.i) return void tell("says", "The disks are being pressed together …")
+    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null })
     pushes(false)
     going.pause()
     mu = scene.mu
@@ -223,8 +227,8 @@ export function render({ model, view }) {
     if (now.filled) space.fill()
     if (!body.whole && space.dots.length) body.u = body.u.map((_, k) => space.dots.reduce((s, u) => s + u[k], 0) / space.dots.length)
     part("name").value = scene.name
-    part("fixed").classList.toggle("packed", Boolean(scene.packed))
-    part("fixed").textContent = scene.packed ? `friction during packing: ${scene.packed}` : "changing μ moves no disk"
+    root.classList.toggle("explained", Boolean(scene.box[0]) || scene.name === "own")
+    root.classList.toggle("tall", tall(scene))
     follow()
     say(root.opened ? "" : model.note)
     if (root.opened && !same) address()
@@ -323,7 +327,7 @@ export function render({ model, view }) {
       history.pushState(null, "", `?scene=${name}`)
       return say("This scene opens once the connection is back.")
     }
-    part("says").textContent = `Making “${event.target.selectedOptions[0].textContent}” …`
+    tell("says", `Making “${event.target.selectedOptions[0].textContent}” …`)
     ask(model, view, { scene: name, ...(chosenMu ? { mu } : {}) })
   })
   part("range").addEventListener("input", (event) => chooseMu(Number(event.target.value)))
@@ -332,7 +336,7 @@ export function render({ model, view }) {
     if (Number.isFinite(value) && value >= 0) chooseMu(value)
     else { say("μ is a number from 0 on"); follow() }
   })
-  part("play").addEventListener("click", () => going.toggle(body))
+  part("play").addEventListener("click", () => { going.toggle(body); soon() })
   part("fill").addEventListener("click", () => {
     now.filled = !now.filled
     if (now.filled) space.fill()
@@ -358,17 +362,32 @@ export function render({ model, view }) {
   part("save").addEventListener("click", () => ask(model, view, { save: { mu, load: [...body.load] } }))
   part("lesson").querySelector("article").innerHTML = lesson()
   for (const button of root.querySelectorAll(".print")) {
-    button.addEventListener("click", () => {
-      arrows.draw({ ...colours(false), ...now }) // paper is white
-      printed(part("packing").toDataURL(), button.classList.contains("answered"))
-      soon()
-    })
+    button.addEventListener("click", () => printed(pictures(), button.classList.contains("answered")))
   }
+  part("lesson").addEventListener("toggle", () => {
+    part("board").classList.toggle("reading", part("lesson").open && !part("lesson").hidden)
+    if (part("lesson").open) part("board").scrollIntoView()
+  })
+  part("mend").addEventListener("click", () => chooseMu(now.enough))
   part("tourist").addEventListener("click", () => tour.go(1))
   part("bars").addEventListener("pointerover", (event) => {
     const row = event.target.closest("[data-contact]")
     if (row) { choose(Number(row.dataset.contact)); soon() }
   })
+
+  /** The disk and S as they are, for white paper: nothing chosen, and with words that can be read at their size. */
+  function pictures() {
+    const look = { ...colours(false), ...now, contact: null, disk: null, side: null, contacts: new Set(), dots: 0 }
+    return [Arrows, Space].map((Picture) => {
+      const canvas = root.appendChild(document.createElement("canvas"))
+      canvas.style.cssText = "position: absolute; visibility: hidden; width: 400px; height: 230px; border: 0"
+      const picture = new Picture(canvas, heard, 3)
+      if (picture.fit) { picture.fit(body); picture.draw(look) }
+      else picture.draw(body, look, [])
+      canvas.remove()
+      return canvas.toDataURL()
+    })
+  }
 
   function download(text) {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)), link = document.createElement("a")
@@ -405,7 +424,7 @@ export function render({ model, view }) {
   }
 
   const sized = new ResizeObserver(() => { arrows.wide = 0; soon() })
-  sized.observe(root)
+  for (const seen of [root, part("packing"), part("space")]) sized.observe(seen)
   window.addEventListener("keydown", key)
   window.addEventListener("popstate", returned)
   model.on("remove", () => {

@@ -50,8 +50,8 @@ class Small(Scripted):
     dark = param.Boolean()
 
     _esm = joined(
-        *("ask", "gone", "body", "arrows", "space", "builder", "push", "going", "bars", "saying"),
-        *("lesson", "tourcard", "small"),
+        *("ask", "gone", "body", "easel", "palette", "arrows", "line", "shadow", "space"),
+        *("builder", "push", "going", "bars", "saying", "lesson", "tourcard", "small"),
     )
     _stylesheets: ClassVar = [FOLDER / "small.css"]
 

@@ -3,14 +3,15 @@
 
 const TURN = 0.008 // radians a pixel
 // Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
-const BESIDE = [[46, 46], [95, 46], [110, 46], [30, 30], [60, 50]]
+const BESIDE = [[46, 46], [95, 46], [140, 50], [30, 30], [60, 64]]
+const ON = 34 // pixels of an arrow where S goes on without an end
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
 class Space {
-  constructor(canvas, told) {
+  constructor(canvas, told, ratio) {
     this.told = told
     this.canvas = canvas
-    this.context = canvas.getContext("2d")
+    this.easel = new Easel(canvas, ratio)
     this.view = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     this.turn(0.6, -0.5)
     this.half = 0
@@ -30,6 +31,8 @@ class Space {
     canvas.addEventListener("keydown", (event) => this.key(event))
   }
 
+  get context() { return this.easel.g }
+
   turn(a, b) {
     const about = ([x, y, z], a, b) => {
       const [x1, z1] = [x * Math.cos(a) + z * Math.sin(a), -x * Math.sin(a) + z * Math.cos(a)]
@@ -42,12 +45,22 @@ class Space {
   /** Place of u in the plane of the screen, in units of force, and its depth. */
   flat(u) {
     const { body } = this
-    if (body.h > 3) {
-      const F = body.forces(u)
-      return [F[this.shadow[0]], F[this.shadow[1]], 0]
-    }
-    if (body.h < 3) return [u[0] ?? 0, u[1] ?? 0, 0]
+    if (body.h > 3) return this.onAxes.map(({ row, rest }) => dot(row, u) + rest)
+    if (body.h < 3) return [this.sign * (u[0] ?? 0), u[1] ?? 0, 0]
     return this.view.map((row) => dot(row, u))
+  }
+
+  /** Which way a line is drawn. */
+  get sign() { return signOf(this.body) }
+
+  /** Both forces of the shadow, as rows of u: found once, as many points are drawn. */
+  get onAxes() {
+    const { body, shadow, axes } = this
+    if (axes?.body !== body || axes.origin !== body.origin || axes.shadow.join() !== shadow.join()) {
+      const rows = shadow.map((k) => ({ row: body.axes.map((axis) => axis[k]), rest: body.origin[k] }))
+      this.axes = { body, origin: body.origin, shadow, rows }
+    }
+    return this.axes.rows
   }
 
   /** u whose place moves by so much in the plane of the screen. */
@@ -59,14 +72,14 @@ class Space {
       const part = solve(M, [dx, dy]) ?? [dx / (M[0][0] || 1), 0]
       return u.map((v, k) => v + part[0] * a[k] + part[1] * b[k])
     }
-    if (body.h < 3) return u.map((v, k) => v + [dx, dy][k])
+    if (body.h < 3) return u.map((v, k) => v + [this.sign * dx, dy][k])
     return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
   }
 
   /** Half the width and height that S may take, which leaves room for words. */
   get room() {
-    const { clientWidth: w, clientHeight: h } = this.canvas, [x, y] = BESIDE[Math.min(this.body.h, 4)]
-    return [w / 2 - Math.min(x, 0.25 * w), h / 2 - Math.min(y, 0.2 * h)]
+    const { wide: w, high: h } = this.easel, [x, y] = BESIDE[Math.min(this.body.h, 4)]
+    return [w / 2 - Math.min(x, 0.33 * w), h / 2 - Math.min(y, 0.2 * h)]
   }
 
   /** Pixels of a unit of force. */
@@ -79,15 +92,15 @@ class Space {
   }
 
   px([x, y]) {
-    const { clientWidth: w, clientHeight: h } = this.canvas, { unit } = this
+    const { wide: w, high: h } = this.easel, { unit } = this
     return [w / 2 + (x - this.centre[0]) * unit, h / 2 - (y - this.centre[1]) * unit]
   }
 
   /** The part of the plane that is seen follows S, so that it is seen to grow: not all the time. */
   frame(at_once) {
     const { body } = this
-    const points = (body.whole ? body.corners.map(({ u }) => u) : [...this.dots, body.u]).map((u) => this.flat(u))
-    if (!body.whole) points.push(...this.corners())
+    const points = (body.whole ? body.corners.map(({ u }) => u) : [body.u]).map((u) => this.flat(u))
+    if (!body.whole) points.push(...this.corners(), ...this.dotted)
     if (!points.length) return false
     const [xs, ys] = [0, 1].map((k) => points.map((p) => p[k]))
     const middle = [xs, ys].map((v) => (Math.max(...v) + Math.min(...v)) / 2)
@@ -100,6 +113,16 @@ class Space {
     this.half += 0.18 * (Math.max(wanted, 0.05 * body.scaleOf()) - this.half)
     this.centre = this.centre.map((v, k) => v + 0.18 * (middle[k] - v))
     return moves
+  }
+
+  /** Two corners of the rectangle around all random points; found once. */
+  get dotted() {
+    const { dots, onAxes } = this
+    if (this.around?.dots !== dots || this.around.onAxes !== onAxes) {
+      const flat = dots.map((u) => this.flat(u)), side = (k) => flat.map((p) => p[k])
+      this.around = { dots, onAxes, ends: flat.length ? [Math.min, Math.max].map((end) => [0, 1].map((k) => end(...side(k)))) : [] }
+    }
+    return this.around.ends
   }
 
   fill() {
@@ -118,25 +141,23 @@ class Space {
   draw(body, look, path) {
     this.body = body
     this.look = look
-    const { context: g, canvas } = this, ratio = window.devicePixelRatio || 1
-    const { clientWidth: w, clientHeight: h } = canvas
-    if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
-      canvas.width = Math.round(w * ratio)
-      canvas.height = Math.round(h * ratio)
-    }
-    g.setTransform(ratio, 0, 0, ratio, 0, 0)
-    g.clearRect(0, 0, w, h)
     this.labels = []
+    this.easel.measure()
+    const moves = !body.scene.idle && !body.empty && this.frame(this.sceneDrawn !== body.scene)
+    this.easel.begin(look.paper, this.standing(), () => {
+      if (body.empty || body.scene.idle) return
+      if (body.h > 3) drawShadow(this)
+      if (look.dots) this.drawDots()
+    })
+    const { context: g } = this, { wide: w, high: h } = this.easel
     if (body.scene.idle) return this.write(w / 2, h / 2, "nothing presses yet", look.ink, 14)
-    if (body.empty) return this.write(w / 2, h / 2, "S is empty: no forces hold this", look.warm, 14)
-    const moves = this.frame(this.sceneDrawn !== body.scene)
+    g.lineJoin = "round" // no spikes where sides meet
+    if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
-    if (body.h > 3) this.drawShadow()
-    if (look.dots) this.drawDots()
-    if (body.h === 1) this.drawSegment()
+    if (body.h === 1) drawSegment(this)
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) this.drawSolid()
-    if (body.whole && body.h > 1 && look.contact !== null) this.drawInterval(look.contact)
+    if (body.whole && body.h > 1 && look.contact !== null) drawInterval(this, look.contact)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
     g.beginPath()
@@ -146,22 +167,28 @@ class Space {
     g.strokeStyle = look.paper
     g.lineWidth = 2
     g.stroke()
-    if (!body.h) this.write(w / 2, h / 2 + 28, "one point: everything is determined", look.ink, 13)
+    if (!body.h || (body.whole && body.corners.length === 1)) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
     return moves
   }
 
+  /** What decides how that looks which stands still while a point goes through S. */
+  standing() {
+    const { body, look, dots, outline, centre, half, shadow, view } = this
+    return [body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
+  }
+
   write(x, y, text, colour, size = 13, align = "center") {
-    const { context: g, canvas } = this
+    const { context: g, easel } = this
     g.font = `${size}px sans-serif`
     g.textAlign = align === "middle" ? "center" : align
     g.textBaseline = "middle"
     const words = text.split("\n"), wide = g.measureText(text).width
-    if (words.length === 1 && align === "center" && wide > canvas.clientWidth - 12) { // in two lines
+    if (words.length === 1 && align === "center" && wide > easel.wide - 12) { // in two lines
       const middle = text.indexOf(" ", text.length / 2)
       if (middle > 0) words.splice(0, 1, text.slice(0, middle), text.slice(middle + 1))
     }
     const half = Math.max(...words.map((line) => g.measureText(line).width)) / 2
-    if (align === "center") x = Math.min(Math.max(x, half + 5), canvas.clientWidth - half - 5)
+    if (align === "center") x = Math.min(Math.max(x, half + 5), easel.wide - half - 5)
     y -= 0.6 * size * (words.length - 1)
     g.lineWidth = 3
     g.strokeStyle = this.look.paper
@@ -193,25 +220,22 @@ class Space {
     g.globalAlpha = 1
   }
 
-  drawSegment() {
-    const { context: g, body, look } = this
-    const ends = body.corners.map(({ u }) => this.px(this.flat(u)))
-    g.strokeStyle = look.cold
-    g.lineWidth = 7
-    g.lineCap = "butt"
+  /** An arrow from this place in which S goes on without an end, with the mean of its rays. */
+  drawOn([x, y], thick) {
+    const { context: g, body, look } = this, flat = body.rays.map((ray) => this.flat(ray))
+    const way = [0, 1].map((k) => flat.reduce((sum, ray) => sum + ray[k], 0)), size = Math.hypot(...way)
+    if (size < 1e-6) return // it goes on away from the eye
+    const [ux, uy] = [way[0] / size, -way[1] / size], head = 8 + thick
+    g.strokeStyle = g.fillStyle = look.cold
+    g.lineWidth = thick
     g.beginPath()
-    g.moveTo(...ends[0])
-    g.lineTo(...(ends[1] ?? ends[0]))
+    g.moveTo(x, y)
+    g.lineTo(x + (ON - head) * ux, y + (ON - head) * uy)
     g.stroke()
-    const order = ends.map((_, k) => k).sort((a, b) => ends[a][0] - ends[b][0])
-    body.sides.forEach((side) => {
-      const k = side.corners[0], [x, y] = ends[k], below = order.indexOf(k) ? -1 : 1, lit = this.lit(side)
-      g.fillStyle = side.cap ? look.paper : lit ? look.hand : look.cold
-      if (!side.cap) g.fillRect(x - 3, y - 13, 6, 26)
-      const text = side.cap ? "no end this way" : this.told("words", side), narrow = g.measureText(text).width > 2 * BESIDE[1][0]
-      this.write(x, y + below * 34, narrow ? text.replace(/ and (?=at |between )/, "\nand ") : text, lit ? look.hand : look.ink)
-      this.labels.push({ side, x, y, reach: 30 })
-    })
+    g.beginPath()
+    g.moveTo(x + ON * ux, y + ON * uy)
+    for (const side of [0.6, -0.6]) g.lineTo(x + (ON - head) * ux - side * head * uy, y + (ON - head) * uy + side * head * ux)
+    g.fill()
   }
 
   lit(side) {
@@ -241,13 +265,17 @@ class Space {
       g.lineTo(...b)
       g.stroke()
       g.setLineDash([])
+      if (side.cap) for (const part of [0, 0.5, 1]) this.drawOn([0, 1].map((d) => a[d] + part * (b[d] - a[d])), 2)
       const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], long = Math.hypot(a[0] - b[0], a[1] - b[1]) || 1
       const normal = [(a[1] - b[1]) / long, (b[0] - a[0]) / long] // outwards
       const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
       const text = side.cap ? "no end this way" : this.told("words", side)
       g.font = "13px sans-serif"
-      const words = g.measureText(text).width > long - 8 ? text.replace(/ (at|between) /, "\n$1 ") : text
-      if (long > 14 || lit) this.besides(x, y, ux, uy, words, lit)
+      const upright = Math.abs(uy) < 0.64 // words beside it, in short lines
+      const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
+      const words = short ? text : text.replace(/ (at|between) /, "\n$1 ").replace(upright ? /^(disk \d+) / : /^$/, "$1\n")
+      const on = side.cap ? ON : 0
+      if (long > 14 || lit) this.besides(x + on * ux, y + on * uy, ux, uy, words, lit)
       this.labels.push({ side, a, b, reach: 14 })
     }
   }
@@ -258,6 +286,7 @@ class Space {
     const wide = Math.max(...lines.map((line) => g.measureText(line).width)), along = Math.abs(uy) >= 0.64
     const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
     if (!this.free(at, along ? wide * Math.abs(uy) : wide, along ? wide * Math.abs(ux) + high : 2 * high) && !lit) return
+    if (!along) at[0] = Math.min(Math.max(at[0], wide / 2 + 4), this.easel.wide - wide / 2 - 4)
     g.save()
     g.translate(...at)
     if (along) g.rotate(Math.atan(-ux / uy))
@@ -267,7 +296,7 @@ class Space {
 
   /** Whether nothing is written yet where these words shall be; then they have their place. */
   free([x, y], wide, high) {
-    if (this.taken.some((t) => Math.abs(t.x - x) < 0.4 * (t.wide + wide) && Math.abs(t.y - y) < 0.35 * (t.high + high))) return false
+    if (this.taken.some((t) => Math.abs(t.x - x) < 0.48 * (t.wide + wide) && Math.abs(t.y - y) < 0.45 * (t.high + high))) return false
     this.taken.push({ x, y, wide, high })
     return true
   }
@@ -276,7 +305,7 @@ class Space {
     const { context: g, body, look } = this
     const places = body.corners.map(({ u }) => this.px(this.flat(u)))
     const towards = (side) => -dot(this.view[2], side.slope) // sides' slopes point inwards
-    const sides = [...body.sides].sort((a, b) => towards(a) - towards(b))
+    const sides = [...body.sides].sort((a, b) => towards(a) - towards(b)), words = []
     for (const side of sides) {
       const front = towards(side) > 0, lit = this.lit(side)
       g.beginPath()
@@ -296,87 +325,15 @@ class Space {
       g.stroke()
       g.setLineDash([])
       g.globalAlpha = 1
-      if (front && lit) {
-        const [x, y] = [0, 1].map((d) => side.corners.reduce((s, k) => s + places[k][d], 0) / side.corners.length)
-        this.write(x, y - 12, side.cap ? "no end this way" : this.told("words", side), look.ink)
-      }
+      if (side.cap) for (const k of side.corners) this.drawOn(places[k], 2)
+      if (front && lit) words.push(side.cap ? "no end this way" : this.told("words", side))
     }
-  }
-
-  /** The exact interval of a contact's f_n: the shadow of S on that axis. */
-  drawInterval(contact) {
-    const { context: g, body, look } = this, slope = body.axes.map((axis) => axis[2 * contact])
-    const size = Math.hypot(...slope)
-    if (size < 1e-9) return
-    const along = slope.map((v) => v / size), m = body.middle
-    const [dx, dy] = this.flat(along), flat = Math.hypot(dx, dy)
-    if (flat < 0.2) return
-    const from = this.flat(m), side = [dy / flat, -dx / flat]
-    const below = side[1] > 0 ? side.map((v) => -v) : side
-    const reach = Math.max(...body.corners.map(({ u }) => { const p = this.flat(u); return dot([p[0] - from[0], p[1] - from[1]], below) }))
-    const off = reach + 0.14 * this.half
-    const foot = (u) => {
-      const s = dot(along, u.map((v, k) => v - m[k]))
-      return [from[0] + s * dx + off * below[0], from[1] + s * dy + off * below[1]]
-    }
-    const order = [...body.corners].sort((a, b) => dot(along, a.u) - dot(along, b.u)), ends = [order[0], order.at(-1)]
-    g.strokeStyle = look.hand
-    g.lineWidth = 1
-    g.setLineDash([2, 4])
-    for (const { u } of [...ends, { u: body.u }]) {
-      g.beginPath()
-      g.moveTo(...this.px(this.flat(u)))
-      g.lineTo(...this.px(foot(u)))
-      g.stroke()
-    }
-    g.setLineDash([])
-    g.lineWidth = 4
-    g.beginPath()
-    g.moveTo(...this.px(foot(ends[0].u)))
-    g.lineTo(...this.px(foot(ends[1].u)))
-    g.stroke()
-    const interval = body.interval(2 * contact)
-    ends.forEach(({ u }, k) => {
-      const [x, y] = this.px(foot(u))
-      this.write(x, y + 12, Number.isFinite(interval[k]) ? interval[k].toFixed(2) : "∞", look.hand, 11)
-    })
+    words.forEach((line, k) => this.write(this.easel.wide / 2, 18 + 17 * k, line, look.ink)) // clear of the body
   }
 
   corners() {
     const { points } = this.outline
     return Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1]])
-  }
-
-  drawShadow() {
-    const { context: g, look, canvas } = this, { clientWidth: w, clientHeight: h } = canvas
-    g.strokeStyle = look.edge
-    g.lineWidth = 1
-    g.strokeRect(30, 8, w - 40, h - 40)
-    const corners = this.corners().map((p) => this.px(p)), { stale } = this.outline
-    if (corners.length) {
-      g.beginPath()
-      corners.forEach((p, n) => (n ? g.lineTo(...p) : g.moveTo(...p)))
-      g.closePath()
-      g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
-      g.fillStyle = look.shade
-      g.fill()
-      g.strokeStyle = look.cold
-      g.lineWidth = 2.5
-      g.setLineDash(stale ? [4, 4] : [])
-      g.stroke()
-      g.setLineDash([])
-      g.globalAlpha = 1
-    }
-    const ends = [0, 1].map((k) => { const all = this.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
-    for (const v of ends[0]) this.write(this.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)
-    for (const v of ends[1]) this.write(52, this.px([0, v])[1], v.toFixed(2), look.cold, 11)
-    const [a, b] = this.shadow.map((k) => this.told("name", k))
-    this.write(w / 2, h - 16, `→ ${a}`, look.ink)
-    g.save()
-    g.translate(15, h / 2)
-    g.rotate(-Math.PI / 2)
-    this.write(0, 0, `→ ${b}`, look.ink, 13, "middle")
-    g.restore()
   }
 
   // The hand

@@ -1,4 +1,4 @@
-// The tour's card at the lower edge, over the page that it speaks of: nothing lies between.
+// The tour's card at the lower edge of the page that it speaks of, beside or below that.
 
 const SEEN = "granforce.tour" // remembered in the browser
 const LOOK_MS = 100 // between two looks for what a step is about, which may still be on its way
@@ -41,7 +41,6 @@ export function render({ model, view }) {
     part("p").textContent = text
     part(".count").textContent = `${step + model.before} of ${steps.length + model.before}`
     part(".on").textContent = step === steps.length ? "Finish" : "Next"
-    card.classList.toggle("aside", target() !== "scene") // not over what it speaks of
     leaveRoom()
     if (step === shown) return
     shown = step

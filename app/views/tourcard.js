@@ -1,4 +1,4 @@
-// The card of the tour at the lower edge of a small scene: its first steps; the others are of 400 disks.
+// The card of the tour in a small scene, above the pictures it speaks of: its first steps; the others are of 400 disks.
 
 const NARROW = "(max-width: 759.95px)" // where S lies below the scene
 const UNSEEN = "granforce.tour" // remembered in the browser: that the tour was seen
@@ -22,7 +22,7 @@ class TourCard {
     const { card, root } = this, was = this.step
     this.step = step
     card.hidden = !step
-    root.style.paddingBottom = ""
+    root.classList.toggle("touring", Boolean(step))
     if (!step) {
       if (was) root.querySelector(".tourist").focus({ preventScroll: true })
       return
@@ -33,10 +33,9 @@ class TourCard {
     card.querySelector("p").textContent = text
     this.part("of").textContent = `${step} of ${this.all}`
     this.part("earlier").disabled = step === 1
-    root.style.paddingBottom = `${card.offsetHeight + 20}px` // what lies under the card can be scrolled to
     this.shown(does)
     requestAnimationFrame(() => {
-      if (window.matchMedia(NARROW).matches) root.querySelector(`.${does.see ?? "pair"}`).scrollIntoView({ block: "start" })
+      if (window.matchMedia(NARROW).matches) root.querySelector(`.${does.see ?? "card"}`).scrollIntoView({ block: "start" })
       card.querySelector("h2").focus({ preventScroll: true })
     })
   }

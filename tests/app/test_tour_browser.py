@@ -92,6 +92,9 @@ def test_the_tour_is_walked_through_and_closes_into_the_page(visit, width, heigh
             if tab != "plane" or width < 1800:  # on a wide page it is seen anyway
                 page.wait_for_function(f"() => location.search.includes('tab={tab}')")
         page.locator(".ring").filter(visible=True).wait_for()
+        if width > 900:  # over the last of the controls, not over what it speaks of
+            box = card(page).bounding_box()
+            assert box["x"] + box["width"] <= page.locator(".scene").bounding_box()["x"]
         page.wait_for_timeout(700)  # what scrolls comes to rest: for the picture only
         page.screenshot(path=ARTEFACTS / f"{width}-{scheme}-{step}.png")
         assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -1,0 +1,35 @@
+// A canvas that is painted anew each frame. What stands still on it is painted once, on a canvas of its
+// own that is copied; nothing shines through, which halves what a browser without a graphics card does.
+
+class Easel {
+  /** ratio: pixels of the canvas for one of the page. */
+  constructor(canvas, ratio = window.devicePixelRatio || 1) {
+    this.canvas = canvas
+    this.ratio = ratio
+    this.still = document.createElement("canvas")
+    this.g = canvas.getContext("2d", { alpha: false })
+    this.measure()
+  }
+
+  /** Size in CSS pixels; to be asked for once a frame, before it, as the answer may need a layout. */
+  measure() { ({ clientWidth: this.wide, clientHeight: this.high } = this.canvas) }
+
+  /** A frame with what stands still; that is painted by `paint` where a value of `key` is another one. */
+  begin(paper, key, paint) {
+    const { ratio } = this, size = [this.wide, this.high].map((v) => Math.max(1, Math.round(v * ratio)))
+    const whole = [paper, ...size, ...key], own = this.g
+    if (!this.key || whole.some((value, k) => value !== this.key[k])) {
+      this.key = whole
+      for (const canvas of [this.canvas, this.still]) [canvas.width, canvas.height] = size
+      this.g = this.still.getContext("2d", { alpha: false })
+      this.g.setTransform(ratio, 0, 0, ratio, 0, 0)
+      this.g.fillStyle = paper
+      this.g.fillRect(0, 0, this.wide, this.high)
+      paint()
+      this.g = own
+    }
+    own.setTransform(1, 0, 0, 1, 0, 0)
+    own.drawImage(this.still, 0, 0)
+    own.setTransform(ratio, 0, 0, ratio, 0, 0)
+  }
+}

@@ -1,0 +1,73 @@
+// Shadows of S: on one axis, the exact interval of a force, and on two above three dimensions.
+
+/** The exact interval of a contact's f_n: the shadow of S on that axis. */
+function drawInterval(space, contact) {
+  const { context: g, body, look } = space, slope = body.axes.map((axis) => axis[2 * contact])
+  const size = Math.hypot(...slope)
+  if (size < 1e-9) return
+  const along = slope.map((v) => v / size), m = body.middle
+  const [dx, dy] = space.flat(along), flat = Math.hypot(dx, dy)
+  if (flat < 0.2) return
+  const from = space.flat(m), side = [dy / flat, -dx / flat]
+  const below = side[1] > 0 ? side.map((v) => -v) : side
+  const reach = Math.max(...body.corners.map(({ u }) => { const p = space.flat(u); return dot([p[0] - from[0], p[1] - from[1]], below) }))
+  const off = reach + Math.max(0.14 * space.half, (body.h === 2 ? 46 : 0) / space.unit) // beyond the words at the sides
+  const foot = (u) => {
+    const s = dot(along, u.map((v, k) => v - m[k]))
+    return [from[0] + s * dx + off * below[0], from[1] + s * dy + off * below[1]]
+  }
+  const order = [...body.corners].sort((a, b) => dot(along, a.u) - dot(along, b.u)), ends = [order[0], order.at(-1)]
+  g.strokeStyle = look.hand
+  g.lineWidth = 1
+  g.setLineDash([2, 4])
+  for (const { u } of [...ends, { u: body.u }]) {
+    g.beginPath()
+    g.moveTo(...space.px(space.flat(u)))
+    g.lineTo(...space.px(foot(u)))
+    g.stroke()
+  }
+  g.setLineDash([])
+  g.lineWidth = 4
+  g.beginPath()
+  g.moveTo(...space.px(foot(ends[0].u)))
+  g.lineTo(...space.px(foot(ends[1].u)))
+  g.stroke()
+  const interval = body.interval(2 * contact)
+  ends.forEach(({ u }, k) => {
+    const [x, y] = space.px(foot(u))
+    space.write(x, y + 12, Number.isFinite(interval[k]) ? interval[k].toFixed(2) : "∞", look.hand, 11)
+  })
+}
+
+/** The shadow on the plane of two forces, with its exact outline. */
+function drawShadow(space) {
+  const { context: g, look } = space, { wide: w, high: h } = space.easel
+  g.strokeStyle = look.edge
+  g.lineWidth = 1
+  g.strokeRect(30, 8, w - 40, h - 40)
+  const corners = space.corners().map((p) => space.px(p)), { stale } = space.outline
+  if (corners.length) {
+    g.beginPath()
+    corners.forEach((p, n) => (n ? g.lineTo(...p) : g.moveTo(...p)))
+    g.closePath()
+    g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
+    g.fillStyle = look.shade
+    g.fill()
+    g.strokeStyle = look.cold
+    g.lineWidth = 2.5
+    g.setLineDash(stale ? [4, 4] : [])
+    g.stroke()
+    g.setLineDash([])
+    g.globalAlpha = 1
+  }
+  const ends = [0, 1].map((k) => { const all = space.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
+  for (const v of ends[0]) space.write(space.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)
+  for (const v of ends[1]) space.write(52, space.px([0, v])[1], v.toFixed(2), look.cold, 11)
+  const [a, b] = space.shadow.map((k) => space.told("name", k))
+  space.write(w / 2, h - 16, `→ ${a}`, look.ink)
+  g.save()
+  g.translate(15, h / 2)
+  g.rotate(-Math.PI / 2)
+  space.write(0, 0, `→ ${b}`, look.ink, 13, "middle")
+  g.restore()
+}
