@@ -48,11 +48,11 @@ class Pushed(NamedTuple):
 
 
 def limit_loads(library, cell):
-    """Work, for jobs.Task, that finds or computes the limit loads of all contacts."""
+    """Work, for jobs.Task, that finds or computes the failure load of every contact."""
 
     def work(job):
         params = kinds.LIMIT_LOADS.parameters(cell.selection.packing, mu=cell.selection.mu)
-        stage = "limit loads of all contacts"
+        stage = "failure load of every contact"
         found = found_or_made(library, job, stage, kinds.LIMIT_LOADS, params)
         scale = found["force_scale"].item()
         numbers = (found[name].item() for name in ("max_gap", "seconds"))

@@ -101,7 +101,8 @@ class Controls:
             SceneList(**WIDE),
             self.mu,
             pn.Row(self.n, self.seed, **WIDE),
-            pn.Row(self.states, self.packed, **WIDE),
+            self.states,
+            self.packed,  # in a row of its own: its label would be cut in half of one
             self.kind,
             self.relax,
             self.go,

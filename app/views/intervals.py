@@ -27,7 +27,7 @@ One bar for each contact. Pale: every force it can have in any network in balanc
 ({term("exact", "possible")}); dark: what the states passed so far had; yellow: in the
 {term("original")}; dots: in the state on screen. Below: η of the states passed so far (of η3,
 {term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
-{term("known", "known")}, the palest is what was possible before.
+{term("known", "known")}, the faintest part of a bar is what was possible without that knowledge.
 Click a bar to find its contact in the packing.
 """
 
