@@ -7,6 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 import param
 from panel.util import edit_readonly
+from tornado.ioloop import IOLoop
 
 from . import garbage, scenes
 from .data import Library
@@ -204,7 +205,7 @@ def _large(document, query):
 
 def _turns(document):
     """wake(function): call it on the page's thread, soon, when what it changes will be seen."""
-    waiting = []
+    waiting, loop = [], IOLoop.current()
 
     def run(function):
         if _in_transit(document):
@@ -212,9 +213,13 @@ def _turns(document):
         else:
             together(function)
 
-    def wake(function):
+    def come(function):
         if document.session_context is not None:  # else the page has ended
             document.add_next_tick_callback(partial(run, function))
+
+    def wake(function):
+        # From any thread; the page can end at any moment but within a turn of the loop.
+        loop.add_callback(come, function)
 
     def arrived():
         while waiting:

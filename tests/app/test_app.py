@@ -1,5 +1,6 @@
 """Data, state, links and tasks of the app, without a browser."""
 
+import asyncio
 import gc
 import re
 import shlex
@@ -1007,3 +1008,28 @@ def test_states_of_older_packings_in_a_cache_are_not_offered(tmp_path):
     library = Library(cache=tmp_path / "cache")
     assert len(cache.entries()) == 1
     assert [one.params for one in library.cells()] == [one.params for one in shipped.cells()]
+
+
+def test_a_page_is_only_called_within_the_loop_and_while_it_is_there():
+    """Jobs end in other threads; asked there, a page could end between question and call."""
+    from app.page import _turns
+
+    called = []
+
+    class Page:
+        session_context = object()
+
+        def add_next_tick_callback(self, function):
+            called.append(threading.current_thread())
+
+    async def visit():
+        page = Page()
+        wake = _turns(page)
+        await asyncio.to_thread(wake, print)
+        await asyncio.sleep(0)
+        page.session_context = None
+        await asyncio.to_thread(wake, print)
+        await asyncio.sleep(0)
+
+    asyncio.run(visit())
+    assert called == [threading.main_thread()]
