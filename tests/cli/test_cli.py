@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from heeding import heed
 
 import granforce as gf
 from granforce.cli import commands
@@ -334,6 +335,7 @@ def test_interrupt_ends_quietly_and_keeps_what_is_finished(tmp_path):
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=heed,
     )
     deadline = time.time() + 120
     while not list((tmp_path / "s.zarr").glob("walk-*")) and time.time() < deadline:
@@ -363,6 +365,7 @@ def altered(arguments):
 
 @pytest.mark.parametrize("command", [swallowed, altered])
 def test_an_interrupt_that_a_library_swallows_ends_the_command(command, monkeypatch, capsys):
+    heed()
     monkeypatch.setattr(commands, "pack", command)
     assert main(["pack"]) == 130
     assert capsys.readouterr().err.splitlines()[-1] == (
