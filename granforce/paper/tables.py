@@ -14,7 +14,7 @@ from scipy.spatial.distance import pdist
 from granforce import measures
 from granforce.explore.stress_outline import plane_of
 from granforce.figures import ratio_counts
-from granforce.forces.ensemble import stress_of
+from granforce.forces.balance import stress_of
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import Floats, InputError, Integers, Packing, friction

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.forces.ensemble import ensemble, stress_of
+from granforce.forces.balance import stress_of
+from granforce.forces.ensemble import ensemble
 from granforce.packing.closing import _strained, _stretch, cell_of, margin
 from granforce.packing.compaction import (
     WATCH_EVERY,
