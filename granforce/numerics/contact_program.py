@@ -26,7 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.numerics import contact_matrix
+from granforce.numerics import cholesky, contact_matrix
+from granforce.numerics.blocks import NO_PIVOT
 from granforce.numerics.contact_matrix import Factors, Network, clear, copy, pull, push
 from granforce.numerics.lanes import (
     ONE,
@@ -139,7 +140,7 @@ def make_workspace(problem: Problem, width: int) -> Workspace:
     return Workspace(
         factors=contact_matrix.make_factors(problem.network, width),
         stop=cancelling.flag(),
-        least=np.full(rows, contact_matrix.NO_PIVOT),
+        least=np.full(rows, NO_PIVOT),
         K=room(3 * forces // 2, width),
         h=room(n + 1, width),
         dy=room(n + 1, width),
@@ -192,7 +193,7 @@ def dependent_rows(problem: Problem, idle: Floats) -> Mask:
     look(problem, True, at, work, ONE)
     advance(problem, True, BALANCE, at, work, ONE)
     cancelling.check()
-    return contact_matrix.left_out(network, work.factors) & (idle == 0)
+    return cholesky.left_out(network, work.factors) & (idle == 0)
 
 
 def without_rows(problem: Problem, idle: Floats, out: Mask) -> Problem:
@@ -489,7 +490,7 @@ def _factor(problem, mode, at, work, lanes):
         if at.loaded[lane] >= 0:
             K = 1.0 / _load_stiffness(at, mode, lane)
             contact_matrix.add_one(network, at.loaded[lane], K, work.factors, lane)
-    contact_matrix.factor(network, work.least, work.factors, work.stop, lanes)
+    cholesky.factor(network, work.least, work.factors, work.stop, lanes)
 
 
 @within
@@ -520,7 +521,7 @@ def _towards(problem, mode, at, work, lanes):
     for lane in range(len(at.loaded)):
         force = -work.h[last, lane] / _load_stiffness(at, mode, lane)
         _push_one(network, force, work.dv, work.dv_border, at.loaded[lane], lane)
-    contact_matrix.solve(network, work.factors, work.dv, work.dv_border, lanes)
+    cholesky.solve(network, work.factors, work.dv, work.dv_border, lanes)
     for k in range(0, pairs, 2):
         d0 = _stiffness(k, at.y, at.z, mode, lanes)
         d1 = _stiffness(k + 1, at.y, at.z, mode, lanes)

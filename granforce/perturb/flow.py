@@ -37,7 +37,7 @@ import numpy as np
 
 from granforce.forces.contact_problem import balance_of
 from granforce.forces.gauss_seidel import BOX_MASS
-from granforce.numerics import contact_matrix
+from granforce.numerics import contact_matrix, lu
 from granforce.numerics.contact_matrix import Factors, Network
 from granforce.numerics.lanes import (
     ONE,
@@ -412,9 +412,7 @@ def _follow(step, flows, rest, stop, lanes):
             contact_matrix.copy(to.border, given.border, lanes)
         _factor(step, flows, stop, lanes)
         direction = flows.direction
-        contact_matrix.solve_lu(
-            step.network, flows.factors, direction.rows, direction.border, lanes
-        )
+        lu.solve(step.network, flows.factors, direction.rows, direction.border, lanes)
         _search(step, flows, lanes)
         _measure(step, flows, lanes)
         ended = False
@@ -572,7 +570,7 @@ def _factor(step, flows, stop, lanes):
         across = pick(slides, sliding, across, zero)
         tangential = pick(slides, sliding, zero, pick(slides, closed, tangential, zero))
         contact_matrix.add_skew(network, c, normal, zero, across, tangential, factors, lanes)
-    contact_matrix.factor_lu(network, factors, stop, lanes)
+    lu.factor(network, factors, stop, lanes)
 
 
 @within
