@@ -15,6 +15,7 @@ from granforce.numerics import (
     certified_values,
     contact_matrix,
     contact_program,
+    interior_point,
     linear_programs,
 )
 from granforce.numerics.contact_matrix import Network
@@ -141,7 +142,7 @@ def independent_problem_of(ensemble: Ensemble) -> Problem:
             out = np.zeros(len(idle), bool)
             out[problem.place] = _dependent_rows(ensemble)
         else:
-            out = contact_program.dependent_rows(problem, idle)
+            out = interior_point.dependent_rows(problem, idle)
         kept.append(contact_program.without_rows(problem, idle, out))
     return kept[2]
 

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from numba import njit
 
-from granforce.numerics import cholesky, contact_matrix, contact_program, elimination, lu
+from granforce.numerics import (
+    cholesky,
+    contact_matrix,
+    contact_program,
+    elimination,
+    interior_point,
+    lu,
+)
 from granforce.numerics.blocks import NO_PIVOT
 from granforce.numerics.lanes import LANES, MANY, ONE, load
 
@@ -121,7 +128,7 @@ def test_rows_that_follow_from_others_are_found():
     problem = contact_program.make_problem(
         network, rows, rows[:0], idle, np.arange(3 * grains), 1.0, 1e-11
     )
-    out = contact_program.dependent_rows(problem, idle)
+    out = interior_point.dependent_rows(problem, idle)
     assert out.sum() == 2
     found = contact_program.without_rows(problem, idle, out)
     assert np.array_equal(found.diagonal, np.where(out, 1.0, idle))
