@@ -122,15 +122,19 @@ def _make_packing(job, library, packing):
 def _compact(job, library, packing):
     steps = library.expected_steps(packing["n"], packing["mu"])
 
-    def tell(step, message):
-        job.stage = f"compaction, step {step}: {message}"
+    def tell(step, _):
         if steps:
             job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
 
     job.begin("compaction")
     seen = live.shared(live.Compaction, packing)
     seen.restart()
-    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=seen.add)
+
+    def look(glimpse):
+        job.stage = f"compaction, step {glimpse.step}: {glimpse.state}"
+        seen.add(glimpse)
+
+    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=look)
 
 
 def _tell_states(job, done, total):

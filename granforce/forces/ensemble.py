@@ -101,6 +101,11 @@ class Ensemble:
         return unknowns - int(np.sum(square > 1e-12 * square[-1]))
 
     @property
+    def is_determined(self) -> bool:
+        """Whether A x = b leaves no freedom: h = 0, known up to LARGEST_RANK rows."""
+        return self.A.shape[0] <= LARGEST_RANK and self.dimension == 0
+
+    @property
     def free_columns(self) -> sparse.csr_matrix:
         """A without the columns of components that are pinned."""
         if self.known is None:
