@@ -21,9 +21,9 @@ function stopping({ scene }, side) {
   return [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ").replace("at the left wall and at the right wall", "at both walls")
 }
 
-/** Where a disk is about to slide at a wall: against the friction on it. */
+/** Where a disk is about to slide: against the friction on it; of two disks, which way round each other. */
 function way(scene, contact, what) {
-  if (scene.j[contact] < scene.r.length) return ""
+  if (scene.j[contact] < scene.r.length) return what > 0 ? " clockwise" : " anticlockwise"
   const [x, y] = [-what * scene.normal[2 * contact + 1], what * scene.normal[2 * contact]]
   return Math.abs(y) > 0.3 ? (y > 0 ? " up" : " down") : x > 0 ? " right" : " left"
 }

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from granforce.cli import words
 from granforce.cli.options import EXAMPLE, Parser, refused
+from granforce.system import interrupts
 
 # Only the standard library in what this needs: --help must not wait for numba, xarray and HiGHS.
 
@@ -16,28 +17,46 @@ from granforce.cli.options import EXAMPLE, Parser, refused
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0, 1 (some cells failed), 2 (bad input) or 130 (Ctrl-C)."""
     arguments = _parser().parse_args(argv)
+    usual = warnings.formatwarning
+    with interrupts.noted():
+        try:
+            return _run(arguments)
+        except KeyboardInterrupt:
+            return _told_interrupted()
+        except BrokenPipeError:
+            sys.stderr.close()  # the reader of our output (head, less) has gone; that is no error
+            return 0
+        except Exception:
+            if interrupts.interrupted():  # what a library made of it
+                return _told_interrupted()
+            raise
+        finally:
+            warnings.formatwarning = usual
+
+
+def _run(arguments: argparse.Namespace) -> int:
     from granforce.records import Cancelled, InputError
     from granforce.system.terminal import one_line
 
-    usual, warnings.formatwarning = warnings.formatwarning, one_line
+    warnings.formatwarning = one_line
     try:
         from granforce.cli import commands
         from granforce.system.compiled import tell_when_compiling
 
+        interrupts.check()  # an import may have swallowed it
         tell_when_compiling(_say_compiling)
         return getattr(commands, arguments.run)(arguments) or 0
     except InputError as error:
         return refused(str(error))
     except MemoryError as error:
         return refused(f"not enough memory: {str(error) or 'ask for less'}")
-    except (KeyboardInterrupt, Cancelled):
-        print("granforce: interrupted; finished entries are kept", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output (head, less) has gone; that is no error
-        return 0
-    finally:
-        warnings.formatwarning = usual
+    except Cancelled:
+        return _told_interrupted()
+
+
+def _told_interrupted() -> int:
+    print("granforce: interrupted; finished entries are kept", file=sys.stderr)
+    return 130
 
 
 def _say_compiling() -> None:

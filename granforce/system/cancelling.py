@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 import numpy as np
 
 from granforce.records import Cancel, Cancelled, Mask
+from granforce.system.interrupts import interrupted
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -62,7 +63,8 @@ def watched(cancel: Cancel | None = None) -> Iterator[None]:
     if cancel is None and (outer.cancel is not None or not main):
         yield
         return
-    scope = _Scope(np.zeros(1, dtype=bool), _either(outer, cancel))
+    asked = _either(outer, cancel)
+    scope = _Scope(np.array([_ending.is_set() or interrupted()]), asked)
     ears, mouth = socket.socketpair()
     mouth.setblocking(False)
     ours = main and _wake_by_signals(mouth)
@@ -97,7 +99,9 @@ def cancellable(function: Callable[P, T]) -> Callable[P, T]:
 
 def _either(outer: _Scope, cancel: Cancel | None) -> Cancel:
     asked = [one for one in (outer.cancel, cancel) if one is not None]
-    return lambda: bool(outer.flag[0]) or _ending.is_set() or any(ask() for ask in asked)
+    return lambda: (
+        bool(outer.flag[0]) or _ending.is_set() or interrupted() or any(ask() for ask in asked)
+    )
 
 
 def end_everything() -> None:

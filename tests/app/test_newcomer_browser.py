@@ -126,8 +126,10 @@ def test_on_a_narrow_page_there_is_room_below_the_text_for_what_is_computed(visi
 def ring(page):
     """What the tour's ring is around, once it is seen: (left, top, right, bottom)."""
     found = page.locator(".ring").filter(visible=True)
-    found.wait_for()
-    box = found.bounding_box()
+    box = None
+    while box is None:  # it may be laid out anew between the two
+        found.wait_for()
+        box = found.bounding_box()
     return box["x"], box["y"], box["x"] + box["width"], box["y"] + box["height"]
 
 

@@ -1,5 +1,6 @@
 """The command line as a user meets it: reports, exit codes, one-line errors, no heavy start."""
 
+import contextlib
 import json
 import os
 import signal
@@ -11,7 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import granforce as gf
+from granforce.cli import commands
 from granforce.cli.parser import main
+from granforce.system import interrupts
 
 SMALL = ["-n", "20", "--mu", "0.3", "--relax", "nearest", "--states", "5"]
 
@@ -340,3 +344,28 @@ def test_interrupt_ends_quietly_and_keeps_what_is_finished(tmp_path):
     assert out == ""
     assert "Traceback" not in err
     assert "finished entries are kept" in err
+
+
+def swallowed(arguments):
+    """A command during which Ctrl-C is lost, as in an import; then it computes."""
+    with contextlib.suppress(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+    gf.pack(40, 0.3, 0, sweeps=10**9, accuracy=1e-300)
+
+
+def altered(arguments):
+    """A command during which a library makes another error of Ctrl-C."""
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except KeyboardInterrupt:
+        raise ImportError("could not import module datetime") from None
+
+
+@pytest.mark.parametrize("command", [swallowed, altered])
+def test_an_interrupt_that_a_library_swallows_ends_the_command(command, monkeypatch, capsys):
+    monkeypatch.setattr(commands, "pack", command)
+    assert main(["pack"]) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        "granforce: interrupted; finished entries are kept"
+    )
+    assert not interrupts.interrupted()  # the next command begins anew
