@@ -5,6 +5,7 @@ from granforce.study import kinds
 
 from . import live
 from .data import SOURCES, Shown
+from .replays import first_replay
 from .turns import in_turn
 
 # A compaction's part of the bar; it never seems to be at its end.
@@ -57,7 +58,7 @@ def _watched(selection, params):
     walking = live.shared(live.Walking, params)
 
     def begun(S):
-        walking.restart(live.first_replay(S, params["states"]))
+        walking.restart(first_replay(S, params["states"]))
 
     return {"begun": begun, "watch": walking.add}
 

@@ -13,14 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce import measures
 from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.schema import dataset_packing
 from granforce.study.store import open_store
 
-from . import geometry
+from .replays import Replay, make_replay
 from .selection import Selection, selected, series
 
 # Environment variable naming a store of precomputed results to open instead of data/start.zarr.
@@ -31,7 +30,6 @@ SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states}
 
 OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
-FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
 SHOWN_KEPT = 16  # cells in memory, for all visitors
 
 
@@ -53,29 +51,6 @@ class Cell(NamedTuple):
     def kind(self):
         """Kind of the entry: walk or uniform."""
         return self.selection.kind
-
-
-class Replay(NamedTuple):
-    """States to look at: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
-
-    disks: geometry.Disks
-    links: geometry.Links
-    box: np.ndarray  # (2,) sides; inf where open
-    tilt: float  # of the cell
-    window: tuple  # x_low, x_high, y_low, y_high of the view, a square
-    backbone: np.ndarray  # (N_c,) positions of the contacts in the packing
-    force_scale: float  # ⟨f_n⟩, force
-    normal: np.ndarray  # (F, N_c) float32 f_n: the original network, then the states kept
-    tangential: np.ndarray  # (F, N_c) float32 f_t
-    number: np.ndarray  # (F,) number of the state, 0 for the original
-    distance: np.ndarray  # (F,) from the centre of the states
-    residual: np.ndarray  # (F,) NaN for the original
-    attempts: np.ndarray  # (F,) spent on each state; NaN for the original and where none are made
-    growth: dict  # {"eta1", "eta2", "eta3": (F,)} of the states shown so far, NaN for the original
-    low: np.ndarray  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
-    high: np.ndarray  # (N_c, 2) float32 largest
-    order: np.ndarray  # (N_c,) contacts by original f_n, ascending
-    summary: dict  # plain numbers of the states, by their names in the schema
 
 
 class Shown(NamedTuple):
@@ -271,58 +246,3 @@ LEAST_PLACE = -3.5  # stands for μ = 0
 def place(mu):
     """log10 μ, and LEAST_PLACE for what is below."""
     return max(LEAST_PLACE, np.log10(mu)) if mu > 0 else LEAST_PLACE
-
-
-def make_replay(packing, dataset, mu):
-    """The Replay of a dataset of states on its packing; μ is that of the ensemble."""
-    backbone = dataset["backbone"].values
-    scale = float(dataset["force_scale"])
-    summary = {name: array.item() for name, array in dataset.items() if array.ndim == 0}
-    kept = dataset.sizes["state"]
-    walked = int(summary["accepted"] + summary["skipped"]) if "accepted" in summary else kept
-    pick = _shown(kept, len(backbone))
-    frames = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
-    frames = (frames / scale).astype(np.float32)
-    number = np.linspace(0, walked - 1, kept).astype(int)[pick] + 1
-    summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
-    summary |= {"kept": len(pick), "states": walked}
-    x = geometry.into_cell(packing)
-    window = geometry.square(x, packing)
-
-    def column(name):
-        if name not in dataset:
-            return np.full(len(pick) + 1, np.nan)
-        return np.append(np.nan, dataset[name].values[pick])
-
-    distance = column("distance_to_centre")
-    distance[0] = summary["original_distance"]
-    return Replay(
-        disks=geometry.disks(packing, x, backbone),
-        links=geometry.links(packing, x, backbone),
-        box=packing.box,
-        tilt=packing.tilt,
-        window=window,
-        backbone=backbone,
-        force_scale=scale,
-        normal=np.ascontiguousarray(frames[..., 0]),
-        tangential=np.ascontiguousarray(frames[..., 1]),
-        number=np.append(0, number),
-        distance=distance,
-        residual=column("residual"),
-        attempts=column("attempts"),
-        growth={
-            name: np.append(np.nan, values) for name, values in measures.growing(frames[1:]).items()
-        },
-        low=(dataset["low"].values / scale).astype(np.float32),
-        high=(dataset["high"].values / scale).astype(np.float32),
-        order=np.argsort(frames[0, :, 0], kind="stable"),
-        summary=summary,
-    )
-
-
-def _shown(kept, contacts):
-    """Which of the states kept fit in FRAME_BYTES, evenly spaced."""
-    most = max(2, int(FRAME_BYTES / (8 * max(1, contacts))))
-    if kept <= most:
-        return np.arange(kept)
-    return np.linspace(0, kept - 1, most).astype(int)
