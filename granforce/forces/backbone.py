@@ -68,7 +68,7 @@ def carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
         known = some_network(full, np.zeros_like(known))
     trusted = full.admits(known)
     if not trusted and full.known is not None:
-        _tell_contradiction(full)
+        _raise_contradiction(full)
     idle = np.ones(len(known), np.bool_)
     dead = ~idle
     if trusted:
@@ -79,7 +79,7 @@ def carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
     return ~(dead | _proven_idle(full, idle, at_hand)), at_hand
 
 
-def _tell_contradiction(full: Ensemble) -> None:
+def _raise_contradiction(full: Ensemble) -> None:
     """NotJammedError with the statements that cannot hold together, where that can be proved."""
     assert full.known is not None
     A, b, T = full.scaled_balance
@@ -127,13 +127,13 @@ def _cannot_balance(full: Ensemble, idle: Mask) -> Mask:
     normal = sparse.csr_matrix(T)[:: full.per_contact][idle][:, columns]
     model = programs.standard_form(local, np.zeros(local.shape[0]), upper=1.0)
     dead, everyone = np.zeros(len(idle), bool), np.ones(int(idle.sum()), bool)
-    shown = _shown_idle(model, local, np.zeros(local.shape[0]), normal, everyone)
-    if shown is not None:
-        dead[idle] = shown
+    proved = _never_pressing(model, local, np.zeros(local.shape[0]), normal, everyone)
+    if proved is not None:
+        dead[idle] = proved
     return dead
 
 
-def _shown_idle(
+def _never_pressing(
     model: highspy.Highs, A: sparse.csr_matrix, b: Floats, normal: sparse.csr_matrix, idle: Mask
 ) -> Mask | None:
     """Those of the idle contacts that carry nothing in {y ≥ 0 : A y = b}; None where undecided.
@@ -179,9 +179,9 @@ def _proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
     for limit in limits:
         model = programs.standard_form(A, b, upper=limit, solver="ipm")
         model.setOptionValue("run_crossover", "off")  # no vertex is wanted
-        shown = _shown_idle(model, A, b, normal_rows, idle)
-        if shown is not None:
-            return shown
+        proved = _never_pressing(model, A, b, normal_rows, idle)
+        if proved is not None:
+            return proved
     if known is not None:
         return idle  # feasible within BALANCED but not exactly: no more is known to carry
     raise certificates.why_unsolved(A, b, _unbalanced_message(full), slack=full.slack)

@@ -383,7 +383,7 @@ def _answer(step, flows, lanes):
         store(rest.border, k, lanes, -load(flows.load.border, k, lanes) - moved)
     store(flows.changed, 0, lanes, same(lanes, 0.0))
     for c in range(len(step.stiffness)):
-        f_n, f_t = _followed(step, flows, c, lanes)
+        f_n, f_t = _next_forces(step, flows, c, lanes)
         contact_matrix.push(step.network, c, f_n, f_t, rest.rows, rest.border, lanes)
     merit = same(lanes, 0.0)
     for k in range(len(step.mass)):
@@ -396,7 +396,7 @@ def _answer(step, flows, lanes):
 
 
 @inline
-def _followed(step, flows, c, lanes):
+def _next_forces(step, flows, c, lanes):
     """f⁺ of one contact; sets that, its state, and whether it changed."""
     zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
     rows, border = flows.velocity.rows, flows.velocity.border
