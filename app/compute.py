@@ -5,6 +5,7 @@ from granforce.study import kinds
 
 from . import live
 from .data import SOURCES, Shown
+from .replays import first_replay
 from .turns import in_turn
 
 # A compaction's part of the bar; it never seems to be at its end.
@@ -57,7 +58,7 @@ def _watched(selection, params):
     walking = live.shared(live.Walking, params)
 
     def begun(S):
-        walking.restart(live.first_replay(S, params["states"]))
+        walking.restart(first_replay(S, params["states"]))
 
     return {"begun": begun, "watch": walking.add}
 
@@ -122,15 +123,19 @@ def _make_packing(job, library, packing):
 def _compact(job, library, packing):
     steps = library.expected_steps(packing["n"], packing["mu"])
 
-    def tell(step, message):
-        job.stage = f"compaction, step {step}: {message}"
+    def tell(step, _):
         if steps:
             job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
 
     job.begin("compaction")
     seen = live.shared(live.Compaction, packing)
     seen.restart()
-    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=seen.add)
+
+    def look(glimpse):
+        job.stage = f"compaction, step {glimpse.step}: {glimpse.state}"
+        seen.add(glimpse)
+
+    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=look)
 
 
 def _tell_states(job, done, total):

@@ -7,20 +7,22 @@ import json
 import os
 import threading
 from collections import OrderedDict
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
-from granforce import measures
-from granforce.records import InputError
+from granforce.records import InputError, Packing
 from granforce.study import cells as study
 from granforce.study import kinds
+from granforce.study.keys import Parameters
 from granforce.study.schema import dataset_packing
-from granforce.study.store import open_store
+from granforce.study.store import Store, open_store
 
-from . import geometry
+from .replays import Replay, make_replay
 from .selection import Selection, selected, series
 
 # Environment variable naming a store of precomputed results to open instead of data/start.zarr.
@@ -31,7 +33,6 @@ SHIPPED = Path(__file__).resolve().parent.parent / "data" / "start.zarr"
 SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states}
 
 OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
-FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
 SHOWN_KEPT = 16  # cells in memory, for all visitors
 
 
@@ -40,42 +41,19 @@ class Cell(NamedTuple):
 
     selection: Selection
     series: str  # everything but μ, in words; cells of one series form one η(μ)
-    params: dict  # as its kind names it
-    store: object  # the store that holds them
+    params: Parameters  # as its kind names it
+    store: Store  # the store that holds them
     name: str  # of the entry
 
     @property
-    def mu(self):
+    def mu(self) -> float:
         """Friction coefficient of the ensemble."""
         return self.selection.mu
 
     @property
-    def kind(self):
+    def kind(self) -> str:
         """Kind of the entry: walk or uniform."""
         return self.selection.kind
-
-
-class Replay(NamedTuple):
-    """States to look at: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
-
-    disks: geometry.Disks
-    links: geometry.Links
-    box: np.ndarray  # (2,) sides; inf where open
-    tilt: float  # of the cell
-    window: tuple  # x_low, x_high, y_low, y_high of the view, a square
-    backbone: np.ndarray  # (N_c,) positions of the contacts in the packing
-    force_scale: float  # ⟨f_n⟩, force
-    normal: np.ndarray  # (F, N_c) float32 f_n: the original network, then the states kept
-    tangential: np.ndarray  # (F, N_c) float32 f_t
-    number: np.ndarray  # (F,) number of the state, 0 for the original
-    distance: np.ndarray  # (F,) from the centre of the states
-    residual: np.ndarray  # (F,) NaN for the original
-    attempts: np.ndarray  # (F,) spent on each state; NaN for the original and where none are made
-    growth: dict  # {"eta1", "eta2", "eta3": (F,)} of the states shown so far, NaN for the original
-    low: np.ndarray  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
-    high: np.ndarray  # (N_c, 2) float32 largest
-    order: np.ndarray  # (N_c,) contacts by original f_n, ascending
-    summary: dict  # plain numbers of the states, by their names in the schema
 
 
 class Shown(NamedTuple):
@@ -83,7 +61,7 @@ class Shown(NamedTuple):
 
     cell: Cell
     replay: Replay
-    exact: object  # Dataset of exact intervals, or None where no store has them
+    exact: xr.Dataset | None  # of exact intervals, or None where no store has them
 
 
 class Library:
@@ -92,20 +70,20 @@ class Library:
     Shared by all visitors; its methods may be called from any thread.
     """
 
-    def __init__(self, shipped=None, cache=None):
+    def __init__(self, shipped: str | Path | None = None, cache: str | Path | None = None) -> None:
         """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache."""
-        self.notes = []  # one line for each store that cannot be used
+        self.notes: list[str] = []  # one line for each store that cannot be used
         shipped = shipped or os.environ.get(SHIPPED_VARIABLE) or SHIPPED
         self.shipped = self._open(shipped, readonly=True)
         self.cache = self._open(cache, readonly=False)
-        self.catalogue = []  # as last read
-        self._known = {}  # (path, entry's name) → Cell or None; entries never change
-        self._damaged = set()  # the same of those that could not be read
-        self._rows = {}
-        self._shown = OrderedDict()
+        self.catalogue: list[Cell] = []  # as last read
+        self._known: dict[tuple[Path, str], Cell | None] = {}  # of entries, which never change
+        self._damaged: set[tuple[Path, str]] = set()  # the same of those that could not be read
+        self._rows: dict[str, dict[str, Any]] = {}
+        self._shown: OrderedDict[str, Shown] = OrderedDict()
         self._lock = threading.Lock()
 
-    def _open(self, path, readonly):
+    def _open(self, path: str | Path | None, readonly: bool) -> Store | None:
         try:
             return open_store(path, readonly=readonly)
         except InputError as error:
@@ -113,24 +91,25 @@ class Library:
             return None
 
     @property
-    def stores(self):
+    def stores(self) -> list[Store]:
         """The stores that could be opened; what both hold is taken from the first."""
         return [store for store in (self.shipped, self.cache) if store is not None]
 
-    def cells(self):
+    def cells(self) -> list[Cell]:
         """All states of the current algorithms, by series and μ; also kept as `catalogue`."""
-        found = {}
+        found: dict[str, Cell] = {}
         for store in self.stores:
             for name in store:
                 key = store.path, name
                 if key not in self._known:
                     self._known[key] = _cell(store, name)
-                if self._known[key] is not None and key not in self._damaged:
-                    found.setdefault(name, self._known[key])
+                cell = self._known[key]
+                if cell is not None and key not in self._damaged:
+                    found.setdefault(name, cell)
         self.catalogue = sorted(found.values(), key=lambda cell: (cell.series, cell.mu))
         return self.catalogue
 
-    def find(self, kind, params):
+    def find(self, kind: str, params: Parameters) -> Cell | None:
         """The cell of these parameters, or None."""
         for store in self.stores:
             name = study.entry_name(store, SOURCES[kind], params)
@@ -142,7 +121,7 @@ class Library:
                 return _cell(store, name)
         return None
 
-    def dataset(self, cell):
+    def dataset(self, cell: Cell) -> xr.Dataset:
         """The dataset of one cell; InputError if it is damaged, and then it is no longer listed."""
         found = study.load(cell.store, SOURCES[cell.kind], cell.params)
         if found is None:
@@ -150,7 +129,7 @@ class Library:
             raise _damage(cell.store, cell.name)
         return found
 
-    def shown(self, cell):
+    def shown(self, cell: Cell) -> Shown:
         """Shown of one cell; the last few are kept. InputError if its packing is nowhere."""
         found = self.shown_in_memory(cell)
         if found is None:
@@ -160,28 +139,28 @@ class Library:
             self.keep_in_memory(found)
         return found
 
-    def shown_in_memory(self, cell):
+    def shown_in_memory(self, cell: Cell) -> Shown | None:
         """Shown of one cell if it is one of the last, or None: takes no time."""
         with self._lock:
             if cell.name in self._shown:
                 self._shown.move_to_end(cell.name)
             return self._shown.get(cell.name)
 
-    def keep_in_memory(self, shown):
+    def keep_in_memory(self, shown: Shown) -> None:
         """Make this the newest of those kept."""
         with self._lock:
             self._shown[shown.cell.name] = shown
             while len(self._shown) > SHOWN_KEPT:
                 self._shown.popitem(last=False)
 
-    def packing(self, params):
+    def packing(self, params: Parameters) -> Packing:
         """The packing of these parameters from the first store that has it. InputError if none."""
         found = self.stored(kinds.PACKING, params)
         if found is not None:
             return dataset_packing(found)
         raise InputError("the packing of these states is in no store that is open here")
 
-    def table(self, cells):
+    def table(self, cells: Sequence[Cell]) -> list[dict[str, Any]]:
         """One row of measures for each cell, as study.row with the ensemble's μ."""
         for cell in cells:
             if cell.name not in self._rows:
@@ -189,12 +168,12 @@ class Library:
                 self._rows[cell.name] = row | {"mu": cell.mu}
         return [self._rows[cell.name] for cell in cells]
 
-    def exact(self, selection):
+    def exact(self, selection: Selection) -> xr.Dataset | None:
         """The exact intervals of a selection's packing at its μ as a dataset, or None."""
         params = kinds.INTERVALS.parameters(selection.packing, mu=selection.mu)
         return self.stored(kinds.INTERVALS, params)
 
-    def stored(self, kind, params):
+    def stored(self, kind: study.Kind, params: Parameters) -> xr.Dataset | None:
         """The dataset of this kind and parameters from the first store that has it, or None."""
         for store in self.stores:
             found = study.load(store, kind, params)
@@ -202,7 +181,7 @@ class Library:
                 return found
         return None
 
-    def lend_packing(self, params):
+    def lend_packing(self, params: Parameters) -> None:
         """Copy a packing that only the shipped store has to the cache: it need not be made anew."""
         if self.cache is None:
             raise InputError("no cache folder can be written, so nothing can be computed")
@@ -211,7 +190,7 @@ class Library:
             if found is not None:
                 kinds.keep_packing(self.cache, params, dataset_packing(found))
 
-    def expected_steps(self, n, mu):
+    def expected_steps(self, n: int, mu: float) -> int | None:
         """Compaction steps of the stored packing of n grains with the nearest μ, or None."""
         known = []
         for store in self.stores:
@@ -227,7 +206,7 @@ class Library:
 
 
 @contextmanager
-def readable(store, name):
+def readable(store: Store, name: str) -> Iterator[xr.Dataset]:
     """The dataset of an entry, to be read as needed; InputError where it turns out damaged."""
     try:
         yield store[name]
@@ -235,11 +214,11 @@ def readable(store, name):
         raise _damage(store, name) from error
 
 
-def _damage(store, name):
+def _damage(store: Store, name: str) -> InputError:
     return InputError(f"entry {name} in {store.path} is damaged; compute it anew, or remove it")
 
 
-def _cell(store, name):
+def _cell(store: Store, name: str) -> Cell | None:
     """The Cell of a store's entry; None where it holds no states of the current algorithms."""
     entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
     if entry is None or not study.is_current(SOURCES[entry.kind], entry):
@@ -248,12 +227,12 @@ def _cell(store, name):
     return Cell(selection, series(selection, entry.params), entry.params, store, name)
 
 
-def nearest_cell(cells, mu):
+def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:
     """Of these cells the one whose μ is nearest, on the logarithmic scale of the slider."""
     return min(cells, key=lambda cell: abs(place(cell.mu) - place(mu)))
 
 
-def best_cell(cells, wanted=None):
+def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | None:
     """The cell of the wanted Selection, or the one most worth opening with; None without cells."""
     for cell in cells:
         if wanted is not None and cell.selection.names(wanted):
@@ -268,61 +247,6 @@ def best_cell(cells, wanted=None):
 LEAST_PLACE = -3.5  # stands for μ = 0
 
 
-def place(mu):
+def place(mu: float) -> float:
     """log10 μ, and LEAST_PLACE for what is below."""
     return max(LEAST_PLACE, np.log10(mu)) if mu > 0 else LEAST_PLACE
-
-
-def make_replay(packing, dataset, mu):
-    """The Replay of a dataset of states on its packing; μ is that of the ensemble."""
-    backbone = dataset["backbone"].values
-    scale = float(dataset["force_scale"])
-    summary = {name: array.item() for name, array in dataset.items() if array.ndim == 0}
-    kept = dataset.sizes["state"]
-    walked = int(summary["accepted"] + summary["skipped"]) if "accepted" in summary else kept
-    pick = _shown(kept, len(backbone))
-    frames = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
-    frames = (frames / scale).astype(np.float32)
-    number = np.linspace(0, walked - 1, kept).astype(int)[pick] + 1
-    summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
-    summary |= {"kept": len(pick), "states": walked}
-    x = geometry.into_cell(packing)
-    window = geometry.square(x, packing)
-
-    def column(name):
-        if name not in dataset:
-            return np.full(len(pick) + 1, np.nan)
-        return np.append(np.nan, dataset[name].values[pick])
-
-    distance = column("distance_to_centre")
-    distance[0] = summary["original_distance"]
-    return Replay(
-        disks=geometry.disks(packing, x, backbone),
-        links=geometry.links(packing, x, backbone),
-        box=packing.box,
-        tilt=packing.tilt,
-        window=window,
-        backbone=backbone,
-        force_scale=scale,
-        normal=np.ascontiguousarray(frames[..., 0]),
-        tangential=np.ascontiguousarray(frames[..., 1]),
-        number=np.append(0, number),
-        distance=distance,
-        residual=column("residual"),
-        attempts=column("attempts"),
-        growth={
-            name: np.append(np.nan, values) for name, values in measures.growing(frames[1:]).items()
-        },
-        low=(dataset["low"].values / scale).astype(np.float32),
-        high=(dataset["high"].values / scale).astype(np.float32),
-        order=np.argsort(frames[0, :, 0], kind="stable"),
-        summary=summary,
-    )
-
-
-def _shown(kept, contacts):
-    """Which of the states kept fit in FRAME_BYTES, evenly spaced."""
-    most = max(2, int(FRAME_BYTES / (8 * max(1, contacts))))
-    if kept <= most:
-        return np.arange(kept)
-    return np.linspace(0, kept - 1, most).astype(int)

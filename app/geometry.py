@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granforce.records import Floats, Integers, Mask, Packing
+
 # Width of the strip around the periodic cell in which images are drawn, in largest radii.
 MARGIN = 1.0
 
@@ -11,32 +13,32 @@ MARGIN = 1.0
 class Disks(NamedTuple):
     """Disks and their periodic images that are seen, k rows."""
 
-    x: np.ndarray  # (k,) length
-    y: np.ndarray
-    r: np.ndarray
-    grain: np.ndarray  # (k,) number of the grain
-    contacts: np.ndarray  # (k,) its number of force-bearing contacts
-    image: np.ndarray  # (k,) bool, whether the centre lies outside the cell
+    x: Floats  # (k,) length
+    y: Floats
+    r: Floats
+    grain: Integers  # (k,) number of the grain
+    contacts: Integers  # (k,) its number of force-bearing contacts
+    image: Mask  # (k,) bool, whether the centre lies outside the cell
 
 
 class Links(NamedTuple):
     """Contacts of the backbone and their periodic images as segments, k rows."""
 
-    x0: np.ndarray  # (k,) centre of grain i, length
-    y0: np.ndarray
-    x1: np.ndarray  # (k,) that centre + ℓ n
-    y1: np.ndarray
-    contact: np.ndarray  # (k,) position among the backbone's contacts
-    i: np.ndarray  # (k,) numbers of the two grains
-    j: np.ndarray
+    x0: Floats  # (k,) centre of grain i, length
+    y0: Floats
+    x1: Floats  # (k,) that centre + ℓ n
+    y1: Floats
+    contact: Integers  # (k,) position among the backbone's contacts
+    i: Integers  # (k,) numbers of the two grains
+    j: Integers
 
 
-def into_cell(packing):
+def into_cell(packing: Packing) -> Floats:
     """Centres (N, 2), moved into the cell along each periodic direction."""
     return packing.cell.wrapped(packing.x)
 
 
-def square(x, packing):
+def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     """(x_low, x_high, y_low, y_high) of a square around the cell (where open, the grains)."""
     margin = MARGIN * packing.r.max()
     periodic = np.isfinite(packing.box)
@@ -45,10 +47,11 @@ def square(x, packing):
     high = np.where(periodic, opposite, (x + packing.r[:, None]).max(axis=0))
     middle, half = (low + high) / 2, (high - low).max() / 2 + margin
     corners = np.stack([middle - half, middle + half], axis=1)
-    return tuple(float(value) for value in corners.ravel())
+    x_low, x_high, y_low, y_high = corners.ravel().tolist()
+    return x_low, x_high, y_low, y_high
 
 
-def disks(packing, x, backbone):
+def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:
     """Disks; x (N, 2) centres in the cell, backbone: (N_c,) its contacts as positions."""
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
     number = np.bincount(i, minlength=len(x)) + np.bincount(j, minlength=len(x))
@@ -62,7 +65,7 @@ def disks(packing, x, backbone):
     return Disks(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
-def links(packing, x, backbone):
+def links(packing: Packing, x: Floats, backbone: Integers) -> Links:
     """Segments of the backbone's contacts, given as positions in the packing."""
     i, j = packing.contacts.i[backbone], packing.contacts.j[backbone]
     reach = packing.contacts.length[backbone, None] * packing.contacts.normal[backbone]

@@ -3,11 +3,15 @@
 The kernels release the interpreter lock, so a thread keeps neither the page nor others waiting.
 """
 
+from __future__ import annotations
+
 import logging
 import threading
 import time
+from collections.abc import Callable
 from functools import partial
 from queue import SimpleQueue
+from typing import Any
 
 import param
 
@@ -16,7 +20,7 @@ from granforce.system import cancelling
 
 from .garbage import settle
 from .limits import LIMITS
-from .turns import Later, turn_of
+from .turns import Later, Turn, turn_of
 
 ESTIMATED = 2.0  # s of a stage from which on its end can be told
 LONGEST_LINE = 500  # characters of what a page tells about an error
@@ -28,17 +32,17 @@ _log = logging.getLogger(__name__)
 class Pool:
     """Threads that run jobs in turn; they end with the server, whatever the jobs are doing."""
 
-    def __init__(self, workers, name):
-        self._jobs = SimpleQueue()
+    def __init__(self, workers: int, name: str) -> None:
+        self._jobs: SimpleQueue[Job] = SimpleQueue()
         for k in range(workers):
             # Not concurrent.futures: its threads would keep a server that is to end waiting.
             threading.Thread(target=self._serve, name=f"{name}-{k}", daemon=True).start()
 
-    def submit(self, job):
+    def submit(self, job: Job) -> None:
         """Have job.run() called when a thread is free."""
         self._jobs.put(job)
 
-    def _serve(self):
+    def _serve(self) -> None:
         while True:
             try:
                 self._jobs.get().run()
@@ -61,69 +65,81 @@ class Job:
     Raising Later it is called again. work.wants: names of turns that it will take, if it has any.
     """
 
-    def __init__(self, work, pool=computing, on_end=None):
+    def __init__(
+        self,
+        work: Callable[[Job], Any],
+        pool: Pool = computing,
+        on_end: Callable[[], object] | None = None,
+    ) -> None:
         """on_end(): called from another thread when the job has ended."""
         self.stage = WAITING
-        self.fraction = None  # done, 0 … 1; None where unknown
-        self.seconds_left = None  # of this stage
+        self.fraction: float | None = None  # done, 0 … 1; None where unknown
+        self.seconds_left: float | None = None  # of this stage
         self.error = ""
-        self.result = None
-        self._work, self._pool, self._on_end = work, pool, on_end
+        self.result: Any = None
+        self._work: Callable[[Job], Any] | None = work
+        self._pool, self._on_end = pool, on_end
         self._begun = time.perf_counter()
         self._cancel, self._ended = threading.Event(), threading.Event()
-        self.turns = []  # that it has just now
+        self.turns: list[Turn] = []  # that it has just now
         self._wants = [turn_of(named) for named in getattr(work, "wants", ())]
         for turn in self._wants:
             turn.join(self)
         self._taken = threading.Lock()  # by the thread that runs it, or by whoever cancels it first
         pool.submit(self)
 
-    def begin(self, stage):
+    def begin(self, stage: str) -> None:
         """Enter a stage; its time left is counted from here."""
         self.stage, self._begun = stage, time.perf_counter()
         self.seconds_left = None
 
-    def tell(self, done, total, *, part=(0.0, 1.0)):
+    def tell(
+        self, done: float, total: float | None, *, part: tuple[float, float] = (0.0, 1.0)
+    ) -> None:
         """Progress of the stage; part: where on the whole bar the stage begins and ends."""
+        if total is None:
+            self.fraction = self.seconds_left = None
+            return
         begin, end = part
         self.fraction = begin + (end - begin) * min(1.0, done / total)
         spent = time.perf_counter() - self._begun
         known = 0 < done <= total and spent > ESTIMATED
         self.seconds_left = spent / done * (total - done) if known else None
 
-    def cancel(self):
+    def cancel(self) -> None:
         """Ask it to end: at once if it has not begun, else within a second once it is unwanted."""
         self._cancel.set()
         if self._taken.acquire(blocking=False):
             self._end()
 
-    def cancelled(self):
+    def cancelled(self) -> bool:
         """Whether it was asked to end."""
         return self._cancel.is_set()
 
-    def unwanted(self):
+    def unwanted(self) -> bool:
         """Whether it was asked to end, and no other job needs what it is making just now."""
         return self.cancelled() and not any(turn.wanted(self) for turn in list(self.turns))
 
     @property
-    def ended(self):
+    def ended(self) -> bool:
         """Whether it has ended, one way or another."""
         return self._ended.is_set()
 
-    def wait(self, timeout=None):
+    def wait(self, timeout: float | None = None) -> bool:
         """Whether it ends in time, in s; for tests and scripts."""
         return self._ended.wait(timeout)
 
-    def run(self):
+    def run(self) -> None:
         """Do the work, unless cancelled before; called by a thread of the pool."""
         if not self._taken.acquire(blocking=False):
             return
         if self.stage == WAITING:
             self.begin("starting")
         try:
-            if not self.cancelled():
+            work = self._work
+            if work is not None and not self.cancelled():
                 with cancelling.watched(self.unwanted):
-                    self.result = self._work(self)
+                    self.result = work(self)
         except Later:
             self._taken.release()
             self._pool.submit(self)
@@ -136,7 +152,7 @@ class Job:
             self.error = told(error)
         self._end()
 
-    def _end(self):
+    def _end(self) -> None:
         self._work = None  # what it refers to may be large
         self._ended.set()
         on_end, self._on_end = self._on_end, None
@@ -147,7 +163,7 @@ class Job:
             _log.exception("the end of a job could not be told")
 
 
-def told(error):
+def told(error: BaseException) -> str:
     """What went wrong, in one line for the page."""
     line = " ".join(str(error).split())[:LONGEST_LINE]
     if isinstance(error, InputError):
@@ -167,14 +183,22 @@ class Task(param.Parameterized):
     seconds_left = param.Number(default=None, allow_None=True)
     message = param.String(doc="one line about what went wrong, or empty")
 
-    def __init__(self, pool=computing, wake=None, **params):
+    def __init__(
+        self,
+        pool: Pool = computing,
+        wake: Callable[[Callable[[], object]], object] | None = None,
+        **params: Any,
+    ) -> None:
         """wake(function): call a function soon on the page's thread; without it, poll yourself."""
-        super().__init__(**params)
+        super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
         self._pool, self._wake = pool, wake
-        self._job = self._done = None
+        self._job: Job | None = None
+        self._done: Callable[[Any], object] | None = None
         self._closed = False
 
-    def start(self, work, done=None):
+    def start(
+        self, work: Callable[[Job], Any], done: Callable[[Any], object] | None = None
+    ) -> None:
         """Begin work(job), as for Job; done(result) follows within `poll` unless it failed.
 
         Nothing begins once the task is closed.
@@ -188,7 +212,7 @@ class Task(param.Parameterized):
             running=True, stage=self._job.stage, fraction=None, seconds_left=None, message=""
         )
 
-    def poll(self):
+    def poll(self) -> None:
         """Take over how far the job is; when it has ended, its result."""
         job = self._job
         if job is None:
@@ -215,12 +239,12 @@ class Task(param.Parameterized):
                     _log.exception("a result could not be shown")
                     self.message = told(error)
 
-    def cancel(self):
+    def cancel(self) -> None:
         """Ask the job to end; its result is dropped."""
         if self._job is not None:
             self._job.cancel()
 
-    def close(self):
+    def close(self) -> None:
         """End the job, and begin no other: nobody is there any more."""
         self._closed = True
         self.cancel()

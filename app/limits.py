@@ -2,7 +2,7 @@
 
 import math
 import os
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from granforce.records import InputError
 
@@ -21,7 +21,7 @@ class Limits(NamedTuple):
     upload: int = 64  # size of an uploaded file, MB
     computations: int = 2  # at the same time, all visitors together
 
-    def check(self, **asked):
+    def check(self, **asked: Any) -> None:
         """InputError if a number lies outside its limits, or radii differ by more than SIZE_RATIO.
 
         asked: any of NAMES; what has no field here must lie in its range of RANGES.
@@ -65,7 +65,7 @@ NAMES = {
 }
 
 
-def _check_radii(text):
+def _check_radii(text: Any) -> None:
     """InputError unless it is a distribution of sizes that can be packed together."""
     kind, _, numbers = str(text).partition(":")
     try:
@@ -82,13 +82,13 @@ def _check_radii(text):
         )
 
 
-def _short(value):
+def _short(value: Any) -> str:
     """A value in few characters, however long it is."""
     text = repr(value)
     return text if len(text) <= 30 else f"{text[:12]}… ({len(text)} characters)"
 
 
-def read_limits(text=None):
+def read_limits(text: str | None = None) -> Limits:
     """Limits from "n=1000,states=2000,upload=10,computations=2", each optional.
 
     text: by default what GRANFORCE_LIMITS holds. InputError for other names or values.

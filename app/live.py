@@ -13,8 +13,7 @@ import numpy as np
 
 from granforce import measures
 
-from . import geometry
-from .data import FRAME_BYTES, Replay
+from .replays import FRAME_BYTES, fitting
 
 # A moving packing is kept each time its box has shrunk by this part, or so many seconds have gone:
 # the gas, which is compressed within a tenth of a second, is seen as well as the slow end.
@@ -174,8 +173,7 @@ class Arriving:
 
 def every(summary):
     """Of a walk under way every so many states are sent: all, if they fit in FRAME_BYTES."""
-    most = max(2, int(FRAME_BYTES / (8 * max(1, summary["contacts"]))))
-    return -(-summary["states"] // most)
+    return -(-summary["states"] // fitting(summary["contacts"], FRAME_BYTES))
 
 
 def numbers(summary):
@@ -195,46 +193,6 @@ def _batch(parts):
         "tangential": forces[..., 1].ravel(),
         **dict(zip(NUMBERS, rows, strict=True)),
     }
-
-
-def first_replay(S, states):
-    """The Replay of an ensemble before its walk: the original network alone; `states` will follow.
-
-    S is of any kind that has packing, index, original, force_scale and mu.
-    """
-    packing, backbone, scale = S.packing, S.index, S.force_scale
-    original = (S.original / scale).astype(np.float32)
-    x = geometry.into_cell(packing)
-    window = geometry.square(x, packing)
-    nothing = np.full(1, np.nan)
-    return Replay(
-        disks=geometry.disks(packing, x, backbone),
-        links=geometry.links(packing, x, backbone),
-        box=packing.box,
-        tilt=packing.tilt,
-        window=window,
-        backbone=backbone,
-        force_scale=scale,
-        normal=np.ascontiguousarray(original[None, :, 0]),
-        tangential=np.ascontiguousarray(original[None, :, 1]),
-        number=np.zeros(1),
-        distance=nothing,
-        residual=nothing,
-        attempts=nothing,
-        growth={name: nothing for name in ("eta1", "eta2", "eta3")},
-        low=original,
-        high=original,
-        order=np.argsort(original[:, 0], kind="stable"),
-        summary={
-            "mu": S.mu,
-            "n": len(packing.r),
-            "contacts": len(backbone),
-            "states": states,
-            "packing_fraction": packing.packing_fraction,
-            "coordination": S.coordination,
-            "dimension": S.dimension,
-        },
-    )
 
 
 class Following:

@@ -2,13 +2,23 @@
 
 import io
 import re
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce.packing import importers, scenes
-from granforce.records import InputError, NotJammedError, float_array, friction
+from granforce.records import (
+    Floats,
+    InputError,
+    Integers,
+    NotJammedError,
+    Packing,
+    float_array,
+    friction,
+)
 from granforce.study import hulls
 
 FIRST, MANY, OWN = "groove", "many", "own"
@@ -30,7 +40,7 @@ class Asked(NamedTuple):
     query: str  # for the page of large packings
 
 
-def asked(query):
+def asked(query: str) -> Asked:
     """What a link's query asks for; what cannot be read is left out.
 
     An address without a view begins with the groove; links from before there were scenes name a μ,
@@ -51,12 +61,12 @@ def asked(query):
     return Asked(name, mu, step, dark, given.get("built", "")[:LONGEST], query)
 
 
-def titles():
+def titles() -> list[list[str]]:
     """[name, title] of every scene, as the list on the page has them."""
     return [[name, kind.title] for name, kind in scenes.SCENES.items()] + [[OWN, "Build your own"]]
 
 
-def drawn(name, mu=None, built=""):
+def drawn(name: str, mu: float | None = None, built: str = "") -> dict[str, Any]:
     """What the page draws of a scene: plain numbers and arrays.
 
     Raises InputError for a built scene that cannot be.
@@ -67,12 +77,12 @@ def drawn(name, mu=None, built=""):
     return {"name": name, "built": built, "begins": begins, "mu": packing.mu, **geometry(packing)}
 
 
-def packing_of(name, mu=None, built=""):
+def packing_of(name: str, mu: float | None = None, built: str = "") -> Packing:
     """The Packing of a scene, by name or built, whether or not anything balances."""
     return own(built, mu) if name == OWN else scenes.sketched(name, mu)
 
 
-def geometry(packing):
+def geometry(packing: Packing) -> dict[str, Any]:
     """Disks, walls, contacts and the balance of a packing without its cones."""
     contacts, count = packing.contacts, packing.info.get("disks", len(packing.r))
     walls = np.reshape(packing.info.get("walls", []), (-1, 4))
@@ -101,7 +111,7 @@ def geometry(packing):
     }
 
 
-def _balance(found):
+def _balance(found: hulls.Hull) -> dict[str, Any]:
     return {
         "A": found.A.ravel(),
         "b": found.b,
@@ -113,7 +123,7 @@ def _balance(found):
     }
 
 
-def names(packing, count):
+def names(packing: Packing, count: int) -> list[str]:
     """Where each contact is, in words."""
     contacts, said = packing.contacts, []
     several, lids = count > 1, len(packing.info.get("pressing", []))
@@ -128,7 +138,7 @@ def names(packing, count):
     return said
 
 
-def falling(packing, load=None):
+def falling(packing: Packing, load: npt.ArrayLike | None = None) -> Floats:
     """Motion (N, 3) of the disks, and of walls that press, that proves that nothing balances.
 
     Flat; empty without a proof.
@@ -143,7 +153,9 @@ def falling(packing, load=None):
     return np.zeros(0) if motion is None else motion[:count].ravel()
 
 
-def measured(packing, load=None, plane=()):
+def measured(
+    packing: Packing, load: npt.ArrayLike | None = None, plane: Sequence[int] = ()
+) -> dict[str, Any]:
     """What is exact about S where it is not drawn whole: its ends, and its outline in a plane.
 
     plane: two force components, 2 c for f_n and 2 c + 1 for f_t of contact c. bounds: [least,
@@ -158,7 +170,7 @@ def measured(packing, load=None, plane=()):
     return {"bounds": bounds, "outline": hulls.outline(packing, plane).ravel().tolist()}
 
 
-def _loaded(packing, load):
+def _loaded(packing: Packing, load: npt.ArrayLike | None) -> Packing:
     """The packing under other loads on its disks, flat."""
     if load is None:
         return packing
@@ -168,7 +180,7 @@ def _loaded(packing, load):
     return packing._replace(load=changed)
 
 
-def own(text, mu=None):
+def own(text: str, mu: float | None = None) -> Packing:
     """The Packing of a visitor's scene: "x,y,r;… | x,y,x,y;…", disks and walls, under gravity.
 
     With a third part, "p1,2", there is none, and walls 1 and 2 press: with 1 on a length of 1.
@@ -187,7 +199,7 @@ def own(text, mu=None):
     return made._replace(info=made.info | {"scene": OWN})
 
 
-def _pressing(text, walls):
+def _pressing(text: str, walls: int) -> Integers:
     """Which of so many walls press."""
     lids = [int(k) for k in text[1:].split(",") if k] if PRESSED.fullmatch(text) else [walls]
     if max(lids, default=0) >= walls and lids:
@@ -195,7 +207,7 @@ def _pressing(text, walls):
     return np.unique(np.array(lids, dtype=np.int64))
 
 
-def _numbers(text, width, most, what):
+def _numbers(text: str, width: int, most: int, what: str) -> Floats:
     try:
         rows = [[float(part) for part in row.split(",")] for row in text.split(";") if row.strip()]
         found = np.array(rows, dtype=float).reshape(-1, width)
@@ -206,7 +218,7 @@ def _numbers(text, width, most, what):
     return float_array(found, (-1, width), what)
 
 
-def file_of(packing, load=None):
+def file_of(packing: Packing, load: npt.ArrayLike | None = None) -> bytes:
     """The packing under these loads as an NPZ file, with a network of its own if there is one."""
     packing = _loaded(packing, load)
     try:

@@ -1,11 +1,16 @@
 """What is asked for, and its three spellings: words on screen, a link, a command line."""
 
+from __future__ import annotations
+
 import shlex
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
 from granforce.records import InputError, friction
 from granforce.study import kinds
+from granforce.study.keys import Parameters
+
+from .limits import Limits
 
 # Names on screen of kinds.RELAXATIONS; the first is what a new walk takes unless told otherwise.
 SOLVERS = {
@@ -26,7 +31,7 @@ LONGEST_REASON = 200  # characters of a message about a link, which may hold any
 class Selection(NamedTuple):
     """States asked for: of which packing, at which friction, from which source."""
 
-    packing: dict  # parameters of the packing, as kinds.PACKING names it
+    packing: Parameters  # parameters of the packing, as kinds.PACKING names it
     mu: float  # friction coefficient of the ensemble
     kind: str = "walk"  # one of KINDS
     relax: str = "accelerated"  # of the walk
@@ -34,23 +39,23 @@ class Selection(NamedTuple):
     seed: int = 0  # of the walk or sample
 
     @property
-    def imported(self):
+    def imported(self) -> bool:
         """Whether the packing comes from elsewhere, so that none can be made like it."""
         return "imported" in self.packing
 
     @property
-    def same_mu(self):
+    def same_mu(self) -> bool:
         """Whether packing and ensemble have the same friction."""
         return self.packing["mu"] == self.mu
 
-    def at(self, mu):
+    def at(self, mu: Any) -> Selection:
         """The same at another μ; the packing's friction goes along if it was the same."""
         mu = friction(mu)
         if self.imported or not self.same_mu:
             return self._replace(mu=mu)
         return self._replace(mu=mu, packing=self.packing | {"mu": mu})
 
-    def parameters(self):
+    def parameters(self) -> Parameters:
         """Parameters of the walk or sample, as its kind names it."""
         most = int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400)))
         common = {"mu": self.mu, "keep": None if self.states <= most else most}
@@ -60,18 +65,18 @@ class Selection(NamedTuple):
             self.packing, self.states, self.seed, relax=self.relax, **common
         )
 
-    def check(self, limits):
+    def check(self, limits: Limits) -> None:
         """InputError if it asks for more than these Limits allow."""
         limits.check(states=self.states, mu=self.mu, seed=self.seed)
         if not self.imported:
             limits.check(**self.packing)
 
-    def names(self, other):
+    def names(self, other: Selection) -> bool:
         """Whether other is the same but for details that this kind of states does not have."""
         return _plain(self) == _plain(other)
 
 
-def differing(asked, shown):
+def differing(asked: Selection, shown: Selection | None) -> str:
     """What of a Selection is not as in another one (None: all of it), in words."""
     if shown is None or asked.imported or shown.imported:
         return f"the packing at μ = {asked.mu:g}" if asked.imported else f"μ = {asked.mu:g}"
@@ -93,18 +98,25 @@ def differing(asked, shown):
     return ", ".join(words) or f"μ = {asked.mu:g}"
 
 
-def _plain(selection):
+def _plain(selection: Selection) -> Selection:
     return selection if selection.kind == "walk" else selection._replace(relax="")
 
 
-def selected(kind, parameters):
+def selected(kind: str, parameters: Parameters) -> Selection:
     """The Selection that these parameters of a walk or sample belong to."""
     packing, mu = parameters["packing"], float(parameters["mu"])
     relax = parameters.get("relax", "accelerated")
     return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"])
 
 
-def select(n=400, mu=0.1, packing_seed=1, packed_mu=None, box="square", **others):
+def select(
+    n: int = 400,
+    mu: Any = 0.1,
+    packing_seed: int = 1,
+    packed_mu: float | None = None,
+    box: str = "square",
+    **others: Any,
+) -> Selection:
     """A Selection of a packing made here; InputError for what cannot be.
 
     packed_mu: friction during compaction, by default that of the ensemble. box: as for `pack`.
@@ -118,12 +130,12 @@ def select(n=400, mu=0.1, packing_seed=1, packed_mu=None, box="square", **others
     return Selection(packing, mu, **others)
 
 
-def _unusual(packing):
+def _unusual(packing: Parameters) -> Parameters:
     usual = kinds.PACKING.parameters(packing["n"], packing["mu"], packing["seed"])
     return {name: packing[name] for name in OPTIONS if packing.get(name) != usual.get(name)}
 
 
-def series(selection, parameters=None):
+def series(selection: Selection, parameters: Parameters | None = None) -> str:
     """Everything but μ, in words: selections of one series form one η(μ).
 
     parameters: those of the entry, where it is one.
@@ -147,7 +159,7 @@ def series(selection, parameters=None):
     return ", ".join(words)
 
 
-def command(selection):
+def command(selection: Selection) -> str:
     """The command that makes the same states in a terminal."""
     words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
     if selection.kind == "walk":
@@ -157,7 +169,7 @@ def command(selection):
     return shlex.join(str(word) for word in words)
 
 
-def of_packing(selection):
+def of_packing(selection: Selection) -> list[Any]:
     """Words of a command that name a selection's packing and μ."""
     packing = selection.packing
     if selection.imported:
@@ -171,7 +183,7 @@ def of_packing(selection):
     return words
 
 
-def link(selection, view):
+def link(selection: Selection, view: dict[str, Any]) -> str:
     """The query of an address that reopens this selection, seen as `view` {name: plain value}."""
     packing = selection.packing
     if selection.imported:
@@ -189,7 +201,7 @@ def link(selection, view):
     return urlencode(given | view)
 
 
-def read_link(query):
+def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
     """(Selection or None, {name: text} of everything else) of a link's query.
 
     InputError for a selection that cannot be; a link without "mu" selects nothing.
@@ -203,7 +215,7 @@ def read_link(query):
         raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
 
 
-def _read_selection(given):
+def _read_selection(given: dict[str, str]) -> Selection:
     kind, relax = given.pop("source", "walk"), given.pop("relax", "accelerated")
     if kind not in KINDS or relax not in SOLVERS:
         raise InputError("this link names an unknown source of states")

@@ -26,7 +26,7 @@ def on_server_loaded(server_context):
     with suppress(ImportError):
         importlib.import_module("dask.base")
     importlib.import_module(".page", __package__)
-    if compile_ahead("from granforce.study.scan import warm_up; warm_up()", "flow._follow"):
+    if compile_ahead("from granforce.study.scan import warm_up; warm_up()", "flow.until_one_ends"):
         Job(lambda job: warm_up())
 
 

@@ -9,6 +9,7 @@ from bokeh.embed import components
 from bokeh.resources import Resources
 
 from . import planes
+from .replays import evenly
 from .views import explanation, still
 from .views.packing import exact_intervals, full_extent, legend
 from .views.player import Player, frames
@@ -16,8 +17,6 @@ from .views.scripts import FOLDER, joined
 from .views.style import palettes
 
 FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
-# Rows of these belong to the states.
-BY_FRAME = ("number", "distance", "residual", "acceptance", "eta1", "eta2", "eta3")
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
@@ -123,11 +122,9 @@ def html(
 def thinned(replay):
     """A Replay of at most FRAME_BYTES, and the acceptance of its frames."""
     count, contacts = replay.normal.shape
-    most = max(2, int(FRAME_BYTES / (8 * max(1, contacts))))
-    whole = frames(replay)["acceptance"]
-    if count <= most:
+    whole, pick = frames(replay)["acceptance"], evenly(count, contacts, FRAME_BYTES)
+    if len(pick) == count:
         return replay, whole
-    pick = np.linspace(0, count - 1, most).astype(int)
     rows = {
         name: np.ascontiguousarray(getattr(replay, name)[pick])
         for name in ("normal", "tangential", "number", "distance", "residual", "attempts")

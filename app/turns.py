@@ -1,13 +1,21 @@
 """Of jobs that need the same, one works at a time, and goes on as long as any of them wants it."""
 
+from __future__ import annotations
+
 import threading
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 from weakref import WeakSet, WeakValueDictionary
+
+if TYPE_CHECKING:  # it needs this file to run
+    from .jobs import Job
 
 # How long a job stays for its turn before it lets others have the thread, s.
 _ASK = 0.2
 
-_turns, _turns_lock = WeakValueDictionary(), threading.Lock()
+_turns: WeakValueDictionary[str, Turn] = WeakValueDictionary()
+_turns_lock = threading.Lock()
 
 
 class Later(Exception):
@@ -17,30 +25,32 @@ class Later(Exception):
 class Turn:
     """Whose turn it is among jobs that need what has one name, and who they are."""
 
-    def __init__(self):
-        self.lock, self.job = threading.Lock(), None
-        self._wanting, self._guard = WeakSet(), threading.Lock()
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.job: Job | None = None
+        self._wanting: WeakSet[Job] = WeakSet()
+        self._guard = threading.Lock()
 
-    def join(self, job):
+    def join(self, job: Job) -> None:
         """Count a job among those that need it."""
         with self._guard:
             self._wanting.add(job)
 
-    def wanted(self, without):
+    def wanted(self, without: Job) -> bool:
         """Whether a job other than this one needs it that is neither cancelled nor at its end."""
         with self._guard:
             others = [job for job in self._wanting if job is not without]
         return not all(job.cancelled() or job.ended for job in others)
 
 
-def turn_of(named):
+def turn_of(named: Any) -> Turn:
     """The Turn of a name; it lasts while somebody refers to it."""
     with _turns_lock:
         return _turns.setdefault(repr(named), Turn())
 
 
 @contextmanager
-def in_turn(job, *named):
+def in_turn(job: Job, *named: Any) -> Iterator[None]:
     """One job at a time of those named alike: the next finds in the cache what the first made.
 
     Raises Later while another one has its turn: who waits leaves the thread to those who need not.
@@ -48,7 +58,7 @@ def in_turn(job, *named):
     turn = turn_of(named)
     turn.join(job)
     if not turn.lock.acquire(timeout=_ASK):
-        _tell_as(job, turn.job)
+        _goes_as(job, turn.job)
         raise Later
     turn.job, job.stage = job, "starting"
     job.turns.append(turn)
@@ -60,7 +70,7 @@ def in_turn(job, *named):
         turn.lock.release()
 
 
-def _tell_as(job, other):
+def _goes_as(job: Job, other: Job | None) -> None:
     """The progress of the other one, which works for both."""
     job.stage = "being computed for another page"
     if other is not None:

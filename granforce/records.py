@@ -9,7 +9,6 @@ f_n n + f_t t, and f_n ≥ 0 presses.
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -62,27 +61,12 @@ class Contacts(NamedTuple):
 
     def picked(self, rows: Integers | Mask) -> Contacts:
         """The contacts of these rows: a mask (N_c,), or positions (k,)."""
-        return Contacts(
-            i=self.i[rows],
-            j=self.j[rows],
-            normal=self.normal[rows],
-            length=self.length[rows],
-            gap=self.gap[rows],
-            arm_i=self.arm_i[rows],
-            arm_j=self.arm_j[rows],
-        )
+        return Contacts._make(values[rows] for values in self)
 
     def joined(self, others: Contacts) -> Contacts:
         """These contacts, then the others."""
-        return Contacts(
-            i=np.concatenate([self.i, others.i]),
-            j=np.concatenate([self.j, others.j]),
-            normal=np.concatenate([self.normal, others.normal]),
-            length=np.concatenate([self.length, others.length]),
-            gap=np.concatenate([self.gap, others.gap]),
-            arm_i=np.concatenate([self.arm_i, others.arm_i]),
-            arm_j=np.concatenate([self.arm_j, others.arm_j]),
-        )
+        both = zip(self, others, strict=True)
+        return Contacts._make(np.concatenate(values) for values in both)
 
 
 class Cell(NamedTuple):
@@ -314,19 +298,6 @@ def random_seed(value: Any, name: str = "seed") -> int:
     return whole(value, name, most=None)
 
 
-def check_memory(needed: float, what: str) -> None:
-    """InputError where what needs more bytes than this machine has memory."""
-    try:
-        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return  # not told by this system: an allocation will fail instead
-    if needed > there:
-        raise InputError(
-            f"{what} would need {min(needed, 1e300) / 1e9:.3g} GB of memory, and this machine has "
-            f"{there / 1e9:.3g} GB; ask for less"
-        )
-
-
 def moderate(value: Any, name: str) -> float:
     """The value as a float > 0 whose powers stay finite; InputError otherwise."""
     number = positive(value, name)
@@ -400,7 +371,12 @@ def make_packing(
     if not np.isnan(pressure):
         pressure = moderate(pressure, "pressure")
     forces = float_array(forces, (len(contacts.i), 2), "forces")
-    _check_repeated(contacts)
+    if twice := repeated(contacts):
+        i, j = contacts.i[twice[0]], contacts.j[twice[0]]
+        raise InputError(
+            f"contacts {twice[0]} and {twice[1]} are one: both join grains {i} and {j}; give each "
+            "contact once"
+        )
     return Packing(
         x, r, box, contacts, forces, friction(mu), float(pressure), load, dict(info or {}), tilt
     )
@@ -454,18 +430,20 @@ def _loads(load: npt.ArrayLike, count: int) -> Floats:
     return load
 
 
-def _check_repeated(contacts: Contacts) -> None:
-    """Two grains touch twice only through different images, whose normals differ by 60° or more."""
+def repeated(contacts: Contacts) -> tuple[int, int] | None:
+    """The first contact that was given before, behind the one that it repeats; None without any.
+
+    Two grains touch twice only through different images, whose normals differ by 60° or more.
+    """
     low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
     normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)
     order = np.lexsort((high, low))
+    found: list[tuple[int, int]] = []
     for apart in range(1, len(order)):
         a, b = order[:-apart], order[apart:]
         same = (low[a] == low[b]) & (high[a] == high[b])
         if not same.any():
-            return
-        for k in np.flatnonzero(same & (np.sum(normal[a] * normal[b], axis=1) > 0.75)):
-            raise InputError(
-                f"contacts {min(a[k], b[k])} and {max(a[k], b[k])} are one: both join grains "
-                f"{low[a[k]]} and {high[a[k]]}; give each contact once"
-            )
+            break
+        same &= np.sum(normal[a] * normal[b], axis=1) > 0.75
+        found += zip(a[same].tolist(), b[same].tolist(), strict=True)
+    return min(found, key=lambda pair: pair[::-1], default=None)

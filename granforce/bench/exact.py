@@ -104,7 +104,7 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> dict[str,
             if importlib.util.find_spec("cobra"):
                 rows["cobra FVA"] = _timed(cobra_loop, system, data)
         results[name] = rows
-        _show(name, rows)
+        _print_table(name, rows)
     return results
 
 
@@ -128,7 +128,7 @@ def _error(system: Ensemble, data: Any, lower: Floats, upper: Floats) -> float:
     return float(np.max(off) / system.force_scale)
 
 
-def _show(name: str, rows: dict[str, Any]) -> None:
+def _print_table(name: str, rows: dict[str, Any]) -> None:
     print(f"\n{name}\n{'method':24}{'time/s':>9}{'ratio':>8}{'error':>10}{'gap':>10}  counts")
     plain = rows["plain loop"]["seconds"]
     for method, row in rows.items():

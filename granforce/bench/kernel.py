@@ -17,7 +17,7 @@ from granforce.forces.contact_problem import make_problem
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.numerics import contact_matrix, contact_program
+from granforce.numerics import cholesky, contact_program
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.packing.compaction import pack
@@ -81,9 +81,9 @@ def _factorisation(problem: Problem, lanes: Any) -> float:
     for _ in range(30):
         # Any positive definite matrix: its numbers do not change the work.
         work.factors.lower[:] = 0.0
-        work.factors.lower[contact_matrix.diagonals(problem.network).ravel()] = 1.0
+        work.factors.lower[cholesky.diagonals(problem.network).ravel()] = 1.0
         begin = time.perf_counter()
-        contact_matrix.factor(problem.network, work.least, work.factors, work.stop, lanes)
+        cholesky.factor(problem.network, work.least, work.factors, work.stop, lanes)
         best = min(best, time.perf_counter() - begin)
     return best
 

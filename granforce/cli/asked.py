@@ -11,14 +11,14 @@ import xarray as xr
 
 from granforce import measures
 from granforce.packing import importers
-from granforce.records import InputError, whole
+from granforce.records import InputError, Packing, whole
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
 from granforce.study.store import Store, open_store
 from granforce.system.files import check_file, written
-from granforce.system.terminal import Bar, Steps
+from granforce.system.terminal import Bar
 
 
 def radii(text: str, n: int) -> str | list[float]:
@@ -91,11 +91,20 @@ def prepared(
     check_outputs(*outputs)
     store = open_store(arguments.cache)
     if packing is None:
-        with Steps("compaction", "step") as progress:
-            kinds.get_packing(store, named, progress=progress)
+        get_packing(store, named)
     else:
         kinds.keep_packing(store, named, packing)
     return store, parameters
+
+
+def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:
+    """The packing of these parameters, made or found, and whether it was found."""
+    with Bar(kinds.PACKING.title, kinds.PACKING.unit) as progress:
+
+        def watch(glimpse: Any) -> None:
+            progress.note(glimpse.state)
+
+        return kinds.get_packing(store, parameters, progress=progress, watch=watch, **options)
 
 
 def get(

@@ -68,9 +68,9 @@ def informative(
         progress(0, len(best))
     for done, c in enumerate(best):
         if not done:
-            before = _mean_interval(ensemble, workers)
+            before = _mean_extent(ensemble, workers)
         with_it = ensemble.with_normal(c, mean[c, 0], mean)
-        after[done] = _mean_interval(with_it, workers)
+        after[done] = _mean_extent(with_it, workers)
         if progress is not None:
             progress(done + 1, len(best))
     place = np.append(np.argsort(after[: len(best)], kind="stable"), range(len(best), len(order)))
@@ -88,7 +88,7 @@ def _expected(normal: Floats) -> Floats:
     return np.where(spread > FLAT, 1 - left @ spread / max(spread.sum(), FLAT), 0.0)
 
 
-def _mean_interval(ensemble: Ensemble, workers: int) -> float:
+def _mean_extent(ensemble: Ensemble, workers: int) -> float:
     """Mean exact interval of f_n, in ⟨f_n⟩."""
     bounds = intervals(ensemble, workers=workers)
     cancelling.check("exact bounds")

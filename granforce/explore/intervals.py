@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from granforce import measures, notebook
 from granforce.forces.contact_problem import make_system
-from granforce.forces.ensemble import LARGEST_RANK, Ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
@@ -125,7 +125,7 @@ def intervals(
     solver = Solver(system, workers=workers, seen=seen, report=report, found=found)
     pinned = _pinned(ensemble, upper + tangential + lower)
     report(len(pinned))
-    if is_a_point(ensemble, system):
+    if needs_no_program(ensemble, system):
         keys = [key for key in upper + tangential + lower if key not in pinned]
         pinned |= determined(ensemble, keys)
         report(len(keys))
@@ -192,10 +192,10 @@ def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
     return found
 
 
-def is_a_point(ensemble: Ensemble, system: System) -> bool:
-    """Whether balance leaves no freedom; asked where S has no inside, or something is known."""
+def needs_no_program(ensemble: Ensemble, system: System) -> bool:
+    """Whether all is `determined`; asked where S has no inside, or something is known, only."""
     asked = ensemble.known is not None or not system.middle.reached
-    return asked and ensemble.A.shape[0] <= LARGEST_RANK and ensemble.dimension == 0
+    return asked and ensemble.is_determined
 
 
 def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:

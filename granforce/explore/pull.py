@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from granforce.explore.intervals import bound_of, determined, is_a_point
+from granforce.explore.intervals import bound_of, determined, needs_no_program
 from granforce.forces.contact_problem import (
     forces_of,
     independent_problem_of,
@@ -197,7 +197,7 @@ def reach(ensemble: Ensemble, contact: int, *, cancel: Cancel | None = None) -> 
     keys = [(int(position), 0, side) for side in (0, 1)]
     points: dict[Any, Floats] = {}
     system = make_system(ensemble)
-    if is_a_point(ensemble, system):
+    if needs_no_program(ensemble, system):
         found = determined(ensemble, keys)
         states = np.stack([starting_network(ensemble)] * 2)
     else:

@@ -11,7 +11,8 @@ import numpy as np
 
 from granforce import notebook
 from granforce.explore.outline import outline, supports
-from granforce.forces.ensemble import Ensemble, stress_of, stress_rows
+from granforce.forces.balance import stress_of, stress_rows
+from granforce.forces.ensemble import Ensemble
 from granforce.records import Cancel, Floats, InputError, Progress, whole
 from granforce.system import cancelling
 

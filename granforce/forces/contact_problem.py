@@ -15,6 +15,7 @@ from granforce.numerics import (
     certified_values,
     contact_matrix,
     contact_program,
+    interior_point,
     linear_programs,
 )
 from granforce.numerics.contact_matrix import Network
@@ -141,7 +142,7 @@ def independent_problem_of(ensemble: Ensemble) -> Problem:
             out = np.zeros(len(idle), bool)
             out[problem.place] = _dependent_rows(ensemble)
         else:
-            out = contact_program.dependent_rows(problem, idle)
+            out = interior_point.dependent_rows(problem, idle)
         kept.append(contact_program.without_rows(problem, idle, out))
     return kept[2]
 
@@ -239,7 +240,7 @@ def inner_network(ensemble: Ensemble) -> Floats | None:
     are scaled up, or all but follow from others, magnify what the centre is out of balance by: that
     is taken off first.
     """
-    if is_a_point(ensemble) and ensemble.member is not None:
+    if ensemble.member is not None and ensemble.is_determined:
         y = ensemble.coordinates(ensemble.member)
         return np.where(y > 0.1 * BALANCED, y, 0.0)
     middle = linear_programs.centre(independent_problem_of(ensemble))
@@ -260,9 +261,8 @@ def inner_network(ensemble: Ensemble) -> Floats | None:
 
 
 def is_a_point(ensemble: Ensemble) -> bool:
-    """Whether S is the network at hand alone, as far as that is asked of dense matrices."""
-    few = ensemble.A.shape[0] <= MOST_DENSE
-    return few and ensemble.member is not None and ensemble.dimension == 0
+    """Whether S is known to be the network at hand alone."""
+    return ensemble.member is not None and ensemble.is_determined
 
 
 def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:

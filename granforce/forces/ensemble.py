@@ -1,6 +1,12 @@
-"""S: the balance equations and Coulomb cones of a packing, its backbone, and the two judges.
+"""S: the admissible force networks of a packing, and the two judges of any network.
 
-Unknowns x = (f_n1, f_t1, f_n2, …), or (f_n1, f_n2, …) at μ = 0 where no contact can carry f_t.
+S is convex: the plane A x = b of the `balance` of all grains, cut by one Coulomb cone per contact
+of the `backbone` and by what is known of single forces (`knowledge`). Unknowns are x = (f_n1, f_t1,
+f_n2, …), or (f_n1, f_n2, …) at μ = 0 where no contact can carry f_t. A cone is spanned by its two
+edges, so that x = T y with y ≥ 0 and S = {T y : A T y = b, y ≥ 0}, as linear programs want it.
+
+Whether a network is in S is up to two numbers, both in ⟨f_n⟩: by how much it fails the plane
+(`Ensemble.residual`), and by how much the cones (`Ensemble.violation`).
 """
 
 from __future__ import annotations
@@ -9,17 +15,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import highspy
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
 from granforce import notebook
-from granforce.forces import knowledge
+from granforce.forces import backbone, balance, knowledge
 from granforce.forces.knowledge import Known
-from granforce.forces.nearest import nearest, some_network
-from granforce.numerics import certificates
-from granforce.numerics import highs as programs
 from granforce.records import (
     Contacts,
     Floats,
@@ -29,11 +31,10 @@ from granforce.records import (
     NotJammedError,
     Packing,
     are_whole,
-    float_array,
     friction,
 )
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING, ROUNDING, SEEN_CARRYING
+from granforce.tolerances import ADMISSIBLE, BALANCED
 
 # What is prescribed, by its number of values.
 _NAMES = {1: "pressure", 3: "stress"}
@@ -92,12 +93,17 @@ class Ensemble:
         rows, unknowns = A.shape
         if rows > LARGEST_RANK:
             dependent = 2 if self.has_pressure_row else 3
-            dependent = 0 if left_open_in(self.packing).any() else dependent
+            dependent = 0 if balance.left_open_in(self.packing).any() else dependent
             return max(0, unknowns - (rows - dependent))
         if not unknowns:
             return 0
         square = cancelling.apart(np.linalg.eigvalsh, (A @ A.T).toarray())
         return unknowns - int(np.sum(square > 1e-12 * square[-1]))
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether A x = b leaves no freedom: h = 0, known up to LARGEST_RANK rows."""
+        return self.A.shape[0] <= LARGEST_RANK and self.dimension == 0
 
     @property
     def free_columns(self) -> sparse.csr_matrix:
@@ -139,7 +145,7 @@ class Ensemble:
         gives: its own unbalance, up to BALANCED, would be magnified by that scale, and rows that
         follow from others would contradict them.
         """
-        A, b, T = self._scaled_balance
+        A, b, T = self.scaled_balance
         if self.known is not None:
             A, b, T = knowledge.extended(A, b, T, self.known, self.mu, self.known.value)
         y = None if self.member is None else self.coordinates(self.member)
@@ -179,7 +185,8 @@ class Ensemble:
         return 1 / np.where(largest > 0, largest, 1.0)
 
     @cached_property
-    def _scaled_balance(self) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
+    def scaled_balance(self) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
+        """(A, b, T) of `scaled_form` without what is known."""
         scale = self._row_scale
         A, T = self.cone_form
         return sparse.csc_matrix(sparse.diags(scale) @ A), scale * self.b / self.force_scale, T
@@ -328,15 +335,15 @@ def ensemble(
             "loads on the grains"
         )
     bounds = None if known is None else knowledge.bounds_of(known, count)
-    asked = _Asked(mu, held, _prescribed(packing, prescribed, stress, held), bounds)
+    asked = _Asked(mu, held, balance.prescribed_stress(packing, prescribed, stress, held), bounds)
     free = np.flatnonzero(~held)
     if prune:
-        free = _without_danglers(packing, free, held)
+        free = backbone.without_danglers(packing, free, held)
     full = _assemble(packing, asked, free)
     _check_frozen_and_known(packing, held, bounds, full.force_scale)
     if not prune:
         return full
-    carrying, found = _carrying(full)
+    carrying, found = backbone.carrying(full)
     pruned = full if carrying.all() else _assemble(packing, asked, free[carrying])
     pruned = replace(pruned, found=None if found is None else found[carrying])
     _check_idle_and_known(pruned, bounds)
@@ -350,58 +357,6 @@ class _Asked(NamedTuple):
     held: Mask  # (contacts,) bool, frozen
     stress: Floats | None  # prescribed: (1,) pressure, (3,) xx, yy, xy, or None
     bounds: Floats | None  # (contacts, 2, 2) force, by knowledge.bounds_of
-
-
-def _prescribed(
-    packing: Packing, prescribed: str, stress: npt.ArrayLike | None, held: Mask
-) -> Floats | None:
-    """What is prescribed, as in _Asked; InputError where it makes no sense here."""
-    if prescribed not in ("pressure", "stress", "none"):
-        raise InputError(f"prescribed must be pressure, stress or none, got {prescribed!r:.40}")
-    if stress is not None and prescribed != "stress":
-        raise InputError('a stress is given, but not prescribed: add prescribed="stress"')
-    closed = np.isfinite(packing.volume) and not np.isnan(packing.pressure)
-    if prescribed == "none" and closed and not held.any() and not packing.load.any():
-        raise InputError(
-            "with nothing prescribed nothing says how large the forces are: prescribe the pressure "
-            "or the stress, or freeze contacts"
-        )
-    if prescribed == "none":
-        return None
-    if prescribed == "pressure":
-        return np.array([packing.pressure]) if closed and not held.any() else None
-    if held.any():
-        raise InputError(
-            "the stress cannot be prescribed where contacts are frozen: their forces decide it"
-        )
-    if not np.isfinite(packing.volume):
-        raise InputError("the stress can be prescribed in a periodic box only; this one is open")
-    if stress is None:
-        stress = stress_of(packing, packing.forces)
-        if not stress[0] + stress[1] > 0:
-            raise InputError(
-                "the packing has no forces of its own to take the stress from: give the stress"
-            )
-    stress = float_array(stress, (3,), "stress")
-    if not stress[0] + stress[1] > 0:
-        raise InputError("a stress must press: σ_xx + σ_yy must be above 0")
-    return stress
-
-
-def stress_of(packing: Packing, forces: Floats) -> Floats:
-    """σ_xx, σ_yy, σ_xy (…, 3) of networks (…, N_c, 2) on all contacts, force per length.
-
-    σ_ab = (1/V) Σ F_a ℓ_b; off the diagonal the mean of both, which are equal in balance.
-    """
-    return np.einsum("kci,...ci->...k", stress_rows(packing.contacts), forces) / packing.volume
-
-
-def stress_rows(contacts: Contacts) -> Floats:
-    """V σ of unit f_n and f_t: (3, N_c, 2)."""
-    n_x, n_y = contacts.normal.T
-    normal = np.stack([n_x * n_x, n_y * n_y, n_x * n_y])
-    tangential = np.stack([-n_x * n_y, n_x * n_y, 0.5 * (n_x * n_x - n_y * n_y)])
-    return np.stack([normal, tangential], axis=-1) * contacts.length[:, None]
 
 
 def _check_frozen_and_known(
@@ -432,11 +387,6 @@ def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
         )
 
 
-def left_open_in(packing: Packing) -> Mask:
-    """Mask (N,) of grains whose balance is left open: nothing is known of the load on them."""
-    return np.any(np.isnan(packing.load), axis=1)
-
-
 def _frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
     frozen = np.asarray(frozen)
     if frozen.dtype == bool:
@@ -446,21 +396,6 @@ def _frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
     if not are_whole(frozen, count - 1).all():
         raise InputError(f"a frozen contact lies outside 0 … {count - 1}")
     return frozen.astype(np.int64)
-
-
-def _without_danglers(packing: Packing, free: Integers, held: Mask) -> Integers:
-    """Drop, one after another, contacts of unloaded grains that have no other contact."""
-    i, j = packing.contacts.i, packing.contacts.j
-    count = len(packing.r)
-    anchored = np.any(packing.load != 0, axis=1)
-    anchored[i[held]] = anchored[j[held]] = True
-    while True:
-        number = np.bincount(i[free], minlength=count) + np.bincount(j[free], minlength=count)
-        lonely = (number == 1) & ~anchored
-        keep = ~(lonely[i[free]] | lonely[j[free]])
-        if keep.all():
-            return free
-        free = free[keep]
 
 
 def _assemble(packing: Packing, asked: _Asked, free: Integers) -> Ensemble:
@@ -474,21 +409,11 @@ def _assemble(packing: Packing, asked: _Asked, free: Integers) -> Ensemble:
     contacts = packing.contacts.picked(free)
     loaded = np.any(packing.load != 0, axis=1)
     grains = np.union1d(np.union1d(contacts.i, contacts.j), np.flatnonzero(loaded))
-    left_open = np.flatnonzero(left_open_in(packing))
+    left_open = np.flatnonzero(balance.left_open_in(packing))
     touched = np.intersect1d(grains, left_open)
     grains = np.setdiff1d(grains, left_open)
-    A, b = _balance(packing, contacts, grains, held, mu)
     original = packing.forces[free]
-    if asked.stress is None:
-        scale = float(np.mean(np.abs(original[:, 0])))
-    else:
-        rows, values = _conditions(packing, contacts, mu, asked.stress)
-        A = sparse.vstack([A, sparse.csr_matrix(rows)], format="csr")
-        b, scale = np.append(b, values), values[0]
-    scale = float(scale) or 1.0
-    A = _without_rounding(A, len(grains) * (3 if mu > 0 else 2), contacts)
-    if held.any():
-        b = _held_in_balance(A, b, original if mu > 0 else original[:, :1], BALANCED * scale)
+    A, b, scale = balance.equations(packing, free, grains, held, mu, asked.stress)
     known = None
     if asked.bounds is not None:
         known = knowledge.polygons(asked.bounds[free], mu, scale, free)
@@ -510,237 +435,4 @@ def _assemble(packing: Packing, asked: _Asked, free: Integers) -> Ensemble:
         },
         prescribed="none" if asked.stress is None else _NAMES[len(asked.stress)],
         known=known,
-    )
-
-
-def _balance(
-    packing: Packing, contacts: Contacts, grains: Integers, held: Mask, mu: float
-) -> tuple[sparse.csr_matrix, Floats]:
-    """Force and torque rows of the given grains; frozen contacts and loads go to the right."""
-    row_of = np.full(len(packing.r), -1)
-    row_of[grains] = np.arange(len(grains))
-    size = 3 if mu > 0 else 2
-    A = _force_matrix(packing, contacts, row_of, len(grains), size)
-    b = -packing.load[grains, :size]
-    b[:, 2:] /= packing.r[grains, None]
-    b = b.ravel()
-    if held.any():
-        fixed = packing.contacts.picked(held)
-        fixed_matrix = _force_matrix(packing, fixed, row_of, len(grains), 3)
-        unbalance = fixed_matrix @ packing.forces[held].ravel()
-        b = b - unbalance.reshape(-1, 3)[:, :size].ravel()
-    if mu == 0:
-        A = A[:, ::2]
-    return sparse.csr_matrix(A), b
-
-
-def _without_rounding(A: sparse.csr_matrix, balance: int, contacts: Contacts) -> sparse.csr_matrix:
-    """A without entries that are rounding of 0: n_y of contacts along x, n_x² − n_y² at 45°.
-
-    A row of nothing else would be a condition of its own once it is scaled. Entries of the
-    `balance` rows are of order 1, those of what is prescribed of order ℓ/Σℓ.
-    """
-    unit = np.ones(A.shape[0])
-    unit[balance:] = contacts.length.max() / contacts.length.sum()
-    A = sparse.csr_matrix(A)
-    A.data[np.abs(A.data) < ROUNDING * np.repeat(unit, np.diff(A.indptr))] = 0.0
-    A.eliminate_zeros()
-    return A
-
-
-def _held_in_balance(A: sparse.csr_matrix, b: Floats, original: Floats, tolerance: float) -> Floats:
-    """A x of the original network x, if that is balanced: b without what rounding left of it.
-
-    Frozen surroundings determine most forces, and leave rows of A that follow from others times
-    10⁴: what frozen forces are out of balance by, 10⁻¹², would contradict itself there by 10⁻⁸.
-    """
-    balanced = A @ original.ravel()
-    return balanced if np.abs(balanced - b).max(initial=0.0) <= tolerance else b
-
-
-def _force_matrix(
-    packing: Packing, contacts: Contacts, row_of: Integers, count: int, size: int
-) -> sparse.csr_matrix:
-    """Sparse (size · count, 2 N_c): what unit f_n, f_t do to each grain (torque divided by r)."""
-    columns = 2 * np.arange(len(contacts.i))
-    n_x, n_y = contacts.normal.T
-    entries = []
-    for grain, sign, arm in ((contacts.i, -1.0, contacts.arm_i), (contacts.j, 1.0, contacts.arm_j)):
-        row = row_of[grain]
-        inside = row >= 0
-        parts = [(0, 0, sign * n_x), (1, 0, sign * n_y), (0, 1, -sign * n_y), (1, 1, sign * n_x)]
-        if size == 3:
-            parts.append((2, 1, -arm / packing.r[grain]))
-        for component, tangential, value in parts:
-            entries.append(
-                (value[inside], size * row[inside] + component, columns[inside] + tangential)
-            )
-    value, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
-    return sparse.csr_matrix((value, (row, column)), shape=(size * count, 2 * len(columns)))
-
-
-def _conditions(
-    packing: Packing, contacts: Contacts, mu: float, stress: Floats
-) -> tuple[Any, Floats]:
-    """Rows (m, unknowns) and values (m,) of what is prescribed, as mean normal forces.
-
-    The pressure comes first: Σ f_n ℓ / Σ ℓ = 2 P0 V / Σ ℓ. With the whole stress, (σ_xx − σ_yy)/2
-    and σ_xy follow on the same scale.
-    """
-    length = contacts.length
-    total = float(length.sum())
-    size = 2 if mu > 0 else 1
-    row = np.zeros(len(length) * size)
-    row[::size] = length / total
-    if len(stress) == 1:
-        return row[None, :], np.array([2 * stress[0] * packing.volume / total])
-    xx, yy, xy = stress_rows(contacts)[..., :size].reshape(3, -1) / total
-    s_xx, s_yy, s_xy = stress * packing.volume / total
-    return np.stack([row, 0.5 * (xx - yy), xy]), np.array([s_xx + s_yy, 0.5 * (s_xx - s_yy), s_xy])
-
-
-def _carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
-    """Mask of contacts whose largest f_n over S is positive, exactly; and a network, or None.
-
-    What presses in a known state carries; known are the original network, or the one nearest to
-    equal f_n, and one that is pulled towards forces on the contacts without any. Contacts of grains
-    that cannot balance any force on them carry nothing. Only contacts that are neither are left to
-    a linear program over all of S. That a contact carries nothing is proved by duality, so that it
-    does not depend on which state is known.
-    """
-    known = full.original
-    if not full.admits(known):
-        known = some_network(full, np.zeros_like(known))
-    trusted = full.admits(known)
-    if not trusted and full.known is not None:
-        _tell_contradiction(full)
-    idle = np.ones(len(known), np.bool_)
-    dead = ~idle
-    if trusted:
-        idle = known[:, 0] <= SEEN_CARRYING * full.force_scale
-        dead = idle & _cannot_balance(full, idle)
-        idle = _not_pulled(full, known, idle & ~dead)
-    at_hand = known if trusted else None
-    return ~(dead | _proven_idle(full, idle, at_hand)), at_hand
-
-
-def _tell_contradiction(full: Ensemble) -> None:
-    """NotJammedError with the statements that cannot hold together, where that can be proved."""
-    assert full.known is not None
-    A, b, T = full._scaled_balance
-    message = knowledge.contradiction(
-        A, b, T, full.known, full.mu, full.index, full.force_scale, full.slack
-    )
-    if message is not None:
-        raise NotJammedError(message)
-
-
-def _not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
-    """Those of the idle contacts that press in none of the networks that are pulled towards them.
-
-    Every network is pulled towards forces on all that have not pressed before.
-    """
-    while idle.any():
-        target = known.copy()
-        target[idle, 0] += full.force_scale
-        pulled = nearest(full, target).forces
-        pressing = idle & (pulled[:, 0] > SEEN_CARRYING * full.force_scale)
-        if not pressing.any() or not full.admits(pulled):
-            break
-        idle = idle & ~pressing
-    return idle
-
-
-def _cannot_balance(full: Ensemble, idle: Mask) -> Mask:
-    """Mask of idle contacts that even their own grains alone cannot balance: local, exact.
-
-    Grains whose contacts are all idle must be in balance; all others may answer any force.
-    """
-    size = 1 + full.per_contact
-    c = full.contacts
-    held_up = np.zeros(len(full.packing.r), bool)
-    held_up[c.i[~idle]] = held_up[c.j[~idle]] = True
-    held_up |= np.any(full.packing.load != 0, axis=1)
-    held_up[full.packing.contacts.i[full.frozen]] = True
-    held_up[full.packing.contacts.j[full.frozen]] = True
-    rows = np.repeat(~held_up[full.grains], size)
-    columns = np.repeat(idle, full.per_contact)
-    if not rows.any():
-        return np.zeros(len(idle), np.bool_)
-    A, T = full.cone_form
-    local = A[: len(rows)].tocsr()[rows][:, columns]
-    normal = sparse.csr_matrix(T)[:: full.per_contact][idle][:, columns]
-    model = programs.standard_form(local, np.zeros(local.shape[0]), upper=1.0)
-    dead, everyone = np.zeros(len(idle), bool), np.ones(int(idle.sum()), bool)
-    shown = _shown_idle(model, local, np.zeros(local.shape[0]), normal, everyone)
-    if shown is not None:
-        dead[idle] = shown
-    return dead
-
-
-def _shown_idle(
-    model: highspy.Highs, A: sparse.csr_matrix, b: Floats, normal: sparse.csr_matrix, idle: Mask
-) -> Mask | None:
-    """Those of the idle contacts that carry nothing in {y ≥ 0 : A y = b}; None where undecided.
-
-    normal (contacts, n): f_n = normal · y. Contacts that press where Σ f_n is largest are taken
-    out, again and again; the multipliers of the last program prove that the others cannot.
-    """
-    while idle.any():
-        gains = normal.T @ idle.astype(float)
-        programs.set_cost(model, -gains)
-        pressing = None
-        for status, y in programs.solutions(model):
-            if status != programs.OPTIMAL:
-                continue
-            pressing = idle & (normal @ y > SEEN_CARRYING)
-            if pressing.any():
-                break
-            if certificates.proves_small(A, b, gains, -programs.multipliers(model, A, -gains)):
-                return idle
-            pressing = idle & (normal @ y > CARRYING)
-        if pressing is None:
-            return None
-        # Without a proof, and without a state that says so, nothing is called idle.
-        idle = idle & ~pressing if pressing.any() else np.zeros(len(idle), bool)
-    return idle
-
-
-def _proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
-    """Those of the idle contacts whose sum, and so each, can only be 0 over S.
-
-    known (N_c, 2): a network of S, or None.
-    """
-    if not idle.any():
-        return idle
-    A, b, T = full.scaled_form
-    # Without any load or pressure, S is a cone: what carries in it carries in a bounded part too.
-    limits = [np.inf if b.any() else 1.0]
-    if known is not None:
-        # So it does in an S without end, however near to a network of S: a part of the way to any
-        # other one is in S as well.
-        limits.append(1.0 + float(full.coordinates(known).max()))
-    normal_rows = sparse.csr_matrix(T)[:: full.per_contact]
-    for limit in limits:
-        model = programs.standard_form(A, b, upper=limit, solver="ipm")
-        model.setOptionValue("run_crossover", "off")  # no vertex is wanted
-        shown = _shown_idle(model, A, b, normal_rows, idle)
-        if shown is not None:
-            return shown
-    if known is not None:
-        return idle  # feasible within BALANCED but not exactly: no more is known to carry
-    raise certificates.why_unsolved(A, b, _unbalanced_message(full), slack=full.slack)
-
-
-def _unbalanced_message(full: Ensemble) -> str:
-    A, _ = full.cone_form
-    _, rest = programs.least_unbalanced(A, full.b / full.force_scale)
-    size = 1 + full.per_contact
-    load = np.linalg.norm(rest[: size * len(full.grains)].reshape(-1, size), axis=1)
-    worst = np.argsort(load)[::-1][:5]
-    carries = "" if full.prescribed != "stress" else "the contacts cannot carry this stress, or "
-    named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > 0)
-    return (
-        f"no admissible force network exists: {carries}the packing is not jammed, or contacts are "
-        f"missing; grains with the largest unbalanced load: {named or 'none'}"
     )

@@ -16,8 +16,9 @@ from scipy.sparse.linalg import splu
 from granforce.forces.contact_problem import forces_of, problem_of
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import likeliest_piqp
-from granforce.numerics import certificates, contact_program
-from granforce.numerics.contact_program import OPTIMUM, PINNED
+from granforce.numerics import certificates, contact_program, interior_point
+from granforce.numerics.contact_program import PINNED
+from granforce.numerics.interior_point import OPTIMUM
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.records import Floats, InputError, positive
 from granforce.system import cancelling
@@ -129,12 +130,12 @@ def fitted_many(
     lanes = ONE if width == 1 else MANY
     for _ in range(_MOST_STEPS):
         cancelling.check("inference")
-        contact_program.look(problem, False, at, work, lanes)
+        interior_point.look(problem, False, at, work, lanes)
         there = (work.unbalance[0] <= _BALANCE) & (work.product[0] <= closed)
         work.going[0, there] = 0.0
         if not work.going[0].any():
             break
-        contact_program.advance(problem, False, OPTIMUM, at, work, lanes)
+        interior_point.advance(problem, False, OPTIMUM, at, work, lanes)
     forces = np.stack([forces_of(ensemble, at.y[:-1, lane]) for lane in range(len(many))])
     for lane in np.flatnonzero(~(ensemble.residual(forces) <= BALANCED)):
         forces[lane] = _otherwise(ensemble, forces[lane], many[lane], s, unmeasured)

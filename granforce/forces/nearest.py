@@ -22,8 +22,9 @@ import numpy as np
 
 from granforce.forces.contact_problem import problem_of
 from granforce.forces.nearest_piqp import likeliest_piqp, restored
-from granforce.numerics import certificates, contact_program, highs
-from granforce.numerics.contact_program import OPTIMUM, PINNED, PROJECTED, Problem
+from granforce.numerics import certificates, cone_projection, contact_program, highs, interior_point
+from granforce.numerics.contact_program import PINNED, Problem
+from granforce.numerics.interior_point import OPTIMUM, PROJECTED
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.records import Cancel, Floats, Relaxation
 from granforce.system import cancelling
@@ -193,7 +194,7 @@ class Search:
         stay = at.y[pinned]
         normal, tangential = targets[:, 0], mu * targets[:, 1]
         at.c[first], at.c[second] = -0.5 * (normal + tangential), -0.5 * (normal - tangential)
-        contact_program.project(self.problem, at, self.work, self.lanes)
+        cone_projection.project(self.problem, at, self.work, self.lanes)
         f_n, f_t = 0.5 * (at.y[first] + at.y[second]), 0.5 * (at.y[first] - at.y[second])
         slope_n, slope_t = f_n - normal, mu * mu * f_t - tangential
         inside = INSIDE * self.size
@@ -245,7 +246,7 @@ class Search:
 
     def _look(self) -> tuple[list[float], list[float], list[float]]:
         """Products, unbalance and slackness by lane."""
-        contact_program.look(self.problem, False, self.at, self.work, self.lanes)
+        interior_point.look(self.problem, False, self.at, self.work, self.lanes)
         work = self.work
         return work.product[0].tolist(), work.unbalance[0].tolist(), work.slackness[0].tolist()
 
@@ -259,7 +260,7 @@ class Search:
         for k in going:
             self.work.going[0, k] = 1.0
             self.steps[k] += 1
-        contact_program.advance(self.problem, False, mode, self.at, self.work, self.lanes)
+        interior_point.advance(self.problem, False, mode, self.at, self.work, self.lanes)
 
     def _step(self, going: Sequence[int]) -> None:
         self._advance(going, OPTIMUM)
@@ -275,7 +276,7 @@ class Search:
         at, trying = self.at, ready
         kept = at.y.copy(), at.v.copy(), at.v_border.copy()
         for attempt in range(FINAL_STEPS + 1):
-            contact_program.project(self.problem, at, self.work, self.lanes)
+            cone_projection.project(self.problem, at, self.work, self.lanes)
             unbalance, going = self.work.unbalance[0].tolist(), []
             for k in trying:
                 if unbalance[k] <= tolerance:

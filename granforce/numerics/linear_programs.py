@@ -11,16 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from granforce.numerics import contact_program
-from granforce.numerics.contact_program import (
-    BALANCE,
-    CENTRE,
-    OPTIMUM,
-    REFINED,
-    Iterate,
-    Problem,
-    Workspace,
-)
+from granforce.numerics import contact_program, interior_point
+from granforce.numerics.contact_program import Iterate, Problem, Workspace
+from granforce.numerics.interior_point import BALANCE, CENTRE, OPTIMUM, REFINED
 from granforce.numerics.lanes import ONE, lanes_for
 from granforce.records import Floats
 from granforce.system import cancelling
@@ -79,14 +72,14 @@ def centre(problem: Problem) -> Centre:
     at.c[-1] = 1.0
     reached = False
     for _ in range(_MOST_STEPS):
-        contact_program.look(problem, True, at, work, ONE)
+        interior_point.look(problem, True, at, work, ONE)
         off = np.abs(at.y * at.z - 1).max()
         unbalance = max(work.unbalance[0, 0], work.slackness[0, 0])
         reached = bool(off < 0.3 and unbalance < BALANCED)
         if reached or not np.isfinite(off):
             break
         cancelling.check()
-        contact_program.advance(problem, True, CENTRE, at, work, ONE)
+        interior_point.advance(problem, True, CENTRE, at, work, ONE)
     return Centre(at.y[:-1, 0], at.z[:-1, 0], at.v[:, 0], at.v_border[:, 0], reached)
 
 
@@ -141,7 +134,7 @@ def _work(
     arrived = []
     while True:
         cancelling.check()
-        contact_program.look(problem, True, at, work, lanes)
+        interior_point.look(problem, True, at, work, lanes)
         gap, unbalance = work.product[0], work.unbalance[0]
         there = (gap <= _LEAVE_GAP) & (unbalance <= _LEAVE_UNBALANCE)
         there |= (gap <= _HOPELESS * _LEAVE_GAP) | ~np.isfinite(gap) | (steps >= _MOST_STEPS)
@@ -157,8 +150,8 @@ def _work(
         if not np.any(number >= 0):
             return
         if len(left):
-            contact_program.look(problem, True, at, work, lanes)
-        contact_program.advance(problem, True, mode, at, work, lanes)
+            interior_point.look(problem, True, at, work, lanes)
+        interior_point.advance(problem, True, mode, at, work, lanes)
         steps += 1
 
 
@@ -236,13 +229,13 @@ def balanced(
             at.y[-1, lane] = outcome.load
     restored = BALANCED * (_RESTORED_LOADED if problem.b.any() else _RESTORED)
     for _ in range(_MOST_BALANCING):
-        contact_program.look(problem, True, at, work, lanes)
+        interior_point.look(problem, True, at, work, lanes)
         done = work.unbalance[0] <= restored
         if done[: len(outcomes)].all():
             break
         # Those are put back, so that no outcome depends on the company it came in.
         kept = at.y[:, done].copy()
-        contact_program.advance(problem, True, BALANCE, at, work, lanes)
+        interior_point.advance(problem, True, BALANCE, at, work, lanes)
         at.y[:, done] = kept
     y, load = at.y[:-1], at.y[-1]
     if middle.reached:

@@ -9,14 +9,15 @@ inverse, the conductance C, forces that keep the balance move by
 
 and slacks by the matrix K = B Q Bᵀ. Where W = 0 it is the projection I − D Ãᵀ (Ã D² Ãᵀ)⁻¹ Ã D on
 what slacks can do together, in slacks y = D s with Ã y = b̃: no basis of it is needed, only the
-sparse factor of A C Aᵀ (`contact_matrix`). One factor serves eight right-hand sides in lanes.
+sparse factor of A C Aᵀ (`cholesky`). One factor serves eight right-hand sides in lanes.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from granforce.numerics import contact_matrix
+from granforce.numerics import cholesky, contact_matrix
+from granforce.numerics.blocks import NO_PIVOT
 from granforce.numerics.contact_matrix import Factors, Network, clear, pull, push
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import (
@@ -82,14 +83,14 @@ def factored(network: Network, C: Floats, diagonal: Floats, least: float) -> tup
     """
     factors = contact_matrix.make_factors(network, 1)
     _begin(network, C, diagonal, factors, ONE)
-    bound = least * factors.lower[contact_matrix.diagonals(network), 0].ravel()
-    bound = np.maximum(bound, contact_matrix.NO_PIVOT)
+    bound = least * factors.lower[cholesky.diagonals(network), 0].ravel()
+    bound = np.maximum(bound, NO_PIVOT)
     m = network.border.shape[1] // 2
     weight = np.diag(factors.corner.reshape(m, m)).copy()
-    contact_matrix.factor(network, bound, factors, cancelling.flag(), ONE)
+    cholesky.factor(network, bound, factors, cancelling.flag(), ONE)
     cancelling.check()
     _without_dependent(factors.corner.reshape(m, m), weight)
-    out = contact_matrix.left_out(network, factors)
+    out = cholesky.left_out(network, factors)
     return Factors(*(shared(part) for part in factors)), out
 
 
@@ -121,7 +122,7 @@ def global_rows(network: Network, factors: Factors) -> int:
 def log_determinant(network: Network, factors: Factors) -> float:
     """ln det A C Aᵀ by its factors, rows without a pivot left out."""
     m = network.border.shape[1] // 2
-    own = factors.lower[contact_matrix.diagonals(network)].ravel()
+    own = factors.lower[cholesky.diagonals(network)].ravel()
     corner = factors.corner[:: m + 1].ravel() if m else np.zeros(0)
     pivots = np.concatenate([own[own > 1e-30], corner[corner > 0]])
     return -2 * np.log(pivots).sum()
@@ -215,7 +216,7 @@ def _balance(matrix, at, lanes):
 @within
 def _answer(matrix, at, lanes):
     """f ← f + C Aᵀ (A C Aᵀ)⁻¹ (x, y)."""
-    contact_matrix.solve(matrix.network, matrix.factors, at.x, at.y, lanes)
+    cholesky.solve(matrix.network, matrix.factors, at.x, at.y, lanes)
     for c in range(len(matrix.C)):
         normal, tangential = pull(matrix.network, c, at.x, at.y, lanes)
         normal, tangential = _through(matrix.C, c, normal, tangential, lanes)

@@ -31,6 +31,7 @@ from granforce.records import (
     Mask,
     NotJammedError,
     Packing,
+    Progress,
     float_array,
     friction,
     make_packing,
@@ -75,6 +76,11 @@ class Glimpse(NamedTuple):
     unbalance: float  # largest change of a grain's momentum per step, ⟨f_n⟩
     tilt: float = 0.0  # of the cell, length
 
+    @property
+    def state(self) -> str:
+        """How dense it is, and how far from rest, in words."""
+        return _state(self.packing_fraction, self.unbalance)
+
 
 @cancelling.cancellable
 def pack(
@@ -90,7 +96,7 @@ def pack(
     accuracy: float = 0.01,
     box: str = "square",
     max_steps: int = 100_000,
-    progress: Callable[[int, str], object] | None = None,
+    progress: Progress | None = None,
     watch: Callable[[Glimpse], object] | None = None,
     cancel: Cancel | None = None,
 ) -> Packing:
@@ -103,8 +109,9 @@ def pack(
     and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step. box:
     "square", or "isotropic", whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and
     σ_xy = 0: jammed against shear too.
-    progress(step, message) is called now and then, watch(Glimpse) at least every WATCH_EVERY steps;
-    neither changes a bit of the result. cancel() returning True raises Cancelled.
+    progress(steps done, None) is called now and then, as nobody knows how many it takes, and
+    watch(Glimpse) at least every WATCH_EVERY steps; neither changes a bit of the result. cancel()
+    returning True raises Cancelled.
 
     Returns a Packing whose forces balance to BALANCED ⟨f_n⟩, whose overlaps are below OVERLAP, and
     whose contacts are certain: see `margin`, which `info` holds, with the part of steps that ended
@@ -134,25 +141,24 @@ def pack(
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
     counters = np.zeros(4, dtype=np.int64)
     work = {"list_rebuilds": 0, "certificates_tried": 0, "linear_programs": 0}
-    tell = progress or (lambda step, message: None)
     look = None if watch is None else _looking(watch, unit, pressure, counters)
     if look is not None:
         look(motion, np.inf)
     while True:
         motion, overlap, unbalance = _advance(motion, mu, pace, counters, work, look)
         step = int(counters[dynamics.STEPS])
-        tell(step, f"φ = {_fraction(motion):.4f}, unbalance {unbalance:.1e} ⟨f_n⟩")
+        if progress is not None:
+            progress(step, None)
         cancelling.check("compaction")
         finished = _finish(motion, mu, unbalance, work)
         if finished is not None:
             break
         if step >= max_steps:
             raise NotJammedError(
-                f"not jammed after {step} steps: φ = {_fraction(motion):.4f}, unbalance "
-                f"{unbalance:.1e} ⟨f_n⟩, strain rate {_fastest_strain(motion):.1e}; allow more "
-                "steps (max_steps) or more sweeps"
+                f"not jammed after {step} steps: {_state(_fraction(motion), unbalance)}, strain "
+                f"rate {_fastest_strain(motion):.1e}; allow more steps (max_steps) or more sweeps"
             )
-    _check_repeated(finished)
+    _check_neighbours(finished)
     apart = margin(finished)
     info = {
         "seed": seed,
@@ -171,7 +177,12 @@ def pack(
     return _in_users_units(finished, unit, pressure, info)
 
 
-def _check_repeated(packing: Packing) -> None:
+def _state(packing_fraction: float, unbalance: float) -> str:
+    rest = f", unbalance {unbalance:.1e} ⟨f_n⟩" if np.isfinite(unbalance) else ""
+    return f"φ = {packing_fraction:.4f}{rest}"
+
+
+def _check_neighbours(packing: Packing) -> None:
     """NotJammedError where two disks touch more than once: they are neighbours of themselves."""
     pairs = np.sort(np.stack([packing.contacts.i, packing.contacts.j]), axis=0)
     if np.unique(pairs, axis=1).shape[1] < pairs.shape[1]:

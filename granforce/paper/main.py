@@ -10,11 +10,12 @@ from typing import Any
 from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
-from granforce.records import InputError, check_memory, friction, positive, whole
+from granforce.records import InputError, friction, positive, whole
 from granforce.study import scan
 from granforce.study.cells import Cell
 from granforce.study.store import open_store
 from granforce.system.files import make_folder, written
+from granforce.system.memory import check_memory
 from granforce.system.plain import json_text
 from granforce.system.terminal import Bar, print_list, table
 

@@ -14,12 +14,12 @@ from scipy.spatial.distance import pdist
 from granforce import measures
 from granforce.explore.stress_outline import plane_of
 from granforce.figures import ratio_counts
-from granforce.forces.ensemble import stress_of
+from granforce.forces.balance import stress_of
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import Floats, InputError, Integers, Packing, friction
 from granforce.study import cells, kinds
-from granforce.study.schema import dataset_packing, labelled
+from granforce.study.schema import ROW_SCALARS, dataset_packing, labelled
 from granforce.study.store import Entry, Store, open_store
 
 VERSION = 1
@@ -30,14 +30,6 @@ SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "walk", "exact", "uniform")
 TAILED = ("tails", "tails_stress")
 FORCES = np.arange(1, 161) * 0.125
 SAMPLES = ("row", "contact", "normal", "least", "extent")
-
-_SCALARS = (
-    *("eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
-    *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
-    *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "mean_sweeps", "seconds"),
-    *("critical_force", "decay_exponent", "decay_low", "decay_high", "friction"),
-    *("log_volume", "log_volume_error", "log_volume_per_grain", "extent"),
-)
 
 
 class Table(NamedTuple):
@@ -153,7 +145,7 @@ def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:
 def row_of(task: Task, dataset: xr.Dataset) -> dict[str, Any]:
     """The numbers of one cell: scalars of its dataset and what its contacts sum up to."""
     row: dict[str, Any] = {"part": task.part, "n": task.n, "mu": task.mu, "seed": task.seed}
-    for name in _SCALARS:
+    for name in ROW_SCALARS:
         if name in dataset and dataset[name].size:
             row[name] = float(dataset[name].max())
     if "attempts" in task.cell.parameters:

@@ -2,7 +2,7 @@
 
 Protocol. The geometry is fixed and grains are rigid. From the packing's own force network F is
 raised step by step; each step starts from the last equilibrium and follows the flow of contact
-dynamics (`exact_step`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps
+dynamics (`flow`) until the grains are at rest, move steadily, or MOST_STEPS implicit steps
 found no equilibrium. As long as grains come to rest, each load lies RISE of the way to the static
 limit load, beyond which no equilibrium exists; after the first motion, F is halved in from the
 last equilibrium. Motion above the bracket that was not steady yet is followed for STEADY_STEPS;
@@ -23,7 +23,10 @@ import numpy as np
 from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.nearest import starting_network
-from granforce.perturb import flow as exact_step
+from granforce.perturb import flow
+from granforce.perturb.flow import Outcome, Push
+from granforce.perturb.step import Step, grain_velocities, make_step, relative_velocities
+from granforce.perturb.works import follow, relax
 from granforce.records import (
     Cancel,
     Floats,
@@ -58,7 +61,7 @@ class CriticalForce(NamedTuple):
     forces: Floats  # (N_c, 2) equilibrium under `low`, on the ensemble's contacts
     residual: float  # its unbalance with the load, ⟨f_n⟩, by Ensemble.residual
     violation: float  # ⟨f_n⟩, by Ensemble.violation
-    moving: exact_step.Outcome | None  # the end under `high`; None where that was not tried
+    moving: Outcome | None  # the end under `high`; None where that was not tried
     converged: bool  # high − low ≤ precision, and steady motion under `high` (or the limit load)
     counts: dict[str, float]  # COUNTS
     seconds: float  # of following flows, shared among those side by side
@@ -81,9 +84,9 @@ class Response(NamedTuple):
     converged: bool  # breach ≤ STEADY
 
 
-# Work for `exact_step.follow` that asks for flows, is sent their outcomes, and returns a result.
+# Work for `works.follow` that asks for flows, is sent their outcomes, and returns a result.
 T = TypeVar("T")
-Asking = Generator[exact_step.Push, exact_step.Outcome, T]
+Asking = Generator[Push, Outcome, T]
 
 
 class Protocol(NamedTuple):
@@ -146,7 +149,7 @@ def critical_forces(
         if not np.isfinite(limit_loads).all():
             number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]
             raise UndecidedError(f"the limit load of contact {number} could not be certified")
-    step, start = exact_step.make_step(S), starting_network(S) / S.force_scale
+    step, start = make_step(S), starting_network(S) / S.force_scale
     works = [
         _raised(S, step, int(contact), position, float(limit) / S.force_scale, start, protocol)
         for contact, position, limit in zip(contacts, positions, limit_loads, strict=True)
@@ -158,20 +161,20 @@ def critical_forces(
         if finished is not None:
             finished(k, critical)
 
-    exact_step.follow(step, works, ended, workers)
+    follow(step, works, ended, workers)
     return [found[k] for k in range(len(works))]
 
 
 def _raised(
     S: Ensemble,
-    step: exact_step.Step,
+    step: Step,
     contact: int,
     position: int,
     limit: float,
     start: Floats,
     protocol: Protocol,
 ) -> Asking[CriticalForce]:
-    """Work for `exact_step.follow`: the CriticalForce of a contact."""
+    """Work for `works.follow`: the CriticalForce of a contact."""
     counts: dict[str, float] = dict.fromkeys((*COUNTS, "seconds"), 0)
     forces, low, high = start, 0.0, limit
     while True:
@@ -181,7 +184,7 @@ def _raised(
         if moving is None or moving.breach <= STEADY:
             break
         # What was taken for motion is followed on: it may come to rest after all.
-        asked = exact_step.Push(moving.forces, position, high, STEADY_STEPS, STEADY)
+        asked = Push(moving.forces, position, high, STEADY_STEPS, STEADY)
         followed = yield from _relaxed(asked, counts)
         if not followed.at_rest:
             moving = followed
@@ -211,7 +214,7 @@ def _bracket(
     forces: Floats,
     protocol: Protocol,
     counts: dict[str, float],
-) -> Asking[tuple[float, float, Floats, exact_step.Outcome | None]]:
+) -> Asking[tuple[float, float, Floats, Outcome | None]]:
     """Loads raised from `low` until rest and motion are `precision` apart, or rest reaches `high`.
 
     Returns the bracket, the last equilibrium and the motion above it, None where there was none.
@@ -220,7 +223,7 @@ def _bracket(
     while high - low > precision:
         load = low + (protocol.rise if moving is None else 0.5) * (high - low)
         load = min(max(load, low + 0.5 * precision), high - 0.5 * precision)
-        asked = exact_step.Push(forces, position, load, protocol.max_steps, exact_step.STEADY)
+        asked = Push(forces, position, load, protocol.max_steps, flow.STEADY)
         outcome = yield from _relaxed(asked, counts)
         if outcome.at_rest:
             low, forces = load, outcome.forces
@@ -229,7 +232,7 @@ def _bracket(
     return low, high, forces, moving
 
 
-def _relaxed(asked: exact_step.Push, counts: dict[str, float]) -> Asking[exact_step.Outcome]:
+def _relaxed(asked: Push, counts: dict[str, float]) -> Asking[Outcome]:
     """The outcome of what is asked, counted."""
     outcome = yield asked
     counts["flow_steps"] += outcome.steps
@@ -267,16 +270,14 @@ def response(
     if critical is None:
         critical = critical_force(S, contact, precision=precision)
     (position,), scale = S.positions([contact]), S.force_scale
-    step = exact_step.make_step(S)
+    step = make_step(S)
     moving = critical.moving
     load = critical.high / scale + (precision if moving is None else 0.0)
     if force is not None:
         load, moving = float(force) / scale, None
     if moving is None:
         start = critical.forces / scale
-        moving = exact_step.relax(
-            step, exact_step.Push(start, position, load, STEADY_STEPS, STEADY)
-        )
+        moving = relax(step, Push(start, position, load, STEADY_STEPS, STEADY))
     if moving.at_rest:
         raise InputError(
             f"the grains stay at rest under a force of {load * scale:.6g} on contact {contact}: "
@@ -287,15 +288,15 @@ def response(
 
 def _response(
     S: Ensemble,
-    step: exact_step.Step,
+    step: Step,
     contact: int,
     position: int,
     load: float,
-    moving: exact_step.Outcome,
+    moving: Outcome,
 ) -> Response:
-    velocity = exact_step.grain_velocities(S, moving.velocity)
+    velocity = grain_velocities(S, moving.velocity)
     unit = np.sqrt(np.mean(np.sum(velocity[:, :2] ** 2, axis=1)))
-    relative = exact_step.relative_velocities(step, moving.velocity) / unit
+    relative = relative_velocities(step, moving.velocity) / unit
     count = len(S.packing.r)
     displacement, rotation = np.full((count, 2), np.nan), np.full(count, np.nan)
     displacement[S.grains] = velocity[:, :2] / unit

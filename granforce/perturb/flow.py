@@ -1,20 +1,9 @@
 """One step of contact dynamics from rest, solved to rounding: rest, or steady motion.
 
-With the geometry fixed, a step of implicit Euler from rest asks for contact forces f and
-velocities U with
-
-    M U = A f − b,    f = Π(f − D Aᵀ U)
-
-where A f = b is the balance of S, M holds the masses of the grains and of the box, Aᵀ U are the
-relative velocities at the contacts, and Π is Coulomb's law: f_n ← max(f_n, 0), then f_t clipped to
-±μ f_n. Any D > 0 gives the same law. It is not the projection onto the cone: a sliding contact
-does not dilate, so the problem is no convex program, and several solutions may exist side by side:
-networks at rest (U = 0, any f in S), and motion, which goes on with constant acceleration because
-the law is homogeneous in U. Which one is reached depends on where one comes from.
-
 Gauss–Seidel sweeps from a given network, f_c ← Π(f_c − D A_cᵀ U) contact after contact with D the
-effective masses, follow f' = −D Aᵀ U at the pace of one unit per sweep. Here the same flow is
-integrated implicitly for a whole network at a time, with steps of any length τ,
+effective masses, follow f' = −D Aᵀ U at the pace of one unit per sweep (M, D and Π as in `step`).
+Here the same flow is integrated implicitly for a whole network at a time, with steps of any length
+τ,
 
     f⁺ = Π(f − τ D Aᵀ U⁺),    M U⁺ = A f⁺ − b,
 
@@ -27,23 +16,16 @@ none changes a bit of another.
 
 from __future__ import annotations
 
-import threading
-import time
-from collections import deque
-from collections.abc import Callable, Generator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from granforce.forces.contact_problem import balance_of
-from granforce.forces.gauss_seidel import BOX_MASS
-from granforce.numerics import contact_matrix
-from granforce.numerics.contact_matrix import Factors, Network
+from granforce.numerics import contact_matrix, lu
+from granforce.numerics.contact_matrix import Factors
 from granforce.numerics.lanes import (
     ONE,
     compiled,
     inline,
-    lanes_for,
     larger,
     load,
     pick,
@@ -53,12 +35,9 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import Floats, InputError, Integers, Mask
-from granforce.system import cancelling
+from granforce.perturb.step import Step
+from granforce.records import Floats, Integers, Mask
 from granforce.tolerances import BALANCED
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
 
 # Pace τ: the first step's, its growth after a step, and its cut where Newton's method failed.
 FIRST, GROWTH, CUT = 1e2, 4.0, 0.2
@@ -75,22 +54,6 @@ STEADY = 1e-7
 OPEN, STICKING, SLIDING = range(3)  # and −SLIDING, where f_t = −μ f_n
 # How a Newton step ended: no equation is left, the unbalance fell, or neither.
 SOLVED, FELL, FAILED = range(3)
-
-
-class Step(NamedTuple):
-    """The step problem of one ensemble, in units of ⟨f_n⟩ and r_max; Δt = 1.
-
-    Rows of grains are in order of elimination; those of the pressure (m = 1, or 0) come apart.
-    """
-
-    network: Network
-    b: Floats  # (rows,)
-    b_border: Floats  # (m,)
-    mass: Floats  # (rows,) M
-    mass_border: Floats  # (m,)
-    stiffness: Floats  # (N_c, 2) D: effective masses of the contacts
-    mu: float
-    place: Integers  # (rows of the ensemble,) where they are among rows and border
 
 
 class Motion(NamedTuple):
@@ -155,173 +118,7 @@ class Outcome(NamedTuple):
     seconds: float  # its part of those that it was carried for beside others
 
 
-# What asks for one flow after another: it is sent the outcome of each.
-Work = Generator[Push, Outcome, Any]
-
-
-def make_step(ensemble: Ensemble) -> Step:
-    """The step problem of an ensemble with the inertia of contact dynamics: m, I and box.
-
-    Raises InputError where forces are known: contact dynamics does not hold to that.
-    """
-    if ensemble.known is not None:
-        raise InputError(
-            "grains that move change their forces, whatever is known of them: perturb the packing "
-            "without known forces (its limit loads can be had with them)"
-        )
-    network, b, b_border, _, place = balance_of(ensemble)
-    # Rows that nothing acts on (torques without friction) may have any mass.
-    inertia = np.ones(len(b) + len(b_border))
-    inertia[place] = _inertia(ensemble)
-    mass, mass_border = inertia[: len(b)], inertia[len(b) :]
-    rows = 3 * np.stack([network.high, network.low], axis=1)[:, :, None] + np.arange(3)
-    columns = network.columns.reshape(-1, 2, 2, 3)
-    yielding = np.einsum("cpgk,cgk->cp", columns**2, 1 / mass[rows])
-    yielding += network.border.reshape(len(rows), 2, len(b_border)) ** 2 @ (1 / mass_border)
-    stiffness = 1 / np.where(yielding > 0, yielding, 1.0)
-    return Step(network, b, b_border, mass, mass_border, stiffness, ensemble.mu, place)
-
-
-def _inertia(ensemble: Ensemble) -> Floats:
-    packing, size = ensemble.packing, 1 + ensemble.per_contact
-    longest = float(packing.r.max())
-    # The velocity that goes with a torque/r is r ω: its inertia is I/r² = m/2.
-    grain = np.pi * (packing.r[ensemble.grains] / longest) ** 2
-    mass = (grain[:, None] * np.array([1.0, 1.0, 0.5])[:size]).ravel()
-    if not ensemble.has_pressure_row:
-        return mass
-    # The one that goes with the mean normal force Σ f_n ℓ / Σ ℓ is λ Σ ℓ; where the whole stress is
-    # prescribed the box may shear as well, with the same inertia.
-    box = 2 * packing.volume * BOX_MASS / ensemble.contacts.length.sum() ** 2
-    return np.append(mass, np.full(ensemble.A.shape[0] - ensemble.pressure_row, box))
-
-
-def grain_velocities(ensemble: Ensemble, velocity: Floats) -> Floats:
-    """Velocities (M, 3) of the backbone grains: intrinsic v_x, v_y and r ω."""
-    size = 1 + ensemble.per_contact
-    grains = velocity[: size * len(ensemble.grains)].reshape(-1, size)
-    return np.column_stack([grains, np.zeros((len(grains), 3 - size))])
-
-
-def relative_velocities(step: Step, velocity: Floats) -> Floats:
-    """Normal (opening > 0) and tangential relative velocity (N_c, 2) of the contacts, box included.
-
-    They are the work conjugates of the forces: Aᵀ U. velocity (rows,) by the ensemble's rows.
-    """
-    rows = np.zeros(len(step.b) + len(step.b_border))
-    rows[step.place] = velocity
-    relative = np.empty_like(step.stiffness)
-    _relative(step.network, rows[: len(step.b), None], rows[len(step.b) :, None], relative)
-    return relative
-
-
-@compiled
-def _relative(network, velocity, border, relative):
-    for c in range(len(relative)):
-        pulled = contact_matrix.pull(network, c, velocity, border, ONE)
-        relative[c, 0], relative[c, 1] = pulled
-
-
-def relax(step: Step, asked: Push) -> Outcome:
-    """The Outcome of the flow that a Push asks for."""
-
-    def one() -> Generator[Push, Outcome, Outcome]:
-        return (yield asked)
-
-    found: list[Outcome] = []
-    follow(step, [one()], lambda _, outcome: found.append(outcome))
-    return found[0]
-
-
-def follow(
-    step: Step,
-    works: Sequence[Work],
-    finished: Callable[[int, Any], object],
-    workers: int = 1,
-) -> None:
-    """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
-
-    A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
-    finished(number, value) is called, by one thread at a time, as a work returns its value; if it
-    raises, it is still called for what other threads have ended by then. No outcome depends on the
-    number of threads, nor on what it is carried beside, bit for bit.
-    """
-    waiting, told, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
-
-    def tell(number: int, value: Any) -> None:
-        with told:
-            finished(number, value)
-
-    def carry() -> None:
-        try:
-            _carry(step, waiting, tell, failed)
-        except BaseException:
-            failed.set()  # the other threads end as well
-            raise
-
-    if workers == 1:
-        carry()
-        return
-    with cancelling.threads(workers) as pool:
-        for task in [pool.submit(carry) for _ in range(workers)]:
-            task.result()
-
-
-def _carry(
-    step: Step,
-    waiting: deque[tuple[int, Work]],
-    finished: Callable[[int, Any], object],
-    failed: threading.Event,
-) -> None:
-    """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
-    if not waiting:
-        return
-    lanes = lanes_for(len(waiting))
-    flows, stop = _make_flows(step, len(lanes)), cancelling.flag()
-    seconds = np.zeros(len(lanes))
-    carried: list[tuple[int, Work] | None] = [None] * len(lanes)
-    while True:
-        for lane in np.flatnonzero(~flows.going).tolist():
-            sent = _outcome(step, flows, lane, seconds[lane]) if carried[lane] else None
-            carried[lane] = _go_on(step, flows, lane, carried[lane], sent, waiting, finished)
-            seconds[lane] = 0.0
-        going = flows.going.copy()
-        if failed.is_set() or not going.any():
-            return
-        begin = time.perf_counter()
-        _follow(step, flows, BALANCED / 10, stop, lanes)
-        cancelling.check("perturbation")
-        seconds[going] += (time.perf_counter() - begin) / going.sum()
-
-
-def _go_on(
-    step: Step,
-    flows: Flows,
-    lane: int,
-    carried: tuple[int, Work] | None,
-    sent: Outcome | None,
-    waiting: deque[tuple[int, Work]],
-    finished: Callable[[int, Any], object],
-) -> tuple[int, Work] | None:
-    """Send a lane's work its outcome and start what it asks for next, or else what waits first.
-
-    carried: number and work of the lane; it and what is sent are None without. Returns the same.
-    """
-    while True:
-        try:
-            number, work = carried or waiting.popleft()
-        except IndexError:
-            return None
-        try:
-            _start(step, flows, lane, next(work) if sent is None else work.send(sent))
-        except StopIteration as ended:
-            finished(number, ended.value)
-            carried = sent = None
-        else:
-            return number, work
-
-
-def _make_flows(step: Step, width: int) -> Flows:
+def make_flows(step: Step, width: int) -> Flows:
     """The Flows of `width` lanes that rest."""
     contacts, (rows, m) = len(step.stiffness), (len(step.b), len(step.b_border))
 
@@ -365,7 +162,7 @@ def _make_flows(step: Step, width: int) -> Flows:
     )
 
 
-def _start(step: Step, flows: Flows, lane: int, asked: Push) -> None:
+def start(step: Step, flows: Flows, lane: int, asked: Push) -> None:
     """Put what is asked into a lane."""
     flows.load.rows[:, lane], flows.load.border[:, lane] = step.b, step.b_border
     pair = np.ascontiguousarray(flows.load.rows[:, [lane]])
@@ -385,7 +182,8 @@ def _pushed(network, contact, force, rows, border):
     contact_matrix.push(network, contact, force, 0.0, rows, border, ONE)
 
 
-def _outcome(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
+def outcome_of(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
+    """Where the flow of a lane has ended; seconds: its part of what its lanes took."""
     rows = np.concatenate([flows.velocity.rows[:, lane], flows.velocity.border[:, lane]])
     ended, breach = bool(flows.ended[lane]), float(flows.lately[0, lane])
     return Outcome(
@@ -401,7 +199,7 @@ def _outcome(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
 
 
 @compiled
-def _follow(step, flows, rest, stop, lanes):
+def until_one_ends(step, flows, rest, stop, lanes):
     """Newton steps of all flows, until one that is going has ended."""
     while not stop[0]:
         _answer(step, flows, lanes)
@@ -412,9 +210,7 @@ def _follow(step, flows, rest, stop, lanes):
             contact_matrix.copy(to.border, given.border, lanes)
         _factor(step, flows, stop, lanes)
         direction = flows.direction
-        contact_matrix.solve_lu(
-            step.network, flows.factors, direction.rows, direction.border, lanes
-        )
+        lu.solve(step.network, flows.factors, direction.rows, direction.border, lanes)
         _search(step, flows, lanes)
         _measure(step, flows, lanes)
         ended = False
@@ -572,7 +368,7 @@ def _factor(step, flows, stop, lanes):
         across = pick(slides, sliding, across, zero)
         tangential = pick(slides, sliding, zero, pick(slides, closed, tangential, zero))
         contact_matrix.add_skew(network, c, normal, zero, across, tangential, factors, lanes)
-    contact_matrix.factor_lu(network, factors, stop, lanes)
+    lu.factor(network, factors, stop, lanes)
 
 
 @within
@@ -587,7 +383,7 @@ def _answer(step, flows, lanes):
         store(rest.border, k, lanes, -load(flows.load.border, k, lanes) - moved)
     store(flows.changed, 0, lanes, same(lanes, 0.0))
     for c in range(len(step.stiffness)):
-        f_n, f_t = _followed(step, flows, c, lanes)
+        f_n, f_t = _next_forces(step, flows, c, lanes)
         contact_matrix.push(step.network, c, f_n, f_t, rest.rows, rest.border, lanes)
     merit = same(lanes, 0.0)
     for k in range(len(step.mass)):
@@ -600,7 +396,7 @@ def _answer(step, flows, lanes):
 
 
 @inline
-def _followed(step, flows, c, lanes):
+def _next_forces(step, flows, c, lanes):
     """f⁺ of one contact; sets that, its state, and whether it changed."""
     zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
     rows, border = flows.velocity.rows, flows.velocity.border

@@ -21,7 +21,7 @@ class Kind(NamedTuple):
     name: str  # in the store: entries are called <name>-<key>
     version: int  # raised when the algorithm gives other numbers: older entries are not used
     title: str  # in words
-    unit: str  # what progress counts: progress(done, total), but of a packing (step, message)
+    unit: str  # what progress counts: progress(done, total)
     # (…) → the plain parameters that name one; InputError for what is wrong
     parameters: Callable[..., Parameters]
     compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset

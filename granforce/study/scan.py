@@ -237,7 +237,7 @@ def run_cell(path: str | Path, cell: Cell, dtypes: Mapping[str, str] | None = No
         raise InputError(f"no store at {path} on {socket.gethostname()}: the folder must be shared")
     seen = 0.0
 
-    def count(done: float, total: float | None) -> None:
+    def count(done: float, total: float | None) -> None:  # None: of a compaction
         nonlocal seen
         if _counter is not None and total:
             part = min(done / total, 1.0)
@@ -245,9 +245,7 @@ def run_cell(path: str | Path, cell: Cell, dtypes: Mapping[str, str] | None = No
                 _counter.value += part - seen
             seen = part
 
-    # The steps of a compaction are not known beforehand.
-    progress = None if cell.kind == kinds.PACKING else count
-    _, cached = get(open_store(path), *cell, workers=1, dtypes=dtypes, progress=progress)
+    _, cached = get(open_store(path), *cell, workers=1, dtypes=dtypes, progress=count)
     count(1, 1)
     return cached
 

@@ -237,8 +237,8 @@ VARIABLES: dict[str, Variable] = {
 }
 
 # The reduced study: one row per cell, with scalars of its dataset, and samples of its contacts.
-_ROW_SCALARS = (
-    *("mu", "eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
+ROW_SCALARS = (
+    *("eta1", "eta2", "eta3", "correlation", "correlation_low", "correlation_high"),
     *("coordination", "dimension", "packing_fraction", "acceptance", "original_distance"),
     *("residual", "max_gap", "worst_r_hat", "least_bulk_size", "mean_sweeps", "seconds"),
     *("critical_force", "decay_exponent", "decay_low", "decay_high", "friction"),
@@ -251,7 +251,7 @@ VARIABLES |= {
         f"row_{name}": Variable(
             ("row",), "float64", VARIABLES[name].units, VARIABLES[name].long_name
         )
-        for name in _ROW_SCALARS
+        for name in ("mu", *ROW_SCALARS)
     },
     "row_part": Variable(("row",), "int64", "1", "part of the study, a position in attrs' parts"),
     "row_n": Variable(("row",), "int64", "1", "number of disks"),

@@ -60,8 +60,8 @@ def one_line(
     return f"granforce: {' '.join(str(message).split())}\n"
 
 
-class _Line:
-    """A tqdm bar on stderr; unseen when not used."""
+class Bar:
+    """A tqdm bar on stderr that a progress(done, total) callable drives; unseen when not used."""
 
     def __init__(self, label: str, unit: str) -> None:
         # Made at once, so that its rate counts from the beginning, and shown from the first call.
@@ -73,7 +73,7 @@ class _Line:
     def __exit__(self, *_: Any) -> None:
         self.bar.close()
 
-    def show(self, done: float, total: float | None) -> None:
+    def __call__(self, done: float, total: float | None) -> None:
         """So much is done of a total, if that is known."""
         self.bar.delay, self.bar.total = 0, total
         # Set, not added: quarters of cells would leave whole numbers as 2.0.
@@ -83,18 +83,3 @@ class _Line:
     def note(self, text: str) -> None:
         """What stands behind the bar when it is next drawn."""
         self.bar.set_postfix_str(text, refresh=False)
-
-
-class Bar(_Line):
-    """A bar that a progress(done, total) callable drives."""
-
-    def __call__(self, done: float, total: float | None) -> None:
-        self.show(done, total)
-
-
-class Steps(_Line):
-    """The same for work whose end is not known: progress(step, message)."""
-
-    def __call__(self, step: int, message: str) -> None:
-        self.note(message)
-        self.show(step, None)

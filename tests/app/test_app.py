@@ -124,8 +124,8 @@ def test_mu_zero_is_one_point_without_relaxation(library):
 @pytest.mark.parametrize("basis", [((2, 1), (1, 1)), ((1, 1), (0, 1)), ((1, 3), (0, 1))])
 def test_tilted_cells_are_drawn_with_their_images(library, basis):
     """The same disks and contacts as in the straight cell, up to whole cells, and all images."""
-    from app.data import make_replay
     from app.geometry import MARGIN
+    from app.replays import make_replay
 
     cell = cell_at(library, 0.1)
     packing, dataset = library.packing(cell.params["packing"]), library.dataset(cell)
@@ -162,7 +162,7 @@ def test_tilted_cells_are_drawn_with_their_images(library, basis):
 
 def test_open_boxes_have_no_images(library):
     """Imported packings may be open; then nothing is drawn twice."""
-    from app.data import make_replay
+    from app.replays import make_replay
 
     cell = library.cells()[1]
     packing = library.packing(cell.params["packing"])
@@ -172,14 +172,14 @@ def test_open_boxes_have_no_images(library):
 
 
 def test_frames_beyond_the_budget_are_left_out_and_counted(library, monkeypatch):
-    from app import data
+    from app import replays
     from app.views.summary import left_out
 
     cell = cell_at(library, 0.1)
     packing, dataset = library.packing(cell.params["packing"]), library.dataset(cell)
-    whole = data.make_replay(packing, dataset, cell.mu)
-    monkeypatch.setattr(data, "FRAME_BYTES", 8 * 5 * whole.normal.shape[1])
-    short = data.make_replay(packing, dataset, cell.mu)
+    whole = replays.make_replay(packing, dataset, cell.mu)
+    monkeypatch.setattr(replays, "FRAME_BYTES", 8 * 5 * whole.normal.shape[1])
+    short = replays.make_replay(packing, dataset, cell.mu)
     assert len(short.number) == 6 and short.summary["kept"] == 5
     assert "Shown: 5 evenly spaced of 30" in left_out(short.summary)
     among = np.searchsorted(whole.number, short.number)

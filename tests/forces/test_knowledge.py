@@ -9,7 +9,7 @@ from packings import REFERENCE, lattice, packed, reference, two_disks
 
 import granforce as gf
 from granforce.explore.intervals import intervals, limit_load_bounds
-from granforce.forces.ensemble import stress_of
+from granforce.forces.balance import stress_of
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 

@@ -16,7 +16,7 @@ from granforce.forces import contact_problem as module
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.numerics import contact_matrix, contact_program
+from granforce.numerics import cone_projection, contact_matrix, contact_program
 from granforce.numerics.lanes import ONE
 from granforce.records import Relaxation
 from granforce.tolerances import ADMISSIBLE, BALANCED
@@ -212,7 +212,7 @@ def project(normal, tangential, mu):
     at = contact_program.make_iterate(problem, 1)
     work = contact_program.make_workspace(problem, 1)
     at.c[0], at.c[1] = -0.5 * (normal + mu * tangential), -0.5 * (normal - mu * tangential)
-    contact_program.project(problem, at, work, ONE)
+    cone_projection.project(problem, at, work, ONE)
     f_n, f_t = 0.5 * (at.y[0, 0] + at.y[1, 0]), mu * 0.5 * (at.y[0, 0] - at.y[1, 0])
     return f_n, f_t
 

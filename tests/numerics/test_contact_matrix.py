@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 from numba import njit
 
-from granforce.numerics import contact_matrix, contact_program, elimination
+from granforce.numerics import (
+    cholesky,
+    contact_matrix,
+    contact_program,
+    elimination,
+    interior_point,
+    lu,
+)
+from granforce.numerics.blocks import NO_PIVOT
 from granforce.numerics.lanes import LANES, MANY, ONE, load
 
 NEVER = np.zeros(1, dtype=bool)
@@ -19,8 +27,8 @@ def solved(network, K, diagonal, least, factors, x, y, stop, lanes):
     for c in range(len(network.high)):
         nn, nt, tt = load(K, 4 * c, lanes), load(K, 4 * c + 1, lanes), load(K, 4 * c + 3, lanes)
         contact_matrix.add(network, c, nn, nt, tt, factors, lanes)
-    contact_matrix.factor(network, least, factors, stop, lanes)
-    contact_matrix.solve(network, factors, x, y, lanes)
+    cholesky.factor(network, least, factors, stop, lanes)
+    cholesky.solve(network, factors, x, y, lanes)
 
 
 @njit
@@ -30,8 +38,8 @@ def solved_skew(network, K, diagonal, least, factors, x, y, stop, lanes):
         nn, nt = load(K, 4 * c, lanes), load(K, 4 * c + 1, lanes)
         tn, tt = load(K, 4 * c + 2, lanes), load(K, 4 * c + 3, lanes)
         contact_matrix.add_skew(network, c, nn, nt, tn, tt, factors, lanes)
-    contact_matrix.factor_lu(network, factors, stop, lanes)
-    contact_matrix.solve_lu(network, factors, x, y, lanes)
+    lu.factor(network, factors, stop, lanes)
+    lu.solve(network, factors, x, y, lanes)
 
 
 def random_network(rng, grains=30, contacts=70, borders=1):
@@ -65,7 +73,7 @@ def test_factors_solve_what_dense_algebra_solves(symmetric, lanes, borders):
     diagonal = rng.uniform(0.5, 1.0, rows)
     factors = contact_matrix.make_factors(network, width, symmetric)
     flat = np.ascontiguousarray(K.reshape(width, -1).T)
-    least = np.full(rows, contact_matrix.NO_PIVOT)
+    least = np.full(rows, NO_PIVOT)
     solver = solved if symmetric else solved_skew
     solver(network, flat, diagonal, least, factors, x, y, NEVER, lanes)
     for lane in range(width):
@@ -78,12 +86,22 @@ def test_factors_solve_what_dense_algebra_solves(symmetric, lanes, borders):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
+def test_one_grain_is_factored_as_worked_out_in_words():
+    none = np.zeros(0, dtype=np.int64)
+    parts = np.zeros((2, 0, 3, 2))
+    network = contact_matrix.make_network(np.zeros((1, 2)), none, none, *parts, np.zeros((0, 0, 2)))
+    factors = contact_matrix.make_factors(network, 1)
+    factors.lower[:, 0] = [4, 2, 0, 2, 5, 4, 0, 4, 5]
+    cholesky.factor(network, np.full(3, NO_PIVOT), factors, NEVER, ONE)
+    assert factors.lower[[0, 3, 4, 6, 7, 8], 0].tolist() == [0.5, 1, 0.5, 0, 2, 1]
+
+
 def test_a_lane_gives_what_it_gives_alone_bit_for_bit():
     rng = np.random.default_rng(2)
     network, A = random_network(rng)
     K = rng.normal(size=(LANES, len(network.high), 2, 2))
     K = (K @ K.transpose(0, 1, 3, 2)).reshape(LANES, -1).T
-    diagonal, least = np.ones(len(A) - 1), np.full(len(A) - 1, contact_matrix.NO_PIVOT)
+    diagonal, least = np.ones(len(A) - 1), np.full(len(A) - 1, NO_PIVOT)
     right = rng.normal(size=(len(A), LANES))
     results = []
     for lanes, columns in ((MANY, [slice(None)]), (ONE, [slice(k, k + 1) for k in range(LANES)])):
@@ -110,7 +128,7 @@ def test_rows_that_follow_from_others_are_found():
     problem = contact_program.make_problem(
         network, rows, rows[:0], idle, np.arange(3 * grains), 1.0, 1e-11
     )
-    out = contact_program.dependent_rows(problem, idle)
+    out = interior_point.dependent_rows(problem, idle)
     assert out.sum() == 2
     found = contact_program.without_rows(problem, idle, out)
     assert np.array_equal(found.diagonal, np.where(out, 1.0, idle))

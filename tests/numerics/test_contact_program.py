@@ -9,8 +9,8 @@ from packings import packed
 from granforce.explore.intervals import bound_of
 from granforce.forces.contact_problem import independent_problem_of
 from granforce.forces.ensemble import ensemble
-from granforce.numerics import contact_program, linear_programs
-from granforce.numerics.contact_program import OPTIMUM, REFINED
+from granforce.numerics import contact_program, interior_point, linear_programs
+from granforce.numerics.interior_point import OPTIMUM, REFINED
 from granforce.numerics.lanes import MANY, ONE, room, side_by_side
 from granforce.tolerances import BALANCED
 
@@ -26,11 +26,11 @@ def unbalances(S, mode, lanes=ONE):
         linear_programs._fill(middle, at, lane, programs, deque([0]))
     found = []
     for _ in range(40):
-        contact_program.look(problem, True, at, work, lanes)
+        interior_point.look(problem, True, at, work, lanes)
         found.append((work.product[0, 0], work.unbalance[0, 0]))
         if found[-1][0] < 1e-9:
             return found
-        contact_program.advance(problem, True, mode, at, work, lanes)
+        interior_point.advance(problem, True, mode, at, work, lanes)
     raise AssertionError("no optimum after 40 steps")
 
 

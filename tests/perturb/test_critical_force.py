@@ -10,9 +10,9 @@ from granforce.forces.ensemble import ensemble
 from granforce.forces.gauss_seidel import _from_rest
 from granforce.numerics.lanes import ONE
 from granforce.perturb import critical_force as perturb
-from granforce.perturb import decay
-from granforce.perturb import flow as exact_step
+from granforce.perturb import decay, flow
 from granforce.perturb.critical_force import critical_force, critical_forces, response
+from granforce.perturb.step import make_step
 from granforce.records import Cancelled, InputError, UndecidedError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -147,7 +147,7 @@ def first_motion(mu=0.1, n=60, k=17):
 
 def test_motion_obeys_momentum_balance_and_coulombs_law():
     S, k, critical = first_motion()
-    step, moving = exact_step.make_step(S), critical.moving
+    step, moving = make_step(S), critical.moving
     assert critical.converged
     f, U = moving.forces, moving.velocity
     mass = np.concatenate([step.mass, step.mass_border])[step.place]
@@ -157,7 +157,7 @@ def test_motion_obeys_momentum_balance_and_coulombs_law():
     assert np.abs(unbalance - mass * U).max() <= ROUNDING * np.abs(unbalance).max()
     w_n, w_t = (S.A.T @ U).reshape(-1, 2).T
     w_n, w_t = (w / np.abs(w_n).max() for w in (w_n, w_t))
-    small = 10 * exact_step.STEADY
+    small = 10 * flow.STEADY
     assert w_n.min() >= -small
     assert np.abs(w_n[f[:, 0] > 0]).max() <= small
     assert S.violation(f * S.force_scale) <= 1e-12

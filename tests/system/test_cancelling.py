@@ -22,7 +22,9 @@ from granforce.explore import billiard, uniform
 from granforce.explore.walls import walls
 from granforce.numerics import elimination
 from granforce.numerics import highs as programs
-from granforce.perturb import flow as exact_step
+from granforce.perturb.flow import Push
+from granforce.perturb.step import make_step
+from granforce.perturb.works import follow, relax
 from granforce.system import cancelling
 
 # What is a second on an idle machine; hours are what the work would take.
@@ -73,18 +75,18 @@ def endless_hits(S):
 
 def endless_motion(S):
     # Under 100 ⟨f_n⟩ grains move for good, and no breach of Coulomb's law is below zero.
-    exact_step.relax(exact_step.make_step(S), moving(S))
+    relax(make_step(S), moving(S))
 
 
 def endless_motions_side_by_side(S):
     def work():
         yield moving(S)
 
-    exact_step.follow(exact_step.make_step(S), [work() for _ in range(9)], print, workers=2)
+    follow(make_step(S), [work() for _ in range(9)], print, workers=2)
 
 
 def moving(S):
-    return exact_step.Push(S.original / S.force_scale, 0, 100.0, 10**9, 0.0)
+    return Push(S.original / S.force_scale, 0, 100.0, 10**9, 0.0)
 
 
 def long_program(solver):
@@ -160,9 +162,9 @@ def test_nothing_is_handed_out_once_cancelled(work, S):
 
 def test_a_cancel_that_never_comes_changes_no_number(S):
     kick = S.original + 0.1 * S.force_scale
-    for relax in (gf.nearest, gf.gauss_seidel):
-        watched = relax(S, kick, cancel=lambda: False)
-        assert np.array_equal(watched.forces, relax(S, kick).forces)
+    for solver in (gf.nearest, gf.gauss_seidel):
+        watched = solver(S, kick, cancel=lambda: False)
+        assert np.array_equal(watched.forces, solver(S, kick).forces)
     plain, watched = gf.pack(20, 0.3, 1), gf.pack(20, 0.3, 1, cancel=lambda: False)
     assert np.array_equal(plain.forces, watched.forces)
 

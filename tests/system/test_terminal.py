@@ -4,7 +4,7 @@ import json
 import math
 import re
 
-from granforce.system.terminal import Bar, Steps, one_line, print_list, report
+from granforce.system.terminal import Bar, one_line, print_list, report
 
 
 def shown(capsys):
@@ -13,17 +13,18 @@ def shown(capsys):
 
 
 def test_a_bar_that_is_not_used_is_not_seen(capsys):
-    with Bar("cells", "cell"), Steps("compaction", "step"):
+    with Bar("cells", "cell"):
         pass
     assert shown(capsys) == []
 
 
 def test_rates_count_from_the_beginning(capsys):
     """A hundred steps are told at once, two seconds after the work began."""
-    with Steps("compaction", "step") as progress:
+    with Bar("compaction", "step") as progress:
         progress.bar.start_t -= 2.0
         progress.bar.last_print_t -= 2.0
-        progress(100, "φ = 0.5")
+        progress.note("φ = 0.5")
+        progress(100, None)
     last = shown(capsys)[-1]
     told = re.fullmatch(r"compaction: 100 step \[00:02, +([\d.]+) step/s, φ = 0\.5\]", last)
     assert told and 30 < float(told[1]) <= 50.1

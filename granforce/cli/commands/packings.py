@@ -5,12 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from granforce.cli.asked import check_outputs, packing_parameters, required_mu, write_csv
+from granforce.cli.asked import (
+    check_outputs,
+    get_packing,
+    packing_parameters,
+    required_mu,
+    write_csv,
+)
 from granforce.packing import importers, scenes
 from granforce.records import InputError, whole
-from granforce.study import kinds
 from granforce.study.store import open_store
-from granforce.system.terminal import Steps, report
+from granforce.system.terminal import report
 
 
 def pack(arguments: argparse.Namespace) -> None:
@@ -21,10 +26,7 @@ def pack(arguments: argparse.Namespace) -> None:
     max_steps = whole(arguments.max_steps, "--max-steps", 1)
     check_outputs(arguments.out)
     store = open_store(arguments.cache)
-    with Steps("compaction", "step") as progress:
-        packing, cached = kinds.get_packing(
-            store, parameters, max_steps=max_steps, progress=progress
-        )
+    packing, cached = get_packing(store, parameters, max_steps=max_steps)
     if arguments.out is not None:
         importers.save_packing(packing, arguments.out)
     told = "steps", "sweeps_done", "unfinished_steps", "largest_contact_gap", "least_other_gap"

@@ -14,12 +14,13 @@ from granforce.cli.asked import (
     walked,
     write_csv,
 )
-from granforce.records import Rows, check_memory, whole
+from granforce.records import Rows, whole
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study import scan as scans
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
+from granforce.system.memory import check_memory
 from granforce.system.terminal import Bar, report, table
 
 

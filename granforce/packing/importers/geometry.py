@@ -15,6 +15,7 @@ from granforce.records import (
     make_contacts,
     make_packing,
     positive,
+    repeated,
 )
 
 # Contacts may overlap, or gape, by this part of the smaller radius before the file must be wrong.
@@ -89,7 +90,12 @@ def check_contacts(
             f"{place(c)}: {_pair(i, j, c)} {state} by {abs(gap[c]):.3g}, more than "
             f"{allowed:.0%} of a radius; check positions, radii and box"
         )
-    _check_repeated(contacts, place)
+    if twice := repeated(contacts):
+        before, c = twice
+        raise InputError(
+            f"{place(c)}: {_pair(i, j, c)} were given before ({place(before)}); give each contact "
+            "once"
+        )
 
 
 def check_disks(
@@ -134,23 +140,6 @@ def _check_branches(misfit: Floats, largest: float, place: Callable[[int], str])
             f"{place(c)}: normal and length lead {np.hypot(*misfit[c]):.2g} past the second "
             "grain; check positions, box, and that the normal points from i to j"
         )
-
-
-def _check_repeated(contacts: Contacts, place: Callable[[int], str]) -> None:
-    """Two grains touch twice only through different images, whose normals differ by 60° or more."""
-    swapped = contacts.i > contacts.j
-    low = np.minimum(contacts.i, contacts.j)
-    high = np.maximum(contacts.i, contacts.j)
-    normal = np.where(swapped[:, None], -contacts.normal, contacts.normal)
-    seen: dict[tuple[int, int], list[int]] = {}
-    for c, pair in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
-        for other in seen.setdefault(pair, []):
-            if normal[c] @ normal[other] > 0.75:
-                raise InputError(
-                    f"{place(c)}: {_pair(contacts.i, contacts.j, c)} were given before "
-                    f"({place(other)}); give each contact once"
-                )
-        seen[pair].append(c)
 
 
 def _pair(i: Integers, j: Integers, c: int) -> str:

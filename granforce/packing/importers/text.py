@@ -54,7 +54,7 @@ class Table(NamedTuple):
                 values[row] = math.nan
             if not abs(values[row]) <= LARGEST:
                 raise InputError(
-                    f"{self.place(row)}: {column} is {_shown(text)}, not a finite number; "
+                    f"{self.place(row)}: {column} is {_quoted(text)}, not a finite number; "
                     "repair or remove the row"
                 )
         return values
@@ -64,8 +64,8 @@ class Table(NamedTuple):
         values = self.numbers(column)
         for row in np.flatnonzero(~are_whole(values))[:1]:
             raise InputError(
-                f"{self.place(row)}: {column} is {_shown(self.fields(column)[row])}, and must be a "
-                "whole number, at least 0; repair or remove the row"
+                f"{self.place(row)}: {column} is {_quoted(self.fields(column)[row])}, and must be "
+                "a whole number, at least 0; repair or remove the row"
             )
         return values.astype(np.int64)
 
@@ -76,7 +76,7 @@ class Table(NamedTuple):
             first = rows.setdefault(_label(text), row)
             if first != row:
                 raise InputError(
-                    f"{self.place(row)}: {column} {_shown(text)} was given in line "
+                    f"{self.place(row)}: {column} {_quoted(text)} was given in line "
                     f"{self.lines[first]} already; give each grain once"
                 )
         return rows
@@ -88,7 +88,7 @@ class Table(NamedTuple):
             position = index.get(_label(text))
             if position is None:
                 raise InputError(
-                    f"{self.place(row)}: {column} names grain {_shown(text)}, which is not "
+                    f"{self.place(row)}: {column} names grain {_quoted(text)}, which is not "
                     "among the grains; correct it or add the grain"
                 )
             found[row] = position
@@ -188,5 +188,5 @@ def _label(text: str) -> int | str:
     return int(number) if abs(number) < 2**53 else text
 
 
-def _shown(text: str) -> str:
+def _quoted(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "…")

@@ -13,7 +13,6 @@ from granforce.records import (
     InputError,
     Packing,
     Progress,
-    check_memory,
     friction,
     positive,
     random_seed,
@@ -27,6 +26,7 @@ from granforce.study.keys import Parameters
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.study.store import Store
 from granforce.system import cancelling
+from granforce.system.memory import check_memory
 
 # Memory that a packing needs at the least for each disk: the lists of pairs, and one factor of its
 # balance.

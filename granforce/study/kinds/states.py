@@ -21,7 +21,6 @@ from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.records import (
     InputError,
     Progress,
-    check_memory,
     positive,
     random_seed,
     whole,
@@ -36,6 +35,7 @@ from granforce.study.kinds.packings import cones_of, ensemble_of, hash_of
 from granforce.study.samples import inference_dataset, uniform_dataset, walk_dataset
 from granforce.study.store import Store
 from granforce.system import cancelling
+from granforce.system.memory import check_memory
 from granforce.tolerances import EQUILIBRIUM
 
 # Memory that a walk needs at the least for each state and disk: f_n and f_t of one and a half

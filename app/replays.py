@@ -1,0 +1,141 @@
+"""Replays: states to look at, as plain arrays, of a store or of a walk that is only beginning."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce import measures
+from granforce.records import Floats, Integers, Packing
+
+from . import geometry
+
+FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
+
+
+class Replay(NamedTuple):
+    """States to look at: geometry, frames and numbers. Forces are in ⟨f_n⟩."""
+
+    disks: geometry.Disks
+    links: geometry.Links
+    box: Floats  # (2,) sides; inf where open
+    tilt: float  # of the cell
+    window: tuple[float, float, float, float]  # x_low, x_high, y_low, y_high of the view, a square
+    backbone: Integers  # (N_c,) positions of the contacts in the packing
+    force_scale: float  # ⟨f_n⟩, force
+    normal: Any  # (F, N_c) float32 f_n: the original network, then the states kept
+    tangential: Any  # (F, N_c) float32 f_t
+    number: Any  # (F,) number of the state, 0 for the original
+    distance: Floats  # (F,) from the centre of the states
+    residual: Floats  # (F,) NaN for the original
+    attempts: Floats  # (F,) spent on each state; NaN for the original and where none are made
+    growth: Mapping[str, Floats]  # {"eta1", "eta2", "eta3": (F,)} of the states shown so far
+    low: Any  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
+    high: Any  # (N_c, 2) float32 largest
+    order: Integers  # (N_c,) contacts by original f_n, ascending
+    summary: dict[str, Any]  # plain numbers of the states, by their names in the schema
+
+
+def make_replay(packing: Packing, dataset: xr.Dataset, mu: float) -> Replay:
+    """The Replay of a dataset of states on its packing; μ is that of the ensemble."""
+    backbone = dataset["backbone"].values
+    scale = float(dataset["force_scale"])
+    summary: dict[str, Any] = {
+        str(name): array.item() for name, array in dataset.items() if array.ndim == 0
+    }
+    kept = dataset.sizes["state"]
+    walked = int(summary["accepted"] + summary["skipped"]) if "accepted" in summary else kept
+    pick = evenly(kept, len(backbone), FRAME_BYTES)
+    frames: Any = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
+    frames = (frames / scale).astype(np.float32)
+    number = np.linspace(0, walked - 1, kept).astype(int)[pick] + 1
+    summary |= {"mu": mu, "n": len(packing.r), "contacts": len(backbone)}
+    summary |= {"kept": len(pick), "states": walked}
+
+    def column(name: str) -> Floats:
+        if name not in dataset:
+            return np.full(len(pick) + 1, np.nan)
+        return np.append(np.nan, dataset[name].values[pick])
+
+    distance = column("distance_to_centre")
+    distance[0] = summary["original_distance"]
+    growing = measures.growing(frames[1:]).items()
+    return _replay(
+        packing,
+        backbone,
+        scale,
+        frames,
+        number=np.append(0, number),
+        distance=distance,
+        residual=column("residual"),
+        attempts=column("attempts"),
+        growth={name: np.append(np.nan, values) for name, values in growing},
+        low=(dataset["low"].values / scale).astype(np.float32),
+        high=(dataset["high"].values / scale).astype(np.float32),
+        summary=summary,
+    )
+
+
+def first_replay(S: Any, states: int) -> Replay:
+    """The Replay of an ensemble before its walk: the original network alone; `states` will follow.
+
+    S is of any kind that has packing, index, original, force_scale and mu.
+    """
+    original = (S.original / S.force_scale).astype(np.float32)
+    nothing = np.full(1, np.nan)
+    return _replay(
+        S.packing,
+        S.index,
+        S.force_scale,
+        original[None],
+        number=np.zeros(1),
+        distance=nothing,
+        residual=nothing,
+        attempts=nothing,
+        growth=dict.fromkeys(("eta1", "eta2", "eta3"), nothing),
+        low=original,
+        high=original,
+        summary={
+            "mu": S.mu,
+            "n": len(S.packing.r),
+            "contacts": len(S.index),
+            "states": states,
+            "packing_fraction": S.packing.packing_fraction,
+            "coordination": S.coordination,
+            "dimension": S.dimension,
+        },
+    )
+
+
+def _replay(
+    packing: Packing, backbone: Integers, scale: float, frames: Any, **numbers: Any
+) -> Replay:
+    """The Replay of frames (F, N_c, 2), float32, the original network first."""
+    x = geometry.into_cell(packing)
+    return Replay(
+        disks=geometry.disks(packing, x, backbone),
+        links=geometry.links(packing, x, backbone),
+        box=packing.box,
+        tilt=packing.tilt,
+        window=geometry.square(x, packing),
+        backbone=backbone,
+        force_scale=scale,
+        normal=np.ascontiguousarray(frames[..., 0]),
+        tangential=np.ascontiguousarray(frames[..., 1]),
+        order=np.argsort(frames[0, :, 0], kind="stable"),
+        **numbers,
+    )
+
+
+def fitting(contacts: int, most_bytes: float) -> int:
+    """How many states of so many contacts fit in so many bytes: two at least."""
+    return max(2, int(most_bytes / (8 * max(1, contacts))))
+
+
+def evenly(count: int, contacts: int, most_bytes: float) -> Integers:
+    """Which of `count` states fit in so many bytes, evenly spaced: all, where they do."""
+    most = fitting(contacts, most_bytes)
+    if count <= most:
+        return np.arange(count)
+    return np.linspace(0, count - 1, most).astype(int)

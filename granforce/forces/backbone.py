@@ -1,0 +1,201 @@
+"""Which contacts of a packing carry: the backbone, found from networks and proved by duality.
+
+A contact belongs to the backbone where max f_n over S is above 0. That it does, one network shows;
+that it does not, only a proof can. So networks come first: whatever presses in one of them carries.
+The rest is idle so far, and its sum Σ f_n over S is asked for by one linear program after another:
+idle contacts that press in its solution carry, and are taken out of the sum, until the maximum is
+0. The multipliers v of the balance then prove it for all that are left at once: with A y = b and
+y ≥ 0,
+
+    Σ f_n = g·y = b·v + (g − Aᵀ v)·y ≤ b·v  where  Aᵀ v ≥ g,
+
+and b·v = 0 to what `certificates.proves_small` allows. As f_n ≥ 0, each of them is 0, in every
+network, whichever were known.
+
+| word | meaning |
+|---|---|
+| idle | presses in no network that is known so far |
+| dead | cannot press, as its own grains could not balance it: a proof from few rows |
+| pressing | presses in the network at hand, beyond SEEN_CARRYING: not idle any more |
+| trusted | a network that both judges of S admit: it shows what it shows |
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import highspy
+import numpy as np
+from scipy import sparse
+
+from granforce.forces import knowledge
+from granforce.forces.nearest import nearest, some_network
+from granforce.numerics import certificates
+from granforce.numerics import highs as programs
+from granforce.records import Floats, Integers, Mask, NotJammedError, Packing
+from granforce.tolerances import CARRYING, SEEN_CARRYING
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
+
+
+def without_danglers(packing: Packing, free: Integers, held: Mask) -> Integers:
+    """Drop, one after another, contacts of unloaded grains that have no other contact."""
+    i, j = packing.contacts.i, packing.contacts.j
+    count = len(packing.r)
+    anchored = np.any(packing.load != 0, axis=1)
+    anchored[i[held]] = anchored[j[held]] = True
+    while True:
+        number = np.bincount(i[free], minlength=count) + np.bincount(j[free], minlength=count)
+        lonely = (number == 1) & ~anchored
+        keep = ~(lonely[i[free]] | lonely[j[free]])
+        if keep.all():
+            return free
+        free = free[keep]
+
+
+def carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
+    """Mask of contacts whose largest f_n over S is positive, exactly; and a network, or None.
+
+    What presses in a known state carries; known are the original network, or the one nearest to
+    equal f_n, and one that is pulled towards forces on the contacts without any. Contacts of grains
+    that cannot balance any force on them carry nothing. Only contacts that are neither are left to
+    a linear program over all of S. That a contact carries nothing is proved by duality, so that it
+    does not depend on which state is known.
+    """
+    known = full.original
+    if not full.admits(known):
+        known = some_network(full, np.zeros_like(known))
+    trusted = full.admits(known)
+    if not trusted and full.known is not None:
+        _raise_contradiction(full)
+    idle = np.ones(len(known), np.bool_)
+    dead = ~idle
+    if trusted:
+        idle = known[:, 0] <= SEEN_CARRYING * full.force_scale
+        dead = idle & _cannot_balance(full, idle)
+        idle = _not_pulled(full, known, idle & ~dead)
+    at_hand = known if trusted else None
+    return ~(dead | _proven_idle(full, idle, at_hand)), at_hand
+
+
+def _raise_contradiction(full: Ensemble) -> None:
+    """NotJammedError with the statements that cannot hold together, where that can be proved."""
+    assert full.known is not None
+    A, b, T = full.scaled_balance
+    message = knowledge.contradiction(
+        A, b, T, full.known, full.mu, full.index, full.force_scale, full.slack
+    )
+    if message is not None:
+        raise NotJammedError(message)
+
+
+def _not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
+    """Those of the idle contacts that press in none of the networks that are pulled towards them.
+
+    Every network is pulled towards forces on all that have not pressed before.
+    """
+    while idle.any():
+        target = known.copy()
+        target[idle, 0] += full.force_scale
+        pulled = nearest(full, target).forces
+        pressing = idle & (pulled[:, 0] > SEEN_CARRYING * full.force_scale)
+        if not pressing.any() or not full.admits(pulled):
+            break
+        idle = idle & ~pressing
+    return idle
+
+
+def _cannot_balance(full: Ensemble, idle: Mask) -> Mask:
+    """Mask of idle contacts that even their own grains alone cannot balance: local, exact.
+
+    Grains whose contacts are all idle must be in balance; all others may answer any force.
+    """
+    size = 1 + full.per_contact
+    c = full.contacts
+    held_up = np.zeros(len(full.packing.r), bool)
+    held_up[c.i[~idle]] = held_up[c.j[~idle]] = True
+    held_up |= np.any(full.packing.load != 0, axis=1)
+    held_up[full.packing.contacts.i[full.frozen]] = True
+    held_up[full.packing.contacts.j[full.frozen]] = True
+    rows = np.repeat(~held_up[full.grains], size)
+    columns = np.repeat(idle, full.per_contact)
+    if not rows.any():
+        return np.zeros(len(idle), np.bool_)
+    A, T = full.cone_form
+    local = A[: len(rows)].tocsr()[rows][:, columns]
+    normal = sparse.csr_matrix(T)[:: full.per_contact][idle][:, columns]
+    model = programs.standard_form(local, np.zeros(local.shape[0]), upper=1.0)
+    dead, everyone = np.zeros(len(idle), bool), np.ones(int(idle.sum()), bool)
+    proved = _never_pressing(model, local, np.zeros(local.shape[0]), normal, everyone)
+    if proved is not None:
+        dead[idle] = proved
+    return dead
+
+
+def _never_pressing(
+    model: highspy.Highs, A: sparse.csr_matrix, b: Floats, normal: sparse.csr_matrix, idle: Mask
+) -> Mask | None:
+    """Those of the idle contacts that carry nothing in {y ≥ 0 : A y = b}; None where undecided.
+
+    normal (contacts, n): f_n = normal · y. Contacts that press where Σ f_n is largest are taken
+    out, again and again; the multipliers of the last program prove that the others cannot.
+    """
+    while idle.any():
+        gains = normal.T @ idle.astype(float)
+        programs.set_cost(model, -gains)
+        pressing = None
+        for status, y in programs.solutions(model):
+            if status != programs.OPTIMAL:
+                continue
+            pressing = idle & (normal @ y > SEEN_CARRYING)
+            if pressing.any():
+                break
+            if certificates.proves_small(A, b, gains, -programs.multipliers(model, A, -gains)):
+                return idle
+            pressing = idle & (normal @ y > CARRYING)
+        if pressing is None:
+            return None
+        # Without a proof, and without a state that says so, nothing is called idle.
+        idle = idle & ~pressing if pressing.any() else np.zeros(len(idle), bool)
+    return idle
+
+
+def _proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
+    """Those of the idle contacts whose sum, and so each, can only be 0 over S.
+
+    known (N_c, 2): a network of S, or None.
+    """
+    if not idle.any():
+        return idle
+    A, b, T = full.scaled_form
+    # Without any load or pressure, S is a cone: what carries in it carries in a bounded part too.
+    limits = [np.inf if b.any() else 1.0]
+    if known is not None:
+        # So it does in an S without end, however near to a network of S: a part of the way to any
+        # other one is in S as well.
+        limits.append(1.0 + float(full.coordinates(known).max()))
+    normal_rows = sparse.csr_matrix(T)[:: full.per_contact]
+    for limit in limits:
+        model = programs.standard_form(A, b, upper=limit, solver="ipm")
+        model.setOptionValue("run_crossover", "off")  # no vertex is wanted
+        proved = _never_pressing(model, A, b, normal_rows, idle)
+        if proved is not None:
+            return proved
+    if known is not None:
+        return idle  # feasible within BALANCED but not exactly: no more is known to carry
+    raise certificates.why_unsolved(A, b, _unbalanced_message(full), slack=full.slack)
+
+
+def _unbalanced_message(full: Ensemble) -> str:
+    A, _ = full.cone_form
+    _, rest = programs.least_unbalanced(A, full.b / full.force_scale)
+    size = 1 + full.per_contact
+    load = np.linalg.norm(rest[: size * len(full.grains)].reshape(-1, size), axis=1)
+    worst = np.argsort(load)[::-1][:5]
+    carries = "" if full.prescribed != "stress" else "the contacts cannot carry this stress, or "
+    named = ", ".join(f"{full.grains[k]} ({load[k]:.2g} ⟨f_n⟩)" for k in worst if load[k] > 0)
+    return (
+        f"no admissible force network exists: {carries}the packing is not jammed, or contacts are "
+        f"missing; grains with the largest unbalanced load: {named or 'none'}"
+    )

@@ -1,0 +1,201 @@
+"""The equations A x = b of a packing: every grain in balance, and what is prescribed of the whole.
+
+Grain g of a network is pushed by F = ±(f_n n + f_t t) at each of its contacts (+ where it is their
+second grain j, t = (−n_y, n_x)), and turned by −a f_t in either place, a its lever arm. With the
+loads e on the grains that gives three rows each, the torque divided by r so that all are forces:
+
+    Σ ±(f_n n + f_t t) = −(e_x, e_y),    −Σ a f_t / r = −e_τ / r.
+
+At μ = 0 there is no f_t, and no torque that it could balance: two rows a grain. Contacts that are
+frozen push with known forces, which go to the right.
+
+What is prescribed of the whole is its stress σ_ab = (1/V) Σ F_a ℓ_b over contacts, ℓ from centre to
+centre. Its trace is the pressure, Σ f_n ℓ = 2 P0 V, as f_t is across ℓ; divided by Σ ℓ the row
+reads as a mean normal force, which is the scale of all forces. The rows (σ_xx − σ_yy)/2 and σ_xy
+follow where the whole stress is prescribed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from granforce.records import Contacts, Floats, InputError, Integers, Mask, Packing, float_array
+from granforce.tolerances import BALANCED, ROUNDING
+
+
+def prescribed_stress(
+    packing: Packing, prescribed: str, stress: npt.ArrayLike | None, held: Mask
+) -> Floats | None:
+    """(1,) the pressure, (3,) σ_xx, σ_yy, σ_xy, or None: what is prescribed, force per length.
+
+    Raises InputError where that makes no sense here.
+    """
+    if prescribed not in ("pressure", "stress", "none"):
+        raise InputError(f"prescribed must be pressure, stress or none, got {prescribed!r:.40}")
+    if stress is not None and prescribed != "stress":
+        raise InputError('a stress is given, but not prescribed: add prescribed="stress"')
+    closed = np.isfinite(packing.volume) and not np.isnan(packing.pressure)
+    if prescribed == "none" and closed and not held.any() and not packing.load.any():
+        raise InputError(
+            "with nothing prescribed nothing says how large the forces are: prescribe the pressure "
+            "or the stress, or freeze contacts"
+        )
+    if prescribed == "none":
+        return None
+    if prescribed == "pressure":
+        return np.array([packing.pressure]) if closed and not held.any() else None
+    if held.any():
+        raise InputError(
+            "the stress cannot be prescribed where contacts are frozen: their forces decide it"
+        )
+    if not np.isfinite(packing.volume):
+        raise InputError("the stress can be prescribed in a periodic box only; this one is open")
+    if stress is None:
+        stress = stress_of(packing, packing.forces)
+        if not stress[0] + stress[1] > 0:
+            raise InputError(
+                "the packing has no forces of its own to take the stress from: give the stress"
+            )
+    stress = float_array(stress, (3,), "stress")
+    if not stress[0] + stress[1] > 0:
+        raise InputError("a stress must press: σ_xx + σ_yy must be above 0")
+    return stress
+
+
+def stress_of(packing: Packing, forces: Floats) -> Floats:
+    """σ_xx, σ_yy, σ_xy (…, 3) of networks (…, N_c, 2) on all contacts, force per length.
+
+    σ_ab = (1/V) Σ F_a ℓ_b; off the diagonal the mean of both, which are equal in balance.
+    """
+    return np.einsum("kci,...ci->...k", stress_rows(packing.contacts), forces) / packing.volume
+
+
+def stress_rows(contacts: Contacts) -> Floats:
+    """V σ of unit f_n and f_t: (3, N_c, 2)."""
+    n_x, n_y = contacts.normal.T
+    normal = np.stack([n_x * n_x, n_y * n_y, n_x * n_y])
+    tangential = np.stack([-n_x * n_y, n_x * n_y, 0.5 * (n_x * n_x - n_y * n_y)])
+    return np.stack([normal, tangential], axis=-1) * contacts.length[:, None]
+
+
+def left_open_in(packing: Packing) -> Mask:
+    """Mask (N,) of grains whose balance is left open: nothing is known of the load on them."""
+    return np.any(np.isnan(packing.load), axis=1)
+
+
+def equations(
+    packing: Packing,
+    free: Integers,
+    grains: Integers,
+    held: Mask,
+    mu: float,
+    stress: Floats | None,
+) -> tuple[sparse.csr_matrix, Floats, float]:
+    """A (rows, unknowns), b (rows,) of the free contacts (k,), and the scale ⟨f_n⟩ of forces.
+
+    Rows are those of the grains (M,), then of the stress as by `prescribed_stress`. held (N_c,):
+    frozen contacts. The scale is the packing's own mean |f_n| where nothing is prescribed.
+    """
+    contacts, original = packing.contacts.picked(free), packing.forces[free]
+    A, b = _balance(packing, contacts, grains, held, mu)
+    if stress is None:
+        scale = float(np.mean(np.abs(original[:, 0])))
+    else:
+        rows, values = _conditions(packing, contacts, mu, stress)
+        A = sparse.vstack([A, sparse.csr_matrix(rows)], format="csr")
+        b, scale = np.append(b, values), values[0]
+    scale = float(scale) or 1.0
+    A = _without_rounding(A, len(grains) * (3 if mu > 0 else 2), contacts)
+    if held.any():
+        b = _held_in_balance(A, b, original if mu > 0 else original[:, :1], BALANCED * scale)
+    return A, b, scale
+
+
+def _balance(
+    packing: Packing, contacts: Contacts, grains: Integers, held: Mask, mu: float
+) -> tuple[sparse.csr_matrix, Floats]:
+    """Force and torque rows of the given grains; frozen contacts and loads go to the right."""
+    row_of = np.full(len(packing.r), -1)
+    row_of[grains] = np.arange(len(grains))
+    size = 3 if mu > 0 else 2
+    A = _force_matrix(packing, contacts, row_of, len(grains), size)
+    b = -packing.load[grains, :size]
+    b[:, 2:] /= packing.r[grains, None]
+    b = b.ravel()
+    if held.any():
+        fixed = packing.contacts.picked(held)
+        fixed_matrix = _force_matrix(packing, fixed, row_of, len(grains), 3)
+        unbalance = fixed_matrix @ packing.forces[held].ravel()
+        b = b - unbalance.reshape(-1, 3)[:, :size].ravel()
+    if mu == 0:
+        A = A[:, ::2]
+    return sparse.csr_matrix(A), b
+
+
+def _conditions(
+    packing: Packing, contacts: Contacts, mu: float, stress: Floats
+) -> tuple[Any, Floats]:
+    """Rows (m, unknowns) and values (m,) of what is prescribed, as mean normal forces.
+
+    The pressure comes first: Σ f_n ℓ / Σ ℓ = 2 P0 V / Σ ℓ. With the whole stress, (σ_xx − σ_yy)/2
+    and σ_xy follow on the same scale.
+    """
+    length = contacts.length
+    total = float(length.sum())
+    size = 2 if mu > 0 else 1
+    row = np.zeros(len(length) * size)
+    row[::size] = length / total
+    if len(stress) == 1:
+        return row[None, :], np.array([2 * stress[0] * packing.volume / total])
+    xx, yy, xy = stress_rows(contacts)[..., :size].reshape(3, -1) / total
+    s_xx, s_yy, s_xy = stress * packing.volume / total
+    return np.stack([row, 0.5 * (xx - yy), xy]), np.array([s_xx + s_yy, 0.5 * (s_xx - s_yy), s_xy])
+
+
+def _force_matrix(
+    packing: Packing, contacts: Contacts, row_of: Integers, count: int, size: int
+) -> sparse.csr_matrix:
+    """Sparse (size · count, 2 N_c): what unit f_n, f_t do to each grain (torque divided by r)."""
+    columns = 2 * np.arange(len(contacts.i))
+    n_x, n_y = contacts.normal.T
+    entries = []
+    for grain, sign, arm in ((contacts.i, -1.0, contacts.arm_i), (contacts.j, 1.0, contacts.arm_j)):
+        row = row_of[grain]
+        inside = row >= 0
+        parts = [(0, 0, sign * n_x), (1, 0, sign * n_y), (0, 1, -sign * n_y), (1, 1, sign * n_x)]
+        if size == 3:
+            parts.append((2, 1, -arm / packing.r[grain]))
+        for component, tangential, value in parts:
+            entries.append(
+                (value[inside], size * row[inside] + component, columns[inside] + tangential)
+            )
+    value, row, column = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return sparse.csr_matrix((value, (row, column)), shape=(size * count, 2 * len(columns)))
+
+
+def _without_rounding(A: sparse.csr_matrix, balance: int, contacts: Contacts) -> sparse.csr_matrix:
+    """A without entries that are rounding of 0: n_y of contacts along x, n_x² − n_y² at 45°.
+
+    A row of nothing else would be a condition of its own once it is scaled. Entries of the
+    `balance` rows are of order 1, those of what is prescribed of order ℓ/Σℓ.
+    """
+    unit = np.ones(A.shape[0])
+    unit[balance:] = contacts.length.max() / contacts.length.sum()
+    A = sparse.csr_matrix(A)
+    A.data[np.abs(A.data) < ROUNDING * np.repeat(unit, np.diff(A.indptr))] = 0.0
+    A.eliminate_zeros()
+    return A
+
+
+def _held_in_balance(A: sparse.csr_matrix, b: Floats, original: Floats, tolerance: float) -> Floats:
+    """A x of the original network x, if that is balanced: b without what rounding left of it.
+
+    Frozen surroundings determine most forces, and leave rows of A that follow from others times
+    10⁴: what frozen forces are out of balance by, 10⁻¹², would contradict itself there by 10⁻⁸.
+    """
+    balanced = A @ original.ravel()
+    return balanced if np.abs(balanced - b).max(initial=0.0) <= tolerance else b

@@ -1,0 +1,189 @@
+"""Products of 3×3 blocks, and sweeps through a triangle of them: what every factorisation is of.
+
+A matrix that couples grains is kept as blocks of nine numbers, row by row, one block for each pair
+of grains that elimination brings together (`elimination.Pattern`): place 9 b + 3 i + j of the array
+has entry (i, j) of block b. A factor L has a column of blocks per grain: its own, the diagonal one,
+first, then those below. Three things are done with a column k once its diagonal block is factored:
+
+- the blocks below are divided by it, x ← x d⁻ᵀ (`divide`);
+- their products are taken from later columns, z ← z − x yᵀ (`subtract_column` within a panel of
+  columns with the same rows below, `subtract_panel` from all columns beyond it at once);
+- a vector is swept through it, downwards by `forward` (x ← L⁻¹ x), upwards by `backward` (L⁻ᵀ x).
+
+Diagonal blocks have their diagonal inverted, so that sweeps multiply. Of the other six numbers the
+three below it are read (LOWER) where L is a Cholesky factor, those above (UPPER) where the block
+holds the L and U of `lu`, whose U is kept transposed.
+"""
+
+from granforce.numerics.lanes import fma, inline, load, store, within
+
+# A pivot that rounding has driven to zero or below belongs to a direction without weight.
+NO_PIVOT = 1e-40
+# Where a 3×3 block has the numbers 10, 20, 21 of a lower triangle, and of an upper one transposed.
+LOWER, UPPER = (3, 6, 7), (1, 2, 5)
+
+
+@within
+def divide(L, x, d, side, lanes):
+    """x ← x d⁻ᵀ for a block x of L, and the triangle on one side of its diagonal block d."""
+    r0, r1, r2 = load(L, d, lanes), load(L, d + 4, lanes), load(L, d + 8, lanes)
+    l10, l20 = load(L, d + side[0], lanes), load(L, d + side[1], lanes)
+    l21 = load(L, d + side[2], lanes)
+    for a in range(x, x + 9, 3):
+        x0 = load(L, a, lanes) * r0
+        x1 = fma(-l10, x0, load(L, a + 1, lanes)) * r1
+        x2 = fma(-l21, x1, fma(-l20, x0, load(L, a + 2, lanes))) * r2
+        store(L, a, lanes, x0)
+        store(L, a + 1, lanes, x1)
+        store(L, a + 2, lanes, x2)
+
+
+@inline
+def subtract_column(Z, z, X, x, count, Y, y, lanes):
+    """z ← z − x yᵀ for `count` blocks z and x in a row; y stays in registers."""
+    by = _block(Y, y, lanes)
+    for k in range(0, 9 * count, 9):
+        block = _less_product_of_blocks(_block(Z, z + k, lanes), X, x + k, by, lanes)
+        _set_block(Z, z + k, block, lanes)
+
+
+@inline
+def subtract_panel(layout, p, number, Z, X, beyond, Y, lanes):
+    """z ← z − x yᵀ, for all columns of panel p at once and blocks x that are `beyond` y or later.
+
+    Where there are several columns, z stays in registers: what exceeds the caches takes two thirds
+    of the time. With one, y does. The number of pairs of blocks is added to the given one.
+    """
+    start, target, begin, end = layout.start, layout.target, layout.panel[p], layout.panel[p + 1]
+    below = start[end] - start[end - 1] - 1
+    for q in range(below):
+        if end == begin + 1:
+            x = 9 * (start[end] - below)
+            by = _block(Y, x + 9 * q, lanes)
+            for a in range(q + beyond, below):
+                z = 9 * target[number + a - q]
+                block = _less_product_of_blocks(_block(Z, z, lanes), X, x + 9 * a, by, lanes)
+                _set_block(Z, z, block, lanes)
+        else:
+            for a in range(q + beyond, below):
+                z = 9 * target[number + a - q]
+                block = _block(Z, z, lanes)
+                for k in range(begin + 1, end + 1):
+                    x = 9 * (start[k] - below)
+                    by = _block(Y, x + 9 * q, lanes)
+                    block = _less_product_of_blocks(block, X, x + 9 * a, by, lanes)
+                _set_block(Z, z, block, lanes)
+        number += below - q
+    return number
+
+
+@inline
+def _less_product_of_blocks(block, X, x, by, lanes):
+    """A block less x yᵀ, y given by its entries."""
+    z0, z1, z2 = _less_row_product(block[0], block[1], block[2], X, x, by, lanes)
+    z3, z4, z5 = _less_row_product(block[3], block[4], block[5], X, x + 3, by, lanes)
+    z6, z7, z8 = _less_row_product(block[6], block[7], block[8], X, x + 6, by, lanes)
+    return z0, z1, z2, z3, z4, z5, z6, z7, z8
+
+
+@inline
+def _less_row_product(z0, z1, z2, X, x, by, lanes):
+    x0, x1, x2 = -load(X, x, lanes), -load(X, x + 1, lanes), -load(X, x + 2, lanes)
+    z0 = fma(x2, by[2], fma(x1, by[1], fma(x0, by[0], z0)))
+    z1 = fma(x2, by[5], fma(x1, by[4], fma(x0, by[3], z1)))
+    z2 = fma(x2, by[8], fma(x1, by[7], fma(x0, by[6], z2)))
+    return z0, z1, z2
+
+
+@inline
+def _block(X, x, lanes):
+    return (
+        *(load(X, x, lanes), load(X, x + 1, lanes), load(X, x + 2, lanes)),
+        *(load(X, x + 3, lanes), load(X, x + 4, lanes), load(X, x + 5, lanes)),
+        *(load(X, x + 6, lanes), load(X, x + 7, lanes), load(X, x + 8, lanes)),
+    )
+
+
+@inline
+def _set_block(X, x, block, lanes):
+    store(X, x, lanes, block[0])
+    store(X, x + 1, lanes, block[1])
+    store(X, x + 2, lanes, block[2])
+    store(X, x + 3, lanes, block[3])
+    store(X, x + 4, lanes, block[4])
+    store(X, x + 5, lanes, block[5])
+    store(X, x + 6, lanes, block[6])
+    store(X, x + 7, lanes, block[7])
+    store(X, x + 8, lanes, block[8])
+
+
+@within
+def forward(layout, begin, end, D, side, L, x, first, lanes):
+    """x ← L⁻¹ x by columns `begin` to `end`, for the rows of x from `first` on.
+
+    Of L's diagonal blocks one side is in D.
+    """
+    start = layout.start
+    for k in range(begin, end):
+        d, v = 9 * start[k], first + 3 * k
+        v0 = load(x, v, lanes) * load(D, d, lanes)
+        v1 = fma(-load(D, d + side[0], lanes), v0, load(x, v + 1, lanes)) * load(D, d + 4, lanes)
+        v2 = fma(-load(D, d + side[1], lanes), v0, load(x, v + 2, lanes))
+        v2 = fma(-load(D, d + side[2], lanes), v1, v2) * load(D, d + 8, lanes)
+        spread(layout, k, L, v0, v1, v2, x, first, lanes)
+
+
+@inline
+def spread(layout, k, L, v0, v1, v2, x, first, lanes):
+    """Set rows k of x to v, and subtract column k of L times v below."""
+    start, row = layout.start, layout.row
+    v = first + 3 * k
+    store(x, v, lanes, v0)
+    store(x, v + 1, lanes, v1)
+    store(x, v + 2, lanes, v2)
+    v0, v1, v2 = -v0, -v1, -v2
+    for a in range(start[k] + 1, start[k + 1]):
+        w, e = first + 3 * row[a], 9 * a
+        for b in range(3):
+            value = fma(load(L, e, lanes), v0, load(x, w + b, lanes))
+            value = fma(load(L, e + 1, lanes), v1, value)
+            store(x, w + b, lanes, fma(load(L, e + 2, lanes), v2, value))
+            e += 3
+
+
+@within
+def backward(layout, D, side, L, x, lanes):
+    """x ← L⁻ᵀ x; of L's diagonal blocks one side is in D."""
+    for k in range(len(layout.start) - 2, -1, -1):
+        d, v = 9 * layout.start[k], 3 * k
+        v0, v1, v2 = _gathered(layout, k, L, x, lanes)
+        v2 = v2 * load(D, d + 8, lanes)
+        v1 = fma(-load(D, d + side[2], lanes), v2, v1) * load(D, d + 4, lanes)
+        v0 = fma(-load(D, d + side[1], lanes), v2, fma(-load(D, d + side[0], lanes), v1, v0))
+        store(x, v, lanes, v0 * load(D, d, lanes))
+        store(x, v + 1, lanes, v1)
+        store(x, v + 2, lanes, v2)
+
+
+@inline
+def _gathered(layout, k, L, x, lanes):
+    """Rows k of x less those below times column k of L."""
+    start, row = layout.start, layout.row
+    v0, v1, v2 = load(x, 3 * k, lanes), load(x, 3 * k + 1, lanes), load(x, 3 * k + 2, lanes)
+    for a in range(start[k] + 1, start[k + 1]):
+        w, e = 3 * row[a], 9 * a
+        for b in range(3):
+            value = -load(x, w + b, lanes)
+            v0 = fma(load(L, e, lanes), value, v0)
+            v1 = fma(load(L, e + 1, lanes), value, v1)
+            v2 = fma(load(L, e + 2, lanes), value, v2)
+            e += 3
+    return v0, v1, v2
+
+
+@within
+def less_product(value, x, first, y, other, count, lanes):
+    """value − x·y for `count` numbers from `first` of x and `other` of y on."""
+    for k in range(count):
+        value = fma(-load(x, first + k, lanes), load(y, other + k, lanes), value)
+    return value

@@ -1,0 +1,79 @@
+"""The nearest network from v alone: the projection onto each cone, and its slope.
+
+For w = 1 and c·y = −f·target the optimum of a contact program has f = Π(target + Aᵀ v), Π the
+projection onto the Coulomb cone of each contact on its own. So the balance A Π(target + Aᵀ v) = b
+is a system for v alone, piecewise linear, and Newton's method on it ends exactly: once no contact
+changes from inside to sliding or open, the step solves it. With forces (f_n, f_t/μ), and p = the
+normal part of target + Aᵀ v, q = μ times its tangential part:
+
+    inside, |q| ≤ μ² p:     f = (p, q/μ²),                K = (1 0; 0 1/μ²);
+    sliding otherwise:      f = (p + |q|) (1, ±1)/(1 + μ²),   K = (1 ±1; ±1 1)/(1 + μ²);
+    open where p + |q| ≤ 0: f = 0,                        K = 0.
+
+The slopes K are the conductances that `interior_point.advance` puts into A K Aᵀ (PROJECTED).
+"""
+
+from granforce.numerics.contact_matrix import pull
+from granforce.numerics.contact_program import PINNED, unbalance, worst_of
+from granforce.numerics.lanes import compiled, larger, load, pick, same, size, store, within
+
+
+@compiled
+def project(problem, at, work, lanes):
+    """y ← that of the point of each cone nearest to target + Aᵀv, its slope K, and unbalance.
+
+    For w = 1 and no sides: once those forces are balanced they are the optimum, exactly in their
+    cones.
+    """
+    zero, one = same(lanes, 0.0), same(lanes, 1.0)
+    mu2 = same(lanes, problem.mu * problem.mu)
+    flat = same(lanes, 1.0 / (1.0 + problem.mu * problem.mu))
+    soft = one / larger(mu2, same(lanes, 1e-300))
+    for k in range(0, len(problem.w), 2):
+        normal, tangential = pull(problem.network, k // 2, at.v, at.v_border, lanes)
+        # f_n, and μ f_t, of target + Aᵀv.
+        normal = normal - load(at.c, k, lanes) - load(at.c, k + 1, lanes)
+        tangential = tangential - load(at.c, k, lanes) + load(at.c, k + 1, lanes)
+        across = size(tangential)
+        sliding = flat * (normal + across)
+        sign = pick(zero, tangential, -one, one)
+        inside = mu2 * normal
+        f_n, f_t = pick(across, inside, sliding, normal), pick(across, inside, sign * sliding, zero)
+        f_t = pick(across, inside, f_t, soft * tangential)
+        nn = pick(across, inside, flat, one)
+        nt, tt = pick(across, inside, sign * flat, zero), pick(across, inside, flat, soft)
+        if problem.w[k] >= PINNED or problem.w[k + 1] >= PINNED:
+            _project_pinned(problem, k, normal, soft * tangential, at, work, lanes)
+            continue
+        # The tip comes last: without friction a pull without tangential part would pass as inside.
+        beyond = -normal
+        tip = pick(across, beyond, one, zero)
+        store(work.K, 3 * (k // 2), lanes, tip * nn)
+        store(work.K, 3 * (k // 2) + 1, lanes, tip * nt)
+        store(work.K, 3 * (k // 2) + 2, lanes, tip * tt)
+        store(at.y, k, lanes, tip * (f_n + f_t))
+        store(at.y, k + 1, lanes, tip * (f_n - f_t))
+    unbalance(problem, at, work, lanes)
+    worst = worst_of(work.r_border, worst_of(work.r, zero, lanes), lanes)
+    store(work.unbalance, 0, lanes, worst)
+
+
+@within
+def _project_pinned(problem, k, normal, tangential, at, work, lanes):
+    """The same for a contact of which f_n, f_t or both stay: the nearest point of a line."""
+    zero, one, half = same(lanes, 0.0), same(lanes, 1.0), same(lanes, 0.5)
+    y0, y1 = load(at.y, k, lanes), load(at.y, k + 1, lanes)
+    f_n, f_t, nn, tt = half * (y0 + y1), half * (y0 - y1), zero, zero
+    if problem.w[k] < PINNED:
+        least = size(f_t)
+        f_n, nn = larger(normal, least), pick(normal, least, one, zero)
+    elif problem.w[k + 1] < PINNED:
+        soft = same(lanes, 1.0 / max(problem.mu * problem.mu, 1e-300))
+        tt = pick(f_n, size(tangential), soft, zero)
+        f_t = -larger(-f_n, -larger(-f_n, tangential))
+        f_t = pick(f_n, size(tangential), tangential, f_t)
+    store(work.K, 3 * (k // 2), lanes, nn)
+    store(work.K, 3 * (k // 2) + 1, lanes, zero)
+    store(work.K, 3 * (k // 2) + 2, lanes, tt)
+    store(at.y, k, lanes, f_n + f_t)
+    store(at.y, k + 1, lanes, f_n - f_t)

@@ -1,0 +1,135 @@
+"""Works that ask for one flow after another, carried side by side: a scheduler of lanes.
+
+A search for a critical force is a chain: which flow it asks for next depends on where the last one
+went. Chains of many contacts are independent, so they share the lanes of a kernel (see `lanes`).
+Each is a generator that yields a Push and is sent its Outcome. A thread fills its lanes with works
+that wait, advances all of them until one flow has ended, and sends on the work of that lane, or
+puts the next one there: no lane waits for another. As lanes never mix, no outcome depends on what
+else was carried.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from typing import Any
+
+import numpy as np
+
+from granforce.numerics.lanes import lanes_for
+from granforce.perturb.flow import (
+    Flows,
+    Outcome,
+    Push,
+    make_flows,
+    outcome_of,
+    start,
+    until_one_ends,
+)
+from granforce.perturb.step import Step
+from granforce.system import cancelling
+from granforce.tolerances import BALANCED
+
+# What asks for one flow after another: it is sent the outcome of each.
+Work = Generator[Push, Outcome, Any]
+
+
+def relax(step: Step, asked: Push) -> Outcome:
+    """The Outcome of the flow that a Push asks for."""
+
+    def one() -> Generator[Push, Outcome, Outcome]:
+        return (yield asked)
+
+    found: list[Outcome] = []
+    follow(step, [one()], lambda _, outcome: found.append(outcome))
+    return found[0]
+
+
+def follow(
+    step: Step,
+    works: Sequence[Work],
+    finished: Callable[[int, Any], object],
+    workers: int = 1,
+) -> None:
+    """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
+
+    A flow ends at rest (unbalance below BALANCED), in steady motion, or after max_steps.
+    finished(number, value) is called, by one thread at a time, as a work returns its value; if it
+    raises, it is still called for what other threads have ended by then. No outcome depends on the
+    number of threads, nor on what it is carried beside, bit for bit.
+    """
+    waiting, turn, failed = deque(enumerate(works)), threading.Lock(), threading.Event()
+
+    def finish(number: int, value: Any) -> None:
+        with turn:
+            finished(number, value)
+
+    def carry() -> None:
+        try:
+            _carry(step, waiting, finish, failed)
+        except BaseException:
+            failed.set()  # the other threads end as well
+            raise
+
+    if workers == 1:
+        carry()
+        return
+    with cancelling.threads(workers) as pool:
+        for task in [pool.submit(carry) for _ in range(workers)]:
+            task.result()
+
+
+def _carry(
+    step: Step,
+    waiting: deque[tuple[int, Work]],
+    finished: Callable[[int, Any], object],
+    failed: threading.Event,
+) -> None:
+    """One thread: fill lanes with works, and carry each until it has nothing more to ask."""
+    if not waiting:
+        return
+    lanes = lanes_for(len(waiting))
+    flows, stop = make_flows(step, len(lanes)), cancelling.flag()
+    seconds = np.zeros(len(lanes))
+    carried: list[tuple[int, Work] | None] = [None] * len(lanes)
+    while True:
+        for lane in np.flatnonzero(~flows.going).tolist():
+            sent = outcome_of(step, flows, lane, seconds[lane]) if carried[lane] else None
+            carried[lane] = _go_on(step, flows, lane, carried[lane], sent, waiting, finished)
+            seconds[lane] = 0.0
+        going = flows.going.copy()
+        if failed.is_set() or not going.any():
+            return
+        begin = time.perf_counter()
+        until_one_ends(step, flows, BALANCED / 10, stop, lanes)
+        cancelling.check("perturbation")
+        seconds[going] += (time.perf_counter() - begin) / going.sum()
+
+
+def _go_on(
+    step: Step,
+    flows: Flows,
+    lane: int,
+    carried: tuple[int, Work] | None,
+    sent: Outcome | None,
+    waiting: deque[tuple[int, Work]],
+    finished: Callable[[int, Any], object],
+) -> tuple[int, Work] | None:
+    """Send a lane's work its outcome and start what it asks for next, or else what waits first.
+
+    carried: number and work of the lane; it and what is sent are None without. Returns the same.
+    """
+    while True:
+        try:
+            number, work = carried or waiting.popleft()
+        except IndexError:
+            return None
+        try:
+            start(step, flows, lane, next(work) if sent is None else work.send(sent))
+        except StopIteration as ended:
+            finished(number, ended.value)
+            carried = sent = None
+        else:
+            return number, work
