@@ -1,6 +1,8 @@
 // The exact intervals of all normal forces in a small scene, and where each force is in its own. What
 // has not changed is not touched, and nothing that moves is laid out anew: a frame is to be cheap.
 
+const SEEN = 0.03 // part of the rail: how wide a bar is at least, to be seen beside the mark of the force
+
 class Bars {
   constructor(host) { this.host = host; this.rows = [] }
 
@@ -16,7 +18,8 @@ class Bars {
       const [low, high] = both[c], value = F[2 * c]
       row.tell("class", lit.has(c) ? "lit" : "")
       row.tell("label", forceName(body.scene, 2 * c))
-      row.tell("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${Math.max(0.004, (at(high) - at(low)) / 100)})`)
+      const wide = high - low < 1e-9 * body.scaleOf() ? 0 : Math.max(SEEN, (at(high) - at(low)) / 100)
+      row.tell("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${wide})`)
       row.tell("dot", `translateX(${at(value)}%)`)
       row.tell("value", `${number(value)}${range(low, high, body.scaleOf())}`)
     })
@@ -52,5 +55,5 @@ class Bars {
 function range(low, high, scale) {
   if (Number.isNaN(low)) return ""
   if (high - low < 1e-9 * scale) return " (fixed)"
-  return Number.isFinite(high) ? ` (possible ${number(low)} to ${number(high)})` : ` (possible from ${number(low)} on)`
+  return Number.isFinite(high) ? ` (possible ${number(low)} to ${number(high)})` : ` (${number(low)} or more)`
 }

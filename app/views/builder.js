@@ -7,6 +7,15 @@ const BARE = "2,1,1|0,0,4,0", BARE_UNDER_PRESS = "2,1,1|0,0,4,0;0.4,2,3.6,2|p1"
 // What those begin with who let walls press: three disks under one that does.
 const UNDER_PRESS = "1,1,1;3,1,1;2,2.732050807569,1|0,0,4,0;0.4,3.732050807569,3.6,3.732050807569|p1"
 
+// What each tool does.
+const HOW = {
+  disk: "Click an empty place to add a disk; drag a disk to move it.",
+  wall: "Drag from one end of the wall to the other.",
+  press: "Click a wall: it presses, or no longer does.",
+  remove: "Click a disk or a wall.",
+  pull: "Drag the tip of an arrow: all forces follow.",
+}
+
 class Builder {
   /** changed(text): of another scene, of the one to begin with if empty. */
   constructor(host, changed) {
@@ -35,6 +44,7 @@ class Builder {
       </span>
       <label>radius <input class="size" type="range" min="0.4" max="1" step="0.1" value="1" aria-label="radius of new disks"></label>
       <button type="button" class="anew" title="Begin anew, with one disk on the floor">Clear</button>
+      <span class="how"></span>
       <span class="presses">No gravity. A pressing wall pushes with a force equal to its length.</span>`
     host.addEventListener("click", (event) => {
       const { tool, load } = event.target.dataset
@@ -53,6 +63,7 @@ class Builder {
       button.classList.toggle("on", on)
       button.setAttribute("aria-checked", on)
     }
+    this.host.querySelector(".how").textContent = HOW[this.tool]
     for (const name of ["[data-tool=press]", ".presses"]) this.host.querySelector(name).hidden = !this.pressure
   }
 

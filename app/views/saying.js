@@ -28,17 +28,25 @@ function way(scene, contact, what) {
   return Math.abs(y) > 0.3 ? (y > 0 ? " up" : " down") : x > 0 ? " right" : " left"
 }
 
+/** What is drawn of the disks, in this scene. */
+function legend({ scene, empty, load }) {
+  if (empty && !scene.idle) return "orange: the motion in which they give way; grey: weight and other loads"
+  const pulled = load.some((v, k) => k < 3 * scene.r.length && v), pressed = scene.pressing.length > 0
+  const loads = [pulled ? "weight" : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
+  return `blue: contact forces; wedge: where friction lets them point, tangential ≤ μ × normal${loads ? `; grey: ${loads}` : ""}`
+}
+
 /** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
 function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
   const forces = plural(count, "contact") + " with a normal and a tangential force each"
   if (empty && !scene.idle) {
     const none = consistent ? "none of their solutions is allowed" : "they have no solution"
-    const because = consistent ? "; in each, some contact would have to pull, or to rub with more than μ times its normal force" : ""
-    return `<b>${2 * count} forces, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
+    const because = consistent ? "; each has a contact that would have to pull, or a tangential force of more than μ × its normal force" : ""
+    return `<b>${2 * count} unknown forces, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
-  return `<b>${2 * count} forces − ${equations} equations = ${h} free${point}</b> <span>(${forces}; ${sum}${why})</span>`
+  return `<b>${2 * count} unknown forces − ${equations} equations = ${h} free${point}</b> <span>(${forces}; ${sum}${why})</span>`
 }
 
 /** The sum that gives the number of equations, and what its parts are. */
@@ -67,7 +75,7 @@ function pictured(body) {
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
   return h > 3 ? `one shadow of S, which has ${h} dimensions; its outline is exact`
-    : `${S} ${["", "a line", "a polygon, in its true shape", "a body; drag beside the point to turn it"][h]}`
+    : `${S} ${["", "a line", "a polygon, drawn without distortion", "a body; drag beside the point to turn it"][h]}`
 }
 
 /** The sentence over a scene. */
@@ -82,12 +90,13 @@ function sentence(body, mu, now) {
       : "Without friction S is one point: everything is determined. Open the wedges with the slider."
   }
   if (!body.bounded) {
-    const wedged = several ? "the disks have wedged themselves" : "the disk has wedged itself"
-    return `S has no end in some direction: ${wedged}, and the forces may be as large as you like. S is infinite, so evenly spread random points are impossible. (Proof: a change of forces that is in balance by itself and stays in every wedge.)`
+    const jammed = several ? "the disks have jammed themselves" : "the disk has jammed itself"
+    const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
+    return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that walls and disks can press on each other from opposite sides, as hard as they like: such forces cancel, and can be added to any that hold.${filled}`
   }
   if (h > 3) return `${h} free numbers: infinitely many sets of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many sets. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
-  const determined = fixed ? ` ${fixed} of ${body.count} normal forces ${fixed > 1 ? "are" : "is"} fixed all the same.` : ""
+  const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}`
 }
 
@@ -98,7 +107,7 @@ function falling({ scene: { r, pressing, load: own }, load }, mu, { fall, enough
   const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${listed(disks)}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
   const pushed = load.some((v, k) => v !== own[k]) ? " and the push" : ""
   const loads = pressing.length ? "the press does" : `the weights${pushed} do`
-  const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. Proof: forces in balance do no work together in any small motion, but in this one ${loads} some, and no force that friction allows takes it back.` : ""
-  const mended = enough ? ` With friction μ = ${enough} it would hold.` : ""
+  const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. In this motion ${loads} work, and no contact force that friction allows can stop it.` : ""
+  const mended = enough ? ` With friction of at least μ = ${enough} it would hold.` : ""
   return `Nothing balances at μ = ${Number(mu.toPrecision(4))}: S is empty.${mended}${why}`
 }

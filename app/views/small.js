@@ -7,7 +7,7 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "desk"
   root.innerHTML = `
-    <p class="whole">The same disks at rest can be held by many different sets of forces. S is the set of them all; more friction makes S larger, and moves no disk.</p>
+    <p class="whole">Disks at rest can often be held by many different sets of forces. S is the set of them all. More friction allows more sets; with too little, none is left.</p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${MOST_MU}" step="0.005" aria-label="friction μ">
@@ -30,7 +30,7 @@ export function render({ model, view }) {
     </section>
     <div class="board">
     <div class="pair">
-      <figure><figcaption>blue: forces at contacts, within wedges (friction cones); grey: weight, press</figcaption>
+      <figure><figcaption class="legend"></figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
       <figure><figcaption class="what"></figcaption>
         <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one set of forces. Arrow keys move the point"></canvas>
@@ -90,6 +90,7 @@ export function render({ model, view }) {
 
   function say(note = pushed.on ? now.note : "") {
     tell("count", counted(body), "innerHTML")
+    tell("legend", legend(body))
     tell("what", pictured(body))
     tell("special", special(body))
     tell("says", note || sentence(body, mu, now))

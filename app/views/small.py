@@ -31,7 +31,7 @@ FIRST_STEPS = (
         "What friction does",
         "Drag the friction μ. At μ = 0 the wedges are closed, and S is one point. More friction "
         "opens the wedges, and S grows. At μ = 1, as steep as the walls, it has no end any more: "
-        "the disk has wedged itself. Next: 400 disks, and the same thing.",
+        "the disk has jammed itself. Next: 400 disks, and the same thing.",
         {"mu": 0.8, "see": "strip"},
     ),
 )

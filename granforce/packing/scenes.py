@@ -331,6 +331,6 @@ SCENES = {
     "leaning": _Scene("A pyramid against a wall", 0.4, _leaning),
     "column": _Scene("Ten disks in a column", 0.3, _column),
     "six": _Scene("Six disks under pressure", 0.5, _six),
-    "solid": _Scene("Six disks, one dimension more", 0.5, partial(_six, dimension=3)),
+    "solid": _Scene("Six disks, S a solid body", 0.5, partial(_six, dimension=3)),
     "many": _Scene("400 disks under pressure", 0.1, _many),
 }
