@@ -1,5 +1,5 @@
 """The command line."""
 
-from granforce.cli.parser import main
+from granforce.cli.parser import command, main
 
-__all__ = ["main"]
+__all__ = ["command", "main"]

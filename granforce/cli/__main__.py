@@ -1,7 +1,5 @@
 """`python -m granforce.cli` is the command `granforce`."""
 
-import sys
+from granforce.cli.parser import command
 
-from granforce.cli.parser import main
-
-sys.exit(main())
+command()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import NoReturn
 
 from granforce.cli import words
 from granforce.cli.options import EXAMPLE, Parser, refused
@@ -32,6 +34,17 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         finally:
             warnings.formatwarning = usual
+
+
+def command() -> NoReturn:
+    """The process `granforce`: main, and at its end nobody waits for what was left behind."""
+    code = main()
+    cancelling = sys.modules.get("granforce.system.cancelling")
+    if cancelling is not None and cancelling.left_behind():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ A thread asks cancel() ten times a second and raises the flag, and so does Ctrl-
 thread, where no signal handler of Python's own can run before a kernel ends.
 """
 
+import atexit
 import contextvars
 import functools
 import pickle
@@ -50,6 +51,7 @@ class _Scope(NamedTuple):
 _ending = threading.Event()
 _NEVER = _Scope(np.zeros(1, dtype=bool), None)
 _scope = contextvars.ContextVar("scope", default=_NEVER)
+_APART = "granforce-apart"  # threads with a call that cannot read the flag
 
 
 @contextmanager
@@ -176,16 +178,30 @@ def apart(
             result.set_exception(error)
 
     check()
-    threading.Thread(target=work, daemon=True, name="granforce-apart").start()
-    while True:
-        with suppress(TimeoutError):
-            return result.result(_ASK_EVERY)
-        if cancelled():
-            if interrupt is not None:
-                interrupt()
+    threading.Thread(target=work, daemon=True, name=_APART).start()
+    try:
+        while True:
             with suppress(TimeoutError):
-                result.exception(_GRACE)
+                return result.result(_ASK_EVERY)
             check()
+    except (Cancelled, KeyboardInterrupt):
+        if interrupt is not None:
+            interrupt()
+        with suppress(TimeoutError, KeyboardInterrupt):
+            result.exception(_GRACE)
+        raise
+
+
+def left_behind() -> list[threading.Thread]:
+    """Threads with a call that is still running, at an end of the work."""
+    return [thread for thread in threading.enumerate() if thread.name == _APART]
+
+
+@atexit.register
+def _wait_for_left() -> None:
+    # Where C++ returns to an interpreter that has ended, the process aborts.
+    for thread in left_behind():
+        thread.join()
 
 
 def in_child(function: Callable[..., T], *arguments: Any) -> T:

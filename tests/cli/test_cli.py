@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from heeding import heed
 
 import granforce as gf
 from granforce.cli import commands
@@ -334,6 +335,7 @@ def test_interrupt_ends_quietly_and_keeps_what_is_finished(tmp_path):
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=heed,
     )
     deadline = time.time() + 120
     while not list((tmp_path / "s.zarr").glob("walk-*")) and time.time() < deadline:
@@ -363,9 +365,47 @@ def altered(arguments):
 
 @pytest.mark.parametrize("command", [swallowed, altered])
 def test_an_interrupt_that_a_library_swallows_ends_the_command(command, monkeypatch, capsys):
+    heed()
     monkeypatch.setattr(commands, "pack", command)
     assert main(["pack"]) == 130
     assert capsys.readouterr().err.splitlines()[-1] == (
         "granforce: interrupted; finished entries are kept"
     )
     assert not interrupts.interrupted()  # the next command begins anew
+
+
+# A program that HiGHS works on for minutes, as the command `pack`.
+LONG_PROGRAM = """
+import numpy as np
+from scipy import sparse
+from granforce.cli import command, commands
+from granforce.numerics import highs
+
+def solve(arguments):
+    rng = np.random.default_rng(0)
+    A = sparse.csr_matrix(rng.normal(size=(1000, 2000)))
+    model = highs.standard_form(A, A @ rng.random(2000))
+    highs.set_cost(model, rng.random(2000))
+    print("begun", flush=True)
+    with highs.cancelling.watched():
+        highs.solve(model)
+
+commands.pack = solve
+command()
+"""
+
+
+def test_a_call_that_is_left_behind_does_not_abort_the_process():
+    """C++ that returns to an interpreter that has ended does; so the process ends before it."""
+    running = subprocess.Popen(
+        [sys.executable, "-c", LONG_PROGRAM, "pack"],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=heed,
+    )
+    assert running.stdout.readline() == "begun\n"
+    time.sleep(1)  # usually within the solver; wherever it is, the command ends the same way
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=60)
+    assert (running.returncode, err) == (130, "granforce: interrupted; finished entries are kept\n")

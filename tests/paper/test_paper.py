@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from heeding import heed
 
 from granforce import measures
 from granforce.cli.parser import main
@@ -368,6 +369,7 @@ def running_study(folder):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=heed,
     )
 
 

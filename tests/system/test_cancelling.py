@@ -13,6 +13,7 @@ import time
 
 import numpy as np
 import pytest
+from heeding import heed
 from packings import packed
 from scipy import sparse
 
@@ -209,7 +210,11 @@ def test_ctrl_c_ends_a_kernel_in_the_main_thread():
         "gf.pack(40, 0.3, 0, sweeps=10**9, accuracy=1e-300)\n"
     )
     with subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=heed,
     ) as child:
         try:
             assert child.stdout.readline() == "begun\n"
