@@ -1,18 +1,31 @@
 """What the page computes on demand, as work for jobs.Task; all goes through study and the cache."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import xarray as xr
+
 from granforce.study import cells as study
 from granforce.study import kinds
+from granforce.study.cells import Kind
+from granforce.study.keys import Parameters
 
 from . import live
-from .data import SOURCES, Shown
+from .data import SOURCES, Cell, Library, Shown
+from .jobs import Job, Work
 from .replays import first_replay
+from .selection import Selection
 from .turns import in_turn
 
 # A compaction's part of the bar; it never seems to be at its end.
 PACKING_SHARE, NEARLY = 0.5, 0.95
 
 
-def found_or_made(library, job, stage, kind, params, **options):
+def found_or_made(
+    library: Library, job: Job, stage: str, kind: Kind, params: Parameters, **options: Any
+) -> xr.Dataset:
     """The dataset of a kind and parameters from a store, or computed in this stage.
 
     options: as the kind's compute takes them.
@@ -22,57 +35,57 @@ def found_or_made(library, job, stage, kind, params, **options):
         with in_turn(job, kind.name, params):
             library.lend_packing(params["packing"])
             job.begin(stage)
-            found, _ = study.get(library.cache, kind, params, progress=job.tell, **options)
+            found, _ = study.get(library.own, kind, params, progress=job.tell, **options)
     return found
 
 
-def states(library, selection):
+def states(library: Library, selection: Selection) -> Work:
     """Work that finds or computes the states of a Selection; results in their Shown."""
 
     params = selection.parameters()
 
-    def work(job):
+    def work(job: Job) -> Shown:
         with in_turn(job, selection.kind, params):
             cell = library.find(selection.kind, params)
             if cell is None:
                 _make_packing(job, library, selection.packing)
                 job.begin("states")
                 study.get(
-                    library.cache,
+                    library.own,
                     SOURCES[selection.kind],
                     params,
-                    progress=lambda done, total: _tell_states(job, done, total),
+                    progress=lambda done, total: _counted(job, done, total),
                     **_watched(selection, params),
                 )
                 cell = library.find(selection.kind, params)
+            assert cell is not None  # as it was kept
         return library.shown(cell)
 
-    work.wants = (selection.kind, params), ("packing", selection.packing)
-    return work
+    return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
 
 
-def _watched(selection, params):
+def _watched(selection: Selection, params: Parameters) -> dict[str, Any]:
     """Options of the computation of states that have it seen by those who follow it."""
     if selection.kind != "walk":
         return {}
     walking = live.shared(live.Walking, params)
 
-    def begun(S):
+    def begun(S: Any) -> None:
         walking.restart(first_replay(S, params["states"]))
 
     return {"begun": begun, "watch": walking.add}
 
 
-def exact_parameters(selection):
+def exact_parameters(selection: Selection) -> Parameters:
     """As a store names the exact intervals of a Selection."""
     return kinds.INTERVALS.parameters(selection.packing, mu=selection.mu)
 
 
-def exact(library, shown):
+def exact(library: Library, shown: Shown) -> Work:
     """Work that computes the exact intervals beside what is shown; results in a new Shown."""
     params = exact_parameters(shown.cell.selection)
 
-    def work(job):
+    def work(job: Job) -> Shown:
         replay = shown.replay
         bounding = live.shared(live.Bounding, params)
         dataset = found_or_made(
@@ -83,36 +96,34 @@ def exact(library, shown):
         library.keep_in_memory(found)
         return found
 
-    work.wants = ((kinds.INTERVALS.name, params),)
-    return work
+    return Work(work, wants=((kinds.INTERVALS.name, params),))
 
 
 # Standard error of ln V on the page: its width is then known to a part in a thousand.
 VOLUME_ERROR = 0.1
 
 
-def _volume_parameters(cell):
+def _volume_parameters(cell: Cell) -> Parameters:
     selection = cell.selection
     return kinds.VOLUME.parameters(selection.packing, VOLUME_ERROR, mu=selection.mu)
 
 
-def known_volume(library, cell):
+def known_volume(library: Library, cell: Cell) -> Callable[[Job], tuple[Cell, xr.Dataset | None]]:
     """Work that looks for the volume of S of a cell's packing: (cell, dataset or None)."""
     return lambda job: (cell, library.stored(kinds.VOLUME, _volume_parameters(cell)))
 
 
-def volume(library, cell):
+def volume(library: Library, cell: Cell) -> Work:
     """Work that measures the volume of S of a cell's packing; results in (cell, dataset)."""
     params = _volume_parameters(cell)
 
-    def work(job):
+    def work(job: Job) -> tuple[Cell, xr.Dataset]:
         return cell, found_or_made(library, job, "volume of S", kinds.VOLUME, params)
 
-    work.wants = ((kinds.VOLUME.name, params),)
-    return work
+    return Work(work, wants=((kinds.VOLUME.name, params),))
 
 
-def _make_packing(job, library, packing):
+def _make_packing(job: Job, library: Library, packing: Parameters) -> None:
     library.lend_packing(packing)
     if "imported" in packing:
         return
@@ -120,10 +131,10 @@ def _make_packing(job, library, packing):
         _compact(job, library, packing)
 
 
-def _compact(job, library, packing):
+def _compact(job: Job, library: Library, packing: Parameters) -> None:
     steps = library.expected_steps(packing["n"], packing["mu"])
 
-    def tell(step, _):
+    def tell(step: float, _: float | None) -> None:
         if steps:
             job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
 
@@ -131,13 +142,13 @@ def _compact(job, library, packing):
     seen = live.shared(live.Compaction, packing)
     seen.restart()
 
-    def look(glimpse):
+    def look(glimpse: Any) -> None:
         job.stage = f"compaction, step {glimpse.step}: {glimpse.state}"
         seen.add(glimpse)
 
-    study.get(library.cache, kinds.PACKING, packing, progress=tell, watch=look)
+    study.get(library.own, kinds.PACKING, packing, progress=tell, watch=look)
 
 
-def _tell_states(job, done, total):
+def _counted(job: Job, done: float, total: float | None) -> None:
     job.stage = f"{done} of {total} states"
     job.tell(done, total, part=(PACKING_SHARE, 1))

@@ -95,6 +95,13 @@ class Library:
         """The stores that could be opened; what both hold is taken from the first."""
         return [store for store in (self.shipped, self.cache) if store is not None]
 
+    @property
+    def own(self) -> Store:
+        """The cache, where what is computed is kept; InputError without one."""
+        if self.cache is None:
+            raise InputError("no cache folder can be written, so nothing can be computed")
+        return self.cache
+
     def cells(self) -> list[Cell]:
         """All states of the current algorithms, by series and μ; also kept as `catalogue`."""
         found: dict[str, Cell] = {}
@@ -183,12 +190,11 @@ class Library:
 
     def lend_packing(self, params: Parameters) -> None:
         """Copy a packing that only the shipped store has to the cache: it need not be made anew."""
-        if self.cache is None:
-            raise InputError("no cache folder can be written, so nothing can be computed")
+        own = self.own
         if self.shipped is not None:
             found = study.load(self.shipped, kinds.PACKING, params)
             if found is not None:
-                kinds.keep_packing(self.cache, params, dataset_packing(found))
+                kinds.keep_packing(own, params, dataset_packing(found))
 
     def expected_steps(self, n: int, mu: float) -> int | None:
         """Compaction steps of the stored packing of n grains with the nearest μ, or None."""

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 
 import param
 
@@ -57,12 +57,23 @@ computing = Pool(LIMITS.computations, "granforce-compute")
 reading = Pool(2, "granforce-read")
 
 
+class Work(NamedTuple):
+    """Work for a Job that will take turns: `wants` names them, so that others wait for it."""
+
+    run: Callable[[Job], Any]
+    wants: tuple[Any, ...]
+
+    def __call__(self, job: Job) -> Any:
+        """Do it."""
+        return self.run(job)
+
+
 class Job:
     """One piece of work under way. Fields are written by its thread and read by the page.
 
     work(job) returns the result. It may give `job.tell` as progress callback and set `job.stage` to
     say what it is doing. All of it ends soon after `cancel`, unless other jobs want what it makes.
-    Raising Later it is called again. work.wants: names of turns that it will take, if it has any.
+    Raising Later it is called again. Where it takes turns it is a Work, which names them.
     """
 
     def __init__(
@@ -82,7 +93,7 @@ class Job:
         self._begun = time.perf_counter()
         self._cancel, self._ended = threading.Event(), threading.Event()
         self.turns: list[Turn] = []  # that it has just now
-        self._wants = [turn_of(named) for named in getattr(work, "wants", ())]
+        self._wants = [turn_of(named) for named in (work.wants if isinstance(work, Work) else ())]
         for turn in self._wants:
             turn.join(self)
         self._taken = threading.Lock()  # by the thread that runs it, or by whoever cancels it first

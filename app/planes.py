@@ -1,27 +1,40 @@
 """Force space seen in a plane: where states of a Replay lie in it, and the outline of S there."""
 
+from __future__ import annotations
+
 import json
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+import xarray as xr
 from scipy.spatial import ConvexHull, QhullError
 
 from granforce import measures
-from granforce.records import InputError
+from granforce.records import Floats, InputError
 from granforce.study import kinds
+from granforce.study.keys import Parameters
 from granforce.study.stresses import stress_axes
 
 from .compute import found_or_made
+from .data import Cell, Library
+from .jobs import Job
+from .replays import Replay
+from .selection import Selection
+
+# Two (position in the backbone, 0 for f_n or 1 for f_t), or none.
+Components = tuple[tuple[int, int], ...]
 
 
 class Plane(NamedTuple):
     """Two axes of force space, and where states lie in their plane. Forces are in ⟨f_n⟩."""
 
-    components: tuple  # two (position in the backbone, 0 or 1), or empty for principal axes
-    axes: np.ndarray  # (2, N_c, 2)
-    origin: np.ndarray  # (2,) of the plane's coordinates
-    share: np.ndarray  # (2,) of the variance of the states, NaN for components
-    path: np.ndarray  # (F, 2) float32: the original network, then the states shown
+    components: Components  # two (position in the backbone, 0 or 1), or empty for principal axes
+    axes: Floats  # (2, N_c, 2)
+    origin: Floats  # (2,) of the plane's coordinates
+    share: Floats  # (2,) of the variance of the states, NaN for components
+    path: Any  # (F, 2) float32: the original network, then the states shown
     kind: str = ""  # STRESS where the axes are those of stresses
 
 
@@ -32,14 +45,14 @@ class Outlined(NamedTuple):
     """The outline of S in a Plane, between polygons inside and outside."""
 
     plane: Plane
-    inner: np.ndarray  # (k, 2) corners
-    outer: np.ndarray  # (m, 2)
+    inner: Floats  # (k, 2) corners
+    outer: Floats  # (m, 2)
     gap: float  # largest distance between them
     programs: int  # linear programs it took
     seconds: float
 
 
-def principal(replay, states=None):
+def principal(replay: Replay, states: Any = None) -> Plane:
     """The Plane of the two directions along which states (k, N_c, 2), by default those shown, vary
     most.
     """
@@ -48,12 +61,13 @@ def principal(replay, states=None):
     return _plane(replay, (), axes, measures.mean_network(states), share)
 
 
-def components(replay, first, second):
+def components(replay: Replay, first: Sequence[int], second: Sequence[int]) -> Plane:
     """The Plane of two components (position in the backbone, 0 for f_n or 1 for f_t).
 
     InputError for a contact that is not there, or one component named twice.
     """
-    chosen = tuple(first), tuple(second)
+    (a, part), (b, other) = first, second
+    chosen = (a, part), (b, other)
     count = replay.normal.shape[1]
     for contact, component in chosen:
         if not 0 <= contact < count or component not in (0, 1):
@@ -66,24 +80,26 @@ def components(replay, first, second):
     return _plane(replay, chosen, axes, np.zeros(axes.shape[1:]), np.full(2, np.nan))
 
 
-def stress(library, selection, replay):
+def stress(library: Library, selection: Selection, replay: Replay) -> Plane:
     """The Plane of stresses: (σ_xx − σ_yy)/2P and σ_xy/P. InputError without a pressure."""
     axes = stress_axes(library.packing(selection.packing), selection.mu)
     none = np.zeros(axes.shape[1:])
     return _plane(replay, (), axes, none, np.full(2, np.nan))._replace(kind=STRESS)
 
 
-def _frames(replay):
+def _frames(replay: Replay) -> Floats:
     return np.stack([replay.normal, replay.tangential], axis=2).astype(np.float64)
 
 
-def _plane(replay, chosen, axes, centre, share):
+def _plane(
+    replay: Replay, chosen: Components, axes: Floats, centre: Floats, share: Floats
+) -> Plane:
     path = np.tensordot(_frames(replay) - centre, axes, ((1, 2), (1, 2)))
     origin = np.tensordot(axes, centre, ((1, 2), (0, 1)))
     return Plane(chosen, axes, origin, share, path.astype(np.float32))
 
 
-def labels(replay, plane):
+def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
     """Titles of the two axes, in words."""
     if plane.components:
         return tuple(
@@ -99,14 +115,14 @@ def labels(replay, plane):
     )
 
 
-def name(plane):
+def name(plane: Plane) -> str:
     """What a link calls a Plane."""
     if not plane.components:
         return "s" if plane.kind == STRESS else "p"
     return "-".join(f"{contact}{'nt'[part]}" for contact, part in plane.components)
 
 
-def read(text):
+def read(text: str) -> Components:
     """The components () or ((contact, part), (contact, part)) of a name; ValueError for none."""
     if text in ("p", "s"):
         return ()
@@ -114,7 +130,7 @@ def read(text):
     return first, second
 
 
-def named(library, cell, replay, text):
+def named(library: Library, cell: Cell, replay: Replay, text: str) -> Plane:
     """The Plane of a name, with the axes that are kept of it."""
     chosen = read(text)
     if chosen:
@@ -126,7 +142,7 @@ def named(library, cell, replay, text):
     return plane if kept is None else _as_kept(replay, plane, kept)
 
 
-def beside(cells, cell):
+def beside(cells: Sequence[Cell], cell: Cell) -> Cell | None:
     """Of these the cell of the other kind of states of the same packing and μ with most, or None.
 
     States uniform in S beside a walk, a walk beside uniform ones.
@@ -142,14 +158,14 @@ def beside(cells, cell):
     return max(others, key=lambda other: other.selection.states, default=None)
 
 
-def points(plane, replay, other):
+def points(plane: Plane, replay: Replay, other: Replay) -> Floats:
     """Where the states (k, 2) of another Replay of the same contacts lie in a Plane."""
     if not np.array_equal(replay.backbone, other.backbone):
         return np.empty((0, 2))
     return np.tensordot(_frames(other)[1:], plane.axes, ((1, 2), (1, 2))) - plane.origin
 
 
-def inner_share(points, outline):
+def inner_share(points: Floats, outline: npt.ArrayLike) -> float:
     """Share of points (n, 2) within a convex polygon (k, 2) shrunk to half about its centre."""
     corners = np.asarray(outline, dtype=np.float64)
     after = np.roll(corners, -1, axis=0)
@@ -161,7 +177,7 @@ def inner_share(points, outline):
     return float(np.mean(np.all(turn * np.sign(slice_.sum()) >= 0, axis=1)))
 
 
-def hull(points):
+def hull(points: Floats) -> Floats:
     """Corners of the convex hull of points (n, 2); all points where they lie on a line."""
     try:
         return points[ConvexHull(points).vertices]
@@ -169,16 +185,18 @@ def hull(points):
         return points
 
 
-def area(polygon):
+def area(polygon: npt.ArrayLike) -> float:
     """Area of a convex polygon (k, 2); 0 for fewer than three corners."""
     x, y = np.asarray(polygon, dtype=np.float64).T
     return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
-def outline(library, cell, replay, plane):
+def outline(
+    library: Library, cell: Cell, replay: Replay, plane: Plane
+) -> Callable[[Job], Outlined]:
     """Work, for jobs.Task, that finds or computes the outline of S in a Plane."""
 
-    def work(job):
+    def work(job: Job) -> Outlined:
         if plane.kind == STRESS:
             return _stresses(library, job, cell, plane)
         params = _parameters(cell, replay, plane)
@@ -189,7 +207,7 @@ def outline(library, cell, replay, plane):
     return work
 
 
-def _stresses(library, job, cell, plane):
+def _stresses(library: Library, job: Job, cell: Cell, plane: Plane) -> Outlined:
     """The Outlined of all stresses."""
     params = kinds.STRESS.parameters(cell.selection.packing, mu=cell.mu)
     found = found_or_made(library, job, "outline of all stresses", kinds.STRESS, params)
@@ -199,7 +217,7 @@ def _stresses(library, job, cell, plane):
     return Outlined(plane, inner, outer, gap, programs, found["seconds"].item())
 
 
-def _parameters(cell, replay, plane):
+def _parameters(cell: Cell, replay: Replay, plane: Plane) -> Parameters:
     """As a store names the outline in a Plane."""
     selection = cell.selection
     chosen = [[int(replay.backbone[contact]), part] for contact, part in plane.components]
@@ -211,7 +229,7 @@ def _parameters(cell, replay, plane):
     )
 
 
-def _as_kept(replay, plane, found):
+def _as_kept(replay: Replay, plane: Plane, found: xr.Dataset) -> Plane:
     """The Plane on the axes that its outline was made with."""
     axes = found["axes"].values
     if np.array_equal(axes, plane.axes):
@@ -220,9 +238,14 @@ def _as_kept(replay, plane, found):
     return _plane(replay, plane.components, axes, centre, plane.share)
 
 
-def _outlined(replay, plane, found):
+def _outlined(replay: Replay, plane: Plane, found: xr.Dataset) -> Outlined:
     """The outline as kept; its axes are those it was made with, and the path follows them."""
     plane = _as_kept(replay, plane, found)
-    inner, outer = (found[name].values - plane.origin for name in ("inner", "outer"))
-    numbers = (found[name].item() for name in ("outline_gap", "programs", "seconds"))
-    return Outlined(plane, inner, outer, *numbers)
+    return Outlined(
+        plane,
+        inner=found["inner"].values - plane.origin,
+        outer=found["outer"].values - plane.origin,
+        gap=found["outline_gap"].item(),
+        programs=found["programs"].item(),
+        seconds=found["seconds"].item(),
+    )
