@@ -33,7 +33,7 @@ function legend({ scene, empty, load }) {
   if (empty && !scene.idle) return "orange: the motion in which they give way; grey: weight and other loads"
   const pulled = load.some((v, k) => k < 3 * scene.r.length && v), pressed = scene.pressing.length > 0
   const loads = [pulled ? "weight" : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
-  return `blue: contact forces; wedge: where friction lets them point, tangential ≤ μ × normal${loads ? `; grey: ${loads}` : ""}`
+  return `blue: contact forces; wedge: where friction lets them point, tangential ≤ μ × normal${loads ? `; grey: ${loads}` : ""}; orange: at the limit`
 }
 
 /** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
@@ -42,7 +42,7 @@ function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const forces = plural(count, "contact") + " with a normal and a tangential force each"
   if (empty && !scene.idle) {
     const none = consistent ? "none of their solutions is allowed" : "they have no solution"
-    const because = consistent ? "; each has a contact that would have to pull, or a tangential force of more than μ × its normal force" : ""
+    const because = consistent ? "; in every solution some contact would have to pull, or its tangential force to exceed μ × its normal force" : ""
     return `<b>${2 * count} unknown forces, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
@@ -92,7 +92,7 @@ function sentence(body, mu, now) {
   if (!body.bounded) {
     const jammed = several ? "the disks have jammed themselves" : "the disk has jammed itself"
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
-    return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that walls and disks can press on each other from opposite sides, as hard as they like: such forces cancel, and can be added to any that hold.${filled}`
+    return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
   if (h > 3) return `${h} free numbers: infinitely many sets of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many sets. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
