@@ -5,6 +5,7 @@ import pytest
 from packings import REFERENCE, lattice, packed, reference, two_disks
 from scipy.optimize import linprog
 
+from granforce.forces import backbone
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.records import Contacts, NotJammedError, make_packing
@@ -79,6 +80,26 @@ def test_pruning_changes_no_state():
     target[np.setdiff1d(np.arange(len(target)), pruned.index)] = 0
     assert np.allclose(nearest_piqp(whole, target).forces, few, atol=1e-7)
     assert pruned.skipped["rattlers"] > 0
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_networks_at_hand_and_local_proofs_spare_programs_and_change_no_backbone(
+    monkeypatch, given
+):
+    packing = reference("n100_mu1_s12")
+    if not given:
+        packing = packing._replace(forces=np.zeros_like(packing.forces))
+    asked, proven = [], backbone._proven_idle
+    monkeypatch.setattr(
+        backbone,
+        "_proven_idle",
+        lambda full, idle, known: asked.append(idle.sum()) or proven(full, idle, known),
+    )
+    spared = ensemble(packing)
+    monkeypatch.setattr(backbone, "_not_pulled", lambda full, known, idle: idle)
+    monkeypatch.setattr(backbone, "_cannot_balance", lambda full, idle: np.zeros_like(idle))
+    assert np.array_equal(ensemble(packing).index, spared.index)
+    assert asked[0] < asked[1]
 
 
 def relabelled(packing, order):
