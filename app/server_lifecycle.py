@@ -1,4 +1,4 @@
-"""Run once when the server starts: limits that cannot be read end it, kernels are compiled.
+"""Run once when the server starts: kernels are compiled, and it ends where it could not serve.
 
 And once when it ends.
 """
@@ -6,6 +6,8 @@ And once when it ends.
 import importlib
 import sys
 from contextlib import suppress
+
+from panel import config
 
 from granforce.records import InputError
 from granforce.study.scan import warm_up
@@ -21,6 +23,13 @@ except InputError as error:
 
 def on_server_loaded(server_context):
     """Import and load what visitors will need, or compile it first; they may come meanwhile."""
+    if config.nthreads is not None:  # a page takes its turns on one thread, the server's own
+        print(
+            "the app computes in threads of its own, and cannot run with --num-threads or "
+            "PANEL_NUM_THREADS: start panel serve without",
+            file=sys.stderr,
+        )
+        sys.exit(2)
     # xarray imports dask, where it is installed, with the first array it looks at, which fails
     # where two threads do so at once.
     with suppress(ImportError):

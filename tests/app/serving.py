@@ -28,7 +28,7 @@ MODEL = (
 
 
 @contextmanager
-def serve(folder, *options, port=None, **variables):
+def serve(folder, *options, port=None, wait=True, **variables):
     """Address and process of the app on a free port or this one; cache and log are in folder."""
     port = port or free_port()
     env = os.environ | variables
@@ -39,7 +39,9 @@ def serve(folder, *options, port=None, **variables):
     with open(folder / "log", "a") as log:
         server = subprocess.Popen(command, cwd=ROOT, env=env, stdout=log, stderr=log)
     try:
-        wait_until_served(f"http://localhost:{port}/static/js/bokeh.min.js", server, folder / "log")
+        if wait:
+            address = f"http://localhost:{port}/static/js/bokeh.min.js"
+            wait_until_served(address, server, folder / "log")
         yield f"http://localhost:{port}/app", server
     finally:
         server.terminate()
