@@ -202,7 +202,7 @@ def colour_bar(state):
         return "−½ ⟨fₙ⟩", diverging, "+½ ⟨fₙ⟩"  # see FULL in grab.js
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen))
     return {
-        "mobilised": ("−1", diverging, "1"),
+        "mobilised": ("slips one way −1", diverging, "1 the other way"),
         "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
         "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads)),
         "change": ("−⟨fₙ⟩", diverging, "+⟨fₙ⟩"),

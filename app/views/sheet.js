@@ -85,9 +85,9 @@ function colourBar({ low, high, stops }) {
   })
   return [
     `<linearGradient id="colours">${parts.join("")}</linearGradient>`,
-    `<text x="110" y="${PIXELS + 27}" text-anchor="end">${safe(low)}</text>`,
-    `<rect x="118" y="${PIXELS + 14}" width="200" height="16" fill="url(#colours)"/>`,
-    `<text x="326" y="${PIXELS + 27}">${safe(high)}</text>`,
+    `<text x="140" y="${PIXELS + 27}" text-anchor="end">${safe(low)}</text>`,
+    `<rect x="148" y="${PIXELS + 14}" width="200" height="16" fill="url(#colours)"/>`,
+    `<text x="356" y="${PIXELS + 27}">${safe(high)}</text>`,
   ]
 }
 
