@@ -90,8 +90,12 @@ def plot(title, x, y, **options):
 
 
 def hover(renderers, *rows, **options):
-    """Show these (label, field) rows over the renderers."""
-    return HoverTool(renderers=renderers, tooltips=list(rows), **options)
+    """Show these (label, field) rows over the renderers, beside the mouse.
+
+    Bokeh cannot snap to what a layer draws in its place (layer.js): it has not laid that out.
+    """
+    tooltips = list(rows)
+    return HoverTool(renderers=renderers, tooltips=tooltips, point_policy="follow_mouse", **options)
 
 
 def corner(fig, word):
