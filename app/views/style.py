@@ -90,12 +90,10 @@ def plot(title, x, y, **options):
 
 
 def hover(renderers, *rows, **options):
-    """Show these (label, field) rows over the renderers, beside the mouse.
-
-    Bokeh cannot snap to what a layer draws in its place (layer.js): it has not laid that out.
-    """
-    tooltips = list(rows)
-    return HoverTool(renderers=renderers, tooltips=tooltips, point_policy="follow_mouse", **options)
+    """Show these (label, field) rows over the renderers."""
+    # Beside the mouse: where it would snap to a bar, Bokeh 3.9 fails for want of the bar's sides.
+    policy = {"point_policy": "follow_mouse"}
+    return HoverTool(renderers=renderers, tooltips=list(rows), **policy, **options)
 
 
 def corner(fig, word):
