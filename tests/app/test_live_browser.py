@@ -441,22 +441,6 @@ def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(visit)
     until(page, "!scene.hand.player.plots.layers.bars.on")
     page.wait_for_function("before => painted > before", arg=before)
     page.wait_for_function(f"visible => JSON.stringify({drawn}) === visible", arg=visible)
-    # Over a bar stands what it is.
-    at = page.evaluate("""() => {
-        const view = Bokeh.documents[0].views_manager.find_one(
-            Bokeh.documents[0].get_model_by_name("bars_figure"))
-        view.el.scrollIntoView()
-        const { left, top } = view.canvas_view.el.getBoundingClientRect()
-        const bars = Bokeh.documents[0].get_model_by_name("bars")
-        const all = (name) => bars.get_column(name)
-        const [low, high] = [all("low"), all("high")], long = Array.from(low, (y, k) => high[k] - y)
-        const k = long.indexOf(Math.max(...long)), { x_scale, y_scale } = view.frame
-        const [x, y] = [all("rank")[k], (low[k] + high[k]) / 2]
-        return [left + x_scale.compute(x), top + y_scale.compute(y)]
-    }""")
-    page.mouse.move(at[0] - 3, at[1])
-    page.mouse.move(*at)
-    page.locator(".bk-Tooltip").get_by_text("contact").first.wait_for()
 
 
 def inside(page, selector):
