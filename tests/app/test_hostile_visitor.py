@@ -152,7 +152,7 @@ def test_a_server_that_is_told_to_end_does_so_while_it_computes(page, shipped, t
 
 def test_a_server_with_threads_of_panel_is_refused_at_its_start(tmp_path):
     with serve(tmp_path, PANEL_NUM_THREADS="2", wait=False) as (_, server):
-        assert server.wait() == 2
+        assert server.wait(300) == 2
     assert "cannot run with --num-threads" in (tmp_path / "log").read_text().splitlines()[-1]
 
 
