@@ -42,7 +42,7 @@ def found_or_made(
 def states(library: Library, selection: Selection) -> Work:
     """Work that finds or computes the states of a Selection; results in their Shown."""
 
-    params = selection.parameters()
+    kind, params = SOURCES[selection.kind], selection.parameters()
 
     def work(job: Job) -> Shown:
         with in_turn(job, selection.kind, params):
@@ -50,22 +50,22 @@ def states(library: Library, selection: Selection) -> Work:
             if cell is None:
                 _make_packing(job, library, selection.packing)
                 job.begin("states")
-                study.get(
+                dataset, _ = study.get(
                     library.own,
-                    SOURCES[selection.kind],
+                    kind,
                     params,
                     progress=lambda done, total: _counted(job, done, total),
-                    **_watched(selection, params),
+                    **_watched(job, selection, params),
                 )
-                cell = library.find(selection.kind, params)
+                cell = library.find(selection.kind, kind.reached(params, dataset))
             assert cell is not None  # as it was kept
         return library.shown(cell)
 
     return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
 
 
-def _watched(selection: Selection, params: Parameters) -> dict[str, Any]:
-    """Options of the computation of states that have it seen by those who follow it."""
+def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, Any]:
+    """Options of the computation of states that have it seen, and stopped, by who follows it."""
     if selection.kind != "walk":
         return {}
     walking = live.shared(live.Walking, params)
@@ -73,7 +73,11 @@ def _watched(selection: Selection, params: Parameters) -> dict[str, Any]:
     def begun(S: Any) -> None:
         walking.restart(first_replay(S, params["states"]))
 
-    return {"begun": begun, "watch": walking.add}
+    def add(found: Any) -> None:
+        job.keeps = True
+        walking.add(found)
+
+    return {"begun": begun, "watch": add, "enough": job.enough}
 
 
 def exact_parameters(selection: Selection) -> Parameters:

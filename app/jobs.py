@@ -71,7 +71,8 @@ class Work(NamedTuple):
 class Job:
     """One piece of work under way. Fields are written by its thread and read by the page.
 
-    work(job) returns the result. It may give `job.tell` as progress callback and set `job.stage` to
+    work(job) returns the result; once it sets `job.keeps`, `stop` ends it with what it has so far.
+    It may give `job.tell` as progress callback and set `job.stage` to
     say what it is doing. All of it ends soon after `cancel`, unless other jobs want what it makes.
     Raising Later it is called again. Where it takes turns it is a Work, which names them.
     """
@@ -92,6 +93,8 @@ class Job:
         self._pool, self._on_end = pool, on_end
         self._begun = time.perf_counter()
         self._cancel, self._ended = threading.Event(), threading.Event()
+        self.keeps = False  # whether what it has so far is a result
+        self._stop = threading.Event()
         self.turns: list[Turn] = []  # that it has just now
         self._wants = [turn_of(named) for named in (work.wants if isinstance(work, Work) else ())]
         for turn in self._wants:
@@ -122,6 +125,14 @@ class Job:
         self._cancel.set()
         if self._taken.acquire(blocking=False):
             self._end()
+
+    def stop(self) -> None:
+        """Ask it to end with the result that it has so far, unless other jobs want more."""
+        self._stop.set()
+
+    def enough(self) -> bool:
+        """Whether what it has so far is all that is wanted; from then on it is no cancelling."""
+        return self._stop.is_set() and not any(turn.wanted(self) for turn in list(self.turns))
 
     def cancelled(self) -> bool:
         """Whether it was asked to end."""
@@ -192,6 +203,8 @@ class Task(param.Parameterized):
     stage = param.String(doc="what the job is doing")
     fraction = param.Number(default=None, allow_None=True, doc="part done, None if unknown")
     seconds_left = param.Number(default=None, allow_None=True)
+    dismissed = param.Boolean(doc="told when the visitor wants no more of it; never stays True")
+    keeps = param.Boolean(doc="whether what the job has so far would be a result")
     message = param.String(doc="one line about what went wrong, or empty")
 
     def __init__(
@@ -220,8 +233,9 @@ class Task(param.Parameterized):
         on_end = None if self._wake is None else partial(self._wake, self.poll)
         self._job, self._done = Job(work, self._pool, on_end), done
         self.param.update(
-            running=True, stage=self._job.stage, fraction=None, seconds_left=None, message=""
-        )
+            running=True, stage=self._job.stage, fraction=None, seconds_left=None, keeps=False,
+            message="",
+        )  # fmt: skip
 
     def poll(self) -> None:
         """Take over how far the job is; when it has ended, its result."""
@@ -237,6 +251,7 @@ class Task(param.Parameterized):
                 stage="cancelling …" if job.cancelled() else job.stage,
                 fraction=job.fraction,
                 seconds_left=job.seconds_left,
+                keeps=job.keeps and not job.cancelled(),
             )
             return
         done, self._job, self._done = self._done, None, None
@@ -254,6 +269,17 @@ class Task(param.Parameterized):
         """Ask the job to end; its result is dropped."""
         if self._job is not None:
             self._job.cancel()
+
+    def dismiss(self) -> None:
+        """Cancel, as the visitor wishes; those who know what was there before bring it back."""
+        self.cancel()
+        self.dismissed = True
+        self.dismissed = False
+
+    def stop(self) -> None:
+        """Ask the job to end with the result that it has so far."""
+        if self._job is not None and self._job.keeps:
+            self._job.stop()
 
     def close(self) -> None:
         """End the job, and begin no other: nobody is there any more."""

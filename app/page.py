@@ -14,12 +14,13 @@ from .data import Library
 from .grabs import Hand
 from .jobs import Task, computing, reading
 from .state import AppState
+from .views import explanation
 from .views.address import Address
 from .views.controls import Controls
-from .views.explanation import Explanation
 from .views.hints import Hints
 from .views.packing import PackingView
 from .views.parts import (
+    BESIDE,
     PLAIN,
     answer_with_lock,
     mend_late_views,
@@ -144,8 +145,8 @@ def _large(document, query):
     packing.player.on_hand = Hand(state, state.task(reading), packing.player.hand_over).heard
     packing.player.on_known = state.knowledge.heard
     left = pn.Column(packing.player, **wide)
-    middle = pn.Column(visible=False, css_classes=["in-plane"], **wide)
-    right, sidebar = pn.Column(**wide), pn.Column()
+    middle = pn.Column(visible=False, css_classes=["in-plane"], styles=BESIDE, **wide)
+    right, sidebar = pn.Column(styles=BESIDE, **wide), pn.Column()
     header = pn.Row(sizing_mode="stretch_width", align="center", margin=(0, 8))
     whole = pmui.Page(
         title=TITLE,
@@ -167,7 +168,9 @@ def _large(document, query):
     def parts():
         """What follows the packing."""
         controls = Controls(state)
-        left.extend([controls.beside, packing.legend, Explanation(state), Address(state), Hints()])
+        left.extend(
+            [controls.beside, packing.legend, explanation.view(state), Address(state), Hints()]
+        )
         header[:] = in_title(state, query)
         widgets = controls.panel()
         yield
@@ -347,7 +350,9 @@ def _module(name):
 def _pale_when_old(parts):
     """Have parts (name, view) of other states than those asked for be pale; see player.js."""
     for name, part in parts:
-        part.styles = {"opacity": f"var(--{'growing' if name in GROWING else 'still'}, 1)"}
+        part.styles = part.styles | {
+            "opacity": f"var(--{'growing' if name in GROWING else 'still'}, 1)"
+        }
 
 
 def _poll_while_running(state, document):

@@ -18,9 +18,9 @@ from .selection import command, link, read_link, series
 
 # What colour, width and order can show: word in links → words on screen.
 COLOURS = {
+    "change": "change from the original",
     "mobilised": "mobilisation fₜ/(μ fₙ)",
     "extent": "length of the interval ΔFₙ",
-    "change": "change since the original",
     "sign": "sign of fₙ − pinned fₙ",
     "load": "limit load",
     "known": "what is known: part of the interval gone",
@@ -38,6 +38,26 @@ SORTS = {
     "exact": "exact ΔFₙ",
     "position": "place of the original in its interval",
     "shortened": "how much what is known shortened it",
+}
+# What single tabs can show.
+FIGURES = {
+    "eta": "η(μ)",
+    "extent": "P(ΔFₙ)",
+    "correlation": "corr(μ)",
+    "scatter": "ΔFₙ against fₙ",
+    "force": "P(fₙ)",
+}
+AXES = {"linear": "linear", "log": "logarithmic"}
+PUSHES = {
+    "one": "one contact",
+    "all": "failure load of every contact",
+    "store": "critical force against η2",
+}
+PLANES = {
+    "principal": "principal axes",
+    "contact": "fₙ, fₜ of a contact",
+    "pair": "fₙ of two contacts",
+    "stress": "stresses",
 }
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 SCALES = {"mean": "fₙ / ⟨fₙ⟩", "own": "fₙ / original fₙ"}
@@ -80,11 +100,15 @@ class AppState(param.Parameterized):
     known = param.List(doc="known.Statements: forces of contacts that are taken for known")
     narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
     ranked = param.Parameter(doc="known.Ranked: contacts to measure next, or None")
-    colour = param.Selector(default="mobilised", objects=list(COLOURS))
+    colour = param.Selector(default="change", objects=list(COLOURS))
     thickness = param.Selector(default="normal", objects=list(WIDTHS))
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
     sort = param.Selector(default="original", objects=list(SORTS), doc="order of the intervals")
     scale = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
+    figure = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
+    axis = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
+    pushing = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
+    axes = param.Selector(default="principal", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
     busy = param.Boolean(doc="whether any task is running")
     displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
@@ -103,6 +127,7 @@ class AppState(param.Parameterized):
         self.knowledge = Knowledge(self)
         self.besides = Beside(self)
         self.param.watch(self._need_loads, ["colour", "thickness", "replay"])
+        self.computation.param.watch(self._bring_back, "dismissed")
         self.open(query)
 
     # Tasks
@@ -348,6 +373,11 @@ class AppState(param.Parameterized):
         if shown.replay.normal.shape[1] <= EXACT_FOLLOW and shown.replay.summary["dimension"]:
             self.compute_exact()
 
+    def _bring_back(self, event):
+        """What was on screen before something else was asked for, which is wanted no more."""
+        if event.new and self.missing and self.cell is not None:
+            self.show(self.cell)
+
     def _computes(self, selection):
         """Whether this is what is being computed."""
         return self.computation.running and self.live and self.live.selection == selection
@@ -469,6 +499,10 @@ VIEW = {
     "overlay": _flag,
     "sort": str,
     "scale": str,
+    "figure": str,
+    "axis": str,
+    "pushing": str,
+    "axes": str,
     "dark": _flag,
 }
 SPELLED = {"pulls": grabs.spelled, "known": known.spelled}

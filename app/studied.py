@@ -2,6 +2,7 @@
 
 import json
 import math
+import statistics
 import threading
 from functools import cache
 from pathlib import Path
@@ -56,3 +57,11 @@ def rows(*parts):
     """Rows of parts of the study at its usual number of disks; empty without a study."""
     table = study()
     return [] if table is None else table.part(*parts, n=table.plan["n"])
+
+
+def hill():
+    """How undetermined forces are over friction: [(μ, η2)], η2 the mean of the walks at each μ."""
+    by_mu = {}
+    for row in rows("walk"):
+        by_mu.setdefault(row["mu"], []).append(row["eta2"])
+    return [(mu, statistics.fmean(found)) for mu, found in sorted(by_mu.items())]

@@ -19,39 +19,51 @@ function icon(name) {
   return `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`
 }
 
-function button(name, title) {
-  return `<button type="button" class="${name}" title="${title}" aria-label="${title}">${icon(name)}</button>`
+function button(name, title, word = "") {
+  const said = word && ` <span>${word}</span>`
+  return `<button type="button" class="${name}" title="${title}" aria-label="${word ? `${word}: ` : ""}${title}">` +
+    `${icon(name)}${said}</button>`
 }
 
 const BUTTONS = `
+  <div class="lead"></div>
   <div class="source"></div>
   <div class="bar">
     ${button("restart", "restart at the original network (Home)")}
     ${button("back", "one state back (←)")}
-    ${button("play", "play (space)")}
+    ${button("play", "space", "Play")}
     ${button("step", "one state on (→)")}
     <input class="scrub" type="range" min="0" value="0" step="1" aria-label="state">
-    ${button("pin", "pin this state, to compare others with it")}
-    ${button("between", "to and fro between the pinned state and this one")}
-    ${button("split", "the pinned state and this one side by side; another μ then comes beside this one")}
     <label title="speed, states per second"><input class="speed" type="range" min="0" max="6" step="0.25" value="3"
       aria-label="speed"><span class="rate"></span></label>
-    ${button("undo", "undo the last pull (Z); Esc lets all go")}
+  </div>
+  <div class="bar tools">
+    ${button("pin", "pin this state, to compare others with it", "Pin")}
+    ${button("between", "between the pinned state and this one", "To and fro")}
+    ${button("split", "the pinned state and this one; another μ then comes beside this one", "Side by side")}
+    ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
     <span class="knowing">
-      ${button("hold", "hold the selected contact at its present force (H); again: let it go")}
+      ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
       <label title="error bar of a force that is held, in mean forces ⟨fₙ⟩; 0: held exactly">±
         <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in ⟨fₙ⟩"></label>
     </span>
   </div>
   <div class="read">
-    <span>state <b class="state"></b></span>
-    <span tabindex="0" data-term="eta1">η1 <b class="eta1"></b></span>
-    <span tabindex="0" data-term="eta2">η2 <b class="eta2"></b></span>
-    <span tabindex="0" data-term="eta3">η3 <b class="eta3"></b></span>
-    <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
-    <span tabindex="0" data-term="distance">from centre of the states <b class="distance"></b> ⟨fₙ⟩</span>
-    <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
+    <span>network <b class="state"></b></span>
+    <span class="running">
+      <span><b class="played"></b> played:</span>
+      <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
+      <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
+      <span tabindex="0" data-term="eta3">intervals <b class="eta3"></b></span>
+    </span>
   </div>`
+const CHECKS = `<summary>Check this network</summary>
+  <div class="read">
+    <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
+    <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
+    <span tabindex="0" data-term="distance">from the centre of the states <b class="distance"></b> ⟨fₙ⟩</span>
+  </div>`
+const ETA3 = 0.15 // as the paper scales it, to stand beside the other two
 
 class Buttons {
   /** actions: by the buttons' names; scrub(position); tab(number), for the digits. */
@@ -69,7 +81,11 @@ class Buttons {
     this.scenes = document.createElement("div")
     this.scenes.className = "scenes"
     this.scenes.append(scene.root)
-    this.root.append(this.scenes, this.skips)
+    const checks = document.createElement("details")
+    checks.className = "checks"
+    checks.innerHTML = CHECKS
+    checks.append(this.skips)
+    this.root.append(this.scenes, checks)
     this.scene = scene
     for (const name of Object.keys(ICONS)) this.part(name)?.addEventListener("click", actions[name])
     this.part("scrub").addEventListener("input", (event) => actions.scrub(Number(event.target.value)))
@@ -105,8 +121,8 @@ class Buttons {
 
   tellPlaying(playing) {
     const play = this.part("play"), word = playing ? "pause" : "play"
-    play.innerHTML = icon(word)
-    play.title = `${word} (space)`
+    play.innerHTML = `${icon(word)} ${playing ? "Pause" : "Play"}`
+    play.title = "space"
     play.setAttribute("aria-label", word)
     this.root.classList.toggle("playing", playing)
   }
@@ -143,12 +159,14 @@ class Buttons {
       state: replay.place,
       eta1: form(walk.eta1[seen], 3),
       eta2: form(walk.eta2[seen], 3),
-      eta3: form(walk.eta3[seen], 3),
+      eta3: form(ETA3 * walk.eta3[seen], 3),
+      played: seen,
       acceptance: accepted <= 1 ? `${Math.round(100 * accepted)} %` : "–",
       distance: form(replay.distance, 2),
       residual: Number.isFinite(residual) ? residual.toExponential(0) : "–",
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text
+    this.root.classList.toggle("ran", seen > 1 && !replay.held)
     this.part("scrub").value = replay.position
     this.count()
   }

@@ -5,20 +5,25 @@ import panel_material_ui as pmui
 
 from granforce.records import InputError, friction
 
+from .. import studied
 from ..data import SOURCES
+from ..jobs import reading
 from ..limits import LIMITS, RANGES
 from ..selection import KINDS, SOLVERS, differing, select
 from ..state import COLOURS, WIDTHS
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
+from .parts import EXTRA
 from .scenelist import SceneList
 
 WIDE = {"sizing_mode": "stretch_width"}
 SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
 FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
 HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
-SAME = "as S"  # a packing made with the friction of the ensemble
+MADE = "How it is made"
+FOLDED = {"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}}
+SAME = "the same μ"  # of a packing made with the friction of the ensemble
 
 
 def offered(state):
@@ -67,10 +72,11 @@ class Controls:
         # Where the sidebar lies over the page, the one control that all need stays on the page.
         self.beside = FrictionSlider(self._typed, on_narrow=True, **WIDE)
         self.beside.link(self.mu, mu="mu", bidirectional=True)
-        self.mu.link(self.beside, stored="stored")
+        self.mu.link(self.beside, stored="stored", hill="hill")
+        state.task(reading).start(lambda job: studied.hill(), self._draw)
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
         self.seed = self._number("Seed", 0, RANGES["seed"][1])
-        self.packed = pmui.TextInput(label="Friction during packing", placeholder=SAME, **SMALL)
+        self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
         self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
         self.kind = pmui.Select(label="States from", options=_swap(kinds), **SMALL)
@@ -100,21 +106,36 @@ class Controls:
         return [
             SceneList(**WIDE),
             self.mu,
+            self.go,
+            self.error,
+            pn.Column(
+                pmui.Typography("Force chains", **HEADING),
+                self.colour,
+                self.thickness,
+                self.overlay,
+                self._made(),
+                self.link,
+                styles=EXTRA,
+                **WIDE,
+            ),
+        ]
+
+    def _made(self):
+        """What only those need who compute something of their own, closed until it is opened."""
+        inside = pn.Column(
+            self.series,
             pn.Row(self.n, self.seed, **WIDE),
             self.states,
             self.packed,  # in a row of its own: its label would be cut in half of one
             self.kind,
             self.relax,
-            self.go,
-            self.error,
-            self.series,
-            pmui.Typography("Force chains", **HEADING),
-            self.colour,
-            self.thickness,
-            self.overlay,
-            pmui.Typography("Share", **HEADING),
-            pn.Row(self.link, self.command, **WIDE),
-        ]
+            self.command,
+            margin=(-10, -14),
+            **WIDE,
+        )
+        return pmui.Accordion(
+            (MADE, inside), active=[], title_variant="subtitle2", sx=FOLDED, margin=(8, 10), **WIDE
+        )
 
     def _connect(self):
         state = self.state
@@ -136,11 +157,14 @@ class Controls:
         state.computation.param.watch(self._rest, "running")
         self._tell()
 
+    def _draw(self, hill):
+        self.mu.hill = hill
+
     # From the widgets
 
     def _typed(self, text):
         try:
-            self.mu.mu = friction(text)
+            self.mu.mu = friction(text.replace(",", "."))
         except InputError as error:
             self.state.message = str(error)
 
@@ -153,11 +177,13 @@ class Controls:
             state.ask(self._selection(), at_once=True)
         except InputError as error:
             state.message = str(error)
+        if state.message:  # what was refused does not stay in its box
+            self._follow()
 
     def _selection(self):
         now, packing = self.state.selection, self.state.selection.packing
         own = self.packed.value.strip()
-        packed_mu = friction(own) if own else None
+        packed_mu = None if own in ("", SAME) else friction(own)
         details = {
             "kind": self.kind.value,
             "relax": self.relax.value,
@@ -191,7 +217,7 @@ class Controls:
             self.n.value = state.replay.summary["n"]
         self.n.param.update(disabled=asked.imported, visible=known or not asked.imported)
         self.seed.visible = self.packed.visible = not asked.imported
-        self.packed.value = "" if asked.same_mu else f"{packing['mu']:g}"
+        self.packed.value = SAME if asked.same_mu else f"{packing['mu']:g}"
         self.states.value = asked.states
         self.kind.value, self.relax.value = asked.kind, asked.relax
         self.relax.visible = asked.kind == "walk"

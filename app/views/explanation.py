@@ -18,15 +18,28 @@ summary:focus-visible, .term:focus-visible { outline: 2px solid #e8710a; outline
 """
 
 
+def lead(state):
+    """The question that the picture answers, and what is seen, as HTML."""
+    if state.moving and not state.selection.imported:
+        return jamming(state.selection)
+    return "" if state.seen is None else first(state.seen.summary)
+
+
 def first(summary):
-    """What moves and what does not."""
-    return (
-        f"<p><b>The disks never move.</b> These {summary['n']} rigid disks are held by one "
-        "pressure. Playback steps through "
-        f"{term('network', 'force networks')}: sets of contact forces on the same "
-        f"{term('packing')}, each of which keeps all disks in balance. Thick lines are large "
-        "forces.</p>"
-    )
+    """What does not move, what is free, and what playing shows."""
+    n, mu, free = summary["n"], summary["mu"], summary["dimension"]
+    forces = (2 if mu > 0 else 1) * summary["contacts"]
+    still = f"<b>These {n} disks never move.</b> "
+    given = f"Balance gives {forces - free} equations for {forces} contact forces: "
+    if free == 0:
+        question = "Same disks, same pressure: here the forces are fixed."
+        told = f"none is left free, and there is just one {term('network', 'force network')}."
+        told += " Choose some friction to see more." if mu == 0 else ""
+    else:
+        question = "Same disks, same pressure: why are the forces not fixed?"
+        networks = term("network", "force networks")
+        told = f"<b>{free} numbers are left free.</b> Playback shows {networks} that all balance."
+    return f"<h2>{question}</h2><p>{still}{given}{told}</p>"
 
 
 def rest(summary):
@@ -78,39 +91,39 @@ def _dependent(count):
 def jamming(selection):
     """What moves while a packing is made."""
     return (
-        f"<p><b>These disks move until they jam.</b> A gas of {selection.packing['n']} rigid disks "
-        "is compressed by one pressure: the box shrinks, collisions (the short chains) turn into "
-        "contacts that last, and at last nothing can move any more. From then on the disks "
-        f"never move again, and the contact forces are explored on that {term('packing')}.</p>"
+        "<h2>These disks move until they jam.</h2>"
+        f"<p>A gas of {selection.packing['n']} rigid disks is compressed by one pressure: the box "
+        "shrinks, collisions (the short chains) turn into contacts that last, and at last nothing "
+        "can move any more. From then on the disks never move again, and the contact forces are "
+        f"explored on that {term('packing')}.</p>"
     )
 
 
-def text(summary):
-    """All of it, the longer part to be opened."""
-    more = "<details><summary>{}</summary>{}</details>"
-    return first(summary) + more.format(QUESTION, rest(summary))
+def more(summary):
+    """The longer part, to be opened, as HTML for a page without scripts of its own."""
+    return f"<details><summary>{QUESTION}</summary>{rest(summary)}</details>"
 
 
-class Explanation(Scripted):
-    """Sentences below the packing; what was opened stays open, see explanation.js."""
+class Foldout(Scripted):
+    """Sentences under a line that opens them; what was opened stays open, see foldout.js."""
 
-    first = param.String(doc="HTML")
-    rest = param.String(doc="HTML, to be opened; empty where there is no more to say")
-    question = param.String(default=QUESTION, constant=True)
+    line = param.String()
+    inside = param.String(doc="HTML; empty where there is nothing to say")
 
-    _esm = joined("explanation")
+    _esm = joined("foldout")
     _stylesheets: ClassVar = [STYLE]
 
-    def __init__(self, state, **params):
-        super().__init__(sizing_mode="stretch_width", margin=(4, 10), **params)
-        self._state = state
-        state.param.watch(self._tell, ["replay", "growing", "moving"])
-        self._tell()
 
-    def _tell(self, *events):
-        state = self._state
+def view(state):
+    """The longer part of the explanation, below the packing."""
+    made = Foldout(line=QUESTION, sizing_mode="stretch_width", margin=(4, 10))
+
+    def tell(*events):
         if state.moving and not state.selection.imported:
-            self.param.update(first=jamming(state.selection), rest="")
+            made.inside = ""
         elif state.seen is not None:
-            summary = state.seen.summary
-            self.param.update(first=first(summary), rest=rest(summary))
+            made.inside = rest(state.seen.summary)
+
+    state.param.watch(tell, ["replay", "growing", "moving"])
+    tell()
+    return made

@@ -85,14 +85,15 @@ class View:
     def _caption(self):
         """What a picture says about itself: background, colour bar, scale and words."""
         state = self.state
-        low, stops, high = colour_bar(state)
+        pulled = bool(state.pulls)
+        low, stops, high = colour_bar(state, pulled)
         contrast = "#f2f5f9" if state.dark else "#18191d"
         return {
             "background": GROUND[state.dark],
             "ink": contrast,
             "bar": {"low": low, "high": high, "stops": stops},
             "lines": [
-                f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state)}.",
+                f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state, pulled)}.",
                 state.source,
                 *known_words(state),
                 f"granforce ?{state.link()}",

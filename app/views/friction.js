@@ -2,6 +2,7 @@
 
 const SNAP = 0.07 // decades within which the thumb jumps to a stored value
 
+const HILL = 22 // px, its height
 const NARROW = "(max-width: 1199.95px)" // where the sidebar begins closed
 
 const place = (mu, least) => (mu > 0 ? Math.max(least, Math.log10(mu)) : least)
@@ -13,6 +14,7 @@ export function render({ model }) {
   root.innerHTML = `
     <div class="head"><label for="mu">Friction coefficient μ</label>
       <input id="mu" class="typed" inputmode="decimal" aria-label="μ"></div>
+    <div class="hill"></div>
     <div class="rail"><div class="ticks"></div>
       <input type="range" step="0.01" aria-label="logarithm of μ"></div>
     <div class="scale"></div>`
@@ -44,6 +46,17 @@ export function render({ model }) {
     follow()
   }
 
+  /** η over μ as a hill over the rail: how undetermined forces are where friction is so large. */
+  function drawHill() {
+    const most = Math.max(...model.hill.map(([, eta]) => eta))
+    if (!(most > 0)) return
+    const points = model.hill.map(([mu, eta]) =>
+      `${100 * (place(mu, model.least) - model.least) / (model.most - model.least)},${HILL * (1 - eta / most)}`)
+    part("hill").innerHTML = `<span>how undetermined η</span>
+      <svg viewBox="0 0 100 ${HILL}" preserveAspectRatio="none" aria-hidden="true">
+      <polygon points="0,${HILL} ${points.join(" ")} 100,${HILL}"/></svg>`
+  }
+
   function follow() {
     range.value = place(model.mu, model.least)
     typed.value = String(Number(model.mu.toPrecision(4)))
@@ -73,7 +86,10 @@ export function render({ model }) {
 
   for (const name of ["least", "most", "stored"]) model.on(name, draw)
   model.on("mu", follow)
+  model.on("msg:custom", follow) // what was typed has been taken, or refused
+  model.on("hill", drawHill)
   draw()
+  drawHill()
 
   // In the page where it is narrow, else in the sidebar: never in both.
   const host = document.createElement("div"), narrow = matchMedia(NARROW)

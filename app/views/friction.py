@@ -14,6 +14,7 @@ class FrictionSlider(Scripted):
     """μ on a logarithmic scale; jumps to values in `stored`; see friction.js."""
 
     mu = param.Number(default=0.1)
+    hill = param.List(default=[], doc="[(μ, η)] to be drawn along it")
     stored = param.List(default=[], doc="values of μ that need no computing")
     least = param.Number(default=LEAST_PLACE, constant=True, doc="stands for μ = 0")
     most = param.Number(default=MOST_PLACE, constant=True)
@@ -30,3 +31,4 @@ class FrictionSlider(Scripted):
     def _handle_msg(self, message):
         if self._on_typed is not None:
             self._on_typed(str(message.get("typed", "")))
+            self._send_msg({"settled": True})

@@ -121,7 +121,7 @@ class Grab {
   forget() {
     if (this.replay) this.replay.held = null
     this.settle()
-    this.player.buttons.tellHeld(false)
+    this.player.tellHeld(false)
     this.player.buttons.part("source").textContent = this.player.model.source
     this.player.again()
   }
@@ -165,7 +165,7 @@ class Grab {
     player.look.before = this.before
     if (held.pull.length > 2) this.spot.describe(...held.pull.slice(1))
     else this.describe(...held.pull)
-    player.buttons.tellHeld(true)
+    player.tellHeld(true)
     player.again()
   }
 
@@ -190,7 +190,7 @@ class Grab {
   show(held) {
     const { replay, player } = this
     replay.held = held
-    player.buttons.tellHeld(true)
+    player.tellHeld(true)
     if (this.asked) return
     this.asked = requestAnimationFrame(() => {
       this.asked = 0

@@ -17,6 +17,7 @@ MOST_BARS = 1500  # more than there are pixels would only cost time; of more, ev
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
 BARS += ("whole_low", "whole_high")  # exact intervals without what is known
+SEEN = 0.9  # width of a bar of what was seen, in that of one contact; see layer.js
 ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
 ETAS = ("eta1", "eta2", "eta3")
 SMALL = {"size": "small", "width": 190, "margin": (10, 8, 2, 8)}
@@ -126,6 +127,8 @@ class View:
         if exact and self.state.narrowed is not None:
             before = exact_intervals(self.state.narrowed.before, replay)
             whole = before["low"][contacts], before["high"][contacts]
+        for renderer, part in zip(self.layers, (1, 1, SEEN), strict=True):
+            renderer.glyph.width = part * float(ranks[1] - ranks[0] if len(ranks) > 1 else 1)
         self.whole.visible = self.whole_item.visible = whole[0] is not none
         self.bars.data = {
             "rank": (ranks + 1).astype(np.float32),
@@ -216,9 +219,10 @@ class View:
             **bar,
         )
         seen = fig.vbar(
-            bottom="low", top="high", width=0.8, fill_color=DARK, legend_label="seen so far", **bar
+            bottom="low", top="high", width=SEEN, fill_color=DARK, legend_label="seen so far", **bar
         )
-        for glyph in (self.whole, exact, seen):
+        self.layers = self.whole, exact, seen
+        for glyph in self.layers:
             glyph.nonselection_glyph = None
         line = fig.line(
             "rank",

@@ -67,7 +67,7 @@ const LAYERS = {
     const column = (name) => plots.find("bars").get_column(name)
     const rank = column("rank"), low = column("low"), high = column("high")
     const now = column("now"), original = column("original")
-    const step = rank.length > 1 ? rank[1] - rank[0] : 1, half = 0.4 * Math.abs(x(1) - x(0))
+    const step = rank.length > 1 ? rank[1] - rank[0] : 1, half = 0.45 * step * Math.abs(x(1) - x(0))
     context.fillStyle = plots.colours.seen
     for (let k = 0; k < rank.length; k++) {
       const top = y(high[k])
@@ -77,7 +77,7 @@ const LAYERS = {
     context.lineWidth = 1.5
     line(context, rank, original, x, y, rank.length)
     context.fillStyle = plots.colours.now
-    const size = 2.4 * Math.min(1.6, Math.max(1, step * half))
+    const size = 2.4 * Math.min(1.6, Math.max(1, half))
     for (let k = 0; k < rank.length; k++) context.fillRect(x(rank[k]) - size / 2, y(now[k]) - size / 2, size, size)
     const chosen = plots.find("chosen")?.get_column("rank")?.[0]
     const at = chosen === undefined ? -1 : rank.indexOf(chosen)

@@ -68,7 +68,7 @@ class Look {
     if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
     if (colour === "load") return this.loads ? this.loads[c] / this.mostLoad : 0.5
     if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * FULL)
-    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / 2
+    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * FULL)
     return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))
   }
 

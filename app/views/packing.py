@@ -5,6 +5,7 @@ import panel as pn
 
 from .. import live
 from ..state import COLOURS, WIDTHS
+from . import explanation
 from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
@@ -75,6 +76,7 @@ class PackingView:
             self.player.param.watch(lambda event: state.param.update({event.name: event.new}), name)
         self._shown = None
         self.player.param.watch(self._swing, "between")
+        self.player.param.watch(self._explain, "pulled")
         state.param.watch(self._follow, [*SHARED, *FOLLOWED])
         state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "between"])
         state.param.watch(self._pin, ["known", "ranked", "replay"])
@@ -142,7 +144,9 @@ class PackingView:
         self.player.palettes = palettes(event.new)
 
     def _explain(self, *events):
-        self.legend.object = JAMMING if self.state.moving else legend(self.state)
+        pulled = self.player.pulled or bool(self.state.pulls)
+        self.legend.object = JAMMING if self.state.moving else legend(self.state, pulled)
+        self.player.lead = explanation.lead(self.state)
 
 
 def pins(state):
@@ -195,41 +199,42 @@ def full_extent(replay, exact):
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
 
-def colour_bar(state):
+def colour_bar(state, pulled):
     """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
-    if state.pulls:
-        return "−½ ⟨fₙ⟩", diverging, "+½ ⟨fₙ⟩"  # see FULL in grab.js
+    change = "less: −½ ⟨fₙ⟩", diverging, "+½ ⟨fₙ⟩: more"  # see FULL in grab.js
+    if pulled:
+        return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen))
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
         "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
         "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads)),
-        "change": ("−⟨fₙ⟩", diverging, "+⟨fₙ⟩"),
+        "change": change,
         "known": ("0", list(palettes(state.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[state.colour]
 
 
-def colour_words(state):
+def colour_words(state, pulled):
     """What colours mean just now."""
-    return "change by what was pulled" if state.pulls else COLOURS[state.colour]
+    return "change by what was pulled" if pulled else COLOURS[state.colour]
 
 
 def _largest(loads):
     return "(being computed)" if loads is None else f"{loads.max(initial=0):.2f} ⟨fₙ⟩"
 
 
-def legend(state):
+def legend(state, pulled=False):
     """What width and colour mean just now, as HTML."""
     replay = state.seen
     if replay is None:
         return ""
-    low, stops, high = colour_bar(state)
+    low, stops, high = colour_bar(state, pulled)
     bar = BAR.format(low=low, stops=",".join(stops), high=high)
-    if state.colour == "mobilised" and not state.pulls and replay.summary["mu"] == 0:
+    if state.colour == "mobilised" and not pulled and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
-    if state.colour == "known" and not state.pulls and state.narrowed is None:
+    if state.colour == "known" and not pulled and state.narrowed is None:
         bar = "(nothing is known: select a contact and press H)"
     sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
     tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
@@ -237,7 +242,7 @@ def legend(state):
         width=WIDTHS[state.thickness],
         width_term=EXPLAINED[state.thickness],
         colour_term=EXPLAINED[state.colour],
-        colour=colour_words(state),
+        colour=colour_words(state, pulled),
         bar=bar,
         marks=_marks(state.dark) if state.overlay else "",
         sides=f" of {' × '.join(sides)} largest radii{tilted}" if sides else "",

@@ -13,6 +13,11 @@ NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
 
 MOVES = ["moves"]  # tags of what the player draws itself while it plays
 
+# What is not seen while the tour speaks of something else; see tour.js.
+EXTRA = {"display": "var(--extra, flex)"}
+# Panes of HTML say themselves that they are visible, whatever is around them.
+BESIDE = {"content-visibility": "var(--beside, visible)"}
+
 PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
 
 SVG_ICON = (
@@ -197,3 +202,11 @@ def choice(labels, value):
         # Capitals would make other symbols of fₙ and fₜ.
         sx={"& .MuiToggleButton-root": PLAIN, **PLAIN},
     )
+
+
+def chosen(labels, state, name):
+    """A `choice` of the state's parameter of this name."""
+    made = choice(labels, getattr(state, name))
+    made.param.watch(lambda event: state.param.update({name: event.new}), "value")
+    state.param.watch(lambda event: made.param.update(value=event.new), name)
+    return made

@@ -6,17 +6,13 @@ import panel_material_ui as pmui
 from bokeh.models import BoxAnnotation, ColumnDataSource, TapTool
 
 from .. import perturbations
+from ..state import PUSHES
 from . import studied
 from .hints import term
-from .parts import TabView, choice, figure, note
+from .parts import TabView, chosen, figure, note
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
-WHAT = {
-    "one": "one contact",
-    "all": "failure load of every contact",
-    "store": "critical force against η2",
-}
 TILE = (
     '<div style="padding:4px 10px;border-radius:6px;background:rgba(128,128,128,.1)"{}>'
     '<div style="font-size:11px;opacity:.75">{}</div>'
@@ -42,7 +38,7 @@ class View(TabView):
 
     def __init__(self, state):
         super().__init__(state, "replay", "contact")
-        self.what = choice(WHAT, "one")
+        self.what = chosen(PUSHES, state, "pushing")
         self.strongest = pmui.Button(
             label="Take the strongest contact", variant="outlined", size="small", margin=(4, 8)
         )

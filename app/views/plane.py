@@ -10,18 +10,12 @@ from granforce.records import InputError
 
 from .. import compute, live, planes
 from ..jobs import reading
+from ..state import PLANES
 from . import stresses
 from .hints import term
-from .parts import MOVES, TabView, choice, figure, note, together
+from .parts import MOVES, TabView, chosen, figure, note, together
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
-
-PLANES = {
-    "principal": "principal axes",
-    "contact": "fₙ, fₜ of a contact",
-    "pair": "fₙ of two contacts",
-    "stress": "stresses",
-}
 
 # What is offered beside states of a kind, and what the others are called.
 ALSO = {"walk": "also show uniformly sampled states", "uniform": "also show the walk"}
@@ -56,7 +50,9 @@ class View(TabView):
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
         self.cone = ColumnDataSource(empty)
         self.figure = self._figure()
-        self.planes = choice(PLANES, "principal" if state.second is None else "pair")
+        if state.second is not None and state.axes == "principal":
+            state.axes = "pair"
+        self.planes = chosen(PLANES, state, "axes")
         self.task, self.placing = state.task(), state.task(reading)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
         self.others, self.other = state.task(), None  # who finds the other states; their Replay

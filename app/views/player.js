@@ -6,6 +6,8 @@ const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take lon
 const SWING = 2.2 // s, for the displacement field to go to and fro
 const CROSSING = 8 // times as long as a step takes the way between two states
 const OLD = 0.35 // opacity of what is of other states than those asked for
+const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
+const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
 const ROOMY = 1200 // px; from there on the sidebar begins open
 const OVER_PAGE = ".MuiDrawer-modal" // the sidebar where it does
@@ -28,6 +30,7 @@ class Player {
       },
     })
     this.replay = this.look = this.loaded = null
+    this.resting = null // where a pause comes to rest, while it is on its way
     this.playing = this.follows = false // the newest state of a walk under way
     this.live = new Live(this, (live) => tell({ live }))
     this.hand = this.scene.hand = new Grab(this, tell)
@@ -55,7 +58,7 @@ class Player {
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
     this.look = new Look(model, this.replay.walk)
     this.hand.settle()
-    this.buttons.tellHeld(false)
+    this.tellHeld(false)
     scene.mixed = this.replay.mixed
     scene.palette = plain(plain(model.palettes).scene)
     this.plots.colours = plain(plain(model.palettes).plots)
@@ -148,6 +151,12 @@ class Player {
     else this.buttons.read(this.replay)
   }
 
+  /** Whether a network is on screen that was pulled: the legend says so, too. */
+  tellHeld(held) {
+    this.buttons.tellHeld(held)
+    if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
+  }
+
   again() {
     this.split.show()
     if (this.replay && !this.playing && !this.live.moves) this.show(this.replay.position, false)
@@ -161,11 +170,39 @@ class Player {
     this.plots.move(this.playing)
     this.buttons.tellPlaying(this.playing)
     if (!replay) return
-    if (!this.playing) { model.frame = replay.frame; this.paintPlots(); return }
+    this.resting = null
+    if (!this.playing) {
+      this.settle(replay)
+      model.frame = replay.frame
+      this.paintPlots()
+      return
+    }
     if (replay.atEnd && !replay.swinging) this.show(0, false)
     this.direction = 1
     this.before = performance.now()
     requestAnimationFrame((now) => this.tick(now))
+  }
+
+  /** What rests is a network that has a name: the nearest one, but between two that are compared. */
+  settle(replay) {
+    if (replay.held || replay.swinging || !(replay.position % 1)) return
+    replay.go(Math.round(replay.position))
+    this.paint()
+  }
+
+  /** Pause: playing ends at the nearest network, to which it goes over. */
+  pause(replay) {
+    if (replay.held || replay.swinging || STILL.matches) return this.play(false)
+    this.resting = Math.round(replay.position)
+    this.buttons.tellPlaying(false)
+  }
+
+  /** One step of the way to where it comes to rest; whether it is there. */
+  rest(replay, took) {
+    const way = this.resting - replay.position, step = (took / REST_MS) * Math.sign(way)
+    if (Math.abs(way) <= Math.abs(step)) { this.play(false); return true }
+    replay.go(replay.position + step)
+    return false
   }
 
   tick(now) {
@@ -175,6 +212,11 @@ class Player {
     const speed = Math.max(this.buttons.speed, behind)
     const steps = (took * speed) / 1000 / (replay.swinging ? CROSSING : 1)
     this.before = now
+    if (this.resting !== null) {
+      if (this.rest(replay, took)) return
+      this.paint()
+      return void requestAnimationFrame((next) => this.tick(next))
+    }
     if (this.grows && replay.atEnd && !replay.swinging) return void requestAnimationFrame((next) => this.tick(next))
     replay.go(replay.position + this.direction * steps)
     if (replay.swinging && (replay.atEnd || replay.position <= 0)) this.direction = replay.atEnd ? -1 : 1
@@ -201,7 +243,13 @@ class Player {
       hold: loaded((replay) => this.hold(replay)),
       undo: loaded((replay) => { if (replay.held) this.hand.tell({ undo: true }) }),
       free: loaded(() => this.hand.free()),
-      play: loaded(() => { this.hand.free(); this.follows = false; this.play(!this.playing) }),
+      play: loaded((replay) => {
+        this.hand.free()
+        this.follows = false
+        if (this.playing && this.resting === null) this.pause(replay)
+        else if (this.playing) { this.resting = null; this.buttons.tellPlaying(true) }
+        else this.play(true)
+      }),
       step: halted((replay) => this.show(Math.floor(replay.position + 1e-9) + step(replay))),
       back: halted((replay) => this.show(Math.ceil(replay.position - 1e-9) - step(replay))),
       restart: halted(() => this.show(0)),
@@ -258,6 +306,7 @@ class Player {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
+      lead: () => { buttons.part("lead").innerHTML = model.lead },
       source: () => { buttons.part("source").textContent = model.source },
       asked: () => this.tellAsked(),
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
@@ -311,7 +360,7 @@ export function render({ model, view }) {
   model.on("remove", () => {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
-  for (const name of ["source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
+  for (const name of ["lead", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
   openMoving(player)
   closeSidebar(page, view)
   return player.buttons.root

@@ -5,8 +5,8 @@ export function render({ model, view }) {
   root.className = "task"
   root.innerHTML = `
     <div class="bar" role="progressbar" aria-label="progress" aria-valuemin="0" aria-valuemax="100"><div></div></div>
-    <span></span><button type="button">Cancel</button>`
-  const [bar, words, button] = root.children
+    <span></span><button type="button">Stop and keep</button><button type="button">Cancel</button>`
+  const [bar, words, stop, cancel] = root.children
 
   function show() {
     root.hidden = !model.running
@@ -19,11 +19,14 @@ export function render({ model, view }) {
     bar.firstElementChild.style.width = `${percent}%`
     if (known) bar.setAttribute("aria-valuenow", percent)
     else bar.removeAttribute("aria-valuenow")
+    stop.hidden = !model.keeps
+    cancel.textContent = model.keeps ? "Discard" : "Cancel"
     words.textContent = words.title = model.words
   }
 
-  button.addEventListener("click", () => ask(model, view, { cancel: true }))
-  for (const name of ["running", "fraction", "words"]) model.on(name, show)
+  stop.addEventListener("click", () => ask(model, view, { stop: true }))
+  cancel.addEventListener("click", () => ask(model, view, { cancel: true }))
+  for (const name of ["running", "fraction", "words", "keeps"]) model.on(name, show)
   show()
   return root
 }

@@ -6,9 +6,13 @@ import param
 
 from .scripts import Scripted, joined
 
+FOLLOWED = ("running", "fraction", "keeps")
+
 
 class Progress(Scripted):
     """Bar, stage, time left and Cancel of a jobs.Task: of several, the first that is running.
+
+    Where what is there so far would be a result, Stop and keep, and Discard in place of Cancel.
 
     Not Panel's LinearProgress, text and button: they keep the page's thread for 40 ms, this 4 ms.
     """
@@ -16,6 +20,7 @@ class Progress(Scripted):
     running = param.Boolean()
     fraction = param.Number(default=None, allow_None=True)
     words = param.String()
+    keeps = param.Boolean()
 
     _esm = joined("ask", "progress")
     _stylesheets: ClassVar = [
@@ -59,7 +64,7 @@ class Progress(Scripted):
         self._tasks = tasks
         self._follow()
         for task in tasks:
-            task.param.watch(self._follow, ["running", "stage", "fraction", "seconds_left"])
+            task.param.watch(self._follow, [*FOLLOWED, "stage", "seconds_left"])
 
     @property
     def _told(self):
@@ -68,13 +73,16 @@ class Progress(Scripted):
 
     def _handle_msg(self, message):
         if message.get("cancel"):
-            self._told.cancel()
+            self._told.dismiss()
+        if message.get("stop"):
+            self._told.stop()
 
     def _follow(self, *events):
         task = self._told
         left = task.seconds_left
         words = task.stage + ("" if left is None else f" — about {_duration(left)} more")
-        self.param.update(running=task.running, fraction=task.fraction, words=words)
+        followed = {name: getattr(task, name) for name in FOLLOWED}
+        self.param.update(words=words, **followed)
 
 
 def _duration(seconds):

@@ -7,19 +7,12 @@ from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
 
 from .. import distributions
 from ..jobs import reading
+from ..state import AXES, FIGURES
 from . import studied
 from .packing import exact_intervals
-from .parts import TabView, choice, figure, note
+from .parts import TabView, chosen, figure, note
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
-WHAT = {
-    "eta": "η(μ)",
-    "extent": "P(ΔFₙ)",
-    "correlation": "corr(μ)",
-    "scatter": "ΔFₙ against fₙ",
-    "force": "P(fₙ)",
-}
-SCALES = {"linear": "linear", "log": "logarithmic"}
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
 LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
 
@@ -31,7 +24,7 @@ class View(TabView):
 
     def __init__(self, state):
         super().__init__(state, "replay", "exact", "catalogue")
-        self.what, self.scale = choice(WHAT, "eta"), choice(SCALES, "linear")
+        self.what, self.scale = chosen(FIGURES, state, "figure"), chosen(AXES, state, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.told = note()
         self.task = state.task(reading)

@@ -1,5 +1,8 @@
 """Numbers of the walk on screen, and what was left out or went wrong on the way."""
 
+import panel as pn
+
+from .explanation import Foldout
 from .hints import term
 from .parts import of_replay
 
@@ -14,6 +17,7 @@ STYLE = """
 .tile:focus-visible { outline: 2px solid #e8710a; }
 .flag { margin: 6px 0 0; padding: 5px 9px; border-radius: 6px; font-size: 12.5px;
   background: #7a4a00; color: #ffffff; }
+.first { font-size: 14px; line-height: 1.45; margin: 8px 2px 0; }
 .rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
 .term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
 .term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
@@ -21,13 +25,16 @@ STYLE = """
 
 # Words and symbol, name among the summary's numbers, form, and key of the glossary.
 TILES = (
-    ("disks N", "n", "d", "n"),
-    ("packing fraction φ", "packing_fraction", ".4f", "phi"),
-    ("contacts per disk z", "coordination", ".3f", "z"),
     ("free dimensions h", "dimension", "d", "h"),
     ("spread η1", "eta1", ".4f", "eta1"),
     ("distance η2", "eta2", ".4f", "eta2"),
     ("intervals 0.15 η3", "scaled_eta3", ".4f", "eta3"),
+)
+# The same of what only those look at who check.
+CHECKS = (
+    ("disks N", "n", "d", "n"),
+    ("packing fraction φ", "packing_fraction", ".4f", "phi"),
+    ("contacts per disk z", "coordination", ".3f", "z"),
     ("accepted", "acceptance", ".0%", "accepted"),
     ("mixing R̂", "worst_r_hat", ".3f", "r_hat"),
     ("effective size", "least_bulk_size", ".0f", "ess"),
@@ -54,18 +61,38 @@ def doubts(summary):
 
 
 def numbers(summary):
-    """The tiles and the line below them, as HTML."""
+    """How undetermined the forces are, and what speaks against these numbers, as HTML."""
+    flags = "".join(map(FLAG.format, doubts(summary)))
+    return f'<p class="first">{finding(summary)}</p>{_tiles(TILES, summary)}{flags}'
+
+
+def checks(summary):
+    """What the numbers stand on, and what was left out, as HTML."""
+    style, rest = f"<style>{STYLE}</style>", f'<div class="rest">{left_out(summary)}</div>'
+    return style + _tiles(CHECKS, summary) + rest
+
+
+def finding(summary):
+    """What the numbers say, in one sentence."""
+    if not summary["dimension"]:
+        return "<b>How undetermined?</b> Not at all: balance leaves every force one value."
+    states = "the state" if summary["states"] == 1 else f"all {summary['states']} states"
+    return (
+        f"<b>How undetermined?</b> Over {states} a contact's force scatters by "
+        f"<b>{100 * summary['eta1']:.2g} %</b> of the mean force."
+    )
+
+
+def _tiles(rows, summary):
     values = summary | {"scaled_eta3": 0.15 * summary["eta3"]}
     if summary.get("skipped"):
         values["acceptance"] = None  # nothing was tried
-    texts = {key: _text(values[key], form) for _, key, form, _ in TILES if key in values}
-    tiles = "".join(
-        TILE.format(name=name, value=texts[key], term=term)
-        for name, key, _, term in TILES
-        if key in texts
+    made = "".join(
+        TILE.format(name=name, value=_text(values[key], form), term=term)
+        for name, key, form, term in rows
+        if key in values
     )
-    flags = "".join(map(FLAG.format, doubts(summary)))
-    return f'<div class="tiles">{tiles}</div>{flags}<div class="rest">{left_out(summary)}</div>'
+    return f'<div class="tiles">{made}</div>'
 
 
 def _text(value, form):
@@ -102,5 +129,13 @@ def left_out(summary):
 
 
 def tiles(state):
-    """The numbers of the replay on screen."""
-    return of_replay(state, numbers, STYLE, margin=(0, 10))
+    """The numbers of the replay on screen, and what they stand on, to be opened."""
+    folded = Foldout(line="Check", sizing_mode="stretch_width", margin=(2, 12))
+
+    def tell(*events):
+        folded.inside = "" if state.replay is None else checks(state.replay.summary)
+
+    state.param.watch(tell, "replay")
+    tell()
+    shown = of_replay(state, numbers, STYLE, margin=(0, 10))
+    return pn.Column(shown, folded, sizing_mode="stretch_width")

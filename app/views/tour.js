@@ -4,6 +4,7 @@ const SEEN = "granforce.tour" // remembered in the browser
 const LOOK_MS = 100 // between two looks for what a step is about, which may still be on its way
 // Where each step points: other parts of the page than these come and go with their tab.
 const TARGETS = { scene: ".scene", friction: ".friction", plane: ".in-plane", perturb: ".in-perturb" }
+const ALONE = [1, 2] // steps of the packing alone
 
 export function render({ model, view }) {
   const page = view.model.document
@@ -30,8 +31,17 @@ export function render({ model, view }) {
   const target = () => model.steps[model.step - 1][2]
   const go = (step) => ask(model, view, { step })
 
+  /** What a step does not speak of is not seen meanwhile, see parts.py. */
+  function clear(step) {
+    const { style } = document.documentElement
+    if (step) style.setProperty("--extra", "none")
+    else style.removeProperty("--extra")
+    style.setProperty("--beside", ALONE.includes(step) ? "hidden" : "visible")
+  }
+
   function show() {
     const { step } = model, steps = model.steps
+    clear(step)
     card.hidden = !step
     part(".begin").hidden = Boolean(step)
     if (step !== shown) ring.hidden = true
@@ -114,7 +124,7 @@ export function render({ model, view }) {
   })
   model.on("step", show)
   model.on("steps", show)
-  model.on("remove", () => { shown = 0 })
+  model.on("remove", () => { shown = 0; clear(0) })
   show()
   if (model.first && !model.step && !known()) go(1)
   return root

@@ -23,8 +23,8 @@ STEPS = (
         "Other forces balance too",
         "The same disks, in the same places, held by other forces: the picture changes into "
         "another network and back, and every network on the way balances every disk, too. Balance "
-        "and friction alone don't say which of them the packing carries. Drag the slider under "
-        "the packing to step through them yourself.",
+        "and friction alone don't say which of them the packing carries. Drag the slider beside "
+        "Play to step through them yourself.",
         "scene",
     ),
     (

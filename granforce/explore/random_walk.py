@@ -151,6 +151,8 @@ def walk(
     max_attempts: int | None = None,
     whole: bool = True,
     skip: bool = True,
+    begun: Walk | None = None,
+    enough: Callable[[], bool] | None = None,
     progress: Progress | None = None,
     watch: Callable[[Found], object] | None = None,
     cancel: Cancel | None = None,
@@ -162,21 +164,28 @@ def walk(
     they run on; many chains go side by side in each. Neither changes the result. relax, options:
     the relaxation and its options. max_attempts: per chain, by default 20 per state. whole: whether
     fewer states than wanted are an error; else there may be fewer, or none.
+    begun: a Walk of one chain, otherwise the same, with fewer states: its chain goes on. enough():
+    asked after each state of a chain that is alone; True ends it with the states that it has.
     progress(done, total); watch(Found) gets each state as it is accepted, from the thread that
     found it; neither changes the result. cancel() returning True raises Cancelled.
 
     Where S is a single point (h = 0) every state is that point and no relaxation is done, unless
     skip is False: sweeps end where the unbalance is small, which is not quite that point. Raises
-    InputError for sizes below 1, NotJammedError when max_attempts bring too few of a whole walk.
+    InputError for sizes below 1, and for more than one chain that goes on or ends by `enough`;
+    NotJammedError when max_attempts bring too few of a whole walk.
     """
     if states < 1 or chains < 1 or workers < 1 or chains > states:
         raise InputError("states, chains and workers must be at least 1, and chains ≤ states")
+    if chains > 1 and not (begun is None and enough is None):
+        raise InputError("only one chain alone goes on from a walk, or ends when it is enough")
     seeds = np.random.SeedSequence(seed).spawn(chains)
     all_chains = []
     for k, own in enumerate(seeds):
         share = states // chains + (k < states % chains)
         limit = max_attempts or 20 * share
         all_chains.append(_Chain(ensemble, k, share, own, limit, whole))
+    if begun is not None:
+        all_chains[0].go_on(begun, watch)
 
     def tell() -> None:
         if progress is not None:
@@ -187,7 +196,7 @@ def walk(
     else:
         with cancelling.threads(workers) as pool:
             groups = _groups(all_chains, relax, workers, options)
-            list(pool.map(lambda group: _run(group, relax, tell, watch, options), groups))
+            list(pool.map(lambda group: _run(group, relax, tell, watch, enough, options), groups))
         parts = [chain.walked() for chain in all_chains]
     counts = {name: sum(part.counts[name] for part in parts) for name in parts[0].counts}
     return Walk(
@@ -215,6 +224,7 @@ def _run(
     relax: Relax,
     tell: Callable[[], None],
     watch: Callable[[Found], object] | None,
+    enough: Callable[[], bool] | None,
     options: dict[str, Any],
 ) -> None:
     """All chains of a group to their end."""
@@ -228,6 +238,8 @@ def _run(
         accepted = chain.take(relaxation, options)
         if accepted and watch is not None:
             watch(chain.found())
+        if accepted and enough is not None:
+            chain.ended = enough()
         tell()
         cancelling.check("random walk")
 
@@ -281,7 +293,7 @@ class _Chain:
         whole: bool,
     ) -> None:
         self.ensemble, self.number = ensemble, number
-        self.limit, self.whole = limit, whole
+        self.limit, self.whole, self.ended = limit, whole, False
         self.state = init(ensemble, seed)
         self.rng = self.state.rng  # after the attempt under way
         self.counts = {"accepted": 0, "rejected": 0, "unconverged": 0, "skipped": 0}
@@ -293,7 +305,22 @@ class _Chain:
     def done(self) -> bool:
         """Whether it has all its states, or may end without them."""
         ended = not self.whole and sum(self.counts.values()) >= self.limit
-        return ended or self.counts["accepted"] == len(self.states)
+        return ended or self.ended or self.counts["accepted"] == len(self.states)
+
+    def go_on(self, begun: Walk, watch: Callable[[Found], object] | None) -> None:
+        """Take over the states of a walk that was the same so far, and its place in the stream."""
+        tried = int(begun.attempts.sum())
+        if len(begun.states) > len(self.states) or tried != sum(begun.counts.values()):
+            raise InputError("the walk to go on from has more states, or ended between two")
+        self.counts = dict(begun.counts)
+        for name in ("states", "residual", "violation", "sweeps", "attempts"):
+            getattr(self, name)[: len(begun.states)] = getattr(begun, name)
+        for _ in range(tried):  # each attempt drew so many numbers
+            self.rng.uniform(size=self.state.forces.shape)
+        self.state = ChainState(np.array(begun.states[-1]), self.rng)
+        if watch is not None:
+            for k in range(len(begun.states)):
+                watch(self.found(k))
 
     def kicked(self) -> Floats:
         """The start of the next attempt; NotJammedError where there were too many."""
@@ -319,9 +346,9 @@ class _Chain:
             self.violation[k] = relaxation.violation
         return outcome == "accepted"
 
-    def found(self) -> Found:
-        """The last state accepted."""
-        k = self.counts["accepted"] - 1
+    def found(self, k: int = -1) -> Found:
+        """A state accepted, by default the last one."""
+        k %= self.counts["accepted"]
         numbers = float(self.residual[k]), float(self.violation[k]), int(self.attempts[k])
         return Found(self.number, k, self.states[k].copy(), *numbers)
 

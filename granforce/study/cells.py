@@ -26,6 +26,8 @@ class Kind(NamedTuple):
     parameters: Callable[..., Parameters]
     compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset
     holds_states: bool = False
+    # (parameters, dataset) → what names the dataset: it may have ended before all was there
+    reached: Callable[[Parameters, xr.Dataset], Parameters] = lambda parameters, _: parameters
 
 
 class Cell(NamedTuple):
@@ -50,14 +52,16 @@ def get(
     """The dataset of a kind and parameters, and whether the store had it; if not, it is kept.
 
     workers: threads, which change nothing in the result. dtypes: as for Store.save, of states.
-    options: as the kind's compute takes them beside. Raises what that raises.
+    options: as the kind's compute takes them beside; where they end it early, what is there is kept
+    under the parameters that it has `reached`. Raises what compute raises.
     """
     found = load(store, kind, parameters)
     if found is not None:
         return found, True
     store.refuse_unwritable()
     dataset = kind.compute(store, parameters, workers=workers, progress=progress, **options)
-    save(store, kind, parameters, dataset, dtypes=dtypes if kind.holds_states else None)
+    named = kind.reached(parameters, dataset)
+    save(store, kind, named, dataset, dtypes=dtypes if kind.holds_states else None)
     return dataset, False
 
 

@@ -35,6 +35,19 @@ def walk_dataset(
     )
 
 
+def walk_of(dataset: xr.Dataset) -> Walk:
+    """The Walk of a dataset that has all its states."""
+    counted = ("accepted", "rejected", "unconverged", "skipped")
+    return Walk(
+        states=dataset["states"].values,
+        residual=dataset["residual"].values,
+        violation=dataset["violation"].values,
+        sweeps=dataset["sweeps"].values,
+        attempts=dataset["attempts"].values,
+        counts={name: dataset[name].item() for name in counted},
+    )
+
+
 def uniform_dataset(
     S: Ensemble, drawn: UniformSample, *, keep: int | None = None, seconds: float = 0.0
 ) -> xr.Dataset:

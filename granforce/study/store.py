@@ -247,8 +247,11 @@ class Store(Mapping[str, xr.Dataset]):
 
     def entries(self) -> list[Entry]:
         """A list of `Entry`, one for each readable entry; arrays are not read."""
+        return self._read(self._names())
+
+    def _read(self, names: list[str]) -> list[Entry]:
         found = []
-        for name in self._names():
+        for name in names:
             entry = self.entry(name)
             if entry is None:
                 self._warn(name, "its metadata cannot be read")
@@ -259,15 +262,19 @@ class Store(Mapping[str, xr.Dataset]):
     def find(self, kind: str | None = None, **params: Any) -> list[Entry]:
         """The entries of a kind whose parameters include the given ones (compared as in keys)."""
         wanted = {key: keys.canonical(value) for key, value in params.items()}
-        return [
-            entry
-            for entry in self.entries()
-            if kind in (None, entry.kind)
-            and all(
-                key in entry.params and keys.canonical(entry.params[key]) == value
+
+        def fits(name: str) -> bool:
+            attrs = self._attrs(name)
+            if attrs is None:
+                return True  # to be warned of
+            known = json.loads(attrs["parameters"])
+            return all(
+                key in known and keys.canonical(known[key]) == value
                 for key, value in wanted.items()
             )
-        ]
+
+        of_kind = [name for name in self._names() if kind in (None, name.rpartition("-")[0])]
+        return self._read([name for name in of_kind if fits(name)])
 
     def size(self) -> int:
         """Bytes on disk, temporaries of running writers included."""

@@ -91,7 +91,7 @@ def visit(opening):
     def visit(query="", width=1280, height=900, **options):
         page = opening(query or MANY, width, height, **options)
         painted(page, PATIENCE)
-        page.get_by_role("tab").first.wait_for()
+        page.locator("[role=tab]").first.wait_for(state="attached")  # unseen while a tour begins
         return page
 
     return visit

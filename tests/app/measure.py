@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, CLOSED, FLAGS, MANY, MODEL, painted, scene, serve  # noqa: E402
+from serving import CHROMIUM, CLOSED, FLAGS, MANY, MODEL, how_it_is_made, painted, scene, serve  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
 # A place in the packing where a drag moves the view, and pulls nothing.
@@ -227,6 +227,7 @@ def _watch_many(stage, disks=5000, seconds=20):
     page, _ = stage.open()
     page.wait_for_timeout(3000)
     page.locator(".scene").evaluate(LOG)
+    how_it_is_made(page)
     page.get_by_label("Disks N").first.fill(str(disks))
     page.get_by_label("Disks N").first.press("Enter")
     page.wait_for_function("() => log.pictures.length > 0", timeout=120_000)

@@ -68,6 +68,14 @@ def wait_until_served(url, server, log):
     raise RuntimeError(f"nothing served: {log.read_text()}")
 
 
+def how_it_is_made(page):
+    """Open what only those need who compute something of their own; the page."""
+    heading = page.get_by_role("button", name="How it is made")
+    if heading.get_attribute("aria-expanded") != "true":
+        heading.click()
+    return page
+
+
 def painted(page, timeout=30_000):
     """Wait until the packing has been painted; how many frames were."""
     page.locator(".scene").wait_for(timeout=timeout)

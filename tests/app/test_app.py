@@ -438,10 +438,38 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
 
     before = state.replay
     state.ask(select(200, 0.05, 3, states=100), at_once=True)
-    state.computation.cancel()
+    state.computation.dismiss()
     wait_for(state)
     assert state.replay is before and state.message == ""
+    assert state.selection == state.cell.selection and not state.missing
     assert len(state.catalogue) == 3
+
+
+def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):
+    from app.selection import select
+
+    task = state.computation
+    state.ask(select(20, 0.05, 3, states=9), at_once=True)
+    task._job.stop()  # before there is a state: it ends with the first one
+    wait_for(state)
+    assert state.selection.states == 1 and len(state.replay.normal) == 2
+    assert state.cell.params["states"] == 1 and not state.missing
+    first = state.replay.normal[1]
+    state.ask(select(20, 0.05, 3, states=4), at_once=True)
+    wait_for(state)
+    assert state.selection.states == 4
+    np.testing.assert_array_equal(state.replay.normal[1], first)
+
+
+def test_what_is_refused_does_not_stay_in_its_box(state):
+    from app.views.controls import Controls
+
+    controls = Controls(state)
+    controls._typed("1e9")
+    assert "friction" in state.message.lower() and controls.mu.mu == state.cell.mu
+    controls._typed("0,01")
+    assert state.selection.mu == 0.01 and not state.message
+    state.cancel()
 
 
 def test_closing_the_page_ends_its_computation(state):

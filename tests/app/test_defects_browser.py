@@ -4,7 +4,7 @@ import signal
 
 import numpy as np
 import pytest
-from serving import MANY, MODEL, column, free_port, painted, scene, serve
+from serving import MANY, MODEL, column, free_port, how_it_is_made, painted, scene, serve
 from small_store import KEPT, ROOT
 
 # Pictures to be looked at; ignored by git.
@@ -147,7 +147,7 @@ def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, s
 
 def test_number_fields_take_typing_after_enter(visit):
     page = visit()
-    field = page.get_by_role("spinbutton", name="States")
+    field = how_it_is_made(page).get_by_role("spinbutton", name="States")
     field.click()
     for number in (31, 32, 100_050 // 10):
         page.keyboard.press("Control+A")
@@ -161,7 +161,7 @@ def test_number_fields_take_typing_after_enter(visit):
 
 def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
     page = visit()
-    field = page.get_by_role("spinbutton", name="Disks N")
+    field = how_it_is_made(page).get_by_role("spinbutton", name="Disks N")
     before = field.input_value()
     field.fill("many")
     field.press("Enter")
@@ -179,7 +179,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.locator("input[type=file]").set_input_files(files)
     searched(page, "packing=")
     page.locator(".source", has_text="imported").wait_for()
-    assert page.get_by_role("spinbutton", name="Disks N").input_value() == "400"
+    assert how_it_is_made(page).get_by_role("spinbutton", name="Disks N").input_value() == "400"
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
 
 

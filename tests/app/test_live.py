@@ -12,7 +12,6 @@ from app.selection import select
 from app.state import AppState
 from app.views import plane
 from app.views.controls import Controls
-from app.views.explanation import Explanation
 from app.views.intervals import View
 from app.views.packing import PackingView
 from app.views.stream import Stream
@@ -187,13 +186,13 @@ def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, 
 
 def test_while_it_is_compressed_the_words_say_that_it_moves(state):
     browser = Browser(state)
-    view, words = PackingView(state), Explanation(state)
-    assert "never move.</b>" in words.first and " largest radii" in view.legend.object
+    view = PackingView(state)
+    assert "never move.</b>" in view.player.lead and " largest radii" in view.legend.object
     state.ask(asked(0.35, 20_000), at_once=True)
     browser.run(lambda: state.moving)
-    assert "move until they jam" in words.first and "which shrinks" in view.legend.object
+    assert "move until they jam" in view.player.lead and "which shrinks" in view.legend.object
     browser.run(lambda: state.growing is not None)
-    assert "never move.</b>" in words.first and " largest radii" in view.legend.object
+    assert "never move.</b>" in view.player.lead and " largest radii" in view.legend.object
     state.cancel()
     browser.run()
 

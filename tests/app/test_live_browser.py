@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from packings import reference, skewed
-from serving import MODEL, bars_drawn, column, laid_out, scene
+from serving import MODEL, bars_drawn, column, how_it_is_made, laid_out, scene
 from small_store import KEPT, ROOT
 
 from app import geometry
@@ -55,7 +55,7 @@ def ask(page, mu):
 
 def ask_for_many_states(page):
     """So many that the walk cannot end before the browser has seen it grow."""
-    page.get_by_label("States").first.fill("20000")
+    how_it_is_made(page).get_by_label("States").first.fill("20000")
     page.get_by_label("States").first.press("Enter")
 
 
@@ -143,7 +143,7 @@ def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):
     assert seen["pictures"][0] > 1.1 * seen["pictures"][-1]
     # The walk is on screen, not the packing that moved before.
     until(page, "!scene.hand.player.live.moves && scene.painted > 0")
-    page.get_by_role("button", name="Cancel").click()
+    page.get_by_role("button", name="Discard").click()
 
 
 def test_computed_states_are_shown_to_the_last(visit):
@@ -161,15 +161,27 @@ def test_computed_states_are_shown_to_the_last(visit):
     assert not page.locator(".asked").inner_text()
 
 
-def test_cancelled_the_old_packing_is_back_and_says_so(visit):
+def test_discarded_the_old_packing_is_back_with_its_friction(visit):
     page = visit()
     ask_for_many_states(page)
-    until(page, "scene.hand.player.grows")
-    page.get_by_role("button", name="Cancel").click()
+    ask(page, "0.47")
+    until(page, "scene.hand.player.grows && scene.geometry.mu === 0.47")
+    page.get_by_role("button", name="Discard").click()
     until(page, "!scene.hand.player.grows && scene.geometry.states === 30")
-    page.locator(".stage.pale").wait_for()
-    assert "not computed" in page.locator(".asked").inner_text()
-    page.get_by_role("button", name="Compute").first.wait_for()
+    page.wait_for_function("() => !location.search.includes('0.47')")
+    assert page.locator(".stage.pale").count() == 0
+    assert page.locator("input.typed").first.input_value() == "0.1"
+
+
+def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
+    page = visit("?mu=0.48&n=30&states=20000&relax=nearest")
+    until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
+    page.get_by_role("button", name="Stop and keep").click()
+    until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
+    states = scene(page, "scene.geometry.states")
+    page.wait_for_function(f"() => location.search.includes('states={states}')")
+    assert f"{states} states" in page.locator(".source").inner_text()
+    assert page.locator(".stage.pale").count() == 0
 
 
 def test_two_pages_see_the_same_walk(visit):
@@ -185,7 +197,9 @@ def test_two_pages_see_the_same_walk(visit):
     )
     np.testing.assert_array_equal(first, second)
     for page in (one, two):
-        page.get_by_role("button", name="Cancel").click()
+        page.get_by_role("button", name="Cancel").or_(
+            page.get_by_role("button", name="Discard")
+        ).click()
 
 
 def test_a_hidden_tab_is_sent_nothing(visit):

@@ -1,7 +1,7 @@
 """What somebody stumbled over who saw the page for the first time, one test each."""
 
 import pytest
-from serving import MODEL, painted, scene
+from serving import MODEL, how_it_is_made, painted, scene
 from small_store import ROOT
 
 from granforce.glossary import TERMS
@@ -35,7 +35,7 @@ def shows(page, mu):
 
 def computing(page):
     """Ask for a packing that takes longer than any test, and wait until it is computed."""
-    disks = page.get_by_role("spinbutton", name="Disks N")
+    disks = how_it_is_made(page).get_by_role("spinbutton", name="Disks N")
     disks.fill("9000")
     disks.press("Enter")
     bar = page.locator(".task").filter(visible=True).first
@@ -59,7 +59,7 @@ def cancelled():
 def test_where_a_series_has_no_states_none_of_another_friction_is_named(visit, cancelled):
     page = visit(AT)
     shows(page, 0.1)
-    chosen = page.get_by_role("combobox", name="Precomputed results")
+    chosen = how_it_is_made(page).get_by_role("combobox", name="Precomputed results")
     assert chosen.inner_text().endswith("3 μ from 0 to 1")
     computing(page)
     cancelled(page)

@@ -117,7 +117,7 @@ def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     seen = np.isfinite(x)
     assert np.ptp(np.array(x)[seen]) > 1e-3 and np.ptp(np.array(y)[seen]) > 1e-3
     assert len(x) > seen.sum()  # there is room for more
-    page.get_by_role("button", name="Cancel").first.click()
+    page.get_by_role("button", name="Discard").first.click()
     until(page, "!scene.hand.player.grows")
     page.wait_for_function(f"() => {MODEL}('path').get_column('x').every(Number.isFinite)")
 

@@ -3,7 +3,7 @@
 from functools import partial
 
 import pytest
-from serving import MANY, painted, scene
+from serving import MANY, how_it_is_made, painted, scene
 from small_store import ROOT
 
 from app.selection import SOLVERS
@@ -114,7 +114,7 @@ def test_on_a_narrow_page_the_sidebar_waits_until_it_is_asked_for(visit):
     press(page, "Close")
     card(page).wait_for(state="hidden")
     page.get_by_role("button", name="Open drawer").click()
-    page.get_by_role("dialog").get_by_text("Disks N").first.wait_for()
+    page.get_by_role("dialog").get_by_text("How it is made").first.wait_for()
 
 
 def test_the_tour_comes_once_by_itself_and_then_by_its_button(visit):
@@ -213,12 +213,12 @@ def test_words_explain_themselves_on_hover_focus_and_touch(visit):
     hint(page).get_by_text(TERMS["h"].sentence).wait_for()
     page.mouse.move(640, 500)
     hint(page).wait_for(state="hidden")
-    page.locator(".tile[data-term=z]").focus()
+    page.locator(".tile[data-term=h]").focus()
     page.keyboard.press("Tab")
-    hint(page).get_by_text(TERMS["h"].sentence).wait_for()
+    hint(page).get_by_text(TERMS["eta1"].sentence).wait_for()
     page.keyboard.press("Escape")
     hint(page).wait_for(state="hidden")
-    page.get_by_role("combobox", name="Relaxation").hover()
+    how_it_is_made(page).get_by_role("combobox", name="Relaxation").hover()
     hint(page).get_by_text(TERMS["nearest"].sentence).wait_for()
     page.get_by_role("combobox", name="Relaxation").click()
     page.get_by_role("menuitem", name=SOLVERS["gauss_seidel"]).hover()

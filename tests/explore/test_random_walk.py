@@ -30,6 +30,23 @@ def test_every_state_is_in_s(S):
     assert np.all(done.sweeps > 0)
 
 
+def test_a_walk_that_ended_when_it_was_enough_goes_on_as_if_it_had_not(S):
+    whole = walk(S, 12, 3, relax=nearest)
+    asked = iter(range(12))
+    part = walk(S, 12, 3, relax=nearest, enough=lambda: next(asked) == 4)
+    assert len(part.states) == 5 and part.counts["accepted"] == 5
+    seen = []
+    gone_on = walk(S, 12, 3, relax=nearest, begun=part, watch=lambda found: seen.append(found))
+    assert [found.number for found in seen] == list(range(12))
+    assert gone_on.counts == whole.counts
+    for name in ("states", "residual", "violation", "sweeps", "attempts"):
+        np.testing.assert_array_equal(getattr(gone_on, name), getattr(whole, name))
+    with pytest.raises(InputError, match="only one chain"):
+        walk(S, 12, 3, chains=2, begun=part)
+    with pytest.raises(InputError, match="more states"):
+        walk(S, 3, 3, begun=part)
+
+
 def test_the_walk_moves(S):
     done = walk(S, 10, 3)
     moved = np.linalg.norm(np.diff(done.states, axis=0), axis=(1, 2))

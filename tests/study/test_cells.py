@@ -29,6 +29,28 @@ def test_a_cell_is_computed_once(tmp_path):
     assert sorted(entry.kind for entry in store.entries()) == ["packing", "walk"]
 
 
+def test_a_walk_that_was_enough_is_found_as_one_of_so_many_states_and_goes_on(tmp_path):
+    store, other = open_store(tmp_path / "s"), open_store(tmp_path / "other")
+    asked = iter(range(6))
+    study.get(store, kinds.WALK, cell(), enough=lambda: next(asked) == 2)
+    assert study.get(store, kinds.WALK, cell(states=3))[1]
+    assert study.load(store, kinds.WALK, cell()) is None
+    begun = []
+    found, _ = study.get(store, kinds.WALK, cell(), watch=begun.append)
+    wanted, _ = study.get(other, kinds.WALK, cell())
+    assert [one.number for one in begun] == list(range(6))
+    assert found.drop_vars("seconds").identical(wanted.drop_vars("seconds"))
+
+
+def test_a_shorter_walk_that_was_rounded_or_thinned_is_not_gone_on_from(tmp_path):
+    store = open_store(tmp_path / "s")
+    study.get(store, kinds.WALK, cell(states=3), dtypes={"states": "float32"})
+    study.get(store, kinds.WALK, cell(states=4, keep=2))
+    found, _ = study.get(store, kinds.WALK, cell())
+    wanted = kinds.WALK.compute(open_store(tmp_path / "t"), cell(), workers=1, progress=None)
+    assert np.array_equal(found["states"], wanted["states"])
+
+
 def test_friction_is_quantised_in_names(tmp_path):
     store = open_store(tmp_path / "s")
     study.get(store, kinds.WALK, cell(mu=0.3))

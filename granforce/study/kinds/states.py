@@ -4,13 +4,14 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from granforce.explore import remeasured
 from granforce.explore.carrying import carrying
 from granforce.explore.infer import infer
 from granforce.explore.informative import informative
-from granforce.explore.random_walk import walk
+from granforce.explore.random_walk import Walk, walk
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import volume
 from granforce.forces.ensemble import Ensemble
@@ -29,10 +30,10 @@ from granforce.study.bounds import (
     informative_dataset,
     volume_dataset,
 )
-from granforce.study.cells import Kind
+from granforce.study.cells import Kind, entries, load
 from granforce.study.keys import Parameters
 from granforce.study.kinds.packings import cones_of, ensemble_of, hash_of
-from granforce.study.samples import inference_dataset, uniform_dataset, walk_dataset
+from granforce.study.samples import inference_dataset, uniform_dataset, walk_dataset, walk_of
 from granforce.study.store import Store
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
@@ -120,8 +121,12 @@ def _walk(
     progress: Progress | None,
     watch: Any = None,
     begun: Callable[[Ensemble], object] | None = None,
+    enough: Callable[[], bool] | None = None,
 ) -> xr.Dataset:
-    """Dataset of a walk with all its measures; begun(S) is called before its first step."""
+    """Dataset of a walk with all its measures; begun(S) is called before its first step.
+
+    A shorter one that the store has, otherwise the same, goes on. enough: as for `walk`.
+    """
     S = ensemble_of(store, parameters)
     options: dict[str, Any] = dict(RELAXATIONS[parameters["relax"]])
     if "residual" in parameters:
@@ -141,10 +146,43 @@ def _walk(
         workers=workers,
         progress=progress,
         watch=watch,
+        begun=_longest_begun(store, parameters),
+        enough=enough,
         **options,
     )
     seconds = time.perf_counter() - begin
     return walk_dataset(S, done, keep=parameters["keep"], seconds=seconds)
+
+
+def _longest_begun(store: Store, parameters: Parameters) -> Walk | None:
+    """Of the stored walks that this one begins with, with all their states, the longest; or None.
+
+    The states that a single chain finds do not depend on how many are wanted.
+    """
+    if parameters["chains"] > 1 or "attempts" in parameters:
+        return None
+    same = {name: value for name, value in parameters.items() if name not in ("states", "keep")}
+    shorter = [
+        entry
+        for entry in entries(store, WALK, keep=None, **same)
+        if entry.params["states"] < parameters["states"] and len(entry.params) == len(parameters)
+    ]
+    shorter.sort(key=lambda entry: entry.params["states"], reverse=True)
+    for entry in shorter:
+        found = load(store, WALK, entry.params)
+        # Those that were rounded to save room are not where the chain stood.
+        if found is not None and found["states"].dtype == np.float64 and found["accepted"].item():
+            return walk_of(found)
+    return None
+
+
+def _walk_reached(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
+    """The parameters of a walk that ended when it was enough: those of one of so many states."""
+    if "attempts" in parameters:
+        return parameters
+    states = int(dataset["accepted"].item() + dataset["skipped"].item())
+    keep = parameters["keep"]
+    return parameters | {"states": states, "keep": keep if keep and keep < states else None}
 
 
 def _uniform_parameters(
@@ -316,7 +354,11 @@ def _informative(
     return informative_dataset(S, found, seconds=time.perf_counter() - begin)
 
 
-WALK = Kind("walk", 1, "random walk", "state", _walk_parameters, _walk, holds_states=True)
+WALK = Kind(
+    *("walk", 1, "random walk", "state", _walk_parameters, _walk),
+    holds_states=True,
+    reached=_walk_reached,
+)
 UNIFORM = Kind(
     "uniform", 3, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True
 )
