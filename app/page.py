@@ -336,6 +336,7 @@ class Tabs:
                     return
                 self.pages[name].extend(pieces[max(k, 0) : k + 2])
                 yield
+            self.state.views += 1
 
     def _has_place(self, name):
         """Whether a tab's view is beside the packing instead, where there may be but one of it."""

@@ -83,6 +83,7 @@ class AppState(param.Parameterized):
 
     tab = param.String(default="intervals", doc="name of the visible tab; others compute nothing")
     wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
+    views = param.Integer(doc="how many views of tabs there are: what moves in them is drawn then")
     contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
     second = param.Integer(default=None, allow_None=True, doc="contact beside it in a plane")
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")

@@ -13,7 +13,9 @@ const ICONS = {
   split: "M3 5h8v14H3zM13 5h8v14h-8z",
 }
 const HELD = { "[": "less", "]": "more", z: "undo", Z: "undo", Escape: "free", h: "hold", H: "hold" }
-const KEYS = { ArrowRight: "step", ArrowLeft: "back", Home: "restart" }
+const KEYS = {
+  ArrowRight: "step", ArrowLeft: "back", Home: "restart", End: "end", n: "next", N: "previous",
+}
 
 function icon(name) {
   return `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${ICONS[name]}"/></svg>`

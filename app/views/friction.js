@@ -60,6 +60,7 @@ export function render({ model }) {
   function follow() {
     range.value = place(model.mu, model.least)
     typed.value = String(Number(model.mu.toPrecision(4)))
+    range.setAttribute("aria-valuetext", `μ = ${typed.value}`)
   }
 
   // A stored value is shown while the thumb still moves; others are asked for when it is let go.

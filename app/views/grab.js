@@ -6,6 +6,7 @@ const RAIL = 190 // px, the longest
 const EDGE = 14 // px between a rail and the edge of the picture
 const AT_END = 2e-3 // of a rail, within which the hand is at its end
 const FINDING = "Finding how far it can be pulled …"
+const KNOWN = "This force is held: release it (press H) before it is pulled."
 const NUMBER_LINE = 14 // px, height of a line of numbers beside it
 const NUDGE = 1 / 40 // of a rail, by a key
 const REST = 600 // ms after the last key until the force is let go
@@ -91,7 +92,8 @@ class Grab {
   /** A key moves the force of the selected contact. */
   nudge(sign) {
     const { contact } = this.player.model
-    if (contact === null || contact === undefined) return
+    if (contact === null || contact === undefined) return this.player.say(UNCHOSEN)
+    if (this.player.pins.has(contact)) return this.player.say(KNOWN)
     this.grip = null
     if (this.contact !== contact) {
       this.steps = 0

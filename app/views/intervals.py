@@ -7,6 +7,7 @@ from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 
 from .. import live
 from ..state import SCALES, SORTS
+from .contacts import Contacts
 from .hints import term
 from .known import Known
 from .packing import exact_intervals
@@ -69,6 +70,7 @@ class View:
             self.left_out,
             self.told,
             pn.pane.Bokeh(self.growth_figure, **wide),
+            Contacts(self.state),
             sizing_mode="stretch_width",
         )
 

@@ -3,12 +3,14 @@
 const WIDTH = 0.23 // of a chain that carries the mean normal force, in largest radii
 const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
+const THIN = 0.15 // of its width, a chain that a filter leaves out
 const DIM = 0.35 // chains under the marks of Fig. 5
 
 class Look {
   constructor(model, walk) {
     this.model = model
     this.walk = walk
+    this.only = null // 1 for each contact that a filter leaves, or null
     this.before = null // fₙ before the pull whose changes are coloured
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     this.strong = largest(walk.normal.subarray(0, walk.contacts))
@@ -34,7 +36,7 @@ class Look {
     this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most } // a model is slow to ask
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
-      style.width[c] = value > CARRYING ? WIDTH * value : 0
+      style.width[c] = value > CARRYING ? WIDTH * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
     const told = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone)
     style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]

@@ -15,6 +15,7 @@ FOLLOWED = (
     "source",
     "busy",
     "tab",
+    "views",
     "wide",
     "colour",
     "thickness",

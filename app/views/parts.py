@@ -50,6 +50,16 @@ for (const name of ["measure_layout", "after_layout"]) {
 }
 """
 
+# Where fingers scroll the page, a plot that is dragged by them would hold it fast.
+FINGERS = """
+const {prototype} = Bokeh.Models.get("Figure").prototype.default_view
+const {initialize} = prototype
+prototype.initialize = function () {
+  if (matchMedia("(pointer: coarse)").matches) this.model.toolbar.active_drag = null
+  initialize.call(this)
+}
+"""
+
 # Panel's React components listen to changes only some time after they were first drawn: what came
 # in between would never be seen.
 LATE_LISTENERS = """
@@ -65,10 +75,12 @@ prototype.watch = function (view, name, changed, state) {
 def mend_late_views(document):
     """Have the browser bear with what is told to it of views that it has not mounted yet.
 
-    Plots that are not on the page yet are passed over where it lays the page out, and components
-    that begin to listen take over what has changed since they were drawn.
+    Plots that are not on the page yet are passed over where it lays the page out, those under
+    fingers let the page scroll, and components that begin to listen take over what has changed
+    since they were drawn.
     """
-    document.js_on_event("document_ready", CustomJS(code=UNMOUNTED), CustomJS(code=LATE_LISTENERS))
+    mended = [CustomJS(code=code) for code in (UNMOUNTED, FINGERS, LATE_LISTENERS)]
+    document.js_on_event("document_ready", *mended)
 
 
 def answer_with_lock():

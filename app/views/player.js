@@ -6,6 +6,7 @@ const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take lon
 const SWING = 2.2 // s, for the displacement field to go to and fro
 const CROSSING = 8 // times as long as a step takes the way between two states
 const OLD = 0.35 // opacity of what is of other states than those asked for
+const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
@@ -36,6 +37,7 @@ class Player {
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(model)
     this.tell = tell
+    this.listeners = new Set() // functions to be called when other numbers are on screen
     this.scene.onMarks = (context, scene) => { this.pins.draw(context, scene); this.hand.draw(context, scene) }
     this.scene.onSheet = (sheet, scene) => this.pins.onSheet(sheet, scene)
     this.split = new Split(this)
@@ -109,6 +111,7 @@ class Player {
 
   tellAsked() {
     const { model, live } = this, { style } = document.documentElement
+    this.buttons.root.classList.toggle("moving", live.moves)
     this.buttons.tellAsked(live.moves || this.grows ? "" : model.asked)
     // What is beside is pale by these: told by its own style, Bokeh would lay out the whole page anew.
     style.setProperty("--still", model.asked ? OLD : 1)
@@ -132,7 +135,11 @@ class Player {
     if (model.tab === "intervals") plots.show(replay, model.scale)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
+    for (const listener of this.listeners) listener()
   }
+
+  /** The same network, as it is to look now. */
+  repaint() { if (!this.live.moves) this.paint() }
 
   /** Go to a position on the track and paint it; tell: the server, too. */
   show(to, tell = true) {
@@ -253,6 +260,9 @@ class Player {
       step: halted((replay) => this.show(Math.floor(replay.position + 1e-9) + step(replay))),
       back: halted((replay) => this.show(Math.ceil(replay.position - 1e-9) - step(replay))),
       restart: halted(() => this.show(0)),
+      end: halted((replay) => this.show(replay.last)),
+      next: loaded((replay) => this.choose(replay, 1)),
+      previous: loaded((replay) => this.choose(replay, -1)),
       scrub: halted((replay, to) => this.show(to)),
       pin: loaded((replay) => {
         this.model.reference = replay.frame
@@ -264,10 +274,24 @@ class Player {
     }
   }
 
+  /** Select the next contact, the one with the largest force on screen first. */
+  choose({ mixed: { normal } }, sign) {
+    const { model } = this, order = Array.from(normal.keys()).sort((a, b) => normal[b] - normal[a] || a - b)
+    const at = order.indexOf(model.contact ?? -1), { length } = order
+    model.contact = order[at < 0 ? (sign > 0 ? 0 : length - 1) : (at + sign + length) % length]
+    const row = this.scene.geometry.contact.indexOf(model.contact)
+    const told = this.look.contact(row, this.replay).map((pair) => pair.join(" "))
+    this.say(told.join("; "))
+  }
+
+  /** One line in place of where the states come from. */
+  say(words) { this.buttons.part("source").textContent = words }
+
   /** Take the selected contact's force for known, as it is on screen; known, let it go. */
   hold({ mixed }) {
     const { contact } = this.model, { error } = this.buttons
-    if (contact === null || contact === undefined || this.grows || !this.scene.hand) return
+    if (contact === null || contact === undefined) return this.say(UNCHOSEN)
+    if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
     this.tell({ known: known ? { release: contact } : { hold: [contact, mixed.normal[contact], error] } })
   }
@@ -344,7 +368,7 @@ export function render({ model, view }) {
   view.model.data.player = player
   view.model.data.scene = player.scene // for those who find the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
-  for (const name of ["most", "colour", "thickness", "overlay", "reference", "split", "scale", "tab", "wide"]) {
+  for (const name of ["most", "colour", "thickness", "overlay", "reference", "split", "scale", "tab", "views", "wide"]) {
     model.on(name, () => player.again())
   }
   const observer = new ResizeObserver(() => player.scene.resize())

@@ -45,6 +45,7 @@ class Player(Scripted):
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     between = param.List(default=None, allow_None=True)
     tab = param.String()
+    views = param.Integer(doc="of tabs, so far")
     wide = param.Boolean(doc="whether force space is on screen, whatever the tab")
     colour = param.String(default="change")
     thickness = param.String(default="normal")

@@ -1,0 +1,118 @@
+// All contacts as a table: their forces in the network on screen, what they can be, what is known. It
+// asks the player, not the server, and only while it is open; rows that a filter leaves out are dim in
+// the packing.
+
+const ROWS = 200 // shown at once
+const AGAIN_MS = 250 // between two fillings while things move
+const NUMBER = (value) => (Number.isFinite(value) ? value.toFixed(3) : "–")
+// Of each column: heading, what it holds for contact c, how that is written.
+const COLUMNS = [
+  ["contact", (on, c) => on.walk.backbone[c], String],
+  ["disks", (on, c) => on.pairs[c][0], (_, on, c) => on.pairs[c].join(" – ")],
+  ["fₙ", (on, c) => on.mixed.normal[c], NUMBER],
+  ["fₜ", (on, c) => on.mixed.tangential[c], NUMBER],
+  ["smallest fₙ", (on, c) => on.low[c], NUMBER],
+  ["largest fₙ", (on, c) => on.high[c], NUMBER],
+  ["ΔFₙ", (on, c) => on.high[c] - on.low[c], NUMBER],
+  ["held", (on, c) => Number(on.known.has(c)), (value) => (value ? "held" : "")],
+]
+const FORCE = 2 // the column that the table is sorted by at first
+
+export function render({ model, view }) {
+  const root = document.createElement("details"), page = view.model.document
+  root.innerHTML = `<summary>All contacts as a table</summary>
+    <div class="filters">
+      <label>number of contact or disk <input class="find" inputmode="numeric"></label>
+      <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> ⟨fₙ⟩</label>
+    </div>
+    <p class="told" role="status"></p>
+    <div class="frame"><table><thead><tr></tr></thead><tbody></tbody></table></div>`
+  const part = (name) => root.querySelector(name), body = part("tbody")
+  const sorted = { by: FORCE, down: true }
+  const player = () => page.get_model_by_name("player")?.player
+  let from = 0, pending = 0, shown = []
+
+  /** What the columns are read from. */
+  function now() {
+    const on = player(), { replay, look } = on, { walk, mixed } = replay
+    const pairs = new Array(walk.contacts)
+    for (let k = 0; k < walk.contact.length; k++) pairs[walk.contact[k]] ??= [walk.i[k], walk.j[k]]
+    const { low, high } = look.exact ?? walk
+    return { walk, mixed, pairs, low, high, known: new Set(on.pins.pins.contacts ?? []), exact: Boolean(look.exact) }
+  }
+
+  function fits(on, c) {
+    const wanted = part(".find").value.trim(), least = Number(part(".least").value) || 0
+    if (on.mixed.normal[c] < least) return false
+    return !wanted || [on.walk.backbone[c], ...on.pairs[c]].some((number) => String(number) === wanted)
+  }
+
+  function fill() {
+    if (!root.open || !player()?.replay) return
+    const on = now(), value = COLUMNS[sorted.by][1], sign = sorted.down ? -1 : 1
+    const all = Array.from(on.mixed.normal.keys()), found = all.filter((c) => fits(on, c))
+    found.sort((a, b) => sign * (value(on, a) - value(on, b)) || a - b)
+    from = Math.min(from, Math.max(0, found.length - 1))
+    shown = found.slice(from, from + ROWS)
+    part(".told").textContent = `${found.length} of ${all.length} contacts` +
+      (found.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
+      `; forces in ⟨fₙ⟩; smallest and largest: ${on.exact ? "exact" : "of the states shown"}`
+    const chosen = player().model.contact
+    body.innerHTML = shown.map((c) => `<tr tabindex="0" data-contact="${c}" aria-selected="${c === chosen}">` +
+      COLUMNS.map(([, read, write]) => `<td>${write(read(on, c), on, c)}</td>`).join("") + "</tr>").join("")
+    dim(found.length < all.length ? found : null, all.length)
+  }
+
+  /** Contacts that are left out are dim in the packing. */
+  function dim(found, count) {
+    const { look } = player(), was = look.only
+    look.only = found && new Uint8Array(count)
+    for (const c of found ?? []) look.only[c] = 1
+    if (was || look.only) player().repaint()
+  }
+
+  function heads() {
+    part("thead tr").innerHTML = COLUMNS.map(([words], k) => {
+      const order = k === sorted.by ? (sorted.down ? "descending" : "ascending") : "none"
+      return `<th aria-sort="${order}"><button type="button" data-k="${k}">${words}` +
+        `${order === "none" ? "" : sorted.down ? " ↓" : " ↑"}</button></th>`
+    }).join("")
+  }
+
+  function select(row) {
+    player().model.contact = Number(row.dataset.contact)
+    for (const other of body.rows) other.setAttribute("aria-selected", String(other === row))
+  }
+
+  const soon = () => { pending ||= setTimeout(() => { pending = 0; fill() }, AGAIN_MS) }
+  part("thead").addEventListener("click", ({ target: { dataset } }) => {
+    if (dataset.k === undefined) return
+    const by = Number(dataset.k)
+    sorted.down = by === sorted.by ? !sorted.down : by > 1
+    sorted.by = by
+    heads()
+    fill()
+    part(`[data-k="${by}"]`).focus()
+  })
+  body.addEventListener("click", ({ target }) => { const row = target.closest("tr"); if (row) select(row) })
+  body.addEventListener("keydown", (event) => {
+    const row = event.target.closest("tr"), { key } = event
+    const next = { ArrowDown: row.nextElementSibling, ArrowUp: row.previousElementSibling }[key]
+    if (key === "Enter" || key === " ") select(row)
+    else if (next) { next.focus(); select(next) } else if (!key.startsWith("Arrow")) return
+    event.preventDefault()
+    event.stopPropagation()
+  })
+  for (const name of [".find", ".least"]) part(name).addEventListener("input", fill)
+  root.addEventListener("toggle", () => {
+    const on = player()
+    if (!on) return
+    if (root.open) { on.listeners.add(soon); fill() } else { on.listeners.delete(soon); if (on.look) dim(null, 0) }
+  })
+  const ground = () => { root.style.setProperty("--ground", model.dark ? "#121212" : "#ffffff") }
+  model.on("dark", ground)
+  ground()
+  model.on("remove", () => player()?.listeners.delete(soon))
+  heads()
+  return root
+}

@@ -1,0 +1,20 @@
+"""All contacts as a table, to be opened; it follows the network on screen, see contacts.js."""
+
+from typing import ClassVar
+
+import param
+
+from .scripts import FOLDER, Scripted, joined
+
+
+class Contacts(Scripted):
+    """Number, disks, forces and their bounds of each contact; sorted, searched and filtered."""
+
+    dark = param.Boolean()
+
+    _esm = joined("contacts")
+    _stylesheets: ClassVar = [FOLDER / "contacts.css"]
+
+    def __init__(self, state):
+        super().__init__(sizing_mode="stretch_width", dark=state.dark)
+        state.param.watch(lambda event: self.param.update(dark=event.new), "dark")
