@@ -30,7 +30,7 @@ from .views.parts import (
 from .views.progress import Progress
 from .views.small import FIRST_STEPS, Small
 from .views.stream import Stream
-from .views.summary import tiles
+from .views.summary import of_which, tiles
 from .views.tour import STEPS, Tour
 from .views.volume import Volume
 
@@ -178,7 +178,7 @@ def _large(document, query):
             sidebar.extend(widgets[k : k + 3])
             yield
         summary, volume = tiles(state), Volume(state).panel()
-        right.extend([summary, volume])
+        right.extend([of_which(state), summary, volume])
         tabs = Tabs(state)
         _pale_when_old(
             [*tabs.pages.items(), ("summary", summary), ("volume", volume), ("plane", middle)]

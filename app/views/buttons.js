@@ -11,6 +11,10 @@ const ICONS = {
   hold: "M8 2h8v2l-1 1v6l3 3v2h-5v6l-1 1-1-1v-6H6v-2l3-3V5L8 4z",
   between: "M4 12l5-5v3h6V7l5 5-5 5v-3H9v3z",
   split: "M3 5h8v14H3zM13 5h8v14h-8z",
+  closer: "M11 4h2v7h7v2h-7v7h-2v-7H4v-2h7z",
+  farther: "M4 11h16v2H4z",
+  whole: "M4 4h6v2H6v4H4zM14 4h6v6h-2V6h-4zM4 14h2v4h4v2H4zM18 14h2v6h-6v-2h4z",
+  full: "M3 5h18v14H3zm2 2v10h14V7z",
 }
 const HELD = { "[": "less", "]": "more", z: "undo", Z: "undo", Escape: "free", h: "hold", H: "hold" }
 const KEYS = {
@@ -59,6 +63,12 @@ const BUTTONS = `
       <span tabindex="0" data-term="eta3">intervals <b class="eta3"></b></span>
     </span>
   </div>`
+const VIEW = `
+  ${button("closer", "zoom in (wheel, pinch)")}
+  ${button("farther", "zoom out")}
+  ${button("whole", "the whole packing (double click)")}
+  ${button("full", "full screen")}`
+const CLOSER = 0.7 // of the view, by a button
 const CHECKS = `<summary>Check this network</summary>
   <div class="read">
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
@@ -82,14 +92,22 @@ class Buttons {
     this.asked.className = "asked"
     this.scenes = document.createElement("div")
     this.scenes.className = "scenes"
-    this.scenes.append(scene.root)
+    const view = document.createElement("div")
+    view.className = "view"
+    view.innerHTML = VIEW
+    this.scenes.append(scene.root, view)
     const checks = document.createElement("details")
     checks.className = "checks"
     checks.innerHTML = CHECKS
     checks.append(this.skips)
     this.root.append(this.scenes, checks)
     this.scene = scene
-    for (const name of Object.keys(ICONS)) this.part(name)?.addEventListener("click", actions[name])
+    const zoom = (factor) => () => scene.zoom(factor, scene.size / 2, scene.size / 2)
+    const all = {
+      ...actions, closer: zoom(CLOSER), farther: zoom(1 / CLOSER), whole: () => scene.reset(),
+      full: () => (document.fullscreenElement ? document.exitFullscreen() : this.root.requestFullscreen()),
+    }
+    for (const name of Object.keys(ICONS)) this.part(name)?.addEventListener("click", all[name])
     this.part("scrub").addEventListener("input", (event) => actions.scrub(Number(event.target.value)))
     this.part("error").addEventListener("keydown", (event) => { if (event.key === "Enter") actions.hold() })
     this.part("speed").addEventListener("input", () => this.tellRate())

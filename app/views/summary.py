@@ -139,3 +139,18 @@ def tiles(state):
     tell()
     shown = of_replay(state, numbers, STYLE, margin=(0, 10))
     return pn.Column(shown, folded, sizing_mode="stretch_width")
+
+
+def of_which(state):
+    """Whose numbers and plots are pale, while others are asked for."""
+    line = pn.pane.HTML(visible=False, sizing_mode="stretch_width", margin=(6, 12, 0, 12))
+
+    def tell(*events):
+        old = state.cell is not None and state.missing
+        line.visible = old
+        if old:
+            line.object = f"<b>Pale: still of μ = {state.cell.mu:g}</b>, {state.cell.series}"
+
+    state.param.watch(tell, ["missing", "cell"])
+    tell()
+    return line

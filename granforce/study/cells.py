@@ -15,6 +15,10 @@ from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 
 
+def _as_asked(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
+    return parameters
+
+
 class Kind(NamedTuple):
     """One kind of result: what it is called, what names one of it, and how one is computed."""
 
@@ -27,7 +31,7 @@ class Kind(NamedTuple):
     compute: Callable[..., xr.Dataset]  # (store, parameters, *, workers, progress, …) → its dataset
     holds_states: bool = False
     # (parameters, dataset) → what names the dataset: it may have ended before all was there
-    reached: Callable[[Parameters, xr.Dataset], Parameters] = lambda parameters, _: parameters
+    reached: Callable[[Parameters, xr.Dataset], Parameters] = _as_asked
 
 
 class Cell(NamedTuple):

@@ -293,7 +293,7 @@ def test_views_that_make_no_sense_are_left_out(library, wait_for):
     assert (state.contact, state.frame, state.colour, state.between) == (
         None,
         0,
-        "mobilised",
+        "change",
         None,
     )
 

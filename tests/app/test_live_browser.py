@@ -245,7 +245,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(visit):
     page.mouse.up()
     page.wait_for_function("() => location.search.includes('pulls=')")
     assert normal(page)[contact] == pytest.approx(during[contact], abs=1e-5)
-    assert float(page.locator("b.residual").inner_text()) < 1e-9
+    assert float(page.locator("b.residual").text_content()) < 1e-9
     until(page, f"scene.selected === {contact}")
     # what was pulled is coloured by what it changed
     change = normal(page) - before

@@ -78,7 +78,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     page.mouse.up()
     page.wait_for_function("() => /pulls=.*[pn]%3A/.test(location.search)")
     until(page, "scene.hand.player.replay.held.pull?.length === 3")
-    assert float(page.locator("b.residual").inner_text()) < 1e-9
+    assert float(page.locator("b.residual").text_content()) < 1e-9
     np.testing.assert_allclose(normal(page), during, atol=2e-3)
     page.keyboard.press("z")
     until(page, "scene.hand.player.replay.held?.pull?.length !== 3")

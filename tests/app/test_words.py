@@ -6,11 +6,8 @@ from html import unescape
 from small_store import ROOT
 
 from app.selection import KINDS, SOLVERS
-from app.state import COLOURS, SCALES, SORTS, WIDTHS
+from app.state import AXES, COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
 from app.views import hints
-from app.views.perturb import WHAT as PERTURB
-from app.views.plane import PLANES
-from app.views.statistics import WHAT as STATISTICS
 from app.views.summary import TILES
 from granforce import glossary, notebook
 from granforce.glossary import TERMS
@@ -19,7 +16,7 @@ from granforce.glossary import TERMS
 def test_every_symbol_and_option_has_its_sentence():
     known = hints.labels()
     assert set(known.values()) <= set(TERMS)
-    for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, PLANES, PERTURB, STATISTICS):
+    for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, AXES, PLANES, PUSHES, FIGURES):
         for words in options.values():
             assert words in known, words
     for _, _, _, term in TILES:
