@@ -306,7 +306,7 @@ TERMS = {
     ),
     # What colours, widths and orders show
     "change": Term(
-        "change since the original",
+        "change from the original",
         "",
         "Orange contacts carry more than in the original network, blue ones less.",
     ),

@@ -28,7 +28,7 @@ def opened(chromium, address, query, width):
     page.set_default_timeout(PATIENCE)
     page.goto(address + (query or MANY))
     painted(page, PATIENCE)
-    page.get_by_role("tab").first.wait_for()
+    page.locator("[role=tab]").first.wait_for(state="attached")
     page.wait_for_function("() => !document.querySelector('.pn-loading')")
     if width > 900:  # else the sidebar is closed
         page.get_by_text("Copy link").wait_for(state="attached")

@@ -262,7 +262,7 @@ def test_chains_are_coloured_by_what_is_chosen(visit, colour):
     if colour == "sign":
         np.testing.assert_array_equal(shown, 1 + np.sign(normal[6] - normal[3]))
     elif colour == "change":
-        change = np.clip(0.5 + (normal[6] - normal[0]) / 2, 0, 1)
+        change = np.clip(0.5 + (normal[6] - normal[0]), 0, 1)
         np.testing.assert_allclose(shown, 32 * change, atol=0.501)
     else:
         low, high = (
@@ -313,15 +313,38 @@ def test_what_is_shown_between_two_states_is_admissible(page):
     """Halfway frames are the mean of two states: balanced like them, and inside the cones."""
     page.locator("input.speed").fill("2")
     page.locator("button.play").click()
-    page.wait_for_timeout(600)
+    between = """e => {
+        const {mixed, hand: {player: {replay: {position}}}} = e.scene, part = position % 1
+        if (part < 0.2 || part > 0.8) return null
+        return [Array.from(mixed.normal), Array.from(mixed.tangential)]
+    }"""
+    handle = page.locator(".scene").element_handle()
+    normal, tangential = map(np.array, page.wait_for_function(between, arg=handle).json_value())
     page.locator("button.play").click()
-    normal, tangential = (
-        np.array(scene(page, f"Array.from(scene.mixed.{name})"))
-        for name in ("normal", "tangential")
-    )
     frames = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
     assert not np.any(np.all(np.isclose(frames, normal, atol=1e-6), axis=1))  # none of the states
     assert np.all(np.abs(tangential) <= 0.1 * normal + 1e-6) and np.all(normal >= 0)
+
+
+@pytest.mark.parametrize("motion", ["reduce", "no-preference"])
+def test_a_pause_goes_to_the_nearest_state(visit, motion):
+    page = visit()
+    page.emulate_media(reduced_motion=motion)
+    page.locator("input.speed").fill("1")
+    page.locator("button.play").click()
+    page.wait_for_timeout(700)
+    page.locator("button.play").click()
+    page.wait_for_function(
+        "e => { const {playing, replay} = e.scene.hand.player;"
+        " return !playing && replay.position % 1 === 0 }",
+        arg=page.locator(".scene").element_handle(),
+    )
+    shown, frames, frame, told = scene(
+        page,
+        "[scene.mixed.normal, scene.geometry.normal, scene.hand.player.replay.frame,"
+        " scene.hand.player.model.frame].map((value) => value.length ? Array.from(value) : value)",
+    )
+    assert shown == frames[frame * len(shown) : (frame + 1) * len(shown)] and told == frame
 
 
 def test_step_back_and_restart(page):

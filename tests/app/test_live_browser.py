@@ -512,5 +512,5 @@ def test_the_sidebar_leaves_its_room_to_the_packing_where_there_is_little(visit,
 
 def test_on_a_phone_the_player_is_below_the_packing(visit):
     page = visit("", 400, 900)
-    above, below = (page.locator(f".stage .{name}").bounding_box() for name in ("scene", "bar"))
+    above, below = (page.locator(f".stage .{name}").bounding_box() for name in ("scene", "tools"))
     assert above["y"] + above["height"] <= below["y"] + 1

@@ -164,7 +164,7 @@ def test_the_page_plays_slowly_until_it_is_touched(visit):
         "e => e.closest('.stage').classList.contains('playing')", arg=handle(page)
     )
     assert page.locator(".rate").inner_text() == "1.0 /s"
-    page.locator(".legend, .skips").first.click()
+    page.locator(".lead").click()
     page.wait_for_function(
         "e => !e.closest('.stage').classList.contains('playing')", arg=handle(page)
     )

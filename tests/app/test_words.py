@@ -6,7 +6,7 @@ from html import unescape
 from small_store import ROOT
 
 from app.selection import KINDS, SOLVERS
-from app.state import AXES, COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
+from app.state import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
 from app.views import hints
 from app.views.summary import TILES
 from granforce import glossary, notebook
@@ -16,7 +16,7 @@ from granforce.glossary import TERMS
 def test_every_symbol_and_option_has_its_sentence():
     known = hints.labels()
     assert set(known.values()) <= set(TERMS)
-    for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, AXES, PLANES, PUSHES, FIGURES):
+    for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, PLANES, PUSHES, FIGURES):
         for words in options.values():
             assert words in known, words
     for _, _, _, term in TILES:
