@@ -1,7 +1,7 @@
 // The address follows the view, and the view follows Back and Forward; where the server is gone, see
 // gone.js.
 
-const RETURN_MS = 4000 // in which a view that was gone back to appears
+const RETURN_MS = 20000 // in which a view that was gone back to appears
 
 export function render({ model, view }) {
   const banner = goneBanner(view, "What is in the page still plays.")
