@@ -2,6 +2,7 @@
 
 import importlib
 from functools import partial
+from urllib.parse import parse_qsl
 
 import panel as pn
 import panel_material_ui as pmui
@@ -77,6 +78,14 @@ SIDE_BY_SIDE = {
     },
     BAR: HIDDEN,
 }
+# The packing alone, within a page of somebody else's.
+BARE = {BAR: HIDDEN, "& .MuiAppBar-root": HIDDEN, "& .MuiToolbar-root": HIDDEN}
+ALONE = {"sidebar_variant": "temporary", "sidebar_open": False, "sx": BARE}
+AROUND = {
+    "sidebar_width": 290,
+    "sidebar_resizable": False,  # its handle has a name but no role
+    "sx": SIDE_BY_SIDE,
+}
 POLL_MS = 200  # how often the page asks running work how far it is
 WAITING_MS = 250  # how often what Panel has kept back is sent
 GONE_MS = (
@@ -148,14 +157,13 @@ def _large(document, query):
     middle = pn.Column(visible=False, css_classes=["in-plane"], styles=BESIDE, **wide)
     right, sidebar = pn.Column(styles=BESIDE, **wide), pn.Column()
     header = pn.Row(sizing_mode="stretch_width", align="center", margin=(0, 8))
+    alone = dict(parse_qsl(query.lstrip("?"))).get("embed") == "1"
+    around = ALONE | {"main": [left]} if alone else AROUND | {
+        "header": [header], "sidebar": [sidebar], "main": [left, middle, right],
+    }  # fmt: skip
     whole = pmui.Page(
         title=TITLE,
-        header=[header],
-        sidebar=[sidebar],
-        sidebar_width=290,
-        sidebar_resizable=False,  # its handle has a name but no role
-        main=[left, middle, right],
-        sx=SIDE_BY_SIDE,
+        **around,
         template=EARLY % pmui.Page._render_esm(server=True),
         stylesheets=[UNSEEN, NARROW],
         dark_theme=state.dark,
@@ -167,6 +175,9 @@ def _large(document, query):
 
     def parts():
         """What follows the packing."""
+        if alone:
+            left.append(packing.legend)
+            return
         controls = Controls(state)
         left.extend(
             [controls.beside, packing.legend, explanation.view(state), Address(state), Hints()]

@@ -22,12 +22,19 @@ ALSO = {"walk": "also show uniformly sampled states", "uniform": "also show the 
 CALLED = {"uniform": "uniformly sampled states", "walk": "walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "states of the walk (triangles)"}
 ENOUGH = 300  # states beside those shown, where they have to be computed
+NEARLY_ALL = 0.8  # part of the states in the inner half, from which on that is said
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
 
 WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
 
 COMING = "The states come as they are found; the first few tell how to look at them."
 GROWS = "The states come as they are found; the exact outline of S follows."
+
+COMPUTED = (
+    "<details><summary>How was this computed?</summary>{found.programs} linear programs, one for "
+    "each direction, in {found.seconds:.1f} s: the outline is known to {found.gap:.1g} ⟨fₙ⟩. The "
+    "inner half is the outline shrunk to half its lengths about its middle.</details>"
+)
 
 HELP = f"""
 One point is one whole network of forces. Shown is the shadow ({term("principal", "projection")})
@@ -269,21 +276,21 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         h, inner = replay.summary["dimension"], planes.inner_share(path, found.outer)
         words = (
-            f"Shaded: the exact outline of S in this plane ({found.programs} linear programs, "
-            f"{found.seconds:.1f} s, known to {found.gap:.1g} ⟨fₙ⟩). The {len(path)} states shown "
-            f"span {part[0]:.0%} of it across, {part[1]:.0%} upwards and {area:.1%} of its area; "
-            f"<b>{inner:.0%} of them lie in its inner half</b> (by length)"
+            f"Shaded: the exact outline of S in this plane. The {len(path)} states shown span "
+            f"{part[0]:.0%} of it across, {part[1]:.0%} upwards and {area:.1%} of its area; "
+            f"<b>{inner:.0%} of them lie in its inner half</b>"
         )
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
             words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
-        if h >= MANY:
+        words += "."
+        if h >= MANY and inner >= NEARLY_ALL:
             words += (
-                f". That is no failure to explore: S is a body of {h} dimensions, and nearly all "
+                f" That is no failure to explore: S is a body of {h} dimensions, and nearly all "
                 "volume of such a body casts its shadow near the middle."
             )
-        self.told.object = words.rstrip(".") + "."
+        self.told.object = words + COMPUTED.format(found=found)
 
     @property
     def other_kind(self):

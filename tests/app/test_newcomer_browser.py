@@ -206,3 +206,18 @@ def test_what_is_known_colours_the_chains_and_goes_into_pictures(visit):
         page.get_by_role("button", name="SVG", exact=True).click()
     assert "Known: contact " in (saved.value.path()).read_text()
     painted(page)
+
+
+# 10: the packing alone, in a page of somebody else's
+
+
+def test_embedded_there_is_the_packing_with_its_player_alone(opening):
+    page = opening(f"{AT}&embed=1", 600, 700)
+    painted(page, 60_000)
+    page.get_by_text("width: normal force").wait_for()
+    assert page.locator(".header, [role=tab]").filter(visible=True).count() == 0
+    page.locator("button.step").click()
+    page.wait_for_function(
+        "e => e.scene.hand.player.replay.frame === 1", arg=page.locator(".scene").element_handle()
+    )
+    picture(page, "embedded")
