@@ -2,30 +2,38 @@
 
 import threading
 from collections import OrderedDict
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from granforce.records import Floats
 from granforce.study import kinds
 from granforce.study.bounds import UNDETERMINED
 from granforce.study.cells import entry_name
+from granforce.study.store import Store
 
-from .data import readable
+from .data import Cell, Library, readable
+from .selection import Selection
 
 MEASURES = ("eta1", "eta2", "eta3", "coordination", "dimension", "packing_fraction")
 CORRELATIONS = ("correlation", "correlation_low", "correlation_high")
 KEPT = 1000  # rows in memory, for all visitors: some 10 kB each
 MOST_CURVES = 5  # of a distribution in one plot
 
-_rows = OrderedDict()
+Row = dict[str, Any]
+
+_rows: OrderedDict[tuple[str, str], Row] = OrderedDict()
 _lock = threading.Lock()
 
 
-def alike(cells, cell):
+def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
     """Cells of other packings and μ made like this one: seed and friction may differ."""
     return [other for other in cells if _kin(other.selection) == _kin(cell.selection)]
 
 
-def _kin(selection):
+def _kin(selection: Selection) -> tuple[Any, ...]:
     """What is the same for all cells of one statistic."""
     packing = {k: v for k, v in selection.packing.items() if k not in ("seed", "mu")}
     own_mu = None if selection.same_mu else selection.packing["mu"]
@@ -33,12 +41,12 @@ def _kin(selection):
     return packing, own_mu, selection.kind, relax, selection.states
 
 
-def rows(cells):
+def rows(cells: Iterable[Cell]) -> list[Row]:
     """One dict a cell: mu, seed, measures, correlations, `normal` and `extent` (N_c,) in ⟨f_n⟩."""
     return [_row(cell.store, cell.name, cell.selection) for cell in cells]
 
 
-def exact_rows(library, cells):
+def exact_rows(library: Library, cells: Iterable[Cell]) -> list[Row]:
     """The same from exact intervals, of those packings whose intervals a store has."""
     found = []
     for cell in cells:
@@ -51,7 +59,7 @@ def exact_rows(library, cells):
     return found
 
 
-def _row(store, name, selection):
+def _row(store: Store, name: str, selection: Selection) -> Row:
     key = str(store.path), name
     with _lock:
         if key in _rows:
@@ -59,7 +67,7 @@ def _row(store, name, selection):
             return _rows[key]
     with readable(store, name) as dataset:  # but for the states, most of it
         scale = dataset["force_scale"].item()
-        row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
+        row: Row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
         row |= {k: dataset[k].item() for k in (*MEASURES, *CORRELATIONS) if k in dataset}
         low, high = dataset["low"].values[:, 0], dataset["high"].values[:, 0]
         row |= {"normal": dataset["original"].values[:, 0] / scale, "extent": (high - low) / scale}
@@ -70,12 +78,12 @@ def _row(store, name, selection):
     return row
 
 
-def groups(found, mu, most=MOST_CURVES):
+def groups(found: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[float, list[Floats]]:
     """{μ: extents of the packings with it}: of this μ and some others, spread over all there are.
 
     Packings whose forces are determined are left out.
     """
-    by_mu = {}
+    by_mu: dict[float, list[Floats]] = {}
     for row in found:
         if row["extent"].max(initial=0) > UNDETERMINED:
             by_mu.setdefault(row["mu"], []).append(row["extent"])
@@ -86,7 +94,9 @@ def groups(found, mu, most=MOST_CURVES):
     return {value: by_mu[value] for value in chosen}
 
 
-def histogram(values, bins=40, largest=None):
+def histogram(
+    values: npt.ArrayLike, bins: int = 40, largest: float | None = None
+) -> tuple[Floats, Floats]:
     """Edges (bins + 1,) and probability density (bins,) of values from 0 to the largest."""
     values = np.asarray(values).ravel()
     largest = float(values.max(initial=0)) if largest is None else largest

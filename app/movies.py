@@ -14,6 +14,7 @@ FRAME_MS = 80
 MOST_BYTES = 5e6
 FEWER = (1.0, 0.7, 0.5, 0.35)  # parts of SIDE that are tried until it is small enough
 TONES = 64  # colours of the whole movie
+FULL = 0.5  # ⟨f_n⟩, the change at which its colour is full; as in grab.js
 WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 
 
@@ -126,7 +127,7 @@ def shades(
     shade = {
         "mobilised": mobilised,
         "extent": lambda normal, tangential: extent / (most or 1.0),
-        "change": lambda normal, tangential: 0.5 + (normal - first) / 2,
+        "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * FULL),
         "sign": lambda normal, tangential: 0.5 + 0.5 * np.sign(normal - pinned),
         "load": lambda normal, tangential: (
             np.full_like(normal, 0.5) if loads is None else loads / loads.max()

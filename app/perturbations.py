@@ -1,17 +1,23 @@
 """Local perturbations of the packing on screen, and what the stores know about those of others."""
 
 import json
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
+from granforce.records import Floats, Packing
 from granforce.study import kinds
 from granforce.study.cells import entries
+from granforce.study.keys import Parameters
 from granforce.study.responses import moved_grains
 
 from .compute import found_or_made
-from .data import readable
-from .distributions import alike, rows
+from .data import Cell, Library, readable
+from .distributions import Row, alike, rows
+from .jobs import Job
+from .replays import Replay
 
 # Fewer contacts than this say little about the mean over all.
 ENOUGH_CONTACTS = 10
@@ -20,7 +26,7 @@ ENOUGH_CONTACTS = 10
 class Loads(NamedTuple):
     """Limit loads of all contacts, in ⟨f_n⟩."""
 
-    load: np.ndarray  # (N_c,)
+    load: Floats  # (N_c,)
     gap: float  # largest duality gap, ⟨f_n⟩
     seconds: float
 
@@ -36,35 +42,40 @@ class Pushed(NamedTuple):
     slid: int  # at which grains slide
     kept: int  # and which stick
     breach: float  # of Coulomb's law by the motion
-    displacement: np.ndarray  # (N, 2) first motion, rms 1; 0 for rattlers
-    distance: np.ndarray  # (k,) of the backbone's grains from the contact, length
-    size: np.ndarray  # (k,) |u| of those grains
-    radius: np.ndarray  # (shells,) length
-    profile: np.ndarray  # (shells,) mean |u|
+    displacement: Floats  # (N, 2) first motion, rms 1; 0 for rattlers
+    distance: Floats  # (k,) of the backbone's grains from the contact, length
+    size: Floats  # (k,) |u| of those grains
+    radius: Floats  # (shells,) length
+    profile: Floats  # (shells,) mean |u|
     exponent: float  # α of |u| ~ r^−α for this contact alone
-    fit: tuple  # smallest and largest r of its fit, length
-    spread: tuple  # smallest and largest α of other ranges of r; NaN where no fit is possible
+    fit: tuple[float, ...]  # smallest and largest r of its fit, length
+    spread: tuple[
+        float, float
+    ]  # smallest and largest α of other ranges of r; NaN where no fit is possible
     seconds: float
 
 
-def limit_loads(library, cell):
+def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
     """Work, for jobs.Task, that finds or computes the failure load of every contact."""
 
-    def work(job):
+    def work(job: Job) -> Loads:
         params = kinds.LIMIT_LOADS.parameters(cell.selection.packing, mu=cell.selection.mu)
         stage = "failure load of every contact"
         found = found_or_made(library, job, stage, kinds.LIMIT_LOADS, params)
         scale = found["force_scale"].item()
-        numbers = (found[name].item() for name in ("max_gap", "seconds"))
-        return Loads(found["limit_load"].values / scale, *numbers)
+        return Loads(
+            load=found["limit_load"].values / scale,
+            gap=found["max_gap"].item(),
+            seconds=found["seconds"].item(),
+        )
 
     return work
 
 
-def push(library, cell, replay, contact):
+def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable[[Job], Pushed]:
     """Work that finds or computes what a growing force pair on one contact does."""
 
-    def work(job):
+    def work(job: Job) -> Pushed:
         params = kinds.PERTURBATION.parameters(
             cell.selection.packing,
             mu=cell.selection.mu,
@@ -77,16 +88,25 @@ def push(library, cell, replay, contact):
     return work
 
 
-def _pushed(found, packing, contact):
+def _pushed(found: xr.Dataset, packing: Packing, contact: int) -> Pushed:
     scale = found["force_scale"].item()
-    forces = (found[name].values[0] / scale for name in _FORCES)
-    counts = (int(found[name].values[0]) for name in ("opened", "slid", "kept"))
+
+    def force(name: str) -> float:
+        return found[name].values[0].item() / scale
+
+    def count(name: str) -> int:
+        return int(found[name].values[0])
+
     u = found["displacement"].values[0]
     distance, size = moved_grains(packing, found)
     return Pushed(
-        contact,
-        *forces,
-        *counts,
+        contact=contact,
+        limit=force("limit_load"),
+        low=force("critical_low"),
+        high=force("critical_high"),
+        opened=count("opened"),
+        slid=count("slid"),
+        kept=count("kept"),
         breach=float(found["motion_breach"].values[0]),
         displacement=np.nan_to_num(u),
         distance=distance,
@@ -100,15 +120,12 @@ def _pushed(found, packing, contact):
     )
 
 
-def _range(values):
+def _range(values: Floats) -> tuple[float, float]:
     known = values[np.isfinite(values)]
     return (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
 
 
-_FORCES = ("limit_load", "critical_low", "critical_high")
-
-
-def over_store(library, cells, cell):
+def over_store(library: Library, cells: Iterable[Cell], cell: Cell) -> list[Row]:
     """One dict for each packing perturbed at enough contacts: as `figures.perturbation` takes them.
 
     η2 is that of the packing's states among the cells; those of the same kind as `cell` come first.
@@ -132,5 +149,5 @@ def over_store(library, cells, cell):
     return list({row["entry"]: row for row in found}.values())
 
 
-def _key(packing, mu):
+def _key(packing: Parameters, mu: float) -> tuple[Any, ...]:
     return tuple(sorted((k, str(v)) for k, v in packing.items())), mu

@@ -6,6 +6,7 @@ import statistics
 import threading
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from granforce.paper import tables
 from granforce.records import InputError
@@ -22,14 +23,14 @@ ABOUT = {
 _reading = threading.Lock()
 
 
-def study():
+def study() -> tables.Table | None:
     """The reduced study (granforce.paper.tables.Table), or None where it was not brought along."""
     with _reading:
         return _study()
 
 
 @cache
-def _study():
+def _study() -> tables.Table | None:
     try:
         return tables.load(DATA / "study.zarr")
     except InputError:
@@ -37,7 +38,7 @@ def _study():
 
 
 @cache
-def claims(about):
+def claims(about: str) -> list[dict[str, Any]]:
     """The paper's claims about one of ABOUT: dicts with statement, value, low, high, verdict.
 
     What could not be measured is NaN, null in the file.
@@ -53,15 +54,15 @@ def claims(about):
     ]
 
 
-def rows(*parts):
+def rows(*parts: str) -> list[dict[str, Any]]:
     """Rows of parts of the study at its usual number of disks; empty without a study."""
     table = study()
     return [] if table is None else table.part(*parts, n=table.plan["n"])
 
 
-def hill():
+def hill() -> list[tuple[float, float]]:
     """How undetermined forces are over friction: [(μ, η2)], η2 the mean of the walks at each μ."""
-    by_mu = {}
+    by_mu: dict[float, list[float]] = {}
     for row in rows("walk"):
         by_mu.setdefault(row["mu"], []).append(row["eta2"])
     return [(mu, statistics.fmean(found)) for mu, found in sorted(by_mu.items())]
