@@ -13,7 +13,7 @@ import tempfile
 from itertools import pairwise
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
+sys.path[:0] = [str(Path(__file__).parents[k]) for k in range(3)]  # tests/app, tests, and above
 
 from PIL import Image  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
@@ -120,6 +120,7 @@ def act(page, recorder):
     until(page, "!scene.hand.player.grows && !scene.hand.player.model.busy")
     if scene(page, "scene.hand.player.playing"):
         page.locator("button.play").click()
+    page.get_by_role("tab", name="Force space").click()
     page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 4")
     page.wait_for_timeout(1500)
     recorder.on = True
