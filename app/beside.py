@@ -1,10 +1,13 @@
 """Two frictions side by side: the packing of the states on screen, made or held at another μ."""
 
+from typing import Any
+
 from granforce.records import InputError
 
 from . import compute
-from .data import best_cell
+from .data import Shown, best_cell
 from .limits import LIMITS
+from .selection import Selection
 
 
 class Beside:
@@ -15,11 +18,11 @@ class Beside:
     gives it up.
     """
 
-    def __init__(self, state):
+    def __init__(self, state: Any) -> None:
         self.state, self.task = state, state.task()
         state.param.watch(self._follow, ["split", "beside", "cell"])
 
-    def keep(self, wanted):
+    def keep(self, wanted: Selection) -> None:
         """Another Selection was chosen: if only μ differs, what is on screen stays beside it."""
         state = self.state
         if not state.split or state.beside is not None or state.cell is None:
@@ -28,7 +31,7 @@ class Beside:
         if shown.mu != wanted.mu and shown.at(wanted.mu).names(wanted):
             state.beside = shown.mu
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         """Have the other packing found, or computed if no store has it."""
         state = self.state
         if not state.split:
@@ -46,7 +49,7 @@ class Beside:
         if state.twin is None or not state.twin.cell.selection.names(wanted):
             self._find(wanted)
 
-    def _find(self, wanted):
+    def _find(self, wanted: Selection) -> None:
         state, library = self.state, self.state.library
         cell = best_cell(state.catalogue, wanted)
         if cell is None or not cell.selection.names(wanted):
@@ -59,5 +62,5 @@ class Beside:
             self.task.cancel()
             state.twin = shown
 
-    def _found(self, shown):
+    def _found(self, shown: Shown) -> None:
         self.state.twin = shown

@@ -3,17 +3,23 @@
 import io
 import json
 import zipfile
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 import zarr
 
 from granforce.packing import importers
+from granforce.records import Packing
 from granforce.study.keys import canonical
 from granforce.study.schema import packing_dataset
 
+from .data import Cell
+from .replays import Replay
 from .selection import command
+
+Columns = dict[str, np.ndarray]
 
 # The contact dimension of a packing's own arrays; that of the states holds the backbone only.
 PACKING_CONTACTS = "packing_contact"
@@ -27,7 +33,7 @@ class File(NamedTuple):
     content: bytes
 
 
-def contacts(replay, exact, frame):
+def contacts(replay: Replay, exact: xr.Dataset | None, frame: int) -> Columns:
     """One row a contact of the backbone, forces in the packing's unit: {name: array}."""
     scale = replay.force_scale
     first = np.unique(replay.links.contact, return_index=True)[1]
@@ -70,7 +76,7 @@ COLUMNS = {
 }
 
 
-def explained(columns, replay, title):
+def explained(columns: Iterable[str], replay: Replay, title: str) -> str:
     """Lines, each after a #, that tell what a table holds and in which units."""
     unit = (
         f"Forces are in the packing's own unit (pressure times length): mean normal force "
@@ -80,7 +86,7 @@ def explained(columns, replay, title):
     return "".join(f"# {line}\n" for line in lines)
 
 
-def csv(columns, head=""):
+def csv(columns: Columns, head: str = "") -> bytes:
     """Columns {name: array} as a table below the head; whole numbers stay whole."""
     file = io.StringIO()
     file.write(head)
@@ -96,7 +102,7 @@ def csv(columns, head=""):
     return file.getvalue().encode()
 
 
-def dataset(packing, states, exact=None):
+def dataset(packing: Packing, states: xr.Dataset, exact: xr.Dataset | None = None) -> xr.Dataset:
     """Packing, states and, where known, exact intervals (exact_low, exact_high) in one dataset."""
     geometry = packing_dataset(packing)
     geometry = geometry.rename({"contact": PACKING_CONTACTS})
@@ -108,14 +114,14 @@ def dataset(packing, states, exact=None):
     return whole.assign_attrs(states.attrs)
 
 
-def netcdf(whole):
+def netcdf(whole: xr.Dataset) -> bytes:
     """A dataset as NetCDF 3."""
     return bytes(whole.to_netcdf(engine="scipy"))
 
 
-def zarr_zip(whole):
+def zarr_zip(whole: xr.Dataset) -> bytes:
     """A dataset as a zipped Zarr group, which zarr.storage.ZipStore opens."""
-    written = {}
+    written: dict[str, Any] = {}
     whole.to_zarr(zarr.storage.MemoryStore(store_dict=written), zarr_format=3, consolidated=False)
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
@@ -124,14 +130,14 @@ def zarr_zip(whole):
     return file.getvalue()
 
 
-def npz(packing):
+def npz(packing: Packing) -> bytes:
     """A packing as NPZ, to be read by `granforce` and load_packing."""
     file = io.BytesIO()
     importers.save_packing(packing, file)
     return file.getvalue()
 
 
-def parameters(cell, link, view):
+def parameters(cell: Cell, link: str, view: Mapping[str, Any]) -> bytes:
     """All that names what is on screen, as JSON: parameters, link, command, view."""
     told = {
         "kind": cell.kind,

@@ -1,11 +1,18 @@
 """A movie of what plays, as GIF: drawn here, small enough for slides."""
 
 import io
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from granforce.records import Cancelled
+from granforce.records import Cancel, Cancelled, Floats, Progress
+
+from .replays import Replay
+
+Look = Mapping[str, Any]  # of `shades`
+Moment = tuple[int, int, float]
 
 SIDE = 480  # pixels
 FINER = 2  # times as many while drawing, for smooth edges
@@ -18,7 +25,14 @@ FULL = 0.5  # ⟨f_n⟩, the change at which its colour is full; as in grab.js
 WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 
 
-def gif(replay, look, *, between=None, progress=None, cancelled=None):
+def gif(
+    replay: Replay,
+    look: Look,
+    *,
+    between: tuple[int, int] | None = None,
+    progress: Progress | None = None,
+    cancelled: Cancel | None = None,
+) -> bytes:
     """GIF (bytes, at most MOST_BYTES) of the states, or to and fro between two of them.
 
     look: see `shades`. progress(done, total); cancelled() ends it with Cancelled.
@@ -34,10 +48,17 @@ def gif(replay, look, *, between=None, progress=None, cancelled=None):
     return file.getvalue()
 
 
-def _drawn(replay, look, side, between, progress, cancelled):
+def _drawn(
+    replay: Replay,
+    look: Look,
+    side: int,
+    between: tuple[int, int] | None,
+    progress: Progress | None,
+    cancelled: Cancel | None,
+) -> list[Image.Image]:
     fine = side * FINER
     ground = _disks(replay, look, fine)
-    images = []
+    images: list[Image.Image] = []
     for k, (a, b, part) in enumerate(_moments(len(replay.normal), between)):
         if cancelled is not None and cancelled():
             raise Cancelled("the movie was cancelled")
@@ -60,7 +81,7 @@ def _drawn(replay, look, side, between, progress, cancelled):
     return images
 
 
-def _moments(count, between):
+def _moments(count: int, between: tuple[int, int] | None) -> list[Moment]:
     """(state, next state, part of the way) of each frame of the movie."""
     if between is not None:
         way = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(FRAMES) / FRAMES)
@@ -73,14 +94,16 @@ def _moments(count, between):
     ]
 
 
-def _place(replay, fine):
+def _place(
+    replay: Replay, fine: int
+) -> tuple[Callable[[float, float], tuple[float, float]], float]:
     """Pixels of places, and pixels for each unit of length."""
     left, right, _, top = replay.window
     scale = fine / (right - left)
     return lambda x, y: ((x - left) * scale, (top - y) * scale), scale
 
 
-def _disks(replay, look, fine):
+def _disks(replay: Replay, look: Look, fine: int) -> Image.Image:
     image = Image.new("RGB", (fine, fine), look["ground"])
     draw, (place, scale) = ImageDraw.Draw(image), _place(replay, fine)
     disks = replay.disks
@@ -94,7 +117,14 @@ def _disks(replay, look, fine):
     return image
 
 
-def _chains(draw, replay, look, normal, tangential, fine):
+def _chains(
+    draw: ImageDraw.ImageDraw,
+    replay: Replay,
+    look: Look,
+    normal: Floats,
+    tangential: Floats,
+    fine: int,
+) -> None:
     place, scale = _place(replay, fine)
     links = replay.links
     width = WIDTH * look["thickness"](normal) * scale
@@ -109,8 +139,18 @@ def _chains(draw, replay, look, normal, tangential, fine):
 
 
 def shades(
-    replay, exact, palettes, *, colour, thickness, reference, most, dark, loads=None, gone=None
-):
+    replay: Replay,
+    exact: Mapping[str, Floats],
+    palettes: Mapping[str, Any],
+    *,
+    colour: str,
+    thickness: str,
+    reference: int,
+    most: float,
+    dark: bool,
+    loads: Floats | None = None,
+    gone: Floats | None = None,
+) -> Look:
     """How forces are drawn, as on screen: colours, and functions of the forces of a moment.
 
     exact: {"low", "high"} (N_c,) or empty; the others as in the state, most: ΔF_n at full colour,
@@ -120,7 +160,7 @@ def shades(
     extent, first, pinned = high - low, replay.normal[0], replay.normal[reference]
     mu = replay.summary["mu"]
 
-    def mobilised(normal, tangential):
+    def mobilised(normal: Floats, tangential: Floats) -> Floats:
         limit = np.maximum(mu * normal, 1e-9)
         return 0.5 + tangential / limit / 2 if mu > 0 else np.zeros_like(normal)
 

@@ -1,9 +1,11 @@
 """Photoelastic frames that a visitor brings: measured beside inferred forces, as plain arrays."""
 
 import json
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from granforce.packing.importers.listing import plain
 from granforce.packing.importers.network import alone
@@ -14,6 +16,7 @@ from granforce.study import series
 from granforce.study.schema import dataset_packing
 
 from . import exports, uploads
+from .jobs import Job
 from .limits import LIMITS
 
 DRAWS = 80  # for error bars on the page
@@ -25,8 +28,8 @@ class Frame(NamedTuple):
     """A frame and the admissible network that its measurement speaks for; forces in ⟨f_n⟩."""
 
     source: str  # which files it came from, in words
-    report: dict  # of importers.read_pegs
-    numbers: tuple  # of all frames in the files
+    report: dict[str, Any]  # of importers.read_pegs
+    numbers: tuple[Any, ...]  # of all frames in the files
     packing: Packing  # of the grains alone, under what walls do to them in the inferred network
     x: np.ndarray  # (N, 2) centres of the grains
     r: np.ndarray  # (N,) radii
@@ -48,14 +51,21 @@ class Frame(NamedTuple):
     stress_error: np.ndarray  # (9, 3)
 
 
-def infer(files, *, mu, reverse=False, walls=None, number=None):
+def infer(
+    files: uploads.Files,
+    *,
+    mu: float,
+    reverse: bool = False,
+    walls: Any = None,
+    number: int | None = None,
+) -> Callable[[Job], Frame]:
     """Work, for jobs.Task, that reads a frame and finds its likeliest network with errors; a Frame.
 
     files: {role: (name, content)}; mu, reverse, walls: as for `importers.read_pegs`; number: of
     the frame.
     """
 
-    def work(job):
+    def work(job: Job) -> Frame:
         LIMITS.check(mu=mu)
         job.begin("looking for forces that balance the grains, near the measured ones")
         roles = next(roles for roles in ROLES if roles[0] in files)
@@ -71,7 +81,7 @@ def infer(files, *, mu, reverse=False, walls=None, number=None):
     return work
 
 
-def frame_of(dataset, names, numbers):
+def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame:
     """The Frame of a dataset of `series.infer_frame`."""
     told = json.loads(dataset.attrs["account"])
     report, walls = told["report"], len(told["walls"])
@@ -116,7 +126,7 @@ def frame_of(dataset, names, numbers):
     )
 
 
-def table(frame):
+def table(frame: Frame) -> bytes:
     """All that was found as one CSV (bytes): a row for each contact, with names, measured and
     inferred forces, errors, marks and region; above them the stress of each region."""
     suspect, certain = np.zeros((2, len(frame.ends)), dtype=int)
@@ -146,7 +156,7 @@ def table(frame):
     return exports.csv(columns, "".join(f"# {line}\n" for line in head))
 
 
-def account(report):
+def account(report: dict[str, Any]) -> Iterator[str]:
     """What was found, what was done, and what that leaves open: sentences with the numbers."""
     count = report.get
     if "names" in report:
@@ -183,7 +193,7 @@ def account(report):
     )
 
 
-def _walls(report):
+def _walls(report: dict[str, Any]) -> str:
     at = f"{report['grains_at_walls']} grains are at walls"
     if report["walls"] == "open":
         return (
@@ -204,7 +214,7 @@ REVERSED = 0.05  # part of the unbalance, from which on the sign of f_t is doubt
 NAMED = 12  # grains that are named
 
 
-def _left(report):
+def _left(report: dict[str, Any]) -> str:
     names = report["left_open"]
     if not names:
         return (

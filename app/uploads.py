@@ -2,13 +2,19 @@
 
 import io
 import re
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 from granforce.packing import importers
-from granforce.records import InputError
+from granforce.records import InputError, Packing
 from granforce.study import kinds
+from granforce.study.keys import Parameters
 
+from .data import Library
+from .jobs import Job
 from .limits import LIMITS
+
+Files = dict[str, tuple[str, bytes]]  # {role: (name, content)}
 
 # What files together make a packing; those in brackets may be missing.
 FAMILIES = {
@@ -37,12 +43,12 @@ LOOKED_AT, ROWS = 4000, 20
 class Brought(NamedTuple):
     """A packing that was read and kept, and what it is."""
 
-    params: dict  # that name it, as kinds.PACKING names it
-    report: dict  # of granforce.report
+    params: Parameters  # that name it, as kinds.PACKING names it
+    report: dict[str, Any]  # of granforce.report
     source: str  # which files it came from, in words
 
 
-def role(name, content):
+def role(name: str, content: bytes) -> str:
     """What a file is, one of WORDS, told by its content; InputError for anything else."""
     if content[:4] == b"PK\x03\x04":
         return "npz"
@@ -70,9 +76,10 @@ def role(name, content):
     )
 
 
-def _photoelastic(content):
+def _photoelastic(content: bytes) -> str | None:
     """Which file of a photoelastic frame it is, or None: rows of five or six plain numbers."""
-    rows, lines = [], content[:LOOKED_AT].decode("utf-8", "replace").splitlines()
+    rows: list[list[float]] = []
+    lines = content[:LOOKED_AT].decode("utf-8", "replace").splitlines()
     whole = lines if len(content) <= LOOKED_AT else lines[:-1]
     for line in filter(str.strip, whole[:ROWS]):
         try:
@@ -88,12 +95,12 @@ def _photoelastic(content):
     return None
 
 
-def family(roles):
+def family(roles: Iterable[str]) -> str:
     """The one of FAMILIES that these roles belong to."""
     return next(k for k, (_, needed, more) in FAMILIES.items() if set(roles) & {*needed, *more})
 
 
-def added(files, new):
+def added(files: Files, new: Iterable[tuple[str, bytes]]) -> Files:
     """{role: (name, content)} of the files given before and new ones [(name, content), …].
 
     A new file replaces the one with its role, and all that belong to another family.
@@ -109,13 +116,20 @@ def added(files, new):
     return files
 
 
-def missing(files):
+def missing(files: Files) -> list[str]:
     """Roles that are needed besides those of the files."""
-    needed = FAMILIES[family(files)][1] if files else ()
+    needed: tuple[str, ...] = FAMILIES[family(files)][1] if files else ()
     return [part for part in needed if part not in files]
 
 
-def read(files, *, mu=None, box=None, tilt=0.0, pressure=1.0):
+def read(
+    files: Files,
+    *,
+    mu: float | None = None,
+    box: tuple[float, float] | None = None,
+    tilt: float = 0.0,
+    pressure: float = 1.0,
+) -> Packing:
     """The Packing in files {role: (name, content)}.
 
     mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, tilt and
@@ -124,12 +138,13 @@ def read(files, *, mu=None, box=None, tilt=0.0, pressure=1.0):
     """
     LIMITS.check(pressure=pressure)
     given = {part: opened(*file) for part, file in files.items()}
-    most = {"most_grains": LIMITS.n}
     if "npz" in files:
         unpacked = UNPACKED * LIMITS.upload * 10**6
-        packing = importers.load_packing(given["npz"], unpacked=unpacked, **most)
+        packing = importers.load_packing(given["npz"], unpacked=unpacked, most_grains=LIMITS.n)
     elif "particles" in files:
-        packing = importers.read_lammps(given["particles"], given["contacts"], mu, **most)
+        packing = importers.read_lammps(
+            given["particles"], given["contacts"], mu, most_grains=LIMITS.n
+        )
     else:
         packing = importers.read_table(
             given["grains"],
@@ -138,23 +153,23 @@ def read(files, *, mu=None, box=None, tilt=0.0, pressure=1.0):
             box=box,
             tilt=tilt,
             pressure=pressure,
-            **most,
+            most_grains=LIMITS.n,
         )
     LIMITS.check(mu=packing.mu)
     return packing
 
 
-def opened(name, content):
+def opened(name: str, content: bytes) -> io.BytesIO:
     """A file of this content; its name is for messages only."""
     file = io.BytesIO(content)
     file.name = name
     return file
 
 
-def bring(library, files, **options):
+def bring(library: Library, files: Files, **options: Any) -> Callable[[Job], Brought]:
     """Work, for jobs.Task, that reads a packing, reports on it and keeps it in the cache."""
 
-    def work(job):
+    def work(job: Job) -> Brought:
         job.begin("reading")
         packing = read(files, **options)
         names = " and ".join(name for name, _ in files.values())
@@ -163,10 +178,10 @@ def bring(library, files, **options):
     return work
 
 
-def keep(library, packing, source):
+def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Brought]:
     """Work, for jobs.Task, that reports on a packing and keeps it in the cache; a Brought."""
 
-    def work(job):
+    def work(job: Job) -> Brought:
         job.begin("looking for its backbone")
         report = importers.report(packing)
         if library.cache is None:
@@ -178,7 +193,7 @@ def keep(library, packing, source):
     return work
 
 
-def told(report):
+def told(report: dict[str, Any]) -> list[tuple[str, str]]:
     """The report as rows (name, value) of texts for the page."""
     rows = []
     for label, name, form, unit in _ROWS:

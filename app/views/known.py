@@ -9,7 +9,7 @@ from .hints import term
 from .scripts import FOLDER, Scripted, joined
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
-ASK = "Hold a contact's force (press H, or the button with the pin): all other intervals shrink."
+ASK = "Hold a selected contact's force (press H): all other intervals shrink."
 
 
 class Known(Scripted):
