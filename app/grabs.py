@@ -6,29 +6,37 @@ the point in force space was pulled.
 
 import threading
 from collections import OrderedDict
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.records import InputError
+from granforce.records import Floats, InputError
 from granforce.study.pulls import Puller
 
 from . import known, planes
+from .data import Cell, Library
+from .jobs import Job, Task
+from .replays import Replay
+
+Pull = tuple[Any, ...]  # see above
+Message = dict[str, Any]  # to or from the player
 
 MOST_PULLS = 32  # that a page, or a link, may hold
 PULLERS_KEPT = 4  # for all visitors
 
-_pullers, _lock = OrderedDict(), threading.Lock()
+_pullers: OrderedDict[tuple[str, str], Puller] = OrderedDict()
+_lock = threading.Lock()
 
 
 class Held(NamedTuple):
     """A network that the visitor's pulls have led to; forces in ⟨f_n⟩."""
 
-    forces: np.ndarray  # (N_c, 2)
+    forces: Floats  # (N_c, 2)
     residual: float
 
 
-def _puller(library, cell, given):
+def _puller(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
     """The Puller of a cell's packing; given: rows of known forces, which pulls keep."""
     key = cell.name, str(given)
     with _lock:
@@ -50,15 +58,16 @@ class Hand:
     {"fan": …} of a plane.
     """
 
-    def __init__(self, state, task, tell):
+    def __init__(self, state: Any, task: Task, tell: Callable[[Message], object]) -> None:
         self.state, self._task, self._tell = state, task, tell
-        self._made, self._base = [], None  # (pull, Held) of the pulls made, and where from
+        self._made: list[tuple[Pull, Held]] = []  # of the pulls made
+        self._base: tuple[Any, ...] | None = None  # and where from
         task.param.watch(self._failed, "message")
         state.param.watch(self._follow, ["pulls", "replay", "frame", "known"])
         if state.pulls:  # of the link
             self._work()
 
-    def grab(self, contact):
+    def grab(self, contact: int) -> None:
         """Select a contact and have its rail made, from the network on screen."""
         state = self.state
         if state.replay is None or state.growing is not None:
@@ -72,12 +81,12 @@ class Hand:
         else:
             self._work(contact)
 
-    def grab_point(self):
+    def grab_point(self) -> None:
         """Have the fan of the plane on screen made."""
         if self.state.plane is not None and self.state.growing is None:
             self._work(self.state.plane)
 
-    def hold(self, pull):
+    def hold(self, pull: Pull) -> None:
         """Let go: the pull stays."""
         pulls = self.state.pulls
         if len(pulls) >= MOST_PULLS:
@@ -85,11 +94,11 @@ class Hand:
             return
         self.state.pulls = [*pulls, pull]
 
-    def undo(self):
+    def undo(self) -> None:
         """Step back before the last pull."""
         self.state.pulls = self.state.pulls[:-1]
 
-    def heard(self, message):
+    def heard(self, message: Message) -> None:
         """What the browser tells of the hand."""
         count = 0 if self.state.replay is None else len(self.state.replay.backbone)
         match message:
@@ -110,7 +119,7 @@ class Hand:
             case {"anew": True} if self._made:
                 self._show(self._made)
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         """Pulls belong to one state: with another one on screen they are gone."""
         names = {event.name for event in events}
         if "pulls" in names:
@@ -120,7 +129,7 @@ class Hand:
         elif self.state.pulls:
             self._work()  # the networks that keep what is known now
 
-    def _work(self, grabbed=None):
+    def _work(self, grabbed: int | planes.Plane | None = None) -> None:
         """Make the networks of all pulls, and the rail of a contact or the fan of a Plane."""
         state = self.state
         replay, cell, pulls = state.replay, state.cell, list(state.pulls)
@@ -132,7 +141,7 @@ class Hand:
         first = Held(_forces(replay, state.frame), float(replay.residual[state.frame]))
         library = state.library
 
-        def work(job):
+        def work(job: Job) -> tuple[Any, ...]:
             puller = _puller(library, cell, known.rows(replay, told))
             held, refusal = _networks(library, cell, replay, puller, told, made, pulls, first)
             ready = None
@@ -148,7 +157,7 @@ class Hand:
             self._made, self._base = [], base
             self._tell({"held": None})
 
-    def _done(self, found):
+    def _done(self, found: tuple[Any, ...]) -> None:
         base, made, ready, refusal = found
         self._made, self._base = made, base
         if refusal:
@@ -160,26 +169,35 @@ class Hand:
         elif made:
             self._show(made)
 
-    def _show(self, made):
+    def _show(self, made: list[tuple[Pull, Held]]) -> None:
         pull, held = made[-1]
         self._tell({"held": _spelled(held) | {"pull": list(pull)}})
 
-    def _failed(self, event):
+    def _failed(self, event: Any) -> None:
         if event.new:
             self.state.message = event.new
             self._tell({"rail": None, "fan": None})
 
 
-def _forces(replay, frame):
+def _forces(replay: Replay, frame: int) -> Floats:
     return np.stack([replay.normal[frame], replay.tangential[frame]], axis=1).astype(np.float64)
 
 
-def _held(told):
+def _held(told: Iterable[known.Statement]) -> dict[int, float]:
     """{contact: f_n} of those that are held exactly."""
     return {one.contact: one.value for one in told if not one.error}
 
 
-def _networks(library, cell, replay, puller, told, made, pulls, first):
+def _networks(
+    library: Library,
+    cell: Cell,
+    replay: Replay,
+    puller: Puller,
+    told: Iterable[known.Statement],
+    made: Sequence[tuple[Pull, Held]],
+    pulls: Sequence[Pull],
+    first: Held,
+) -> tuple[list[tuple[Pull, Held]], str]:
     """The networks of all pulls, those made before included; a refusal.
 
     told: Statements, which hold in all of them.
@@ -201,7 +219,9 @@ def _networks(library, cell, replay, puller, told, made, pulls, first):
     return made, ""
 
 
-def _pulled(library, cell, replay, puller, last, pull):
+def _pulled(
+    library: Library, cell: Cell, replay: Replay, puller: Puller, last: Held, pull: Pull
+) -> Held:
     """What one pull makes of the network before."""
     scale = replay.force_scale
     if isinstance(pull[0], str):
@@ -209,20 +229,20 @@ def _pulled(library, cell, replay, puller, last, pull):
         point = np.array(pull[1:]) + plane.origin
         found = puller.mixed(puller.fan(plane.axes), plane.axes, point, last.forces * scale)
     else:
-        found = puller.at(replay.backbone[pull[0]], pull[1] * scale, last.forces * scale)
+        found = puller.at(int(replay.backbone[pull[0]]), pull[1] * scale, last.forces * scale)
     return Held(found[0] / scale, found[1])
 
 
-def _to_pull(puller, replay, last, grabbed):
+def _to_pull(puller: Puller, replay: Replay, last: Held, grabbed: int | planes.Plane) -> Message:
     """What the page needs to pull a contact, or the point in a Plane."""
     scale = replay.force_scale
     if isinstance(grabbed, planes.Plane):
         return {"fan": _fan(puller.fan(grabbed.axes), grabbed, scale)}
-    rail = puller.rail(replay.backbone[grabbed], last.forces * scale)
+    rail = puller.rail(int(replay.backbone[grabbed]), last.forces * scale)
     return {"rail": {"contact": grabbed} | _rail(rail, scale)}
 
 
-def _spelled(held):
+def _spelled(held: Held) -> Message:
     return {
         "normal": held.forces[:, 0].astype(np.float32),
         "tangential": held.forces[:, 1].astype(np.float32),
@@ -230,7 +250,7 @@ def _spelled(held):
     }
 
 
-def _fan(fan, plane, scale):
+def _fan(fan: Any, plane: planes.Plane, scale: float) -> Message:
     """A Fan as the player takes it, in the coordinates of the plane on screen."""
     points = fan.points - plane.origin
     return {
@@ -242,7 +262,7 @@ def _fan(fan, plane, scale):
     }
 
 
-def _rail(rail, scale):
+def _rail(rail: Any, scale: float) -> Message:
     """A Rail as the player takes it: flat arrays, forces in ⟨f_n⟩."""
     return {
         "lower": rail.lower / scale,
@@ -256,12 +276,12 @@ def _rail(rail, scale):
     }
 
 
-def spelled(pulls):
+def spelled(pulls: Iterable[Pull]) -> str:
     """Pulls as a link holds them, to all digits: an end of an interval must not round beyond it."""
     return "~".join(":".join([str(name), *map(str, at)]) for name, *at in pulls)
 
 
-def read(text):
+def read(text: str) -> list[Pull]:
     """Pulls of a link's text; ValueError for what is none."""
     pulls = [_read(*part.split(":")) for part in text.split("~")[: MOST_PULLS + 1]]
     if len(pulls) > MOST_PULLS:
@@ -269,7 +289,7 @@ def read(text):
     return pulls
 
 
-def _read(name, *at):
+def _read(name: str, *at: str) -> Pull:
     values = tuple(float(value) for value in at)
     if not all(abs(value) < 1e6 for value in values):
         raise ValueError("forces that cannot be")
@@ -282,7 +302,7 @@ def _read(name, *at):
     return int(name), value
 
 
-def contacts(pulls):
+def contacts(pulls: Iterable[Pull]) -> Iterator[int]:
     """Positions of the contacts that pulls name."""
     for name, *_ in pulls:
         yield from (c for c, _ in planes.read(name)) if isinstance(name, str) else (name,)

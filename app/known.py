@@ -2,17 +2,23 @@
 
 import math
 import shlex
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
-from granforce.records import InputError
+from granforce.records import Floats, InputError, Integers
 from granforce.study import kinds
 from granforce.tolerances import CARRYING
 
 from . import compute
-from .data import Shown
-from .selection import of_packing
+from .data import Cell, Library, Shown
+from .jobs import Job
+from .replays import Replay
+from .selection import Selection, of_packing
+
+Row = list[Any]  # contact, f_n from and to, f_t from and to, as `conditions` takes them
 
 MOST_KNOWN = 32  # statements that a page, or a link, may hold
 LARGEST = 1e6  # ⟨fₙ⟩
@@ -31,7 +37,7 @@ class Statement(NamedTuple):
     value: float
     error: float = 0.0
 
-    def words(self, number):
+    def words(self, number: int) -> str:
         """It in words, with the contact's number in the packing."""
         bar = f" ± {self.error:.3g}" if self.error else ""
         return f"contact {number}: fₙ = {self.value:.3f}{bar} ⟨fₙ⟩"
@@ -40,59 +46,66 @@ class Statement(NamedTuple):
 class Narrowed(NamedTuple):
     """Exact intervals of all contacts under what is known, beside those without."""
 
-    known: tuple  # Statements
-    before: object  # Dataset of intervals
-    after: object
+    known: tuple[Statement, ...]
+    before: xr.Dataset  # of intervals
+    after: xr.Dataset
     left: float = 0.0  # part of the bounds that `after` still has as before
 
     @property
-    def dimension(self):
+    def dimension(self) -> tuple[int, int]:
         """h before and after."""
-        return tuple(int(part["dimension"]) for part in self[1:3])
+        return int(self.before["dimension"]), int(self.after["dimension"])
 
     @property
-    def mean(self):
+    def mean(self) -> tuple[float, float]:
         """Mean interval of f_n before and after, in ⟨f_n⟩."""
-        return tuple(float(extents.mean()) for extents in self.extents)
+        before, after = self.extents
+        return float(before.mean()), float(after.mean())
 
     @property
-    def extents(self):
+    def extents(self) -> tuple[Floats, Floats]:
         """Length of the intervals of f_n (N_c,), before and after, in ⟨f_n⟩."""
-        return tuple(_normal(part, "high") - _normal(part, "low") for part in self[1:3])
+        return _extent(self.before), _extent(self.after)
 
     @property
-    def gone(self):
+    def gone(self) -> Floats:
         """(N_c,) by how much the intervals of f_n are shorter, in ⟨f_n⟩."""
         before, after = self.extents
         return np.maximum(before - after, 0.0)
 
     @property
-    def shortened(self):
+    def shortened(self) -> Floats:
         """The same of the contacts that are not known themselves: of those that are, 0."""
         change = self.gone
         change[[one.contact for one in self.known]] = 0.0
         return change
 
     @property
-    def carrying(self):
+    def carrying(self) -> int:
         """How many contacts carry in every network that is left, by certified bounds."""
         low, gap = (self.after[name].values for name in ("low", "interval_gap"))
         least = low[:, 0] / self.after["force_scale"].item() - gap[:, 0, 0]
         return int(np.sum(least > CARRYING))
 
 
-def _normal(dataset, name):
+def _normal(dataset: xr.Dataset, name: str) -> Floats:
     return dataset[name].values[:, 0] / dataset["force_scale"].item()
+
+
+def _extent(dataset: xr.Dataset) -> Floats:
+    return _normal(dataset, "high") - _normal(dataset, "low")
 
 
 class Underway:
     """Intervals under what is known as their bounds are found: a Narrowed at any time."""
 
-    def __init__(self, known, before, backbone):
+    def __init__(
+        self, known: tuple[Statement, ...], before: xr.Dataset, backbone: Integers
+    ) -> None:
         self.known, self._before, self._backbone = known, before, backbone
         self._after, self._count = before.copy(deep=True), 0
 
-    def add(self, bound):
+    def add(self, bound: Any) -> None:
         """Keep a Bound."""
         place = np.searchsorted(self._backbone, bound.contact)
         name = "high" if bound.side else "low"
@@ -100,7 +113,7 @@ class Underway:
         self._count += 1
 
     @property
-    def narrowed(self):
+    def narrowed(self) -> Narrowed:
         """What is known by now."""
         left = 1 - self._count / (4 * len(self._backbone))
         return Narrowed(self.known, self._before, self._after.copy(deep=True), max(left, 1e-3))
@@ -109,12 +122,12 @@ class Underway:
 class Ranked(NamedTuple):
     """Contacts whose f_n would be worth measuring next, the best first."""
 
-    replay: object  # of whose packing
-    known: tuple  # Statements that hold already
-    contacts: np.ndarray  # (k,) positions in the backbone
+    replay: Replay  # of whose packing
+    known: tuple[Statement, ...]  # that hold already
+    contacts: Integers  # (k,) positions in the backbone
     before: float  # mean interval of f_n now, in ⟨f_n⟩
-    after: np.ndarray  # (k,) the same once this one is known as well; NaN where not computed
-    expected: np.ndarray  # (k,) part by which errors fall, as forces go together over the states
+    after: Floats  # (k,) the same once this one is known as well; NaN where not computed
+    expected: Floats  # (k,) part by which errors fall, as forces go together over the states
 
 
 class Knowledge:
@@ -124,17 +137,19 @@ class Knowledge:
     contact to measure next.
     """
 
-    def __init__(self, state):
+    def __init__(self, state: Any) -> None:
         self.state = state
         self.task, self.ranking = state.task(), state.task()
         state.param.watch(self._follow, ["known", "replay"])
-        self._arriving = None  # the Underway of what is being computed
+        self._arriving: Underway | None = None  # the Underway of what is being computed
         self.task.param.watch(self._failed, "message")
         self.task.param.watch(self._arrive, "fraction")
-        self._first = None  # the Ranked of what is being computed, before exact bounds
+        self._first: Ranked | None = (
+            None  # the Ranked of what is being computed, before exact bounds
+        )
         self.ranking.param.watch(lambda event: self._ranked(self._first), "fraction")
 
-    def hold(self, contact, value, error=0.0):
+    def hold(self, contact: int, value: float, error: float = 0.0) -> None:
         """Take f_n of a contact for known, in ⟨f_n⟩; a message where it cannot be."""
         state = self.state
         others = [one for one in state.known if one.contact != contact]
@@ -145,14 +160,14 @@ class Knowledge:
                 raise InputError(f"{MOST_KNOWN} known forces are the most; let some go")
             state.known = [*others, self._stated(contact, value, error)]
             state.message = ""
-        except InputError as error:
-            state.message = str(error)
+        except InputError as refusal:
+            state.message = str(refusal)
 
-    def release(self, contact):
+    def release(self, contact: int) -> None:
         """Take f_n of a contact for unknown again."""
         self.state.known = [one for one in self.state.known if one.contact != contact]
 
-    def heard(self, message):
+    def heard(self, message: dict[str, Any]) -> None:
         """What a browser tells of the selected contact."""
         count = 0 if self.state.replay is None else len(self.state.replay.backbone)
         match message:
@@ -162,23 +177,23 @@ class Knowledge:
             case {"release": int(contact)}:
                 self.release(contact)
 
-    def compute(self):
+    def compute(self) -> None:
         """Compute the exact intervals under what is known, in the background."""
         state = self.state
         replay, known, cell = state.replay, tuple(state.known), state.cell
         shown = Shown(cell, replay, state.exact)
         self._arriving = None
 
-        def tell(arriving):
+        def tell(arriving: Underway) -> None:
             self._arriving = arriving
 
-        def done(narrowed):
+        def done(narrowed: Narrowed) -> None:
             if state.replay is replay:
                 state.param.update(exact=narrowed.before, narrowed=narrowed)
 
         self.task.start(narrowing(state.library, shown, known, tell), done)
 
-    def rank(self):
+    def rank(self) -> None:
         """Find which contact to measure next, in the background."""
         state = self.state
         replay, known = state.replay, tuple(state.known)
@@ -188,18 +203,18 @@ class Knowledge:
 
         self._first = None
 
-        def tell(ranked):
+        def tell(ranked: Ranked) -> None:
             self._first = ranked
 
         self.ranking.start(ranking(state.library, state.cell, replay, known, tell), self._ranked)
 
-    def _ranked(self, found):
+    def _ranked(self, found: Ranked | None) -> None:
         """Show contacts to measure next, if it is still this that is known."""
         state = self.state
         if found is not None and found.replay is state.replay:
             state.ranked = found if found.known == tuple(state.known) else None
 
-    def _stated(self, contact, value, error):
+    def _stated(self, contact: int, value: float, error: float) -> Statement:
         """The Statement of a force, refused where what is known leaves no room for it."""
         state = self.state
         value, error = _number(value, "a known force"), _number(error, "an error bar")
@@ -224,11 +239,11 @@ class Knowledge:
         return Statement(contact, _rounded(inside))
 
     @property
-    def _settled(self):
+    def _settled(self) -> bool:
         """Whether intervals under some known forces are there, all of them."""
         return self.state.narrowed is not None and not self.state.narrowed.left
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         """Intervals under what is known now; statements belong to one packing."""
         state = self.state
         state.ranked = None
@@ -241,14 +256,14 @@ class Knowledge:
         else:
             self.task.cancel()
 
-    def _arrive(self, event):
+    def _arrive(self, event: Any) -> None:
         """Show the intervals that are there by now."""
         arriving, state = self._arriving, self.state
         if event.new and arriving is not None and arriving.known == tuple(state.known):
             narrowed = arriving.narrowed
             state.param.update(exact=narrowed.before, narrowed=narrowed)
 
-    def _failed(self, event):
+    def _failed(self, event: Any) -> None:
         """What contradicts itself is taken back; the message says what it was."""
         if event.new:
             state = self.state
@@ -256,17 +271,17 @@ class Knowledge:
             state.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
 
 
-def _number(value, what):
+def _number(value: float, what: str) -> float:
     if not 0 <= value < LARGEST:  # nor if it is NaN
         raise InputError(f"{what} must lie between 0 and {LARGEST:g} ⟨fₙ⟩, got {value:g}")
     return float(value)
 
 
-def _rounded(value):
+def _rounded(value: float) -> float:
     return float(f"{value:.9g}")  # as links hold it
 
 
-def rows(replay, known):
+def rows(replay: Replay, known: Iterable[Statement]) -> list[Row]:
     """Statements as `conditions` takes them: contacts of the packing, forces."""
     scale, number = replay.force_scale, replay.backbone
     return [
@@ -275,7 +290,7 @@ def rows(replay, known):
     ]
 
 
-def commands(selection, replay, known):
+def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -> str:
     """Two lines for a terminal: what is known as a file, and the intervals under it."""
     lines = ["contact,f_n_min,f_n_max"]
     lines += [f"{c},{low:.12g},{high:.12g}" for c, low, high, *_ in rows(replay, known)]
@@ -285,28 +300,34 @@ def commands(selection, replay, known):
     )
 
 
-def narrowing(library, shown, known, tell):
+def narrowing(
+    library: Library,
+    shown: Shown,
+    known: tuple[Statement, ...],
+    tell: Callable[[Underway], object],
+) -> Callable[[Job], Narrowed]:
     """Work, for jobs.Task, that finds the intervals under what is known; a Narrowed.
 
     tell(Underway): called before they are computed, the contacts first that may change most.
     """
 
-    def work(job):
-        whole = shown if shown.exact is not None else compute.exact(library, shown)(job)
-        bounds = Underway(known, whole.exact, shown.replay.backbone)
+    def work(job: Job) -> Narrowed:
+        whole = (shown if shown.exact is not None else compute.exact(library, shown)(job)).exact
+        assert whole is not None  # found or made
+        bounds = Underway(known, whole, shown.replay.backbone)
         tell(bounds)
         selection = shown.cell.selection
-        given = {"mu": selection.mu, "known": rows(shown.replay, known)}
+        given: dict[str, Any] = {"mu": selection.mu, "known": rows(shown.replay, known)}
         params = kinds.INTERVALS.parameters(selection.packing, **given)
         stage = "exact intervals under what is known"
-        options = {"widths": affected(shown.replay, known), "watch": bounds.add}
+        options: dict[str, Any] = {"widths": affected(shown.replay, known), "watch": bounds.add}
         found = compute.found_or_made(library, job, stage, kinds.INTERVALS, params, **options)
-        return Narrowed(known, whole.exact, found)
+        return Narrowed(known, whole, found)
 
     return work
 
 
-def affected(replay, known):
+def affected(replay: Replay, known: Iterable[Statement]) -> Floats:
     """(N_c,) how much f_n goes with what is known over the states shown; most for what is known."""
     off = replay.normal[1:] - replay.normal[1:].mean(axis=0)
     spread = np.maximum(off.std(axis=0), DETERMINED)
@@ -316,19 +337,25 @@ def affected(replay, known):
     return score
 
 
-def ranking(library, cell, replay, known, tell):
+def ranking(
+    library: Library,
+    cell: Cell,
+    replay: Replay,
+    known: tuple[Statement, ...],
+    tell: Callable[[Ranked], object],
+) -> Callable[[Job], Ranked]:
     """Work, for jobs.Task, that finds which contact to measure next; a Ranked.
 
     tell(Ranked): called with their order before it is checked by exact bounds.
     """
 
-    def ranked(contacts, expected, before, after):
+    def ranked(contacts: Integers, expected: Floats, before: Any, after: Floats) -> Ranked:
         place = np.searchsorted(replay.backbone, contacts)
         return Ranked(replay, known, place, before, after, expected)
 
-    def work(job):
+    def work(job: Job) -> Ranked:
         selection = cell.selection
-        given = {"mu": selection.mu, "known": rows(replay, known) or None}
+        given: dict[str, Any] = {"mu": selection.mu, "known": rows(replay, known) or None}
         few = len(replay.backbone) <= FEW
         params = kinds.INFORMATIVE.parameters(
             selection.packing, check=LISTED if few else CHECKED, k=LISTED, **given
@@ -342,13 +369,13 @@ def ranking(library, cell, replay, known, tell):
     return work
 
 
-def spelled(known):
+def spelled(known: Iterable[Statement]) -> str:
     """Statements as a link holds them."""
     rows = (one if one.error else one[:2] for one in known)
     return "~".join(":".join(f"{part:.9g}" for part in row) for row in rows)
 
 
-def read(text):
+def read(text: str) -> list[Statement]:
     """Statements of a link's text; ValueError for what is none."""
     parts = [part.split(":") for part in text.split("~")[: MOST_KNOWN + 1]]
     pairs = [(contact, rest) for contact, *rest in parts if 1 <= len(rest) <= 2]

@@ -7,13 +7,22 @@ of its own, which keeps its place, and sends as much as its browser paints.
 import threading
 import time
 from collections import deque
+from collections.abc import Mapping
+from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
 import numpy as np
 
 from granforce import measures
+from granforce.records import Floats, Integers
+from granforce.study.keys import Parameters
 
-from .replays import FRAME_BYTES, fitting
+from .replays import FRAME_BYTES, Replay, fitting
+from .selection import Selection
+
+Message = dict[str, Any]  # to the player
+Summary = Mapping[str, Any]  # of a Replay
+Kind = TypeVar("Kind")
 
 # A moving packing is kept each time its box has shrunk by this part, or so many seconds have gone:
 # the gas, which is compressed within a tenth of a second, is seen as well as the slow end.
@@ -24,10 +33,11 @@ BATCH = 64  # states sent at a time
 ENOUGH = 256  # states, from which axes of force space are found while a walk is under way
 BOUNDS_S = 0.25  # exact bounds are sent no more often: what stands still is drawn anew for them
 
-_shared, _lock = WeakValueDictionary(), threading.Lock()
+_shared: WeakValueDictionary[tuple[str, str], Any] = WeakValueDictionary()
+_lock = threading.Lock()
 
 
-def shared(kind, params):
+def shared(kind: type[Kind], params: Parameters) -> Kind:
     """The Compaction, Walking or Bounding of these parameters: one for all who name them alike."""
     with _lock:
         key = kind.__name__, repr(params)
@@ -40,19 +50,20 @@ def shared(kind, params):
 class Compaction:
     """Pictures of a packing that is being compressed, the last ones kept."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self.run = 0  # how often it was begun
         self.restart()
 
-    def restart(self):
+    def restart(self) -> None:
         """Begin anew: an earlier run was cancelled."""
         with self._lock:
             self.run += 1
-            self._kept, self._total = deque(), 0
+            self._kept: deque[Message] = deque()
+            self._total = 0
             self._side, self._at = np.inf, -np.inf
 
-    def add(self, glimpse):
+    def add(self, glimpse: Any) -> None:
         """Keep a Glimpse, if it differs enough from the last one."""
         now, side = time.perf_counter(), float(np.sqrt(np.prod(glimpse.box)))
         if side > (1 - STRAIN) * self._side and now < self._at + EVERY_S:
@@ -67,11 +78,11 @@ class Compaction:
                 self._kept.popleft()
 
     @property
-    def total(self):
+    def total(self) -> int:
         """Pictures kept since it was begun, those dropped since included."""
         return self._total
 
-    def after(self, run, place):
+    def after(self, run: int, place: int) -> tuple[int, int, Message | None]:
         """(run, place, picture or None): the next picture for who has seen `place` of a run."""
         with self._lock:
             if run != self.run:
@@ -83,7 +94,7 @@ class Compaction:
             return run, place + 1, self._kept[place - self._total]
 
 
-def _picture(glimpse):
+def _picture(glimpse: Any) -> Message:
     """A Glimpse as the page draws it; forces in units of its own ⟨f_n⟩."""
     forces = glimpse.forces.astype(np.float32)
     mean = float(forces[:, 0].mean()) if len(forces) else 1.0
@@ -106,11 +117,12 @@ def _picture(glimpse):
 class Walking:
     """The states of a walk as they are found, and the Replay that they go into."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.run = 0
-        self.replay, self.parts = None, []
+        self.replay: Replay | None = None
+        self.parts: list[tuple[Any, tuple[float, ...]]] = []  # (state, NUMBERS)
 
-    def restart(self, replay):
+    def restart(self, replay: Replay) -> None:
         """Begin anew, on the `first_replay` of the ensemble."""
         self.parts = []
         self._every = every(replay.summary)
@@ -119,8 +131,9 @@ class Walking:
         self.replay = replay
         self.run += 1
 
-    def add(self, found):
+    def add(self, found: Any) -> None:
         """Keep a Found state, or every so many where not all can be sent."""
+        assert self.replay is not None  # begun before
         state = found.forces / self.replay.force_scale
         grown = self._growth.add(state)
         self._found += 1
@@ -134,18 +147,18 @@ class Walking:
 class Bounding:
     """Exact bounds of f_n as they are found; NaN where one is still to come."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.version = 0  # how often something has changed
         self.low = self.high = np.zeros(0, np.float32)
 
-    def restart(self, S):
+    def restart(self, S: Any) -> None:
         """Begin anew, on an ensemble."""
         self._place = {int(contact): k for k, contact in enumerate(S.index)}
         self._scale = S.force_scale
         self.low, self.high = np.full((2, len(S.index)), np.nan, dtype=np.float32)
         self.version += 1
 
-    def add(self, bound):
+    def add(self, bound: Any) -> None:
         """Keep a Bound, if it is one of f_n."""
         if bound.component == 0:
             side = self.high if bound.side else self.low
@@ -156,12 +169,12 @@ class Bounding:
 class Arriving:
     """What one page has been sent of a Bounding."""
 
-    def __init__(self, params):
+    def __init__(self, params: Parameters) -> None:
         """params: of the exact intervals, as a store names them."""
         self._bounding = shared(Bounding, params)
         self._sent, self._at = 0, -np.inf
 
-    def next(self):
+    def next(self) -> Message | None:
         """What comes next, or None: {"bounds": {"low", "high": (N_c,)}}, in ⟨f_n⟩."""
         bounding, now = self._bounding, time.perf_counter()
         version = bounding.version
@@ -171,12 +184,12 @@ class Arriving:
         return {"bounds": {"low": bounding.low.copy(), "high": bounding.high.copy()}}
 
 
-def every(summary):
+def every(summary: Summary) -> int:
     """Of a walk under way every so many states are sent: all, if they fit in FRAME_BYTES."""
     return -(-summary["states"] // fitting(summary["contacts"], FRAME_BYTES))
 
 
-def numbers(summary):
+def numbers(summary: Summary) -> Integers:
     """Numbers (F,) of the states that are sent of a walk under way, 0 for the original."""
     return np.append(0, np.arange(1, summary["states"] + 1, every(summary)))
 
@@ -184,7 +197,7 @@ def numbers(summary):
 NUMBERS = ("number", "residual", "acceptance", "eta1", "eta2", "eta3")
 
 
-def _batch(parts):
+def _batch(parts: list[tuple[Any, tuple[float, ...]]]) -> Message:
     """States as the player takes them: flat arrays, one state after the other."""
     forces = np.stack([state for state, _ in parts])
     rows = np.array([numbers for _, numbers in parts], dtype=np.float32).T
@@ -198,7 +211,7 @@ def _batch(parts):
 class Following:
     """One page's place in what is computed for a Selection."""
 
-    def __init__(self, selection):
+    def __init__(self, selection: Selection) -> None:
         self.selection = selection
         self._compaction = shared(Compaction, selection.packing)
         self._walking = shared(Walking, selection.parameters())
@@ -206,23 +219,23 @@ class Following:
         self._run, self._place = self._compaction.run, max(0, self._compaction.total - 1)
         self._walk_run = self._state = 0
 
-    def rewind(self):
+    def rewind(self) -> None:
         """The page has forgotten the states that it was sent."""
         self._state = 0
 
     @property
-    def fourfold(self):
+    def fourfold(self) -> int:
         """How often the states sent have grown fourfold since the first: 4 → 1, 16 → 2, …"""
         return max(0, self._state.bit_length() - 1) // 2
 
-    def states(self):
+    def states(self) -> Floats | None:
         """The states (k, N_c, 2) sent, in ⟨f_n⟩, of more than ENOUGH so many, evenly; or None."""
         sent = self._walking.parts[: self._state]
         if not sent:
             return None
         return np.stack([state for state, _ in sent[:: -(-len(sent) // ENOUGH)]])
 
-    def next(self):
+    def next(self) -> Message | None:
         """What comes next, or None: {"picture": …}, {"replay": Replay} or {"states": …}."""
         self._run, self._place, picture = self._compaction.after(self._run, self._place)
         if picture is not None:
