@@ -9,9 +9,10 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
-from typing import Any, NamedTuple
+from typing import Any
 
 import param
 
@@ -57,7 +58,8 @@ computing = Pool(LIMITS.computations, "granforce-compute")
 reading = Pool(2, "granforce-read")
 
 
-class Work(NamedTuple):
+@dataclass(frozen=True)
+class Work:
     """Work for a Job that will take turns: `wants` names them, so that others wait for it."""
 
     run: Callable[[Job], Any]

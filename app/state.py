@@ -1,6 +1,8 @@
 """What the page is showing and doing, as parameters: no widgets, no plots."""
 
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 import param
@@ -9,12 +11,15 @@ from granforce.records import InputError
 
 from . import compute, grabs, known, perturbations
 from .beside import Beside
-from .data import best_cell, nearest_cell
-from .jobs import Job, Task, computing, reading
+from .data import Cell, Library, Shown, best_cell, nearest_cell
+from .jobs import Job, Pool, Task, computing, reading
 from .known import Knowledge
 from .limits import LIMITS
 from .live import Arriving, Following
-from .selection import command, link, read_link, series
+from .replays import Replay
+from .selection import Selection, command, link, read_link, series
+
+View = dict[str, Any]  # parameters of AppState by name
 
 # What colour, width and order can show: word in links → words on screen.
 COLOURS = {
@@ -101,27 +106,39 @@ class AppState(param.Parameterized):
     known = param.List(doc="known.Statements: forces of contacts that are taken for known")
     narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
     ranked = param.Parameter(doc="known.Ranked: contacts to measure next, or None")
-    colour = param.Selector(default="change", objects=list(COLOURS))
-    thickness = param.Selector(default="normal", objects=list(WIDTHS))
+    colour: Any = param.Selector(default="change", objects=list(COLOURS))
+    thickness: Any = param.Selector(default="normal", objects=list(WIDTHS))
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
-    sort = param.Selector(default="original", objects=list(SORTS), doc="order of the intervals")
-    scale = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
-    figure = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
-    axis = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
-    pushing = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
-    axes = param.Selector(default="principal", objects=list(PLANES), doc="of force space on screen")
+    sort: Any = param.Selector(
+        default="original", objects=list(SORTS), doc="order of the intervals"
+    )
+    scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
+    figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
+    axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
+    pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
+    axes: Any = param.Selector(
+        default="principal", objects=list(PLANES), doc="of force space on screen"
+    )
     dark = param.Boolean(doc="theme")
     busy = param.Boolean(doc="whether any task is running")
     displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
 
-    def __init__(self, library, wake=None, query="", **params):
+    def __init__(
+        self,
+        library: Library,
+        wake: Callable[[Callable[[], object]], object] | None = None,
+        query: str = "",
+        **params: Any,
+    ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task.
 
         query: of the address that opened the page.
         """
-        super().__init__(**params)
+        super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
         self.library, self._wake = library, wake
-        self.tasks, self._ahead, self._closed = [], [], False
+        self.tasks: list[Task] = []
+        self._ahead: list[Job] = []
+        self._closed = False
         self.computation, self.reader = self.task(), self.task(reading)
         self.loading = self.task()
         self.looking, self.measuring = self.task(reading), self.task()  # for the volume of S
@@ -133,7 +150,7 @@ class AppState(param.Parameterized):
 
     # Tasks
 
-    def piecewise(self, pieces):
+    def piecewise(self, pieces: Iterator[Any]) -> None:
         """Have a generator run to its end; other pages are served between its pieces."""
         if self._wake is None:
             for _ in pieces:
@@ -141,7 +158,7 @@ class AppState(param.Parameterized):
         elif next(pieces, "end") != "end":
             self._wake(partial(self.piecewise, pieces))
 
-    def task(self, pool=computing):
+    def task(self, pool: Pool = computing) -> Task:
         """A new Task of this page: work off the event loop, ended when the page is closed."""
         task = Task(pool, self._wake)
         task.param.watch(self._tell, "message")
@@ -151,33 +168,35 @@ class AppState(param.Parameterized):
             task.close()
         return task
 
-    def poll(self):
+    def poll(self) -> None:
         """Take over the progress of all tasks."""
         for task in self.tasks:
             task.poll()
 
-    def cancel(self):
+    def cancel(self) -> None:
         """End all work of the page that is under way."""
-        for work in (*self.tasks, *self._ahead):
-            work.cancel()
+        for task in self.tasks:
+            task.cancel()
+        for job in self._ahead:
+            job.cancel()
 
-    def close(self):
+    def close(self) -> None:
         """End all work of the page for good."""
         self._closed = True
         self.cancel()
         for task in self.tasks:
             task.close()
 
-    def _tell(self, event):
+    def _tell(self, event: Any) -> None:
         if event.new:
             self.message = event.new
 
-    def _count(self, event):
+    def _count(self, event: Any) -> None:
         self.busy = any(task.running for task in self.tasks)
 
     # What is on screen
 
-    def open(self, query=""):
+    def open(self, query: str = "") -> None:
         """Show what a link selects, computing it if need be, or what is best to begin with."""
         try:
             wanted, view = read_link(query)
@@ -186,38 +205,38 @@ class AppState(param.Parameterized):
             self.message = str(error)
         self._look_up(wanted, self._as_new() | read_view(view))
 
-    def _as_new(self):
+    def _as_new(self) -> View:
         """What a new page shows, but for the theme: what a link does not name."""
         return {name: self.param[name].default for name in VIEW if name != "dark"}
 
-    def shows(self, name):
+    def shows(self, name: str) -> bool:
         """Whether what has this tab is on screen."""
         return name == self.tab or (self.wide and name == "plane")
 
     @property
-    def seen(self):
+    def seen(self) -> Replay | None:
         """The Replay on screen: that of the walk under way, if there is one."""
         return self.replay if self.growing is None else self.growing
 
     @property
-    def possible(self):
+    def possible(self) -> Any:
         """The exact intervals of the Replay on screen, under what is known; or None."""
         if self.growing is not None:
             return None
         return self.exact if self.narrowed is None else self.narrowed.after
 
-    def refresh(self, shown=None):
+    def refresh(self, shown: Shown | None = None) -> None:
         """Read the catalogue anew; show what was just computed."""
         if shown is not None:
             self._show(shown)
         self.reader.start(lambda job: self.library.cells(), self._list)
 
-    def ask(self, selection, at_once=False):
+    def ask(self, selection: Selection, at_once: bool = False) -> None:
         """Select states: shown if a store has them, else `missing`, or computed at_once."""
         self.besides.keep(selection)
         self._ask(selection, at_once)
 
-    def _ask(self, selection, at_once):
+    def _ask(self, selection: Selection, at_once: bool) -> None:
         self.message = ""
         found = best_cell(self.catalogue, selection)
         if found is not None and found.selection.names(selection):
@@ -234,7 +253,7 @@ class AppState(param.Parameterized):
             if at_once:
                 self.compute()
 
-    def choose(self, series=None, mu=None):
+    def choose(self, series: str | None = None, mu: float | None = None) -> None:
         """Show a stored series at its μ nearest to that on screen; or the one on screen at this μ.
 
         Where that has no states there, they are asked for, and can be computed.
@@ -250,11 +269,12 @@ class AppState(param.Parameterized):
         elif mu is not None and self.cell is not None:
             self.ask(self.cell.selection.at(mu))
 
-    def cells(self):
+    def cells(self) -> list[Cell]:
         """The cells of the series on screen, by μ."""
-        return [c for c in self.catalogue if self.cell is not None and c.series == self.cell.series]
+        here = self.cell
+        return [c for c in self.catalogue if here is not None and c.series == here.series]
 
-    def show(self, cell):
+    def show(self, cell: Cell) -> None:
         """Put a cell on screen: at once if it is in memory, else when it is read."""
         shown = self.library.shown_in_memory(cell)
         if shown is not None:
@@ -262,7 +282,7 @@ class AppState(param.Parameterized):
         else:
             self.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
 
-    def read_ahead(self):
+    def read_ahead(self) -> None:
         """Have the cells with the nearest μ read meanwhile: they are the likeliest next."""
         cells = self.cells()
         if self.cell in cells:
@@ -270,15 +290,15 @@ class AppState(param.Parameterized):
             for job in self._ahead:
                 job.cancel()
             self._ahead = [
-                Job(lambda job, near=near: self.library.shown(near), reading)
+                Job(partial(_read, self.library, near), reading)
                 for near in cells[max(here - 1, 0) : here + 2]
                 if self.library.shown_in_memory(near) is None
             ]
 
-    def _look_up(self, wanted, view):
+    def _look_up(self, wanted: Selection | None, view: View) -> None:
         library = self.library
 
-        def read(job):
+        def read(job: Job) -> tuple[list[Cell], Shown | None, str]:
             damage = ""
             while True:
                 cells = library.cells()
@@ -290,7 +310,7 @@ class AppState(param.Parameterized):
                         raise
                     damage = str(error)  # the next best, then
 
-        def done(found):
+        def done(found: tuple[list[Cell], Shown | None, str]) -> None:
             cells, shown, damage = found
             self.message = damage or self.message
             self._list(cells)
@@ -302,20 +322,20 @@ class AppState(param.Parameterized):
 
         at_hand = best_cell(library.catalogue, wanted)
         shown = at_hand and library.shown_in_memory(at_hand)
-        if shown and (wanted is None or at_hand.selection.names(wanted)):
+        if shown and (wanted is None or shown.cell.selection.names(wanted)):
             done((library.catalogue, shown, ""))  # the first picture needs no thread
             self.refresh()
         else:
             self.reader.start(read, done)
 
-    def _list(self, cells):
+    def _list(self, cells: list[Cell]) -> None:
         self.catalogue = list(cells)
 
-    def _show_and_read_ahead(self, shown):
+    def _show_and_read_ahead(self, shown: Shown) -> None:
         self._show(shown)
         self.read_ahead()
 
-    def _show(self, shown, view=None):
+    def _show(self, shown: Shown, view: View | None = None) -> None:
         cell, replay, exact = shown
         fresh = dict(UNSEEN)
         if (self.replay is replay and view is None) or self._is_grown(replay):
@@ -339,7 +359,7 @@ class AppState(param.Parameterized):
             **fresh | _fitting(view or {}, replay),
         )
 
-    def _source(self, cell=None):
+    def _source(self, cell: Cell | None = None) -> str:
         """Where the states of a cell, by default the one on screen, come from."""
         cell = cell or self.cell
         if cell is None:
@@ -347,14 +367,14 @@ class AppState(param.Parameterized):
         shipped = cell.store is self.library.shipped
         return f"μ = {cell.mu:g}, {cell.series} ({PRECOMPUTED if shipped else COMPUTED})"
 
-    def _is_grown(self, replay):
+    def _is_grown(self, replay: Replay) -> bool:
         """Whether a Replay is what the walk on screen has grown into."""
         growing = self.growing
         return growing is not None and np.array_equal(growing.normal[0], replay.normal[0])
 
     # What is computed
 
-    def compute(self):
+    def compute(self) -> None:
         """Compute the states selected, in the background, and show them as they are found."""
         if self.selection is None or self._computes(self.selection):
             return
@@ -368,22 +388,22 @@ class AppState(param.Parameterized):
         self.param.update(live=Following(asked), arriving=None, growing=None)
         self.computation.start(compute.states(self.library, asked), self._computed)
 
-    def _computed(self, shown):
+    def _computed(self, shown: Shown) -> None:
         """Show states that were just computed; their exact intervals follow, if that is soon."""
         self.refresh(shown)
         if shown.replay.normal.shape[1] <= EXACT_FOLLOW and shown.replay.summary["dimension"]:
             self.compute_exact()
 
-    def _bring_back(self, event):
+    def _bring_back(self, event: Any) -> None:
         """What was on screen before something else was asked for, which is wanted no more."""
         if event.new and self.missing and self.cell is not None:
             self.show(self.cell)
 
-    def _computes(self, selection):
+    def _computes(self, selection: Selection) -> bool:
         """Whether this is what is being computed."""
         return self.computation.running and self.live and self.live.selection == selection
 
-    def grow(self, replay):
+    def grow(self, replay: Replay) -> None:
         """Put the Replay of a walk that begins on screen."""
         asked = self.live.selection
         source = f"μ = {asked.mu:g}, {series(asked)} (as they are found)"
@@ -392,7 +412,7 @@ class AppState(param.Parameterized):
             **UNSEEN,
         )  # fmt: skip
 
-    def follow(self):
+    def follow(self) -> Following | Arriving | None:
         """The Following or Arriving of what is computed, or None; what has ended is dropped."""
         if self.live is not None and not self.computation.running:
             plane = self.plane if self.growing is None else None
@@ -404,7 +424,7 @@ class AppState(param.Parameterized):
         return self.live or self.arriving
 
     @property
-    def asked(self):
+    def asked(self) -> str:
         """What was asked for and is not on screen, in words; empty where there is nothing."""
         if not self.missing or self.cell is None:
             return ""
@@ -413,14 +433,14 @@ class AppState(param.Parameterized):
             return f"asked for: {words}"
         return f"of μ = {self.cell.mu:g}; not computed: {words}"
 
-    def compute_exact(self):
+    def compute_exact(self) -> None:
         """Compute the exact intervals of the packing on screen, in the background."""
         if self.computation.running or self.cell is None or self.exact is not None:
             return
         self.message = ""
         shown = self.library.shown(self.cell)
 
-        def done(found):
+        def done(found: Shown) -> None:
             if found.cell == self.cell:
                 self._show(found)
 
@@ -428,12 +448,12 @@ class AppState(param.Parameterized):
         self.arriving = Arriving(compute.exact_parameters(self.cell.selection))
 
     @property
-    def exact_wanted(self):
+    def exact_wanted(self) -> bool:
         """Whether exact intervals are neither there nor under way, nor anything before them."""
         under_way = self.computation.running or self.knowledge.task.running
         return self.exact is None and self.growing is None and not under_way
 
-    def _need_loads(self, *events):
+    def _need_loads(self, *events: Any) -> None:
         """Limit loads of all contacts are computed where colour or width show them."""
         replay, cell = self.replay, self.cell
         if "load" not in (self.colour, self.thickness) or replay is None:
@@ -444,21 +464,21 @@ class AppState(param.Parameterized):
                 lambda found: self._loads_known(found, replay),
             )
 
-    def _loads_known(self, found, replay):
+    def _loads_known(self, found: perturbations.Loads, replay: Replay) -> None:
         if self.replay is replay:
             self.loads = found.load
 
     # What a link tells
 
     @property
-    def command(self):
+    def command(self) -> str:
         """The commands that make the states asked for, and the intervals under what is known."""
         made = command(self.selection)
         if self.known and self.replay is not None and not self.missing:
             made += "\n" + known.commands(self.selection, self.replay, self.known)
         return made
 
-    def link(self):
+    def link(self) -> str:
         """The query of an address that reopens this view."""
         if self.selection is None:
             return ""
@@ -470,21 +490,25 @@ class AppState(param.Parameterized):
         return link(self.selection, view)
 
 
+def _read(library: Library, cell: Cell, job: Job) -> Shown:
+    return library.shown(cell)
+
+
 # Parameters that a link holds where they are not as in a new page, and how they are read.
-def _pair(text):
+def _pair(text: str) -> tuple[int, int]:
     a, b = (int(part) for part in text.split("-"))
     return a, b
 
 
-def _tab(text):
+def _tab(text: str) -> str:
     return {"projection": "plane"}.get(text, text)  # as older links call it
 
 
-def _flag(text):
+def _flag(text: str) -> bool:
     return {"0": False, "1": True}[text]
 
 
-VIEW = {
+VIEW: dict[str, Callable[[str], Any]] = {
     "tab": _tab,
     "contact": int,
     "second": int,
@@ -506,39 +530,39 @@ VIEW = {
     "axes": str,
     "dark": _flag,
 }
-SPELLED = {"pulls": grabs.spelled, "known": known.spelled}
+SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": grabs.spelled, "known": known.spelled}
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
-UNSEEN = {"contact": None, "second": None, "frame": 0, "reference": 0, "between": None}
+UNSEEN: View = {"contact": None, "second": None, "frame": 0, "reference": 0, "between": None}
 UNSEEN |= {"pulls": [], "known": []}
 OF_A_REPLAY = tuple(UNSEEN)
 
 
-def _spelled(value):
+def _spelled(value: Any) -> Any:
     if isinstance(value, tuple):
         return "-".join(str(part) for part in value)
     return int(value) if isinstance(value, bool) else value
 
 
-def read_view(given):
+def read_view(given: Mapping[str, str]) -> View:
     """Parameters of AppState from a link's texts; what makes no sense is left out."""
     view = {}
     for name, cast in VIEW.items():
         try:
             value = cast(given[name])
-            AppState.param[name]._validate(value)
+            AppState.param[name]._validate(value)  # type: ignore[no-untyped-call]
         except (KeyError, ValueError):
             continue
         view[name] = value
     return view
 
 
-def _fitting(view, replay):
+def _fitting(view: View, replay: Replay) -> View:
     """Of these rows and contacts those that a Replay has."""
     frames, contacts = replay.normal.shape
     sizes = dict.fromkeys(OF_A_REPLAY, frames)
     sizes |= dict.fromkeys(("contact", "second", "pulls", "known"), contacts)
 
-    def fits(name):
+    def fits(name: str) -> bool:
         if view[name] is None:
             return True
         values = view[name] if name == "between" else (view[name],)
