@@ -461,6 +461,34 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
     np.testing.assert_array_equal(state.replay.normal[1], first)
 
 
+def test_a_link_keeps_what_single_tabs_show(library, state, wait_for):
+    from app.state import AppState
+
+    chosen = {"figure": "force", "axis": "log", "pushing": "all", "axes": "stress"}
+    state.param.update(**chosen)
+    again = AppState(library, query=f"?{state.link()}")
+    wait_for(again)
+    assert {name: getattr(again, name) for name in chosen} == chosen
+
+
+def test_what_is_pale_says_of_which_friction_it_is(state):
+    from app.views.summary import of_which
+
+    line = of_which(state)
+    assert not line.visible
+    state.param.update(missing=True)
+    assert line.visible and f"still of μ = {state.cell.mu:g}" in line.object
+
+
+def test_the_legend_says_what_colours_mean_in_the_hand(state):
+    from app.views.packing import PackingView
+
+    view = PackingView(state)
+    assert "change from the original" in view.legend.object
+    view.player.pulled = True
+    assert "change by what was pulled" in view.legend.object
+
+
 def test_what_is_refused_does_not_stay_in_its_box(state):
     from app.views.controls import Controls
 

@@ -221,3 +221,33 @@ def test_embedded_there_is_the_packing_with_its_player_alone(opening):
         "e => e.scene.hand.player.replay.frame === 1", arg=page.locator(".scene").element_handle()
     )
     picture(page, "embedded")
+
+
+# 11: all contacts as a table, and by keyboard
+
+
+def test_contacts_are_chosen_by_keyboard_and_found_in_a_table(visit):
+    page = visit(f"{AT}&frame=5")
+    strongest = "Array.from(scene.mixed.normal).reduce((k, f, c, all) => f > all[k] ? c : k, 0)"
+    page.locator(".scene").focus()
+    page.keyboard.press("n")
+    assert scene(page, "scene.selected") == scene(page, strongest)
+    page.get_by_text("All contacts as a table").click()
+    rows = page.locator("tr[data-contact]")
+    assert rows.first.get_attribute("aria-selected") == "true"
+    page.locator(".least").fill("1")
+    many = scene(page, "scene.mixed.normal.filter((force) => force >= 1).length")
+    page.get_by_text(f"{many} of ").wait_for()
+    assert rows.count() == many
+    assert scene(page, "scene.hand.player.look.only.reduce((a, b) => a + b, 0)") == many
+    rows.first.focus()
+    page.keyboard.press("ArrowDown")
+    second = int(rows.nth(1).get_attribute("data-contact"))
+    page.wait_for_function(
+        f"e => e.scene.selected === {second}", arg=page.locator(".scene").element_handle()
+    )
+    page.get_by_text("All contacts as a table").click()
+    page.wait_for_function(
+        "e => e.scene.hand.player.look.only === null",
+        arg=page.locator(".scene").element_handle(),
+    )
