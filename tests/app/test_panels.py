@@ -26,13 +26,13 @@ from granforce.study import kinds
 LAMMPS = REFERENCE.parent / "lammps"
 
 
-def opened(state, seconds=30):
+def opened(state, seconds=240):
     """The state once its first picture is there."""
     return settled(state, seconds, lambda: state.replay is not None)
 
 
-def settled(state, seconds=60, done=lambda: True):
-    """Poll as the page does until no task runs."""
+def settled(state, seconds=240, done=lambda: True):
+    """Poll as the page does until no task runs; the first ones compile all kernels."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         state.poll()
