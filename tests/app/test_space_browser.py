@@ -196,20 +196,27 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
 
 
 def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
-    page = visit("?split=1&frame=2")
-    until(page, "scene.hand.player.split.on")
+    page = visit("?mu=0.1&n=200&states=8&relax=nearest&split=1")
+    until(page, "scene.geometry.states === 8 && !scene.hand.player.grows && scene.hand.player.split.on")
+    # Each picture is drawn when it arrives: a browser that is late leaves out those of a packing
+    # that has been replaced by its walk meanwhile.
     page.locator(".scene").evaluate(
         """e => {
-            const {live, split} = e.scene.hand.player, {show} = live
+            const {live, split} = e.scene.hand.player, {hear, show} = live, later = requestAnimationFrame
             window.beside = []
             live.show = (picture) => {
                 show.call(live, picture)
                 beside.push([split.on, split.other?.walk.mu, split.twin.counts.drawn])
             }
+            live.hear = (news) => {
+                window.requestAnimationFrame = (draw) => draw(performance.now())
+                hear.call(live, news)
+                window.requestAnimationFrame = later
+            }
         }"""
     )
-    ask(page, "0.45")
-    until(page, "scene.geometry.mu === 0.45 && !scene.hand.player.grows")
+    ask(page, "10")  # takes longest to jam
+    until(page, "scene.geometry.mu === 10")
     seen = page.evaluate("beside")
     assert seen and all(on and mu == 0.1 and drawn > 20 for on, mu, drawn in seen)
     assert page.locator(".twin").is_visible()
