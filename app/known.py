@@ -139,7 +139,7 @@ class Knowledge:
 
     def __init__(self, state: Any) -> None:
         self.state = state
-        self.task, self.ranking = state.task(), state.task()
+        self.task, self.ranking = state.task(told=False), state.task()
         state.param.watch(self._follow, ["known", "replay"])
         self._arriving: Underway | None = None  # the Underway of what is being computed
         self.task.param.watch(self._failed, "message")

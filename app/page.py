@@ -180,7 +180,14 @@ def _large(document, query):
             return
         controls = Controls(state)
         left.extend(
-            [controls.beside, packing.legend, explanation.view(state), Address(state), Hints()]
+            [
+                controls.beside,
+                controls.error_beside,
+                packing.legend,
+                explanation.view(state),
+                Address(state),
+                Hints(),
+            ]
         )
         header[:] = in_title(state, query)
         widgets = controls.panel()

@@ -158,10 +158,14 @@ class AppState(param.Parameterized):
         elif next(pieces, "end") != "end":
             self._wake(partial(self.piecewise, pieces))
 
-    def task(self, pool: Pool = computing) -> Task:
-        """A new Task of this page: work off the event loop, ended when the page is closed."""
+    def task(self, pool: Pool = computing, *, told: bool = True) -> Task:
+        """A new Task of this page: work off the event loop, ended when the page is closed.
+
+        told: whether the page tells what goes wrong in it; else whoever asks for it does.
+        """
         task = Task(pool, self._wake)
-        task.param.watch(self._tell, "message")
+        if told:
+            task.param.watch(self._tell, "message")
         task.param.watch(self._count, "running")
         self.tasks.append(task)
         if self._closed:

@@ -72,7 +72,7 @@ def in_turn(job: Job, *named: Any) -> Iterator[None]:
 
 def _goes_as(job: Job, other: Job | None) -> None:
     """The progress of the other one, which works for both."""
-    job.stage = "being computed for another page"
+    job.stage = "already under way"
     if other is not None:
         job.stage += f": {other.stage}"
         job.fraction, job.seconds_left = other.fraction, other.seconds_left

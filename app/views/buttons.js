@@ -131,8 +131,11 @@ class Buttons {
   /** States per second. */
   get speed() { return 2 ** Number(this.part("speed").value) }
 
-  /** Error bar of a force that is held, in ⟨fₙ⟩. */
-  get error() { return Math.max(0, Number(this.part("error").value) || 0) }
+  /** Error bar of a force that is held, in ⟨fₙ⟩; NaN where what was typed is none. */
+  get error() {
+    const typed = this.part("error").valueAsNumber
+    return typed >= 0 ? typed : NaN
+  }
 
   /** Whether a contact is selected, whose force can be held. */
   tellChosen(chosen) { this.root.classList.toggle("chosen", Boolean(chosen)) }

@@ -23,6 +23,11 @@ FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
 HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
 MADE = "How it is made"
 FOLDED = {"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}}
+# Where the sidebar lies over the page, what went wrong is told at the page's lower edge.
+AT_EDGE = """
+:host { position: fixed; inset: auto 0 calc(var(--task, 0px) + var(--card, 0px)); z-index: 1400; }
+@media (min-width: 1200px) { :host { display: none !important } }
+"""
 SAME = "the same μ"  # of a packing made with the friction of the ensemble
 
 
@@ -89,6 +94,10 @@ class Controls:
             label="Strong and undetermined contacts", value=state.overlay, margin=(2, 10)
         )
         self.error = pmui.Alert(severity="error", visible=False, **WIDE)
+        self.error_beside = pmui.Alert(
+            severity="error", variant="filled", visible=False, closeable=True, margin=0,
+            stylesheets=[AT_EDGE],
+        )  # fmt: skip
         self.link = CopyButton(label="Copy link", margin=(4, 10), **WIDE)
         self.command = CopyButton(label="Copy CLI command", margin=(4, 10), **WIDE)
         self._connect()
@@ -154,6 +163,7 @@ class Controls:
         state.param.watch(self._command, ["selection", "missing", "replay", "known"])
         self._command()
         state.param.watch(self._tell, "message")
+        self.error_beside.param.watch(self._read, "closed")
         state.computation.param.watch(self._rest, "running")
         self._tell()
 
@@ -241,5 +251,12 @@ class Controls:
         for name in ("colour", "thickness", "overlay"):
             getattr(self, name).value = getattr(self.state, name)
 
+    def _read(self, event):
+        """What was read and closed may be told again."""
+        if event.new:
+            self.state.message = ""
+
     def _tell(self, *events):
-        self.error.param.update(title=self.state.message, visible=bool(self.state.message))
+        told = {"title": self.state.message, "visible": bool(self.state.message)}
+        self.error.param.update(**told)
+        self.error_beside.param.update(closed=False, **told)

@@ -8,7 +8,7 @@ const NARROW = "(max-width: 1199.95px)" // where the sidebar begins closed
 const place = (mu, least) => (mu > 0 ? Math.max(least, Math.log10(mu)) : least)
 const rounded = (mu) => Number(mu.toPrecision(2))
 
-export function render({ model }) {
+export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "friction"
   root.innerHTML = `
@@ -22,6 +22,11 @@ export function render({ model }) {
   const range = root.querySelector("[type=range]"), typed = part("typed")
 
   const along = (at) => `calc(8px + (100% - 16px) * ${(at - model.least) / (model.most - model.least)})`
+  /** Ask for a μ; where the server is gone, the page that opens anew does, see gone.js. */
+  function wish(mu) {
+    view.model.data.wish = mu
+    model.mu = mu
+  }
   const value = (at) => (at <= model.least + SNAP ? 0 : rounded(10 ** at))
 
   function snapped(at) {
@@ -43,6 +48,9 @@ export function render({ model }) {
       marks += `<span style="left:${along(k)}">${Number((10 ** k).toPrecision(1))}</span>`
     }
     part("scale").innerHTML = marks
+    for (const mark of part("scale").children) {
+      mark.addEventListener("click", () => { wish(Number(mark.textContent)) })
+    }
     follow()
   }
 
@@ -67,11 +75,11 @@ export function render({ model }) {
   range.addEventListener("input", () => {
     const at = Number(range.value), stored = snapped(at)
     typed.value = String(stored ?? value(at))
-    if (stored !== null && stored !== model.mu) model.mu = stored
+    if (stored !== null && stored !== model.mu) wish(stored)
   })
   range.addEventListener("change", () => {
     const at = Number(range.value)
-    model.mu = snapped(at) ?? value(at)
+    wish(snapped(at) ?? value(at))
     follow()
   })
   range.addEventListener("keydown", (event) => {
@@ -79,11 +87,15 @@ export function render({ model }) {
     if (!step || !model.stored.length) return
     const sorted = [...model.stored].sort((a, b) => a - b)
     const next = step > 0 ? sorted.find((mu) => mu > model.mu) : sorted.findLast((mu) => mu < model.mu)
-    if (next !== undefined) model.mu = next
+    if (next !== undefined) wish(next)
     event.preventDefault()
     event.stopPropagation()
   })
-  typed.addEventListener("change", () => { model.send_msg({ typed: typed.value }) })
+  typed.addEventListener("change", () => {
+    const asked = Number(typed.value.replace(",", "."))
+    if (Number.isFinite(asked)) view.model.data.wish = asked
+    model.send_msg({ typed: typed.value })
+  })
 
   for (const name of ["least", "most", "stored"]) model.on(name, draw)
   model.on("mu", follow)

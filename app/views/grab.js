@@ -10,6 +10,7 @@ const KNOWN = "This force is held: release it (press H) before it is pulled."
 const NUMBER_LINE = 14 // px, height of a line of numbers beside it
 const NUDGE = 1 / 40 // of a rail, by a key
 const REST = 600 // ms after the last key until the force is let go
+const LINGER = 1000 // ms for which its rail is seen after it was let go
 const FULL = 0.5 // ⟨fₙ⟩, the change at which its colour is full
 
 class Grab {
@@ -18,6 +19,8 @@ class Grab {
     this.player = player
     this.tell = (hand) => tell({ hand })
     this.rail = this.contact = this.value = this.before = null
+    this.flung = false // whether it was let go before its rail was there
+    this.lingers = 0
     this.frames = 0
     this.spot = new PointHand(this)
     this.tell({ anew: true })
@@ -35,6 +38,7 @@ class Grab {
     const { player } = this
     if (!this.begin()) return
     this.contact = contact
+    this.flung = false
     this.place = place
     player.scene.selected = contact
     player.scene.tip.classList.remove("on")
@@ -67,11 +71,14 @@ class Grab {
   leave() {
     const { contact, rail, value } = this
     if (contact === null) return
-    this.contact = null
     clearTimeout(this.resting)
-    if (rail && Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
+    this.flung = !rail
+    if (this.flung) return // followed once its rail is there
+    this.contact = null
+    if (Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
       this.tell({ hold: [contact, value] })
     }
+    this.linger()
     this.still()
   }
 
@@ -81,6 +88,12 @@ class Grab {
     this.player.plots.move(false)
     this.player.paint()
     this.player.paintPlots()
+  }
+
+  /** What the rail said can be read for a while after the force was let go. */
+  linger() {
+    clearTimeout(this.lingers)
+    this.lingers = setTimeout(() => { this.lingers = 0; this.player.repaint() }, LINGER)
   }
 
   /** Where nothing came to be pulled, tell what was told before. */
@@ -129,6 +142,8 @@ class Grab {
   }
 
   settle() {
+    clearTimeout(this.lingers)
+    this.lingers = 0
     this.rail = this.value = null
     if (this.player.look) this.player.look.before = this.replay?.held ? this.before : null
   }
@@ -150,6 +165,7 @@ class Grab {
     this.remember()
     this.slid = mixed.tangential.map((t, c) => Math.abs(t) >= 0.999 * this.replay.walk.mu * mixed.normal[c])
     this.move()
+    if (this.flung) this.leave()
   }
 
   /** Changes are coloured against the network on screen. */
@@ -280,7 +296,7 @@ class Grab {
 
   /** Rail, handle and what holds it, on the canvas of marks. */
   draw(context, scene) {
-    if (this.contact === null) return
+    if (this.contact === null && !this.lingers) return
     const { palette, ratio } = scene
     const { opened, sliding } = this.rail ? this.holding : { opened: [], sliding: [] }
     this.drawHolding(context, scene, opened, true)

@@ -47,7 +47,7 @@ class View(TabView):
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.told = note()
-        self.task = state.task()
+        self.task = state.task(told=False)
         self.loads = self.pushed = self._shown = None
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.what.param.watch(self.refresh, "value")

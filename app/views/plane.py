@@ -60,7 +60,7 @@ class View(TabView):
         if state.second is not None and state.axes == "principal":
             state.axes = "pair"
         self.planes = chosen(PLANES, state, "axes")
-        self.task, self.placing = state.task(), state.task(reading)
+        self.task, self.placing = state.task(told=False), state.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
         self.others, self.other = state.task(), None  # who finds the other states; their Replay
         self.also.param.watch(lambda event: together(self._fetch), "value")

@@ -7,6 +7,7 @@ const SWING = 2.2 // s, for the displacement field to go to and fro
 const CROSSING = 8 // times as long as a step takes the way between two states
 const OLD = 0.35 // opacity of what is of other states than those asked for
 const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
+const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
 const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
@@ -293,6 +294,7 @@ class Player {
     if (contact === null || contact === undefined) return this.say(UNCHOSEN)
     if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
+    if (!known && Number.isNaN(error)) return this.say(NO_ERROR)
     this.tell({ known: known ? { release: contact } : { hold: [contact, mixed.normal[contact], error] } })
   }
 

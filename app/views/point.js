@@ -10,7 +10,10 @@ class PointHand {
 
   get active() { return this.target !== null }
 
-  drop() { this.target = this.fan = this.from = null }
+  drop() {
+    this.target = this.fan = this.from = null
+    this.flung = false // whether it was let go before its networks were there
+  }
 
   // The hand
 
@@ -29,8 +32,9 @@ class PointHand {
   leave() {
     const { fan, at } = this
     if (!this.active) return
+    if (!fan) return void (this.flung = true)
     this.drop()
-    if (fan && at) this.hand.tell({ hold_point: at })
+    if (at) this.hand.tell({ hold_point: at })
     this.hand.still()
   }
 
@@ -50,6 +54,7 @@ class PointHand {
     this.from.residual = hand.replay.residual
     hand.remember()
     this.set()
+    if (this.flung) this.leave()
   }
 
   /** The network at the target, or at the nearest point of the polygon. */

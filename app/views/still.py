@@ -35,7 +35,7 @@ class Light:
         """Whether what has this tab is on screen, as for AppState."""
         return name == self.tab
 
-    def task(self, pool=None):
+    def task(self, pool=None, *, told=True):
         """A Task that is never started."""
         return Task()
 

@@ -47,7 +47,7 @@ class View:
     def __init__(self, state):
         self.state = state
         self.files = {}
-        self.task = state.task()
+        self.task = state.task(told=False)
         self.dropper = Dropper(
             self._dropped,
             self._refuse,

@@ -134,15 +134,69 @@ def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, s
         page.wait_for_function(
             f"e => e.scene.painted > {painting} + 3", arg=page.locator(".scene").element_handle()
         )
+        page.locator(".scale span").first.click()  # μ = 0, of which nobody hears yet
     with serve(tmp_path, port=port, **store):
         page.get_by_text("Connection lost").wait_for(state="detached")
         painted(page, PATIENCE)
-        shows(page, 1)
-        ask_for_mu(page, 0)  # and it listens again
         shows(page, 0)
+        searched(page, "mu=0&")
+        ask_for_mu(page, 1)  # and it listens again
+        shows(page, 1)
 
 
-# 3: Number fields
+# 3: What is refused, and fields
+
+
+def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
+    page = visit(width=390, height=844)
+    ask_for_mu(page, "10e9")
+    told = page.get_by_role("alert").filter(has_text="friction coefficient must lie")
+    told.wait_for()
+    edges = told.bounding_box()
+    assert edges["y"] + edges["height"] <= 844 and edges["x"] >= 0
+    told.get_by_role("button", name="Close").click()
+    told.wait_for(state="hidden")
+    ask_for_mu(page, "10e9")
+    told.wait_for()  # the same refusal is told again
+
+
+def test_a_mark_of_the_slider_is_chosen_by_a_click(visit):
+    page = visit()
+    page.locator(".scale span").get_by_text("1", exact=True).click()
+    shows(page, 1)
+
+
+def test_an_error_bar_below_0_holds_nothing(visit):
+    page = visit()
+    page.keyboard.press("n")
+    page.locator("input.error").fill("-1")
+    page.locator("button.hold").click()
+    page.locator(".source").get_by_text("An error bar is a number from 0 on").wait_for()
+    assert "known=" not in page.url
+    page.locator("input.error").fill("0.1")
+    page.locator("button.hold").click()
+    searched(page, "known=")
+
+
+def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(visit):
+    page = visit()
+    flung = page.locator(".scene").evaluate(
+        """e => {
+            const {hand, geometry} = e.scene, [xa, ya, xb, yb] = e.scene.ends(5)
+            const at = e.scene.toPixel((xa + xb) / 2, (ya + yb) / 2)
+            hand.takeInScene(geometry.contact[5], ...at)
+            hand.moveInScene(at[0], at[1] - 40)
+            hand.leave()
+            return [hand.rail === null, geometry.contact[5]]
+        }"""
+    )
+    assert flung[0]  # let go before it could be pulled
+    searched(page, f"pulls={flung[1]}%3A")
+    scene = page.locator(".scene").element_handle()
+    page.wait_for_function("e => e.scene.hand.replay.held && !e.scene.hand.active", arg=scene)
+
+
+# 4: Number fields
 
 
 def test_number_fields_take_typing_after_enter(visit):
@@ -169,7 +223,7 @@ def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
     assert field.input_value() == before
 
 
-# 4: Uploaded packings
+# 5: Uploaded packings
 
 
 def test_uploaded_packings_show_their_own_number_of_disks(visit):
@@ -183,7 +237,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
 
 
-# 5: Keys
+# 6: Keys
 
 
 @pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
@@ -215,7 +269,7 @@ def test_who_goes_by_tab_means_the_widget(visit):
     assert page.locator(".stage.playing").count() == 0
 
 
-# 6: What is not computed yet
+# 7: What is not computed yet
 
 
 def at_rest(place):
@@ -246,7 +300,7 @@ def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old
     assert at_rest(plot)["y"] == before["y"]
 
 
-# 7: Two contacts
+# 8: Two contacts
 
 
 def middles(page, count):
@@ -291,7 +345,7 @@ def test_two_contacts_are_chosen_in_the_packing_and_both_are_marked(visit):
     searched(page, f"second={a}")
 
 
-# 8: Small things
+# 9: Small things
 
 
 @pytest.mark.parametrize("tab", ["intervals", "statistics"])

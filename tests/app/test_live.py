@@ -148,7 +148,7 @@ def test_a_page_that_comes_later_joins_and_both_end_with_the_same(library, wait_
     assert second.live is not first.live
     two.run(lambda: second.growing is not None)
     assert second.growing is first.growing  # not computed anew
-    two.run(lambda: "another page" in second.computation.stage or not second.busy)
+    two.run(lambda: "already under way" in second.computation.stage or not second.busy)
     while first.busy or second.busy:
         one.run(lambda: True)
         two.run(lambda: True)

@@ -197,12 +197,16 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
 
 def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
     page = visit("?mu=0.1&n=200&states=8&relax=nearest&split=1")
-    until(page, "scene.geometry.states === 8 && !scene.hand.player.grows && scene.hand.player.split.on")
+    until(
+        page,
+        "scene.geometry.states === 8 && !scene.hand.player.grows && scene.hand.player.split.on",
+    )
     # Each picture is drawn when it arrives: a browser that is late leaves out those of a packing
     # that has been replaced by its walk meanwhile.
     page.locator(".scene").evaluate(
         """e => {
-            const {live, split} = e.scene.hand.player, {hear, show} = live, later = requestAnimationFrame
+            const {live, split} = e.scene.hand.player, {hear, show} = live
+            const later = window.requestAnimationFrame
             window.beside = []
             live.show = (picture) => {
                 show.call(live, picture)
