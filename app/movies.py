@@ -21,7 +21,7 @@ FRAME_MS = 80
 MOST_BYTES = 5e6
 FEWER = (1.0, 0.7, 0.5, 0.35)  # parts of SIDE that are tried until it is small enough
 TONES = 64  # colours of the whole movie
-FULL = 0.5  # ⟨f_n⟩, the change at which its colour is full; as in grab.js
+FULL = 0.5  # ⟨f_n⟩, the change at which its colour is full; as in look.js
 WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 
 
@@ -127,7 +127,7 @@ def _chains(
 ) -> None:
     place, scale = _place(replay, fine)
     links = replay.links
-    width = WIDTH * look["thickness"](normal) * scale
+    width = WIDTH * look["stretch"] * look["thickness"](normal) * scale
     colours = look["colours"]
     tone = np.clip(look["shade"](normal, tangential), 0, 1) * (len(colours) - 1)
     for k in np.argsort(width[links.contact], kind="stable"):
@@ -150,11 +150,14 @@ def shades(
     dark: bool,
     loads: Floats | None = None,
     gone: Floats | None = None,
+    full: float | None = None,
+    stretch: float = 1.0,
 ) -> Look:
     """How forces are drawn, as on screen: colours, and functions of the forces of a moment.
 
     exact: {"low", "high"} (N_c,) or empty; the others as in the state, most: ΔF_n at full colour,
-    loads (N_c,) limit loads or None; gone (N_c,) of ΔF_n by what is known, or None.
+    loads (N_c,) limit loads or None; gone (N_c,) of ΔF_n by what is known, or None; full: ⟨f_n⟩ at
+    which colours are full, or None; stretch: how many times as wide chains are.
     """
     low, high = (exact["low"], exact["high"]) if exact else (replay.low[:, 0], replay.high[:, 0])
     extent, first, pinned = high - low, replay.normal[0], replay.normal[reference]
@@ -167,10 +170,10 @@ def shades(
     shade = {
         "mobilised": mobilised,
         "extent": lambda normal, tangential: extent / (most or 1.0),
-        "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * FULL),
+        "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * (full or FULL)),
         "sign": lambda normal, tangential: 0.5 + 0.5 * np.sign(normal - pinned),
         "load": lambda normal, tangential: (
-            np.full_like(normal, 0.5) if loads is None else loads / loads.max()
+            np.full_like(normal, 0.5) if loads is None else loads / (full or loads.max())
         ),
         "known": lambda normal, tangential: (
             np.zeros_like(normal) if gone is None else gone / np.maximum(gone + extent, 1e-6)
@@ -188,4 +191,4 @@ def shades(
     if not dark:
         tones = {"ground": "#ffffff", "disk": "#d0d8e2", "pale": "#eef1f5", "edge": "#a9b7c8"}
     colours = [palettes["neutral"]] if neutral else palettes[colour]
-    return {"shade": shade, "thickness": width, "colours": colours, **tones}
+    return {"shade": shade, "thickness": width, "stretch": stretch, "colours": colours, **tones}

@@ -75,11 +75,12 @@ def html(
     between = view["between"]
     if len(shown.normal) < len(replay.normal):
         frame, between = 0, None
-    given = {name: view[name] for name in ("contact", "colour", "thickness", "overlay", "scale")}
+    same = ("contact", "colour", "thickness", "full", "stretch", "overlay", "scale")
+    given = {name: view[name] for name in same}
     given |= {
         "walk": frames(shown) | {"acceptance": acceptance},
         "exact": intervals,
-        "most": full_extent(replay, intervals),
+        "most": view["full"] or full_extent(replay, intervals),
         "palettes": palettes(False),
         "lead": explanation.first(replay.summary),
         "source": source,

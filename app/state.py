@@ -108,6 +108,11 @@ class AppState(param.Parameterized):
     ranked = param.Parameter(doc="known.Ranked: contacts to measure next, or None")
     colour: Any = param.Selector(default="change", objects=list(COLOURS))
     thickness: Any = param.Selector(default="normal", objects=list(WIDTHS))
+    full = param.Number(
+        default=None, bounds=(1e-3, 1e3), allow_None=True,
+        doc="⟨f_n⟩ at which colours are full; None: half for changes, else as the packing has it",
+    )  # fmt: skip
+    stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
     sort: Any = param.Selector(
         default="original", objects=list(SORTS), doc="order of the intervals"
@@ -525,6 +530,8 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "known": known.read,
     "colour": str,
     "thickness": str,
+    "full": float,
+    "stretch": float,
     "overlay": _flag,
     "sort": str,
     "scale": str,

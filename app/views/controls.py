@@ -21,7 +21,7 @@ WIDE = {"sizing_mode": "stretch_width"}
 SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
 FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
 HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
-MADE = "How it is made"
+MADE, SCALES = "How it is made", "Scales of colour and width"
 FOLDED = {"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}}
 # Where the sidebar lies over the page, what went wrong is told at the page's lower edge.
 AT_EDGE = """
@@ -90,6 +90,8 @@ class Controls:
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
         self.colour = pmui.Select(label="Colour", options=_swap(COLOURS), **SMALL)
         self.thickness = pmui.Select(label="Width", options=_swap(WIDTHS), **SMALL)
+        self.full = pmui.TextInput(label="Full colour, ⟨fₙ⟩", placeholder="by itself", **SMALL)
+        self.stretch = pmui.TextInput(label="Width, times", **SMALL)
         self.overlay = pmui.Switch(
             label="Strong and undetermined contacts", value=state.overlay, margin=(2, 10)
         )
@@ -142,8 +144,15 @@ class Controls:
             margin=(-10, -14),
             **WIDE,
         )
+        scales = pn.Row(self.full, self.stretch, margin=(-10, -14), **WIDE)
         return pmui.Accordion(
-            (MADE, inside), active=[], title_variant="subtitle2", sx=FOLDED, margin=(8, 10), **WIDE
+            (MADE, inside),
+            (SCALES, scales),
+            active=[],
+            title_variant="subtitle2",
+            sx=FOLDED,
+            margin=(8, 10),
+            **WIDE,
         )
 
     def _connect(self):
@@ -158,8 +167,11 @@ class Controls:
             widget.param.watch(
                 lambda event, name=name: state.param.update({name: event.new}), "value"
             )
+        self.full.param.watch(self._scale, "value")
+        self.stretch.param.watch(self._scale, "value")
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
-        state.param.watch(self._look, ["colour", "thickness", "overlay", "reference", "known"])
+        looks = ["colour", "thickness", "full", "stretch", "overlay", "reference", "known"]
+        state.param.watch(self._look, looks)
         state.param.watch(self._command, ["selection", "missing", "replay", "known"])
         self._command()
         state.param.watch(self._tell, "message")
@@ -245,11 +257,30 @@ class Controls:
         if state.missing:
             self.go.label = f"Compute {differs(state)}"
 
+    def _scale(self, event):
+        """Where colours are full and how wide chains are, as typed; empty: by itself."""
+        name = "full" if event.obj is self.full else "stretch"
+        text = event.new.strip().replace(",", ".")
+        low, high = self.state.param[name].bounds
+        try:
+            value = float(text) if text else self.state.param[name].default
+            if value is not None and not low <= value <= high:
+                raise ValueError
+        except ValueError:
+            label = event.obj.label
+            self.state.message = f"{label}: a number from {low:g} to {high:g}, got {text[:30]!r}"
+            self._look()
+            return
+        self.state.param.update({name: value})
+
     def _look(self, *events):
         for name, labels in (("colour", COLOURS), ("thickness", WIDTHS)):
             getattr(self, name).options = _swap(meaningful(self.state, labels, name))
         for name in ("colour", "thickness", "overlay"):
             getattr(self, name).value = getattr(self.state, name)
+        full = self.state.full
+        self.full.value = "" if full is None else f"{full:g}"
+        self.stretch.value = f"{self.state.stretch:g}"
 
     def _read(self, event):
         """What was read and closed may be told again."""

@@ -121,10 +121,11 @@ class View:
             if key == "gif":
                 job.begin("drawing the movie")
                 bounds = exact_intervals(possible, replay)
-                names = ("colour", "thickness", "reference", "dark")
+                most = view["full"] or full_extent(replay, bounds)
+                names = ("colour", "thickness", "reference", "dark", "full", "stretch")
                 look = movies.shades(
-                    replay, bounds, palettes(view["dark"]), most=full_extent(replay, bounds),
-                    loads=loads, gone=given, **{name: view[name] for name in names},
+                    replay, bounds, palettes(view["dark"]), loads=loads, gone=given,
+                    most=most, **{name: view[name] for name in names},
                 )  # fmt: skip
                 content = movies.gif(
                     replay, look, between=view["between"], progress=job.tell,

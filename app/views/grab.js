@@ -11,7 +11,6 @@ const NUMBER_LINE = 14 // px, height of a line of numbers beside it
 const NUDGE = 1 / 40 // of a rail, by a key
 const REST = 600 // ms after the last key until the force is let go
 const LINGER = 1000 // ms for which its rail is seen after it was let go
-const FULL = 0.5 // ⟨fₙ⟩, the change at which its colour is full
 
 class Grab {
   /** tell(message): to the server. */

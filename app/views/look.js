@@ -1,6 +1,7 @@
 // How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
 
 const WIDTH = 0.23 // of a chain that carries the mean normal force, in largest radii
+const FULL = 0.5 // ⟨fₙ⟩, the change at which its colour is full, where nothing else is asked for
 const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
 const THIN = 0.15 // of its width, a chain that a filter leaves out
@@ -31,12 +32,15 @@ class Look {
 
   /** The style of these forces, for the scene. */
   of(mixed) {
-    const { model, style } = this, { thickness, reference, most, palettes } = model
+    const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
     const colour = this.before ? "pulled" : model.colour
-    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most } // a model is slow to ask
+    // A model is slow to ask.
+    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? FULL }
+    this.asked.load = full ?? this.mostLoad
+    const unit = WIDTH * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
-      style.width[c] = value > CARRYING ? WIDTH * value * (this.only?.[c] === 0 ? THIN : 1) : 0
+      style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
     const told = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone)
     style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
@@ -68,9 +72,9 @@ class Look {
     if (colour === "mobilised") return 0.5 + (this.mobilised(normal[c], tangential[c]) ?? 0) / 2
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
     if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
-    if (colour === "load") return this.loads ? this.loads[c] / this.mostLoad : 0.5
-    if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * FULL)
-    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * FULL)
+    if (colour === "load") return this.loads ? this.loads[c] / this.asked.load : 0.5
+    if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.asked.full)
+    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.asked.full)
     return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))
   }
 
@@ -97,13 +101,61 @@ class Look {
     return rows
   }
 
-  grain(k) {
-    const { walk } = this
-    return [
-      ["disk", `${walk.grain[k]}${walk.kind[k] % 2 ? " (rattler)" : ""}`],
+  grain(k, { mixed }) {
+    const { walk } = this, grain = walk.grain[k]
+    const rows = [
+      ["disk", `${grain}${walk.kind[k] % 2 ? " (rattler)" : ""}`],
       ["radius", walk.r[k].toFixed(3)],
       ["contacts", walk.touching[k]],
     ]
+    const { pressure, shear, angle } = this.stressOn(grain, mixed)
+    if (!(pressure > 0)) return rows
+    const degrees = Math.round((angle * 180) / Math.PI)
+    return [...rows,
+      ["pressure / mean", (pressure / this.meanPressure(mixed)).toFixed(2)],
+      ["shear / pressure", `${(shear / pressure).toFixed(2)}, pressed most at ${degrees}°`],
+    ]
+  }
+
+  /** What presses on a grain: {normal direction outwards nx, ny, force on it fx, fy} of each contact. */
+  forcesOn(grain, { normal, tangential }) {
+    const { walk } = this, { i, j, contact, x0, y0, x1, y1 } = walk, found = [], seen = new Set()
+    for (let k = 0; k < contact.length; k++) {
+      if ((i[k] !== grain && j[k] !== grain) || seen.has(contact[k])) continue
+      seen.add(contact[k])
+      const c = contact[k], far = Math.hypot(x1[k] - x0[k], y1[k] - y0[k]), out = i[k] === grain ? 1 : -1
+      const nx = (x1[k] - x0[k]) / far, ny = (y1[k] - y0[k]) / far, n = normal[c], t = tangential[c]
+      // The normal points from i to j, and the force acts on j; t = (−n_y, n_x).
+      found.push({
+        nx: out * nx, ny: out * ny, fx: -out * (n * nx - t * ny), fy: -out * (n * ny + t * nx),
+      })
+    }
+    return found
+  }
+
+  /** Stress on a grain, σ = (1/πr²) Σ r n F, compression positive: its mean principal stress, half the
+   * difference of the two, and the direction of the larger, −90° … 90°. */
+  stressOn(grain, mixed) {
+    let xx = 0, yy = 0, xy = 0
+    for (const { nx, ny, fx, fy } of this.forcesOn(grain, mixed)) {
+      xx -= nx * fx
+      yy -= ny * fy
+      xy -= (nx * fy + ny * fx) / 2
+    }
+    const unit = 1 / (Math.PI * this.walk.radius[grain]), shear = unit * Math.hypot((xx - yy) / 2, xy)
+    return { pressure: (unit * (xx + yy)) / 2, shear, angle: Math.atan2(2 * xy, xx - yy) / 2 }
+  }
+
+  /** Mean pressure of the grains, each by its area. */
+  meanPressure({ normal }) {
+    const { walk } = this, { i, j, contact, radius } = walk, seen = new Set()
+    let virial = 0
+    for (let k = 0; k < contact.length; k++) {
+      if (seen.has(contact[k])) continue
+      seen.add(contact[k])
+      virial += normal[contact[k]] * (radius[i[k]] + radius[j[k]])
+    }
+    return virial / (2 * Math.PI * radius.reduce((sum, r) => sum + r * r, 0))
   }
 }
 

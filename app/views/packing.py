@@ -19,10 +19,13 @@ FOLLOWED = (
     "wide",
     "colour",
     "thickness",
+    "full",
+    "stretch",
     "overlay",
     "scale",
 )  # from the state
 
+WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
 # What colours and widths show → key of the glossary.
@@ -40,7 +43,8 @@ LEGEND = """
 <div style="display:flex;flex-wrap:wrap;gap:3px 20px;align-items:center;font-size:12px">
  <span tabindex="0" data-term="{width_term}">width: {width}
   <svg width="56" height="12" style="vertical-align:middle"><polygon points="0,5.5 56,0 56,12 0,6.5"
-   fill="currentColor" fill-opacity="0.65"/></svg></span>
+   fill="currentColor" fill-opacity="0.65"/></svg>
+   {widest:.3g} ⟨fₙ⟩ as wide as the largest disk</span>
  <span tabindex="0" data-term="{colour_term}">colour: {colour} {bar}</span>
  {marks}
  <span tabindex="0" data-term="rattler">pale disks: loose; dashed: the box{sides};
@@ -79,14 +83,24 @@ class PackingView:
         self.player.param.watch(self._swing, "between")
         self.player.param.watch(self._explain, "pulled")
         state.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "between"])
+        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "between", "full"])
         state.param.watch(self._pin, ["known", "ranked", "replay"])
         state.param.watch(self._displace, "displacement")
         state.param.watch(self._accompany, "twin")
         state.param.watch(self._load, "loads")
         state.param.watch(self._project, "plane")
         state.param.watch(self._dress, ["dark"])
-        shown = ["colour", "thickness", "overlay", "exact", "narrowed", "loads", "dark"]
+        shown = [
+            "colour",
+            "thickness",
+            "full",
+            "stretch",
+            "overlay",
+            "exact",
+            "narrowed",
+            "loads",
+            "dark",
+        ]
         state.param.watch(self._explain, [*shown, "replay", "growing", "moving", "pulls"])
         self._show()
         self._accompany()
@@ -108,7 +122,7 @@ class PackingView:
         changes = {
             "exact": exact,
             "gone": gone(state, replay),
-            "most": full_extent(replay, exact),
+            "most": state.full or full_extent(replay, exact),
             "between": None if state.between is None else list(state.between),
         }
         if self._shown is not replay:
@@ -203,14 +217,15 @@ def full_extent(replay, exact):
 def colour_bar(state, pulled):
     """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
-    change = "less: −½ ⟨fₙ⟩", diverging, "+½ ⟨fₙ⟩: more"  # see FULL in grab.js
+    half = "½" if state.full is None else f"{state.full:.3g}"  # see FULL in look.js
+    change = f"less: −{half} ⟨fₙ⟩", diverging, f"+{half} ⟨fₙ⟩: more"
     if pulled:
         return change
-    most = full_extent(state.seen, exact_intervals(state.possible, state.seen))
+    most = state.full or full_extent(state.seen, exact_intervals(state.possible, state.seen))
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
         "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
-        "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads)),
+        "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads, state.full)),
         "change": change,
         "known": ("0", list(palettes(state.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
@@ -222,8 +237,10 @@ def colour_words(state, pulled):
     return "change by what was pulled" if pulled else COLOURS[state.colour]
 
 
-def _largest(loads):
-    return "(being computed)" if loads is None else f"{loads.max(initial=0):.2f} ⟨fₙ⟩"
+def _largest(loads, full):
+    if loads is None:
+        return "(being computed)"
+    return f"{full or loads.max(initial=0):.2f} ⟨fₙ⟩"
 
 
 def legend(state, pulled=False):
@@ -241,6 +258,7 @@ def legend(state, pulled=False):
     tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
     return LEGEND.format(
         width=WIDTHS[state.thickness],
+        widest=2 / (WIDTH * state.stretch),
         width_term=EXPLAINED[state.thickness],
         colour_term=EXPLAINED[state.colour],
         colour=colour_words(state, pulled),

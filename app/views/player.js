@@ -45,7 +45,8 @@ class Player {
     this.scene.onRepaint = () => { this.buttons.count(); this.split.paint() }
     this.scene.describe = {
       contact: (k) => this.look.contact(k, this.replay),
-      grain: (k) => this.look.grain(k),
+      grain: (k) => this.look.grain(k, this.replay),
+      forces: (grain) => this.look.forcesOn(grain, this.replay.mixed),
     }
   }
 
@@ -370,7 +371,7 @@ export function render({ model, view }) {
   view.model.data.player = player
   view.model.data.scene = player.scene // for those who find the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
-  for (const name of ["most", "colour", "thickness", "overlay", "reference", "split", "scale", "tab", "views", "wide"]) {
+  for (const name of ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]) {
     model.on(name, () => player.again())
   }
   const observer = new ResizeObserver(() => player.scene.resize())

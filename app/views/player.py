@@ -49,6 +49,8 @@ class Player(Scripted):
     wide = param.Boolean(doc="whether force space is on screen, whatever the tab")
     colour = param.String(default="change")
     thickness = param.String(default="normal")
+    full = param.Number(default=None, allow_None=True, doc="⟨f_n⟩ at which colours are full")
+    stretch = param.Number(default=1.0, doc="how many times as wide chains are")
     overlay = param.Boolean()
     scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")

@@ -6,6 +6,7 @@ const FEW = 2500 // chains drawn one by one, with round ends; more are gathered 
 const FINE = 16 // colours; of more, every second serves where chains are gathered
 const GRAB = 6 // px from a chain that still mean it
 const ZOOM = [0.02, 4] // least and largest part of the whole view
+const ARROW = 1.3 // of the largest force on a disk, in largest radii
 const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 class Scene {
@@ -27,6 +28,7 @@ class Scene {
     this.painted = 0
     this.counts = { segments: 0, drawn: 0, outside: 0, thin: 0 }
     this.selected = this.second = null
+    this.pointed = -1 // the disk under the pointer, whose forces are drawn
     this.frozen = false // whether what is drawn moves by itself and cannot be pointed at
     this.offset = null
     this.mixed = null
@@ -36,6 +38,7 @@ class Scene {
   // Geometry and view
 
   show(geometry) {
+    this.pointed = -1
     const moved = !this.geometry || `${geometry.window}` !== `${this.geometry.window}`
     this.geometry = geometry
     const { x0 } = geometry
@@ -106,7 +109,7 @@ class Scene {
   /** The whole packing, drawn as on screen, as the text of an SVG. */
   picture(caption) {
     const { disks, chains, marks, view, size, geometry } = this, sheet = new Sheet()
-    Object.assign(this, { disks: sheet, chains: sheet, marks: sheet, size: PIXELS })
+    Object.assign(this, { disks: sheet, chains: sheet, marks: sheet, size: PIXELS, pointed: -1 })
     this.reset(false)
     this.drawDisks()
     this.stale = false
@@ -270,8 +273,33 @@ class Scene {
       this.drawSelected(this.second)
       marks.setLineDash([])
     }
+    if (this.pointed >= 0 && this.describe?.forces) this.drawForces(this.pointed)
     if (marks instanceof Sheet) this.onSheet?.(marks, this)
     else this.onMarks?.(marks, this)
+  }
+
+  /** The forces that press on a disk, each an arrow that ends where it acts. */
+  drawForces(disk) {
+    const { marks, scale, palette, geometry } = this, { x, y, r, grain, radius } = geometry
+    const forces = this.describe.forces(grain[disk])
+    const most = Math.max(...forces.map(({ fx, fy }) => Math.hypot(fx, fy)))
+    const long = ARROW * Math.max(...radius), head = Math.max(0.16, 6 / scale)
+    marks.lineWidth = Math.max(0.07, 2 / scale)
+    marks.strokeStyle = palette.strong
+    marks.lineCap = "round"
+    marks.beginPath()
+    for (const { nx, ny, fx, fy } of forces) {
+      const size = Math.hypot(fx, fy)
+      if (!(size > 1e-3 * most)) continue
+      const ux = fx / size, uy = fy / size, ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
+      marks.moveTo(ex - (long * fx) / most, ey - (long * fy) / most)
+      marks.lineTo(ex, ey)
+      for (const side of [1, -1]) {
+        marks.moveTo(ex - head * (ux - 0.5 * side * uy), ey - head * (uy + 0.5 * side * ux))
+        marks.lineTo(ex, ey)
+      }
+    }
+    marks.stroke()
   }
 
   drawSelected(selected) {
@@ -363,7 +391,14 @@ class Scene {
     }
     root.addEventListener("pointerup", end)
     root.addEventListener("pointercancel", end)
-    root.addEventListener("pointerleave", () => this.tip.classList.remove("on"))
+    root.addEventListener("pointerleave", () => { this.tip.classList.remove("on"); this.point(-1) })
+  }
+
+  /** A disk is pointed at, or none (−1). */
+  point(disk) {
+    if (disk === this.pointed) return
+    this.pointed = disk
+    if (this.style && this.geometry && !this.frozen) this.drawMarks(this.style)
   }
 
   /** The contact that a pointer takes in hand, or null where it moves the view.
@@ -410,6 +445,7 @@ class Scene {
   hover(px, py) {
     if (!this.geometry || !this.describe || this.frozen) return this.tip.classList.remove("on")
     const k = this.linkAt(px, py), disk = k < 0 ? this.diskAt(px, py) : -1
+    this.point(disk)
     const rows = k >= 0 ? this.describe.contact(k) : disk >= 0 ? this.describe.grain(disk) : null
     this.tip.classList.toggle("on", rows !== null)
     this.root.style.cursor = k >= 0 ? "pointer" : "grab"

@@ -192,6 +192,78 @@ def test_hovering_tells_grain_and_contact(page):
     assert f"{r:.3f}" in tip.inner_text()
 
 
+def test_the_forces_on_a_disk_are_shown_and_balance(page):
+    off, most, pressure, mean = scene(
+        page,
+        """(() => {
+            const {look, replay} = scene.hand.player, {walk, mixed} = replay
+            let off = 0, most = 0, sum = 0, area = 0
+            for (let g = 0; g < walk.radius.length; g++) {
+                const forces = look.forcesOn(g, mixed), {pressure} = look.stressOn(g, mixed)
+                const total = (name) => forces.reduce((sum, force) => sum + force[name], 0)
+                off = Math.max(off, Math.abs(total("fx")), Math.abs(total("fy")))
+                for (const {fx, fy} of forces) most = Math.max(most, Math.hypot(fx, fy))
+                sum += pressure * walk.radius[g] ** 2
+                area += walk.radius[g] ** 2
+            }
+            return [off, most, sum / area, look.meanPressure(mixed)]
+        })()""",
+    )
+    assert off < 1e-5 < 1 < most  # balanced as single precision has it
+    assert pressure == pytest.approx(mean, rel=1e-5)
+    x, y, r = scene(
+        page,
+        "(k => ['x', 'y', 'r'].map(name => scene.geometry[name][k]))"
+        "(scene.geometry.touching.findIndex((n, k) => n === 3 && scene.geometry.kind[k] === 0))",
+    )
+    inside = page.locator(".scene").evaluate(
+        f"""({{scene}}) => {{
+            for (let turn = 0; turn < 60; turn++) {{
+                const place = [Math.cos(turn / 9), Math.sin(turn / 9)]
+                place[0] = {x} + 0.6 * {r} * place[0]
+                place[1] = {y} + 0.6 * {r} * place[1]
+                if (scene.linkAt(...scene.toPixel(...place)) < 0) return place
+            }}
+        }}"""
+    )
+    page.mouse.move(*at(page, *inside))
+    tip = page.locator(".tip.on").filter(has_text="pressure / mean")
+    tip.wait_for()
+    assert "shear / pressure" in tip.inner_text()
+    assert scene(page, "scene.pointed") >= 0
+
+
+def test_scales_of_colour_and_width_are_set_and_stay(visit):
+    page = visit(MANY + "&frame=5&full=0.2&stretch=2")
+    c, width, bin_, colours, change, force = scene(
+        page,
+        """(() => {
+            const {style, mixed: {normal}} = scene, first = scene.hand.player.replay.walk.normal
+            const c = normal.findIndex((n, c) => n > 0.1 && Math.abs(n - first[c]) < 0.15)
+            return [
+                c, style.width[c], style.bin[c], style.colours.length,
+                normal[c] - first[c], normal[c],
+            ]
+        })()""",
+    )
+    assert c >= 0 and width == pytest.approx(2 * 0.23 * force, rel=1e-5)
+    assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
+    page.get_by_text("+0.2 ⟨fₙ⟩: more").wait_for()
+    page.get_by_text("4.35 ⟨fₙ⟩ as wide as the largest disk").wait_for()
+    page.locator("input.typed").fill("1")  # another μ
+    page.locator("input.typed").press("Enter")
+    page.wait_for_function("() => location.search.includes('mu=1&')")
+    assert "full=0.2" in page.url and "stretch=2" in page.url
+    page.get_by_role("button", name="Scales of colour and width").click()
+    page.get_by_label("Width, times").fill("-3")
+    page.get_by_label("Width, times").press("Enter")
+    page.get_by_text("a number from 0.1 to 10, got '-3'").first.wait_for()
+    page.get_by_label("Full colour, ⟨fₙ⟩").fill("")
+    page.get_by_label("Full colour, ⟨fₙ⟩").press("Enter")
+    page.wait_for_function("() => !location.search.includes('full=')")
+    page.get_by_text("+½ ⟨fₙ⟩: more").wait_for()
+
+
 def test_a_click_selects_the_contact_everywhere(page):
     contact, x, y = link_of(page, 3)
     page.mouse.click(*at(page, x, y))
