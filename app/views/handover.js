@@ -2,6 +2,9 @@
 
 const RATE = 6e6 // bits a second of a movie
 const LONGEST_MS = 60000 // of a movie
+const HELD_MS = 500 // for which a movie ends with the last network; a shorter one would have no picture
+const SIDE = 900 // pixels of a movie, as of the picture whose caption it has
+const WHERE = [888, 60] // pixels in its caption, where the number of the network ends
 const SCALE = 2 // pixels of a PNG per pixel of its SVG
 
 export function render({ model, view }) {
@@ -49,46 +52,67 @@ export function render({ model, view }) {
   }
 
   /** A movie of what plays, from the first state to the last, or once to and fro. */
-  async function recorded({ background }, button) {
+  async function recorded(caption, button) {
     const it = player(), { scene } = it, layers = [scene.disks, scene.chains, scene.marks]
+    const { position } = it.replay, told = await imageOf(drawn(caption)), height = told.naturalHeight - SIDE
     const canvas = document.createElement("canvas")
-    canvas.width = canvas.height = scene.disks.canvas.width & ~1
+    canvas.width = SIDE
+    canvas.height = (SIDE + height) & ~1
     const context = canvas.getContext("2d"), pieces = []
     const stream = canvas.captureStream(30)
     const recorder = new MediaRecorder(stream, { mimeType: "video/webm", videoBitsPerSecond: RATE })
     recorder.ondataavailable = (event) => pieces.push(event.data)
     const ended = new Promise((resolve) => { recorder.onstop = resolve })
+    const { view } = scene
+    scene.reset(false) // whole, as the scale in its caption is
+    scene.finer(SIDE)
     it.show(0, false)
     it.play(true)
     recorder.start(250)
     const begun = performance.now(), words = button?.textContent
+    let over // since when the last network is seen
     const frame = (now) => {
-      context.fillStyle = background
+      context.fillStyle = caption.background
       context.fillRect(0, 0, canvas.width, canvas.height)
       for (const layer of layers) context.drawImage(layer.canvas, 0, 0)
+      context.drawImage(told, 0, SIDE, SIDE, height, 0, SIDE, SIDE, height)
+      context.fillStyle = caption.ink
+      context.font = "15px Helvetica, Arial, sans-serif"
+      context.textAlign = "right"
+      context.fillText(`network ${it.replay.place}`, WHERE[0], SIDE + WHERE[1])
       if (button) button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
       const swung = it.replay.swinging && it.direction > 0 && it.turned
       if (it.replay.swinging && it.direction < 0) it.turned = true
-      if (!it.playing || swung || now - begun > LONGEST_MS) recorder.stop()
+      if (!it.playing || swung) over ??= now
+      if (now - over > HELD_MS || now - begun > LONGEST_MS) recorder.stop()
       else requestAnimationFrame(frame)
     }
     it.turned = false
     requestAnimationFrame(frame)
     await ended
+    const took = performance.now() - begun
     it.play(false)
+    scene.view = view // as it was on screen
+    scene.size = 0
+    scene.resize()
+    it.show(position)
     if (button) button.textContent = words
-    return new Blob(pieces, { type: "video/webm" })
+    return timed(new Blob(pieces, { type: "video/webm" }), took)
   }
 
-  async function rendered(svg) {
+  async function imageOf(svg) {
     const image = new Image()
     image.src = URL.createObjectURL(svg)
     await image.decode()
-    const canvas = document.createElement("canvas")
+    URL.revokeObjectURL(image.src)
+    return image
+  }
+
+  async function rendered(svg) {
+    const image = await imageOf(svg), canvas = document.createElement("canvas")
     canvas.width = SCALE * image.naturalWidth
     canvas.height = SCALE * image.naturalHeight
     canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height)
-    URL.revokeObjectURL(image.src)
     return new Promise((resolve) => canvas.toBlob(resolve, "image/png"))
   }
 
@@ -115,4 +139,23 @@ export function render({ model, view }) {
   model.on("msg:custom", take)
   offer()
   return root
+}
+
+// What a recorder writes does not say how long it is, so that players cannot wind.
+
+const INFO = [0x15, 0x49, 0xa9, 0x66], DURATION = [0x44, 0x89, 0x88] // EBML: names, and 8 bytes to come
+
+/** A WebM with its duration (ms) written into its Info; as it is where that is not found. */
+async function timed(movie, duration) {
+  const bytes = new Uint8Array(await movie.arrayBuffer())
+  const at = bytes.subarray(0, 1000).findIndex((_, k) => INFO.every((byte, n) => bytes[k + n] === byte))
+  const size = bytes[at + 4] & 0x7f // of one byte, whose highest bit says so
+  if (at < 0 || !(bytes[at + 4] & 0x80) || size === 0x7f) return movie
+  const told = new DataView(new ArrayBuffer(8)), longer = new DataView(new ArrayBuffer(8)), end = at + 5 + size
+  told.setFloat64(0, duration)
+  longer.setBigUint64(0, (1n << 56n) | BigInt(size + DURATION.length + 8)) // a size of eight bytes
+  const parts = [
+    bytes.subarray(0, at + 4), longer, bytes.subarray(at + 5, end), new Uint8Array(DURATION), told, bytes.subarray(end),
+  ]
+  return new Blob(parts, { type: movie.type })
 }

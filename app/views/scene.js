@@ -70,10 +70,13 @@ class Scene {
     const size = this.root.clientWidth, ratio = window.devicePixelRatio || 1
     if (!size || (size === this.size && ratio === this.ratio)) return
     this.size = size
-    this.ratio = ratio
-    for (const { canvas } of [this.disks, this.chains, this.marks]) {
-      canvas.width = canvas.height = Math.round(size * ratio)
-    }
+    this.finer(size * ratio)
+  }
+
+  /** Draw with so many pixels a side, however many of them are seen; `resize` takes it back. */
+  finer(pixels) {
+    this.ratio = pixels / this.size
+    for (const { canvas } of [this.disks, this.chains, this.marks]) canvas.width = canvas.height = Math.round(pixels)
     if (this.geometry) this.changed()
   }
 

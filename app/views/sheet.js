@@ -3,6 +3,7 @@
 const PIXELS = 900 // of the picture's side
 const BELOW = 60 // pixels from the picture to the first line of its caption
 const LINE = 21 // pixels
+const MOST = 116 // letters of a line
 const SCALE_LENGTH = 5 // of the scale, in largest radii
 
 const written = (value) => (typeof value === "number" ? Number(value.toPrecision(5)) : value)
@@ -52,7 +53,8 @@ class Sheet {
   clearRect() {}
 
   /** All that was drawn, as a text, with colour bar, scale and caption below. */
-  svg([left, right, bottom, top], { background, ink, bar, lines, unit }) {
+  svg([left, right, bottom, top], { background, ink, bar, lines: told, unit }) {
+    const lines = told.flatMap(wrapped)
     const place = `x="${left}" y="${-top}" width="${right - left}" height="${top - bottom}"`
     const element = ({ name, ...given }) =>
       `<${name} ${Object.entries(given).map(([key, value]) => `${key}="${written(value)}"`).join(" ")}/>`
@@ -74,6 +76,16 @@ class Sheet {
       "</svg>",
     ].join("\n")
   }
+}
+
+/** A line as lines that fit, broken between words, or within one that does not fit by itself. */
+function wrapped(line) {
+  const lines = [""]
+  for (const word of line.match(new RegExp(`\\S{1,${MOST}}\\s*`, "g")) ?? []) {
+    if ((lines.at(-1) + word.trimEnd()).length > MOST) lines.push("")
+    lines[lines.length - 1] += word
+  }
+  return lines.map((part) => part.trimEnd())
 }
 
 const safe = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;")

@@ -1,5 +1,6 @@
 """What visitors take along: a page in one file, movies, all states, pictures with captions."""
 
+import base64
 import io
 
 import numpy as np
@@ -68,11 +69,39 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
 
 
 def test_a_movie_is_recorded_in_the_browser(page, tmp_path):
-    page.locator("input.speed").fill("5")
+    page.locator("input.speed").fill("3")
     path = taken(page, "Movie (WebM)", tmp_path)
     content = path.read_bytes()
     assert path.suffix == ".webm" and content[:4] == b"\x1a\x45\xdf\xa3" and len(content) > 5000
     assert page.get_by_role("button", name="Movie (WebM)", exact=True).is_visible()
+    # The player is where it was; the movie has its caption, and says how long it is.
+    page.wait_for_function("() => location.search.includes('frame=3')")
+    assert scene(page, "scene.hand.player.replay.position") == 3
+    assert scene(page, "scene.disks.canvas.width === Math.round(scene.root.clientWidth)")
+    width, height, duration, picture = page.evaluate(
+        """async (content) => {
+            const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0))
+            const video = document.createElement("video")
+            video.muted = true
+            video.src = URL.createObjectURL(new Blob([bytes], { type: "video/webm" }))
+            await new Promise((resolve) => { video.onloadeddata = resolve })
+            video.currentTime = video.duration / 2 // it can be wound
+            await new Promise((resolve) => { video.onseeked = resolve })
+            const canvas = document.createElement("canvas")
+            canvas.width = video.videoWidth
+            canvas.height = video.videoHeight
+            canvas.getContext("2d").drawImage(video, 0, 0)
+            return [canvas.width, canvas.height, video.duration, canvas.toDataURL()]
+        }""",
+        base64.b64encode(content).decode(),
+    )
+    assert width == 900 and height > 980 and 0.1 < duration < 60
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    picture = base64.b64decode(picture.partition(",")[2])
+    (ARTEFACTS / "webm.png").write_bytes(picture)
+    with Image.open(io.BytesIO(picture)) as image:
+        pixels = np.asarray(image.convert("L"))
+    assert (pixels[:900] < 200).any() and (pixels[905:] < 100).any()  # packing, and words below it
 
 
 def test_a_movie_for_slides_is_drawn_by_the_server(page, tmp_path):
