@@ -1,13 +1,17 @@
 """One visitor's page, from the first picture to its end, when nothing more is computed for it."""
 
 import importlib
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from types import ModuleType
+from typing import Any
 from urllib.parse import parse_qsl
 
 import panel as pn
 import panel_material_ui as pmui
 import param
-from panel.util import edit_readonly
+from bokeh.document import Document
+from panel.util import edit_readonly  # type: ignore[attr-defined]  # which panel says is no export
 from tornado.ioloop import IOLoop
 
 from . import garbage, scenes
@@ -108,17 +112,18 @@ TAB_LESS = TAB | {"& .MuiTab-root:nth-of-type(3)": {"display": "none"}}
 GROWING = ("intervals", "plane")  # what shows a walk while it is computed
 
 
-def page():
+def page() -> Any:
     """One visitor's page: of a small scene, or of a large packing."""
     pn.extension()
     document = pn.state.curdoc
+    assert document is not None  # a page is made for one
     mend_late_views(document)
     answer_with_lock()
     asked = scenes.asked(pn.state.location.search if pn.state.location else "")
     return _large(document, asked.query) if asked.scene == scenes.MANY else _small(document, asked)
 
 
-def _small(document, asked):
+def _small(document: Document, asked: scenes.Asked) -> Any:
     """The page of a small scene, which asks no store."""
     task = Task(computing, _turns(document))
     plain = asked == scenes.asked("")
@@ -135,7 +140,7 @@ def _small(document, asked):
     whole.param.watch(lambda event: view.param.update(dark=event.new), "dark_theme")
     closed = garbage.opened()
 
-    def end(context):
+    def end(context: object) -> None:
         task.close()
         closed()
 
@@ -143,7 +148,7 @@ def _small(document, asked):
     return whole
 
 
-def _large(document, query):
+def _large(document: Document, query: str) -> Any:
     """The page of a large packing."""
     state = AppState(pn.state.as_cached("library", _open_library), _turns(document), query)
     state.message = state.message or " ".join(state.library.notes)
@@ -173,7 +178,7 @@ def _large(document, query):
         # pn.state, to which it was bound, would keep every closed page, and does if given a value.
         whole.busy = param.rx(False)
 
-    def parts():
+    def parts() -> Iterator[None]:
         """What follows the packing."""
         if alone:
             left.append(packing.legend)
@@ -216,7 +221,7 @@ def _large(document, query):
     document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
     closed = garbage.opened()
 
-    def end(context):
+    def end(context: object) -> None:
         state.close()
         closed()
 
@@ -224,25 +229,26 @@ def _large(document, query):
     return whole
 
 
-def _turns(document):
+def _turns(document: Document) -> Callable[[Callable[[], object]], None]:
     """wake(function): call it on the page's thread, soon, when what it changes will be seen."""
-    waiting, loop = [], IOLoop.current()
+    waiting: list[Callable[[], object]] = []
+    loop = IOLoop.current()
 
-    def run(function):
+    def run(function: Callable[[], object]) -> None:
         if _in_transit(document):
             waiting.append(function)
         else:
             together(function)
 
-    def come(function):
+    def come(function: Callable[[], object]) -> None:
         if document.session_context is not None:  # else the page has ended
             document.add_next_tick_callback(partial(run, function))
 
-    def wake(function):
+    def wake(function: Callable[[], object]) -> None:
         # From any thread; the page can end at any moment but within a turn of the loop.
         loop.add_callback(come, function)
 
-    def arrived():
+    def arrived() -> None:
         while waiting:
             wake(waiting.pop(0))
 
@@ -250,24 +256,24 @@ def _turns(document):
     return wake
 
 
-def _in_transit(document):
+def _in_transit(document: Document) -> bool:
     """Whether the browser has connected but not yet said that it has the page.
 
     Panel forgets what changes before that, as if the browser were still to fetch the page: changes
     after it was fetched would be lost.
     """
-    context = document.session_context
+    context: Any = document.session_context
     session = None if context is None else context.session
     return not pn.state.loaded and session is not None and session.connection_count > 0
 
 
-def _open_library():
+def _open_library() -> Library:
     """The stores, once for all visitors."""
     garbage.settle()
     return Library()
 
 
-def in_title(state, query):
+def in_title(state: AppState, query: str) -> list[Any]:
     """What stands in the title bar, where it covers nothing: what is computed, and the tour."""
     knowledge = state.knowledge
     tasks = state.computation, state.loading, state.measuring, state.besides.task
@@ -278,10 +284,11 @@ def in_title(state, query):
 class Tabs:
     """Views beside the packing; each is made when it is first seen, and told when it is hidden."""
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         self.state = state
         self.names = list(TABS)
-        self._begun, self._space = set(), None  # the view of force space, wherever it is
+        self._begun: set[str] = set()
+        self._space: Any = None  # the view of force space, wherever it is
         self.pages = {
             name: pn.Column(sizing_mode="stretch_width", css_classes=[f"in-{name}"])
             for name in self.names
@@ -297,18 +304,18 @@ class Tabs:
         self.tabs.param.watch(lambda event: state.piecewise(self._showing()), "active")
         state.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
 
-    def choose(self, number):
+    def choose(self, number: int) -> None:
         """Show tab 1, 2, …; other numbers do nothing, and what is on screen anyway stays there."""
         if 1 <= number <= len(self.names) and not self._has_place(self.names[number - 1]):
             self.tabs.active = number - 1
 
-    def _showing(self):
+    def _showing(self) -> Iterator[None]:
         name = self.names[self.tabs.active]
         yield from self.filling(name)  # first, so that those who follow the state find it there
         if name == self.names[self.tabs.active]:
             self.state.tab = name
 
-    def beside(self, place):
+    def beside(self, place: Any) -> Iterator[None]:
         """Put force space into a place of its own on a wide screen, else back into its tab."""
         wide, page = self.state.wide, self.pages["plane"]
         self.tabs.sx = TAB_LESS if wide else TAB
@@ -332,13 +339,13 @@ class Tabs:
             self._begun.discard("plane")
         yield
 
-    def _leave(self, place):
+    def _leave(self, place: Any) -> None:
         """Take force space away from a place; it is made anew for another."""
         place[:] = []
         if self._space is not None:
             self._space.left = True
 
-    def filling(self, name):
+    def filling(self, name: str) -> Iterator[None]:
         """Make the view of a tab, once; a generator of pieces."""
         if name not in self._begun and not self._has_place(name):
             self._begun.add(name)
@@ -356,17 +363,17 @@ class Tabs:
                 yield
             self.state.views += 1
 
-    def _has_place(self, name):
+    def _has_place(self, name: str) -> bool:
         """Whether a tab's view is beside the packing instead, where there may be but one of it."""
         return self.state.wide and name == "plane"
 
 
-def _module(name):
+def _module(name: str) -> ModuleType:
     # Relative: `panel serve` names the package after the folder, without a place to find it by.
     return importlib.import_module(f".views.{name}", __package__)
 
 
-def _pale_when_old(parts):
+def _pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
     """Have parts (name, view) of other states than those asked for be pale; see player.js."""
     for name, part in parts:
         part.styles = part.styles | {
@@ -374,17 +381,18 @@ def _pale_when_old(parts):
         }
 
 
-def _poll_while_running(state, document):
+def _poll_while_running(state: AppState, document: Document) -> None:
     """Take over the progress of tasks while there are any; end them where nobody looks any more."""
-    polling, loaded = [], []
+    polling: list[Any] = []
+    loaded: list[bool] = []
 
-    def poll():
+    def poll() -> None:
         if loaded and _left_alone(document.session_context):
             state.cancel()
         if not _in_transit(document):
             state.poll()
 
-    def switch(*events):
+    def switch(*events: Any) -> None:
         if state.busy and not polling:
             polling.append(document.add_periodic_callback(partial(together, poll), POLL_MS))
         elif polling and not state.busy:
@@ -395,7 +403,7 @@ def _poll_while_running(state, document):
     switch()
 
 
-def _left_alone(context):
+def _left_alone(context: Any) -> bool:
     """Whether the browser has been gone for so long that it will hardly come back."""
     session = None if context is None else context.session
     if session is None or session.connection_count:

@@ -21,7 +21,7 @@ except InputError as error:
     sys.exit(2)
 
 
-def on_server_loaded(server_context):
+def on_server_loaded(server_context: object) -> None:
     """Import and load what visitors will need, or compile it first; they may come meanwhile."""
     if config.nthreads is not None:  # a page takes its turns on one thread, the server's own
         print(
@@ -39,6 +39,6 @@ def on_server_loaded(server_context):
         Job(lambda job: warm_up())
 
 
-def on_server_unloaded(server_context):
+def on_server_unloaded(server_context: object) -> None:
     """Whatever is being computed ends, or the process would wait for its threads."""
     end_everything()

@@ -2,14 +2,20 @@
 
 import base64
 import json
+from collections.abc import Mapping
 from html import escape
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from bokeh.embed import components
 from bokeh.resources import Resources
 
+from granforce.records import Floats
+
 from . import planes
-from .replays import evenly
+from .data import Cell, Library
+from .replays import Replay, evenly
 from .views import explanation, still
 from .views.packing import exact_intervals, full_extent, legend
 from .views.player import Player, frames
@@ -48,20 +54,20 @@ const GIVEN = {given}
 
 
 def html(
-    library,
-    cell,
-    replay,
-    exact,
+    library: Library,
+    cell: Cell,
+    replay: Replay,
+    exact: xr.Dataset | None,
     *,
-    view,
-    link,
-    command,
-    source,
-    outlined=None,
-    loads=None,
-    gone=None,
-    pins=None,
-):
+    view: Mapping[str, Any],
+    link: str,
+    command: str,
+    source: str,
+    outlined: planes.Outlined | None = None,
+    loads: Floats | None = None,
+    gone: Floats | None = None,
+    pins: Mapping[str, Any] | None = None,
+) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
     exact: under what is known; gone, pins: as the player has them.
@@ -121,13 +127,13 @@ def html(
     return text.encode()
 
 
-def thinned(replay):
+def thinned(replay: Replay) -> tuple[Replay, Floats]:
     """A Replay of at most FRAME_BYTES, and the acceptance of its frames."""
     count, contacts = replay.normal.shape
     whole, pick = frames(replay)["acceptance"], evenly(count, contacts, FRAME_BYTES)
     if len(pick) == count:
         return replay, whole
-    rows = {
+    rows: dict[str, Any] = {
         name: np.ascontiguousarray(getattr(replay, name)[pick])
         for name in ("normal", "tangential", "number", "distance", "residual", "attempts")
     }
@@ -135,7 +141,7 @@ def thinned(replay):
     return replay._replace(**rows, growth=growth), whole[pick]
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     """Arrays as base64 with their type, all else as JSON takes it."""
     if isinstance(value, dict):
         return {name: _plain(part) for name, part in value.items()}
@@ -147,6 +153,6 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _script(value):
+def _script(value: Any) -> str:
     """JSON that can stand in a script."""
     return json.dumps(value, ensure_ascii=False).replace("</", "<\\/")

@@ -560,7 +560,7 @@ def read_view(given: Mapping[str, str]) -> View:
     for name, cast in VIEW.items():
         try:
             value = cast(given[name])
-            AppState.param[name]._validate(value)  # type: ignore[no-untyped-call]
+            AppState.param[name]._validate(value)
         except (KeyError, ValueError):
             continue
         view[name] = value
