@@ -16,6 +16,9 @@ from granforce.records import Floats, InputError, Mask, Packing
 from granforce.study import conditions
 
 STOPS = 17  # networks along a rail
+# Of more contacts so many that they go side by side, and so far within its ends (part of its
+# width) that each is found at once.
+MANY, FEW_STOPS, INWARD = 5000, 5, 1e-4
 RIBS = 48  # directions of a fan
 
 
@@ -46,16 +49,19 @@ class Puller:
         """known: forces that no pull changes, as for `conditions.conditions`."""
         self._S = ensemble(packing, mu, **conditions.of(conditions.conditions(known=known)))
 
-    def rail(self, contact: int, state: Floats, stops: int = STOPS) -> Rail:
+    def rail(self, contact: int, state: Floats) -> Rail:
         """The Rail of a contact (its number in the packing) for the network `state` (N_c, 2).
 
         Raises what `pull` and `reach` raise.
         """
         ends = reach(self._S, contact)
         (position,) = self._S.positions([contact])
-        here = np.clip(state[position, 0], ends.lower, ends.upper)
+        many = len(self._S.index) > MANY
+        inward = (ends.upper - ends.lower) * (INWARD if many else 0.0)
+        low, high = ends.lower + inward, ends.upper - inward
         # The network itself is among them, so that nothing jumps when it is taken in hand.
-        values = np.union1d(np.linspace(ends.lower, ends.upper, stops), here)
+        stops = np.linspace(low, high, FEW_STOPS if many else STOPS)
+        values = np.union1d(stops, np.clip(state[position, 0], low, high))
         found = pull(self._S, contact, values, state)
         sliding = ends.sliding != 0
         bounds = ends.lower, ends.upper

@@ -7,6 +7,7 @@ from packings import packed
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import ensemble
 from granforce.records import InputError
+from granforce.study import pulls
 from granforce.study.pulls import Puller
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
@@ -29,6 +30,20 @@ def test_a_rail_goes_from_bound_to_bound_through_admissible_networks(S, puller):
     assert np.all(np.diff(rail.values) > 0)
     np.testing.assert_array_equal(rail.states[:, 7, 0], rail.values)
     halfway = (rail.states[1:] + rail.states[:-1]) / 2  # what a page shows in between
+    for states in (rail.states, halfway):
+        assert S.residual(states).max() <= BALANCED and S.violation(states).max() <= ADMISSIBLE
+
+
+def test_rails_of_many_contacts_have_fewer_stops_and_the_same_bounds(S, puller, monkeypatch):
+    contact = int(S.index[7])
+    whole = puller.rail(contact, S.original)
+    monkeypatch.setattr(pulls, "MANY", 1)
+    rail = puller.rail(contact, S.original)
+    assert (rail.lower, rail.upper) == (whole.lower, whole.upper)
+    assert len(rail.values) <= pulls.FEW_STOPS + 1 < len(whole.values)
+    width = rail.upper - rail.lower
+    np.testing.assert_allclose(rail.values[[0, -1]], [rail.lower, rail.upper], atol=1.1e-4 * width)
+    halfway = (rail.states[1:] + rail.states[:-1]) / 2
     for states in (rail.states, halfway):
         assert S.residual(states).max() <= BALANCED and S.violation(states).max() <= ADMISSIBLE
 
