@@ -101,7 +101,7 @@ TABS = {
     "intervals": "Intervals",
     "statistics": "Statistics",
     "plane": "Force space",  # the third: see TAB_LESS
-    "perturb": "Perturb",
+    "perturb": "Push",
     "upload": "Your packing",
     "export": "Export",
 }

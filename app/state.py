@@ -46,11 +46,11 @@ SORTS = {
 }
 # What single tabs can show.
 FIGURES = {
-    "eta": "η(μ)",
-    "extent": "P(ΔFₙ)",
-    "correlation": "corr(μ)",
+    "eta": "η against μ",
+    "extent": "lengths ΔFₙ",
+    "correlation": "correlation",
     "scatter": "ΔFₙ against fₙ",
-    "force": "P(fₙ)",
+    "force": "forces fₙ",
 }
 AXES = {"linear": "linear", "log": "logarithmic"}
 PUSHES = {

@@ -57,10 +57,10 @@ const BUTTONS = `
   <div class="read">
     <span>network <b class="state"></b></span>
     <span class="running">
-      <span><b class="played"></b> played:</span>
+      <span>of the <b class="played"></b> played so far:</span>
       <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
       <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
-      <span tabindex="0" data-term="eta3">intervals <b class="eta3"></b></span>
+      <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
     </span>
   </div>`
 const VIEW = `
@@ -75,7 +75,6 @@ const CHECKS = `<summary>Check this network</summary>
     <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
     <span tabindex="0" data-term="distance">from the centre of the states <b class="distance"></b> ⟨fₙ⟩</span>
   </div>`
-const ETA3 = 0.15 // as the paper scales it, to stand beside the other two
 
 class Buttons {
   /** actions: by the buttons' names; scrub(position); tab(number), for the digits. */
@@ -182,7 +181,7 @@ class Buttons {
       state: replay.place,
       eta1: form(walk.eta1[seen], 3),
       eta2: form(walk.eta2[seen], 3),
-      eta3: form(ETA3 * walk.eta3[seen], 3),
+      eta3: form(walk.eta3[seen], 3),
       played: seen,
       acceptance: accepted <= 1 ? `${Math.round(100 * accepted)} %` : "–",
       distance: form(replay.distance, 2),

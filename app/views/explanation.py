@@ -8,6 +8,7 @@ from .hints import term
 from .scripts import Scripted, joined
 
 QUESTION = "What am I seeing? Why more than one force network?"
+PULL = "; drag a line up or down to make one of your own"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
@@ -22,11 +23,11 @@ def lead(state):
     """The question that the picture answers, and what is seen, as HTML."""
     if state.moving and not state.selection.imported:
         return jamming(state.selection)
-    return "" if state.seen is None else first(state.seen.summary)
+    return "" if state.seen is None else first(state.seen.summary, PULL)
 
 
-def first(summary):
-    """What does not move, what is free, and what playing shows."""
+def first(summary, more=""):
+    """What does not move, what is free, and what playing shows; more: what else can be done."""
     n, mu, free = summary["n"], summary["mu"], summary["dimension"]
     forces = (2 if mu > 0 else 1) * summary["contacts"]
     still = f"<b>These {n} disks never move.</b> "
@@ -38,7 +39,7 @@ def first(summary):
     else:
         question = "Same disks, same pressure: why are the forces not fixed?"
         networks = term("network", "force networks")
-        told = f"<b>{free} numbers are left free.</b> Playback shows {networks} that all balance."
+        told = f"<b>{free} numbers are left free.</b> Play shows {networks} that all balance{more}."
     return f"<h2>{question}</h2><p>{still}{given}{told}</p>"
 
 

@@ -11,7 +11,7 @@ from .scripts import FOLDER, Scripted, joined
 
 # Words on the page that are not the glossary's own: what stands there → key of the glossary.
 LABELS = {
-    "Friction coefficient μ": "mu",
+    "Friction μ": "mu",
     "Disks N": "n",
     "Seed": "seed",
     "States": "states",
@@ -40,11 +40,11 @@ LABELS = {
     "fₙ, fₜ of a contact": "cone",
     "fₙ of two contacts": "pair",
     "stresses": "stress",
-    "η(μ)": "eta2",
-    "P(ΔFₙ)": "extent",
-    "corr(μ)": "correlation",
+    "η against μ": "eta2",
+    "lengths ΔFₙ": "extent",
+    "correlation": "correlation",
     "ΔFₙ against fₙ": "correlation",
-    "P(fₙ)": "fn",
+    "forces fₙ": "fn",
     "one contact": "push",
     "Which measurement next?": "informative",
     "Push": "push",
@@ -52,7 +52,6 @@ LABELS = {
     "critical force against η2": "critical_force",
     "Force space": "s",
     "Intervals": "exact",
-    "Perturb": "push",
     "limit load": "limit_load",
     "what limit loads are": "limit_load",
 }

@@ -9,7 +9,7 @@ from .hints import term
 from .scripts import FOLDER, Scripted, joined
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
-ASK = "Hold a selected contact's force (press H): all other intervals shrink."
+ASK = "Click a line, then hold its force (Hold, or H): the other intervals can only shrink."
 
 
 class Known(Scripted):

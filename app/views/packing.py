@@ -45,7 +45,7 @@ LEGEND = """
   <svg width="56" height="12" style="vertical-align:middle"><polygon points="0,5.5 56,0 56,12 0,6.5"
    fill="currentColor" fill-opacity="0.65"/></svg>
    {widest:.3g} ⟨fₙ⟩ as wide as the largest disk</span>
- <span tabindex="0" data-term="{colour_term}">colour: {colour} {bar}</span>
+ <span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
  {marks}
  <span tabindex="0" data-term="rattler">pale disks: loose; dashed: the box{sides};
   disks outside are periodic copies</span>
@@ -218,7 +218,7 @@ def colour_bar(state, pulled):
     """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
     half = "½" if state.full is None else f"{state.full:.3g}"  # see FULL in look.js
-    change = f"less: −{half} ⟨fₙ⟩", diverging, f"+{half} ⟨fₙ⟩: more"
+    change = f"{half} ⟨fₙ⟩ less", diverging, f"{half} ⟨fₙ⟩ more"
     if pulled:
         return change
     most = state.full or full_extent(state.seen, exact_intervals(state.possible, state.seen))

@@ -34,7 +34,7 @@ HINT = (
 class View(TabView):
     """The selected contact pushed; every contact's limit load; critical force and decay."""
 
-    name, title = "perturb", "Perturb"
+    name, title = "perturb", "Push"
 
     def __init__(self, state):
         super().__init__(state, "replay", "contact")

@@ -7,7 +7,7 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "desk"
   root.innerHTML = `
-    <p class="whole">Disks at rest can often be held by many different sets of forces. S is the set of them all. More friction allows more sets; with too little, none is left.</p>
+    <p class="whole">Disks at rest can often be held by many different sets of forces. S is the set of them all. More friction allows more of them.</p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${MOST_MU}" step="0.005" aria-label="friction μ">

@@ -82,7 +82,9 @@ def indeterminacy(own, exact, log):
         _line(etas, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
     for k, (name, _, factor) in enumerate(MEASURES):
         _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
-    corner(etas, "measured: of the random walk's states")
+    peak = max(studied.hill(), key=lambda point: point[1], default=None)
+    least = f"least determined near μ = {peak[0]:g}; " if peak else ""
+    corner(etas, f"{least}lines: the study; large open symbols: this page")
     seen = _over_mu("samplers", "0.15 η3", 270, **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
         look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
@@ -90,7 +92,7 @@ def indeterminacy(own, exact, log):
         _line(seen, points, label, dash="dashed" if part == "exact" else "solid", **look)
     _own(seen, statistics.means(own, "eta3", factor=0.15), log, COLOURS[0], MARKERS[0])
     _own(seen, statistics.means(exact, "eta3", factor=0.15), log, COLOURS[3], MARKERS[3])
-    corner(seen, "dashed exact, others measured")
+    corner(seen, "the same by other ways to draw networks; dashed: exact")
     z = _over_mu("coordination", "contacts per disk z", 220)
     _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
     _own(z, statistics.means(own, "coordination"), False, COLOURS[0])

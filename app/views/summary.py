@@ -7,7 +7,7 @@ from .hints import term
 from .parts import of_replay
 
 TILE = """<div class="tile" tabindex="0" data-term="{term}"><div class="name">{name}</div>
-<div>{value}</div></div>"""
+<div>{value}</div><div class="name">{meaning}</div></div>"""
 STYLE = """
 .tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(114px, 1fr)); gap: 5px;
   margin-top: 6px; }
@@ -23,21 +23,21 @@ STYLE = """
 .term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
 """
 
-# Words and symbol, name among the summary's numbers, form, and key of the glossary.
+# Words and symbol, name among the summary's numbers, form, key of the glossary, and what it is of.
 TILES = (
-    ("free dimensions h", "dimension", "d", "h"),
-    ("spread η1", "eta1", ".4f", "eta1"),
-    ("distance η2", "eta2", ".4f", "eta2"),
-    ("intervals 0.15 η3", "scaled_eta3", ".4f", "eta3"),
+    ("free numbers h", "dimension", "d", "h", "forces less equations"),
+    ("spread η1", "eta1", ".4f", "eta1", "of one force"),
+    ("distance η2", "eta2", ".4f", "eta2", "of two networks"),
+    ("range η3", "eta3", ".4f", "eta3", "of all that was seen"),
 )
 # The same of what only those look at who check.
 CHECKS = (
-    ("disks N", "n", "d", "n"),
-    ("packing fraction φ", "packing_fraction", ".4f", "phi"),
-    ("contacts per disk z", "coordination", ".3f", "z"),
-    ("accepted", "acceptance", ".0%", "accepted"),
-    ("mixing R̂", "worst_r_hat", ".3f", "r_hat"),
-    ("effective size", "least_bulk_size", ".0f", "ess"),
+    ("disks N", "n", "d", "n", ""),
+    ("packing fraction φ", "packing_fraction", ".4f", "phi", ""),
+    ("contacts per disk z", "coordination", ".3f", "z", ""),
+    ("accepted", "acceptance", ".0%", "accepted", ""),
+    ("mixing R̂", "worst_r_hat", ".3f", "r_hat", ""),
+    ("effective size", "least_bulk_size", ".0f", "ess", ""),
 )
 
 # Beyond these, numbers from a sample are flagged: chains do not agree, or too few states count.
@@ -79,17 +79,18 @@ def finding(summary):
     states = "the state" if summary["states"] == 1 else f"all {summary['states']} states"
     return (
         f"<b>How undetermined?</b> Over {states} a contact's force scatters by "
-        f"<b>{100 * summary['eta1']:.2g} %</b> of the mean force."
+        f"<b>{100 * summary['eta1']:.2g} %</b> of the mean force "
+        "(0 where balance determines it)."
     )
 
 
 def _tiles(rows, summary):
-    values = summary | {"scaled_eta3": 0.15 * summary["eta3"]}
+    values = dict(summary)
     if summary.get("skipped"):
         values["acceptance"] = None  # nothing was tried
     made = "".join(
-        TILE.format(name=name, value=_text(values[key], form), term=term)
-        for name, key, form, term in rows
+        TILE.format(name=name, value=_text(values[key], form), term=term, meaning=meaning)
+        for name, key, form, term, meaning in rows
         if key in values
     )
     return f'<div class="tiles">{made}</div>'

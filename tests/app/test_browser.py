@@ -248,7 +248,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     )
     assert c >= 0 and width == pytest.approx(2 * 0.23 * force, rel=1e-5)
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
-    page.get_by_text("+0.2 ⟨fₙ⟩: more").wait_for()
+    page.get_by_text("0.2 ⟨fₙ⟩ more").wait_for()
     page.get_by_text("4.35 ⟨fₙ⟩ as wide as the largest disk").wait_for()
     page.locator("input.typed").fill("1")  # another μ
     page.locator("input.typed").press("Enter")
@@ -261,7 +261,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page.get_by_label("Full colour, ⟨fₙ⟩").fill("")
     page.get_by_label("Full colour, ⟨fₙ⟩").press("Enter")
     page.wait_for_function("() => !location.search.includes('full=')")
-    page.get_by_text("+½ ⟨fₙ⟩: more").wait_for()
+    page.get_by_text("½ ⟨fₙ⟩ more").wait_for()
 
 
 def test_a_click_selects_the_contact_everywhere(page):
@@ -477,9 +477,9 @@ def test_numbers_told_while_playing_are_those_of_measures(page):
         "eta3": measures.eta3(*measures.intervals_seen(states)),
     }
     for name, value in expected.items():
-        told = value * (0.15 if name == "eta3" else 1)
-        assert float(page.locator(f"b.{name}").inner_text()) == pytest.approx(told, abs=6e-4)
-        assert column(page, "growth", name)[-1] == pytest.approx(told, rel=1e-3)
+        assert float(page.locator(f"b.{name}").inner_text()) == pytest.approx(value, abs=6e-4)
+        drawn = value * (0.15 if name == "eta3" else 1)  # on one scale with the others
+        assert column(page, "growth", name)[-1] == pytest.approx(drawn, rel=1e-3)
     assert page.locator("b.acceptance").text_content().endswith("%")
     assert re.fullmatch(r"\de-\d+", page.locator("b.residual").text_content())
 

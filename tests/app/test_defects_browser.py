@@ -245,7 +245,7 @@ def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
     page = visit("?tab=statistics" if focused == "toggle" else "")
     clicked = {
         "tab": page.get_by_role("tab", name="Intervals"),
-        "toggle": page.get_by_role("button", name="P(fₙ)", exact=True),
+        "toggle": page.get_by_role("button", name="forces fₙ", exact=True),
         "switch": page.get_by_label("Strong and undetermined contacts"),
     }[focused]
     clicked.click()
@@ -408,7 +408,7 @@ def test_the_report_goes_when_another_file_is_dropped(visit):
 def test_nothing_old_stands_under_a_new_statistic(visit):
     page = visit("?tab=statistics")
     page.get_by_text("How undetermined the forces are").wait_for()
-    page.get_by_role("button", name="corr(μ)", exact=True).click()
+    page.get_by_role("button", name="correlation", exact=True).click()
     page.get_by_text("How undetermined the forces are").wait_for(state="detached")
     page.get_by_text("Whether strong contacts").wait_for()
 

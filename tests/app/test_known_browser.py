@@ -19,7 +19,7 @@ def select(page, contact):
 def chips(page, count):
     """Wait for so many chips, and for what they leave open."""
     if not count:
-        page.get_by_text("all other intervals shrink").wait_for()
+        page.get_by_text("the other intervals can only shrink").wait_for()
         return
     page.locator(".known .chip").nth(count - 1).wait_for()
     page.locator(".known .chip").nth(count).wait_for(state="detached")

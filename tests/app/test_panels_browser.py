@@ -137,11 +137,11 @@ def test_statistics_are_drawn_one_after_another(visit):
     drawn(page, 2)
     page.get_by_text("A tap on a point shows the states of that μ").wait_for()
     for words, text in (
-        ("P(ΔFₙ)", "How the extents ΔFₙ"),
-        ("corr(μ)", "Whether strong contacts"),
+        ("lengths ΔFₙ", "How the extents ΔFₙ"),
+        ("correlation", "Whether strong contacts"),
         ("ΔFₙ against fₙ", "Correlation of fₙ with ΔFₙ"),
-        ("P(fₙ)", "of the forces lie beyond"),
-        ("η(μ)", "How undetermined the forces are"),
+        ("forces fₙ", "of the forces lie beyond"),
+        ("η against μ", "How undetermined the forces are"),
     ):
         page.get_by_role("button", name=words, exact=True).click()
         page.get_by_text(text).wait_for()
@@ -337,7 +337,7 @@ def test_closed_pages_are_forgotten(chromium, shipped, tmp_path):
             pages.append(chromium.new_page())
             pages[-1].goto(url + MANY)
             painted(pages[-1], PATIENCE)
-        for tab in ("Statistics", "Force space", "Perturb", "Your packing", "Export"):
+        for tab in ("Statistics", "Force space", "Push", "Your packing", "Export"):
             pages[0].get_by_role("tab", name=tab).click()
             pages[0].wait_for_timeout(500)
         wait_for([3])
