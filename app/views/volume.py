@@ -65,7 +65,7 @@ class Volume:
 def text(dataset):
     """The tiles of a volume, as HTML."""
     tiles = "".join(
-        TILE.format(name=name, value=format(dataset[key].item(), form), term=term)
+        TILE.format(name=name, value=format(dataset[key].item(), form), term=term, meaning="")
         for name, key, form, term in TILES
     )
     return f'<div class="tiles">{tiles}</div>'

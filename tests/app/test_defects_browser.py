@@ -219,7 +219,7 @@ def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
     before = field.input_value()
     field.fill("many")
     field.press("Enter")
-    page.get_by_text("Disks N must be a whole number").wait_for()
+    page.get_by_text("Disks N must be a whole number").filter(visible=True).wait_for()
     assert field.input_value() == before
 
 

@@ -19,7 +19,7 @@ def test_every_symbol_and_option_has_its_sentence():
     for options in (KINDS, SOLVERS, COLOURS, WIDTHS, SORTS, SCALES, PLANES, PUSHES, FIGURES):
         for words in options.values():
             assert words in known, words
-    for _, _, _, term in TILES:
+    for _, _, _, term, _ in TILES:
         assert term in TERMS
     for word, _, sentence in TERMS.values():
         assert re.fullmatch(r"[^.].*\.", sentence) and len(sentence) < 320, word
