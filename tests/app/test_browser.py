@@ -578,7 +578,8 @@ def test_mu_typed_is_computed_and_shown_with_exact_intervals(page):
 def test_wrong_mu_is_one_clear_line(page):
     page.locator("input.typed").fill("-2")
     page.locator("input.typed").press("Enter")
-    page.get_by_text("friction coefficient must be finite and ≥ 0").filter(visible=True).wait_for(timeout=10_000)
+    told = page.get_by_text("friction coefficient must be finite and ≥ 0").filter(visible=True)
+    told.wait_for(timeout=10_000)
 
 
 def test_scripts_are_fetched_once_and_run_as_they_are(visit):
