@@ -122,8 +122,8 @@ TERMS = {
         "indeterminacy by intervals",
         "η3",
         "How long the interval of a contact's force is on average, against the mean force. An "
-        "interval is several times as long as forces scatter in it: so 0.15 η3 is told, which can "
-        "be compared with η1 and η2.",
+        "interval is several times as long as forces scatter in it: plots show 0.15 η3, to be "
+        "compared with η1 and η2.",
     ),
     "width": Term(
         "width of S",
