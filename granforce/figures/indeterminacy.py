@@ -45,7 +45,7 @@ def indeterminacy(
         title="Indeterminacy",
         x="μ",
         y="η",
-        ylim=(0, 2.2 * top) if backend == "matplotlib" else (0, 1.1 * top),
+        ylim=(0, 2.4 * top) if backend == "matplotlib" else (0, 1.1 * top),
         legend=style.beside("top_right", backend),
     )
     log = style.frame(

@@ -12,6 +12,7 @@ from granforce.study.kinds import KINDS, PACKING, get_packing
 from granforce.study.store import open_store
 
 DATA = Path(__file__).resolve().parents[2] / "data"
+REFERENCE = Path(__file__).parents[1] / "reference"
 MADE = PACKING.parameters(20, 0.3, 1)
 
 MEASURED = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
@@ -39,9 +40,9 @@ def named_anew(entry):
     return KINDS[entry.kind].parameters(**given)
 
 
-def kept(name):
+def kept(name, folder=DATA):
     """The store of this name that is shipped, and its entries but the study's table."""
-    store = open_store(DATA / name, readonly=True)
+    store = open_store(folder / name, readonly=True)
     entries = [entry for entry in store.entries() if entry.kind != "study"]
     assert entries
     return store, entries
@@ -57,7 +58,7 @@ def test_what_is_shipped_is_found():
 
 
 def test_packings_of_version_1_still_open_and_are_not_taken_for_the_new_ones():
-    store, entries = kept("study.zarr")
+    store, entries = kept("version1.zarr", REFERENCE)
     for entry in entries:
         assert (entry.kind, entry.version) == ("packing", 1)
         opened = store.load(entry.kind, entry.params, version=entry.version)
