@@ -18,7 +18,7 @@ class Grab {
     this.player = player
     this.tell = (hand) => tell({ hand })
     this.rail = this.contact = this.value = this.before = null
-    this.flung = false // whether it was let go before its rail was there
+    this.moved = this.flung = false // whether it was, and whether it was let go before its rail was there
     this.lingers = 0
     this.frames = 0
     this.spot = new PointHand(this)
@@ -37,7 +37,7 @@ class Grab {
     const { player } = this
     if (!this.begin()) return
     this.contact = contact
-    this.flung = false
+    this.moved = this.flung = false
     this.place = place
     player.scene.selected = contact
     player.scene.tip.classList.remove("on")
@@ -62,6 +62,7 @@ class Grab {
 
   /** The hand has moved. */
   move(place) {
+    this.moved = true
     this.place = place ?? this.place
     if (this.rail && this.contact !== null) this.set(this.place(this.rail))
   }
@@ -71,13 +72,13 @@ class Grab {
     const { contact, rail, value } = this
     if (contact === null) return
     clearTimeout(this.resting)
-    this.flung = !rail
+    this.flung = !rail && this.moved
     if (this.flung) return // followed once its rail is there
     this.contact = null
-    if (Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
+    if (rail && Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
       this.tell({ hold: [contact, value] })
     }
-    this.linger()
+    if (rail) this.linger()
     this.still()
   }
 

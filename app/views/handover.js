@@ -84,7 +84,7 @@ export function render({ model, view }) {
       const swung = it.replay.swinging && it.direction > 0 && it.turned
       if (it.replay.swinging && it.direction < 0) it.turned = true
       if (!it.playing || swung) over ??= now
-      if (now - over > HELD_MS || now - begun > LONGEST_MS) recorder.stop()
+      if ((now - over > HELD_MS && pieces.some(({ size }) => size)) || now - begun > LONGEST_MS) recorder.stop()
       else requestAnimationFrame(frame)
     }
     it.turned = false

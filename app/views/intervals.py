@@ -200,7 +200,7 @@ class View:
             "fₙ / ⟨fₙ⟩",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1, name="bars_range"),
-            height=330,
+            height=320,
         )
         bar = {"x": "rank", "source": self.bars, "line_color": None}
         self.whole = fig.vbar(

@@ -82,9 +82,7 @@ def indeterminacy(own, exact, log):
         _line(etas, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
     for k, (name, _, factor) in enumerate(MEASURES):
         _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
-    peak = max(studied.hill(), key=lambda point: point[1], default=None)
-    least = f"least determined near μ = {peak[0]:g}; " if peak else ""
-    corner(etas, f"{least}lines: the study; large open symbols: this page")
+    corner(etas, "measured: of the random walk's states; open symbols: of this page")
     seen = _over_mu("samplers", "0.15 η3", 270, **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
         look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
@@ -92,7 +90,7 @@ def indeterminacy(own, exact, log):
         _line(seen, points, label, dash="dashed" if part == "exact" else "solid", **look)
     _own(seen, statistics.means(own, "eta3", factor=0.15), log, COLOURS[0], MARKERS[0])
     _own(seen, statistics.means(exact, "eta3", factor=0.15), log, COLOURS[3], MARKERS[3])
-    corner(seen, "the same by other ways to draw networks; dashed: exact")
+    corner(seen, "dashed exact, others measured")
     z = _over_mu("coordination", "contacts per disk z", 220)
     _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
     _own(z, statistics.means(own, "coordination"), False, COLOURS[0])

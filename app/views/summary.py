@@ -79,8 +79,7 @@ def finding(summary):
     states = "the state" if summary["states"] == 1 else f"all {summary['states']} states"
     return (
         f"<b>How undetermined?</b> Over {states} a contact's force scatters by "
-        f"<b>{100 * summary['eta1']:.2g} %</b> of the mean force "
-        "(0 where balance determines it)."
+        f"<b>{100 * summary['eta1']:.2g} %</b> of the mean force."
     )
 
 

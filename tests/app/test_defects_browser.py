@@ -8,6 +8,7 @@ from serving import MANY, MODEL, column, free_port, how_it_is_made, painted, sce
 from small_store import KEPT, ROOT
 
 # Pictures to be looked at; ignored by git.
+STATISTICS = "measured: of the random walk's states; open symbols: of this page"
 ARTEFACTS = ROOT / "artefacts" / "defects"
 PATIENCE = 60_000  # ms, on a busy machine
 
@@ -445,7 +446,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     [
         ("intervals", ("possible: exact; seen: so far",)),
         ("plane", ("exact outline; sampled states",)),
-        ("statistics", ("measured: of the random walk's states", "dashed exact, others measured")),
+        ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],
 )
 def test_plots_say_whether_they_show_exact_seen_or_measured_values(visit, tab, words):

@@ -468,7 +468,8 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
     page = visit("", 1920, 1080)
     page.wait_for_function(f"() => {MODEL}('path')?.get_length() > 2")
     laid_out(page, "path_figure")
-    assert inside(page, ".scene") and page.get_by_role("tab", name="Force space").count() == 0
+    page.get_by_role("tab", name="Force space").wait_for(state="hidden")
+    assert inside(page, ".scene")
     for name in ("path_figure", "bars_figure", "growth_figure"):
         box = page.evaluate(
             """name => {
