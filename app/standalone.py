@@ -86,7 +86,7 @@ def html(
     given |= {
         "walk": frames(shown) | {"acceptance": acceptance},
         "exact": intervals,
-        "most": view["full"] or full_extent(replay, intervals),
+        "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
         "lead": explanation.first(replay.summary),
         "source": source,

@@ -121,7 +121,7 @@ class View:
             if key == "gif":
                 job.begin("drawing the movie")
                 bounds = exact_intervals(possible, replay)
-                most = view["full"] or full_extent(replay, bounds)
+                most = full_extent(replay, bounds, view["full"])
                 names = ("colour", "thickness", "reference", "dark", "full", "stretch")
                 look = movies.shades(
                     replay, bounds, palettes(view["dark"]), loads=loads, gone=given,

@@ -122,7 +122,7 @@ class PackingView:
         changes = {
             "exact": exact,
             "gone": gone(state, replay),
-            "most": state.full or full_extent(replay, exact),
+            "most": full_extent(replay, exact, state.full),
             "between": None if state.between is None else list(state.between),
         }
         if self._shown is not replay:
@@ -208,8 +208,10 @@ def normal_extent(replay, exact):
     return replay.high[:, 0] - replay.low[:, 0]
 
 
-def full_extent(replay, exact):
-    """ΔF_n in ⟨f_n⟩ at which its colour is full."""
+def full_extent(replay, exact, asked=None):
+    """ΔF_n in ⟨f_n⟩ at which its colour is full, where no other was asked for."""
+    if asked is not None:
+        return asked
     extent = normal_extent(replay, exact)
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
@@ -221,7 +223,7 @@ def colour_bar(state, pulled):
     change = f"{half} ⟨fₙ⟩ less", diverging, f"{half} ⟨fₙ⟩ more"
     if pulled:
         return change
-    most = state.full or full_extent(state.seen, exact_intervals(state.possible, state.seen))
+    most = full_extent(state.seen, exact_intervals(state.possible, state.seen), state.full)
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
         "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),

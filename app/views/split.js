@@ -90,7 +90,7 @@ class Split {
     const { look } = this
     look.measure()
     twin.palette = player.scene.palette
-    twin.describe = { contact: (k) => look.contact(k, shown), grain: (k) => look.grain(k, shown), forces: () => [] }
+    twin.describe = { contact: (k) => look.contact(k, shown), grain: (k) => look.grain(k, shown) }
     twin.style = look.of(shown.mixed)
   }
 
