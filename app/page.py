@@ -187,7 +187,7 @@ def _large(document: Document, query: str) -> Any:
         left.extend(
             [
                 controls.beside,
-                controls.error_beside,
+                controls.error,
                 packing.legend,
                 explanation.view(state),
                 Address(state),
@@ -376,8 +376,10 @@ def _module(name: str) -> ModuleType:
 def _pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
     """Have parts (name, view) of other states than those asked for be pale; see player.js."""
     for name, part in parts:
+        old = "growing" if name in GROWING else "still"
         part.styles = part.styles | {
-            "opacity": f"var(--{'growing' if name in GROWING else 'still'}, 1)"
+            "opacity": f"var(--{old}, 1)",
+            "filter": f"var(--{old}-colours, none)",
         }
 
 

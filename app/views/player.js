@@ -5,7 +5,7 @@ const PLOTS_MS = 30 // the plots beside are repainted no more often than this wh
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const SWING = 2.2 // s, for the displacement field to go to and fro
 const CROSSING = 8 // times as long as a step takes the way between two states
-const OLD = 0.35 // opacity of what is of other states than those asked for
+const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
 const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
 const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
@@ -116,8 +116,11 @@ class Player {
     this.buttons.root.classList.toggle("moving", live.moves)
     this.buttons.tellAsked(live.moves || this.grows ? "" : model.asked)
     // What is beside is pale by these: told by its own style, Bokeh would lay out the whole page anew.
-    style.setProperty("--still", model.asked ? OLD : 1)
-    style.setProperty("--growing", model.asked && !this.grows ? OLD : 1)
+    const pale = { "--still": model.asked, "--growing": model.asked && !this.grows }
+    for (const [name, old] of Object.entries(pale)) {
+      style.setProperty(name, old ? OLD : 1)
+      style.setProperty(`${name}-colours`, old ? "grayscale(1)" : "none")
+    }
   }
 
   select() {

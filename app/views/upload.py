@@ -14,6 +14,7 @@ from . import photoelastic as measured
 from .dropper import Dropper
 from .parts import note
 from .progress import Progress
+from .select import Select
 
 STATES = 200  # of the walk that is made at once
 HELP = """
@@ -59,9 +60,8 @@ class View:
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
         self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
         self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
-        self.walls = pmui.Select(
-            label="Walls", options={words: key for key, words in WALLS.items()}, **SMALL
-        )
+        walls = {words: key for key, words in WALLS.items()}
+        self.walls = Select(label="Walls", options=walls, width=150, margin=(4, 8))
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")

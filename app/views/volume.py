@@ -21,7 +21,11 @@ class Volume:
         self.state, self.found = state, None
         self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
         self.measure = pmui.Button(
-            label="Measure the volume of S", variant="outlined", size="small", margin=(4, 10)
+            label="Measure the volume of S",
+            variant="outlined",
+            color="default",
+            size="small",
+            margin=(4, 10),
         )
         self.measure.on_click(lambda event: self._measure())
         state.param.watch(self._look, "replay")

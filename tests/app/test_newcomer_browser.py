@@ -60,12 +60,11 @@ def test_where_a_series_has_no_states_none_of_another_friction_is_named(visit, c
     page = visit(AT)
     shows(page, 0.1)
     chosen = how_it_is_made(page).get_by_role("combobox", name="Precomputed results")
-    assert chosen.inner_text().endswith("3 μ from 0 to 1")
+    assert chosen.locator("option:checked").inner_text().endswith("3 μ from 0 to 1")
     computing(page)
     cancelled(page)
-    page.get_by_role("combobox", name="Precomputed results").filter(
-        has_text="none with N = 9000"
-    ).wait_for()
+    none = chosen.locator("option:checked").filter(has_text="none with N = 9000")
+    none.wait_for(state="attached")
 
 
 # 2: what was opened stays open
