@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from granforce.records import Cancel, Cancelled, Floats, Progress
 
+from .geometry import CHAIN_WIDTH, FULL_CHANGE
 from .replays import Replay
 
 Look = Mapping[str, Any]  # of `shades`
@@ -21,8 +22,6 @@ FRAME_MS = 80
 MOST_BYTES = 5e6
 FEWER = (1.0, 0.7, 0.5, 0.35)  # parts of SIDE that are tried until it is small enough
 TONES = 64  # colours of the whole movie
-FULL = 0.5  # ⟨f_n⟩, the change at which its colour is full; as in look.js
-WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 
 
 def gif(
@@ -127,7 +126,7 @@ def _chains(
 ) -> None:
     place, scale = _place(replay, fine)
     links = replay.links
-    width = WIDTH * look["stretch"] * look["thickness"](normal) * scale
+    width = CHAIN_WIDTH * look["stretch"] * look["thickness"](normal) * scale
     colours = look["colours"]
     tone = np.clip(look["shade"](normal, tangential), 0, 1) * (len(colours) - 1)
     for k in np.argsort(width[links.contact], kind="stable"):
@@ -170,7 +169,7 @@ def shades(
     shade = {
         "mobilised": mobilised,
         "extent": lambda normal, tangential: extent / (most or 1.0),
-        "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * (full or FULL)),
+        "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * (full or FULL_CHANGE)),
         "sign": lambda normal, tangential: 0.5 + 0.5 * np.sign(normal - pinned),
         "load": lambda normal, tangential: (
             np.full_like(normal, 0.5) if loads is None else loads / (full or loads.max())

@@ -122,7 +122,7 @@ def html(
         else "",
         style=_script((FOLDER / "player.css").read_text()),
         given=_script({name: _plain(value) for name, value in given.items()}),
-        code=joined(*Player.SCRIPTS, "standalone"),
+        code="\n".join([Player._esm, joined("standalone")]),
     )
     return text.encode()
 

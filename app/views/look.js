@@ -1,7 +1,6 @@
 // How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
+// CHAIN_WIDTH and FULL_CHANGE are those of geometry.py, see player.py.
 
-const WIDTH = 0.23 // of a chain that carries the mean normal force, in largest radii
-const FULL = 0.5 // ⟨fₙ⟩, the change at which its colour is full, where nothing else is asked for
 const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
 const THIN = 0.15 // of its width, a chain that a filter leaves out
@@ -35,9 +34,9 @@ class Look {
     const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
     const colour = this.before ? "pulled" : model.colour
     // A model is slow to ask.
-    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? FULL }
+    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? FULL_CHANGE }
     this.asked.load = full ?? this.mostLoad
-    const unit = WIDTH * (stretch ?? 1)
+    const unit = CHAIN_WIDTH * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0

@@ -4,6 +4,7 @@ import numpy as np
 import panel as pn
 
 from .. import live
+from ..geometry import CHAIN_WIDTH, FULL_CHANGE
 from ..state import COLOURS, WIDTHS
 from . import explanation
 from .player import Player, frames
@@ -25,7 +26,6 @@ FOLLOWED = (
     "scale",
 )  # from the state
 
-WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
 # What colours and widths show → key of the glossary.
@@ -219,8 +219,8 @@ def full_extent(replay, exact, asked=None):
 def colour_bar(state, pulled):
     """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
-    half = "½" if state.full is None else f"{state.full:.3g}"  # see FULL in look.js
-    change = f"{half} ⟨fₙ⟩ less", diverging, f"{half} ⟨fₙ⟩ more"
+    full = state.full or FULL_CHANGE
+    change = f"{full:.3g} ⟨fₙ⟩ less", diverging, f"{full:.3g} ⟨fₙ⟩ more"
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), state.full)
@@ -260,7 +260,7 @@ def legend(state, pulled=False):
     tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
     return LEGEND.format(
         width=WIDTHS[state.thickness],
-        widest=2 / (WIDTH * state.stretch),
+        widest=2 / (CHAIN_WIDTH * state.stretch),
         width_term=EXPLAINED[state.thickness],
         colour_term=EXPLAINED[state.colour],
         colour=colour_words(state, pulled),

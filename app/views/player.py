@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 import param
 
+from ..geometry import CHAIN_WIDTH, FULL_CHANGE
 from .scripts import FOLDER, Scripted, joined, said
 
 
@@ -72,7 +73,7 @@ class Player(Scripted):
         "opening",
         "player",
     )
-    _esm = joined(*SCRIPTS)
+    _esm = f"const CHAIN_WIDTH = {CHAIN_WIDTH}, FULL_CHANGE = {FULL_CHANGE}\n" + joined(*SCRIPTS)
     _stylesheets: ClassVar = [FOLDER / "player.css"]
 
     def __init__(self, **params):

@@ -261,7 +261,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page.get_by_label("Full colour, ⟨fₙ⟩").fill("")
     page.get_by_label("Full colour, ⟨fₙ⟩").press("Enter")
     page.wait_for_function("() => !location.search.includes('full=')")
-    page.get_by_text("½ ⟨fₙ⟩ more").wait_for()
+    page.get_by_text("0.5 ⟨fₙ⟩ more").wait_for()
 
 
 def test_a_click_selects_the_contact_everywhere(page):
