@@ -102,6 +102,7 @@ class AppState(param.Parameterized):
         default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
     )
     pulls = param.List(doc="what was pulled one after the other, from `frame` on; see `grabs`")
+    held = param.Parameter(doc="the grabs.Held that pulls have led to; None: `frame` is on screen")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
     known = param.List(doc="known.Statements: forces of contacts that are taken for known")
     narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
@@ -494,7 +495,9 @@ class AppState(param.Parameterized):
         view = {}
         for name in VIEW:
             value = getattr(self, name)
-            if value != self.param[name].default:
+            # Between the choice of another μ and its states, what is beside is still on screen.
+            alone = name == "beside" and value == self.selection.mu
+            if value != self.param[name].default and not alone:
                 view[name] = SPELLED.get(name, _spelled)(value)
         return link(self.selection, view)
 

@@ -159,14 +159,16 @@ class View:
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
         frame = min(state.frame, len(replay.normal) - 1)
-        source = state.source
+        source, held = state.source, state.held
         link, view = state.link(), {name: getattr(state, name) for name in VIEW}
 
         def work(job):
             job.begin("making the file")
             if key == "csv":
-                columns = exports.contacts(replay, exact, frame)
-                head = exports.explained(columns, replay, source)
+                columns = exports.contacts(replay, exact, frame, held)
+                head = exports.explained(
+                    columns, replay, source, exports.on_screen(replay, frame, held)
+                )
                 content = exports.csv(columns, head)
                 return exports.File(f"{stem}.csv", "text/csv", content)
             if key == "json":

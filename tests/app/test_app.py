@@ -445,6 +445,21 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
     assert len(state.catalogue) == 3
 
 
+def test_a_friction_stands_beside_another_one_only(state, wait_for):
+    """Back after a comparison once showed 0.1 beside 0.1."""
+    first = state.cell.mu
+    state.split = True
+    links = []
+    state.param.watch(lambda *events: links.append(state.link()), ["beside", "selection", "cell"])
+    state.choose(mu=1)
+    wait_for(state)
+    assert state.beside == first and f"beside={first:g}" in state.link()
+    assert not any(f"mu={first:g}" in link and "beside" in link for link in links)
+    state.choose(mu=first)  # as Back does
+    wait_for(state)
+    assert state.beside is None and state.twin is None
+
+
 def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):
     from app.selection import select
 
@@ -478,6 +493,19 @@ def test_what_is_pale_says_of_which_friction_it_is(state):
     assert not line.visible
     state.param.update(missing=True)
     assert line.visible and f"still of μ = {state.cell.mu:g}" in line.object
+
+
+def test_possible_is_in_the_legend_only_where_it_is_drawn(state, wait_for):
+    from app.views.intervals import View
+
+    state.choose(mu=1)
+    wait_for(state)
+    view = View(state)
+    assert not view.exact_item.visible
+    state.compute_exact()
+    assert view.exact_item.visible  # bounds are drawn as they arrive
+    wait_for(state)
+    assert view.exact_item.visible and view.exact_item.label.value == "possible"
 
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
