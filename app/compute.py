@@ -143,12 +143,12 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
         if steps:
             job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
 
-    job.begin("compaction")
+    job.begin("compressing")
     seen = live.shared(live.Compaction, packing)
     seen.restart()
 
     def look(glimpse: Any) -> None:
-        job.stage = f"compaction, step {glimpse.step}: {glimpse.state}"
+        job.stage = f"compressing, step {glimpse.step}"  # the rest is told beside the picture
         seen.add(glimpse)
 
     study.get(library.own, kinds.PACKING, packing, progress=tell, watch=look)
