@@ -200,12 +200,10 @@ def _large(document: Document, query: str) -> Any:
         for k in range(0, len(widgets), 3):
             sidebar.extend(widgets[k : k + 3])
             yield
-        summary, volume = tiles(state), Volume(state).panel()
-        right.extend([of_which(state), summary, volume])
+        summary = tiles(state, Volume(state))
+        right.extend([of_which(state), summary])
         tabs = Tabs(state)
-        _pale_when_old(
-            [*tabs.pages.items(), ("summary", summary), ("volume", volume), ("plane", middle)]
-        )
+        _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
         packing.player.on_digit = tabs.choose
         state.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
         yield

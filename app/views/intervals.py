@@ -28,7 +28,7 @@ SMALL = {"width": 190, "margin": (6, 8, 2, 8)}
 HELP = f"""
 One bar for each contact. Pale: every force it can have in any network in balance
 ({term("exact", "possible")}); dark: what the states passed so far had; yellow: in the
-{term("original")}; dots: in the state on screen. Below: η of the states passed so far (of η3,
+{term("original")}; dots: in the state on screen. Curves: η of the states passed so far (of η3,
 {term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
 {term("known", "known")}, the faintest part of a bar is what was possible without that knowledge.
 Click a bar to find its contact in the packing.
@@ -73,8 +73,8 @@ class View:
             pn.pane.Bokeh(self.figure, **wide),
             self.exact,  # below, as the plot must not move when the button goes
             self.left_out,
-            self.told,
             pn.pane.Bokeh(self.growth_figure, **wide),
+            self.told,
             Contacts(self.state),
             sizing_mode="stretch_width",
         )

@@ -15,7 +15,7 @@ TILES = (
 
 
 class Volume:
-    """The volume of all networks of the packing on screen, once it is known; else an offer."""
+    """The volume of all networks of the packing on screen, once known: `tiles`; else `measure`."""
 
     def __init__(self, state):
         self.state, self.found = state, None
@@ -31,10 +31,6 @@ class Volume:
         state.param.watch(self._look, "replay")
         state.measuring.param.watch(self._offer, "running")
         self._look()
-
-    def panel(self):
-        """The tiles, or the button in their place."""
-        return pn.Column(self.tiles, self.measure, sizing_mode="stretch_width")
 
     def _look(self, *events):
         """Whether a store has it already."""
