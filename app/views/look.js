@@ -12,6 +12,7 @@ class Look {
     this.walk = walk
     this.only = null // 1 for each contact that a filter leaves, or null
     this.before = null // fₙ before the pull whose changes are coloured
+    this.plain = false // whether colours would give something away, see difference.js
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     this.strong = largest(walk.normal.subarray(0, walk.contacts))
     this.measure()
@@ -41,7 +42,7 @@ class Look {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
-    const told = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone)
+    const told = !this.plain && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone)
     style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {

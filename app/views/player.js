@@ -4,7 +4,7 @@
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const SWING = 2.2 // s, for the displacement field to go to and fro
-const CROSSING = 8 // times as long as a step takes the way between two states
+const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye
 const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
 const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
@@ -39,8 +39,13 @@ class Player {
     this.pins = new Pins(model)
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
-    this.scene.onMarks = (context, scene) => { this.pins.draw(context, scene); this.hand.draw(context, scene) }
+    this.scene.onMarks = (context, scene) => {
+      this.pins.draw(context, scene)
+      this.hand.draw(context, scene)
+      this.difference.draw(context, scene)
+    }
     this.scene.onSheet = (sheet, scene) => this.pins.onSheet(sheet, scene)
+    this.difference = new Difference(this)
     this.split = new Split(this)
     this.scene.onRepaint = () => { this.buttons.count(); this.split.paint() }
     this.scene.describe = {
@@ -57,6 +62,7 @@ class Player {
     const { model, scene, playing } = this, walk = plain(model.walk)
     if (model.walk === this.loaded || !walk.contacts) return
     this.loaded = model.walk
+    this.difference.end()
     const view = this.live.leave(), place = this.grownInto(walk)
     this.playing = false
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
@@ -165,6 +171,7 @@ class Player {
 
   /** Whether a network is on screen that was pulled: the legend says so, too. */
   tellHeld(held) {
+    if (held) this.difference.end()
     this.buttons.tellHeld(held)
     if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
   }
@@ -242,7 +249,11 @@ class Player {
 
   actions() {
     const loaded = (action) => (given) => { if (this.replay && !this.live.moves) action(this.replay, given) }
-    const halted = (action) => loaded((replay, given) => {
+    const other = (action) => loaded((replay, given) => {
+      this.difference.end()
+      action(replay, given)
+    })
+    const halted = (action) => other((replay, given) => {
       this.hand.free()
       this.follows = false
       this.play(false)
@@ -255,7 +266,7 @@ class Player {
       hold: loaded((replay) => this.hold(replay)),
       undo: loaded((replay) => { if (replay.held) this.hand.tell({ undo: true }) }),
       free: loaded(() => this.hand.free()),
-      play: loaded((replay) => {
+      play: other((replay) => {
         this.hand.free()
         this.follows = false
         if (this.playing && this.resting === null) this.pause(replay)
@@ -269,12 +280,18 @@ class Player {
       next: loaded((replay) => this.choose(replay, 1)),
       previous: loaded((replay) => this.choose(replay, -1)),
       scrub: halted((replay, to) => this.show(to)),
-      pin: loaded((replay) => {
+      pin: other((replay) => {
         this.model.reference = replay.frame
         this.model.beside = null
       }),
-      between: loaded((replay) => this.between(replay)),
-      split: loaded(() => { this.model.split = !this.model.split }),
+      between: other((replay) => this.between(replay)),
+      split: other(() => { this.model.split = !this.model.split }),
+      differ: loaded((replay) => {
+        if (this.difference.on) return this.difference.end()
+        this.play(false)
+        if (replay.swinging) this.model.between = null
+        this.difference.begin(replay)
+      }),
       tab: (number) => this.model.send_msg({ tab: number }),
     }
   }
@@ -354,7 +371,7 @@ class Player {
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
       pins: loaded(() => scene.drawMarks(this.look.style)),
-      contact: loaded(() => { this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
+      contact: loaded(() => { this.difference.guess(model.contact); this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
       second: loaded(() => { this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
     }
   }

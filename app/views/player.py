@@ -68,6 +68,7 @@ class Player(Scripted):
         "live",
         "pins",
         "split",
+        "difference",
         "point",
         "grab",
         "opening",

@@ -250,3 +250,22 @@ def test_contacts_are_chosen_by_keyboard_and_found_in_a_table(visit):
         "e => e.scene.hand.player.look.only === null",
         arg=page.locator(".scene").element_handle(),
     )
+
+
+def test_the_difference_of_two_networks_is_spotted(visit):
+    page = visit(AT)
+    page.get_by_role("button", name="Spot the difference").click()
+    game, told = "scene.hand.player.difference", page.locator(".quiz")
+    told.get_by_text("Click the 5 lines that differ most").wait_for()
+    assert scene(page, "new Set(scene.style.bin).size") == 1  # no colour tells
+    changes = scene(page, f"Array.from({game}.change, Math.abs)")
+    most = sorted(range(len(changes)), key=changes.__getitem__)
+    for contact, words in ((most[0], "others differ more. 0 of 5"), (most[-1], "found. 1 of 5")):
+        scene(page, f"scene.onSelect({contact})")
+        told.get_by_text(words).wait_for()
+    for contact in most[-5:-1]:
+        scene(page, f"scene.onSelect({contact})")
+    told.get_by_text("That was the last one").wait_for()
+    assert scene(page, "new Set(scene.style.bin).size") > 3
+    page.locator("button.play").click()
+    assert told.inner_text() == ""
