@@ -17,7 +17,7 @@ from .known import Knowledge
 from .limits import LIMITS
 from .live import Arriving, Following
 from .replays import Replay
-from .selection import Selection, command, link, read_link, series
+from .selection import Selection, command, link, read_link
 
 View = dict[str, Any]  # parameters of AppState by name
 
@@ -416,7 +416,7 @@ class AppState(param.Parameterized):
     def grow(self, replay: Replay) -> None:
         """Put the Replay of a walk that begins on screen."""
         asked = self.live.selection
-        source = f"μ = {asked.mu:g}, {series(asked)} (as they are found)"
+        source = f"μ = {asked.mu:g}, {self.library.series(asked)} (as they are found)"
         self.param.update(
             growing=replay, fourfold=0, plane=None, moving=False, source=source, displacement=None,
             **UNSEEN,
@@ -438,7 +438,7 @@ class AppState(param.Parameterized):
         """What was asked for and is not on screen, in words; empty where there is nothing."""
         if not self.missing or self.cell is None:
             return ""
-        words = f"μ = {self.selection.mu:g}, {series(self.selection)}"
+        words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
         if self.computation.running:
             return f"asked for: {words}"
         return f"of μ = {self.cell.mu:g}; not computed: {words}"

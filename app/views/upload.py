@@ -8,10 +8,11 @@ import panel_material_ui as pmui
 from granforce.records import InputError, friction, make_cell, positive
 
 from .. import photoelastic, uploads
-from ..limits import LIMITS
+from ..limits import LIMITS, SHARED
 from ..selection import Selection
 from . import photoelastic as measured
 from .dropper import Dropper
+from .mine import Mine
 from .parts import note
 from .progress import Progress
 from .select import Select
@@ -86,6 +87,7 @@ class View:
             self.report,
             self.frame,
             note(HELP),
+            *([] if SHARED else [Mine(self.state)]),  # on a server for all it would show all theirs
             sizing_mode="stretch_width",
         )
 
