@@ -94,6 +94,7 @@ class AppState(param.Parameterized):
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
+    predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
     beside = param.Number(
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
     )
@@ -529,6 +530,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "between": _pair,
     "split": _flag,
     "beside": float,
+    "predict": int,
     "pulls": grabs.read,
     "known": known.read,
     "colour": str,

@@ -51,6 +51,7 @@ class Difference {
   }
 
   end(words = "") {
+    if (!this.on && !this.told) return
     const was = this.on
     this.on = false
     this.tell(words)
@@ -58,6 +59,7 @@ class Difference {
   }
 
   tell(words) {
+    this.told = Boolean(words)
     this.player.buttons.part("quiz").textContent = words
     this.player.buttons.part("differ").classList.toggle("on", this.on)
     this.player.buttons.root.classList.toggle("quizzed", this.on) // what is under the pointer would tell

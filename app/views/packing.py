@@ -10,7 +10,7 @@ from . import explanation
 from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
-SHARED = ("contact", "frame", "reference", "split", "beside")  # both ways
+SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
 FOLLOWED = (
     "second",
     "source",
@@ -18,7 +18,6 @@ FOLLOWED = (
     "tab",
     "views",
     "wide",
-    "colour",
     "thickness",
     "full",
     "stretch",
@@ -129,6 +128,7 @@ class PackingView:
             self._shown = replay
             room = 0 if state.growing is None else len(live.numbers(replay.summary))
             changes["walk"] = frames(replay, room)
+            changes["free"] = replay.summary["dimension"]
         self.player.param.update(changes)
 
     def _accompany(self, *events):

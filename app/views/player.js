@@ -46,6 +46,7 @@ class Player {
     }
     this.scene.onSheet = (sheet, scene) => this.pins.onSheet(sheet, scene)
     this.difference = new Difference(this)
+    this.predict = new Predict(this)
     this.split = new Split(this)
     this.scene.onRepaint = () => { this.buttons.count(); this.split.paint() }
     this.scene.describe = {
@@ -84,6 +85,7 @@ class Player {
     this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
     this.follows = walk.room > 0 || (this.follows && place !== null)
     if (playing || walk.room) requestAnimationFrame(() => this.play(true))
+    else if (this.model.predict) this.predict.ask() // of a link
   }
 
   /** Where a walk that is finished goes on, if it is the one that was being computed; else null. */
@@ -259,6 +261,7 @@ class Player {
       this.play(false)
       action(replay, given)
     })
+    const { model } = this
     const step = ({ swinging }) => (swinging ? 0.05 : 1)
     return {
       less: loaded(() => this.hand.nudge(-1)),
@@ -286,7 +289,9 @@ class Player {
       }),
       between: other((replay) => this.between(replay)),
       split: other(() => { this.model.split = !this.model.split }),
+      predict: loaded(() => { model.predict = model.predict ? 0 : 1 }),
       differ: loaded((replay) => {
+        model.predict = 0
         if (this.difference.on) return this.difference.end()
         this.play(false)
         if (replay.swinging) this.model.between = null
@@ -366,12 +371,13 @@ class Player {
       loads: loaded(() => { this.look.measure(); this.again() }),
       gone: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
+      predict: loaded(() => this.predict.ask()),
       frame: loaded((replay) => {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
       pins: loaded(() => scene.drawMarks(this.look.style)),
-      contact: loaded(() => { this.difference.guess(model.contact); this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
+      contact: loaded(() => { this.difference.guess(model.contact); this.predict.guess(model.contact); this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
       second: loaded(() => { this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
     }
   }

@@ -41,6 +41,8 @@ class Player(Scripted):
     second = param.Integer(default=None, allow_None=True)
     frame = param.Integer(default=0)
     reference = param.Integer(default=0)
+    predict = param.Integer(default=0, doc="1 … 3 while a question is asked, see predict.js")
+    free = param.Integer(default=0, doc="dimension h of S")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
     beside = param.Number(default=None, allow_None=True, doc="μ that is seen beside in its place")
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
@@ -69,6 +71,7 @@ class Player(Scripted):
         "pins",
         "split",
         "difference",
+        "predict",
         "point",
         "grab",
         "opening",

@@ -269,3 +269,25 @@ def test_the_difference_of_two_networks_is_spotted(visit):
     assert scene(page, "new Set(scene.style.bin).size") > 3
     page.locator("button.play").click()
     assert told.inner_text() == ""
+
+
+def test_questions_are_asked_before_the_page_shows_the_answers(visit):
+    page = visit(AT + "&predict=2")
+    told = page.locator(".quiz")
+    told.get_by_text("Question 2 of 3").wait_for()
+    extent = scene(page, "Array.from(scene.hand.player.look.extent)")
+    order = sorted(range(len(extent)), key=lambda c: -extent[c])
+    scene(page, f"scene.onSelect({order[4]})")
+    told.get_by_text(f"place 5 of {len(order)}").wait_for()
+    assert scene(page, "scene.selected") == order[0]
+    page.wait_for_function("() => /colour=extent/.test(location.search)")  # told to the page, too
+    told.get_by_role("button", name="Next question").click()
+    told.get_by_role("button", name="More at first, then less").click()
+    told.get_by_text("Well predicted").wait_for()
+    page.wait_for_function("() => /tab=statistics/.test(location.search)")
+    told.get_by_role("button", name="Done").click()
+    told.wait_for(state="hidden")
+    page.get_by_role("button", name="Predict, then look").click()
+    told.get_by_role("button", name="No, others balance as well").click()
+    told.get_by_text("numbers are left free").wait_for()
+    page.locator(".stage.playing").wait_for()
