@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 
 from granforce.records import Cancel, Cancelled, Floats, Progress
 
-from .geometry import CHAIN_WIDTH, FULL_CHANGE
+from .geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from .replays import Replay
 
 Look = Mapping[str, Any]  # of `shades`
@@ -149,18 +149,20 @@ def shades(
     dark: bool,
     loads: Floats | None = None,
     gone: Floats | None = None,
+    measured: Mapping[str, Floats] | None = None,
     full: float | None = None,
     stretch: float = 1.0,
 ) -> Look:
     """How forces are drawn, as on screen: colours, and functions of the forces of a moment.
 
     exact: {"low", "high"} (N_c,) or empty; the others as in the state, most: ΔF_n at full colour,
-    loads (N_c,) limit loads or None; gone (N_c,) of ΔF_n by what is known, or None; full: ⟨f_n⟩ at
-    which colours are full, or None; stretch: how many times as wide chains are.
+    loads (N_c,) limit loads or None; gone (N_c,) of ΔF_n by what is known, or None; measured: of a
+    frame, "normal" and "off" (N_c,), or nothing; full: ⟨f_n⟩ at which colours are full, or None;
+    stretch: how many times as wide chains are.
     """
     low, high = (exact["low"], exact["high"]) if exact else (replay.low[:, 0], replay.high[:, 0])
     extent, first, pinned = high - low, replay.normal[0], replay.normal[reference]
-    mu = replay.summary["mu"]
+    mu, of = replay.summary["mu"], measured or {"off": np.zeros_like(first)}
 
     def mobilised(normal: Floats, tangential: Floats) -> Floats:
         limit = np.maximum(mu * normal, 1e-9)
@@ -177,6 +179,9 @@ def shades(
         "known": lambda normal, tangential: (
             np.zeros_like(normal) if gone is None else gone / np.maximum(gone + extent, 1e-6)
         ),
+        "deviation": lambda normal, tangential: (
+            0.5 + np.nan_to_num(of["off"]) / (2 * FULL_DEVIATION)
+        ),
     }[colour]
     width = {
         "normal": lambda normal: normal,
@@ -184,8 +189,13 @@ def shades(
         "difference": lambda normal: np.abs(normal - pinned),
         "load": lambda normal: normal if loads is None else loads,
         "known": lambda normal: normal if gone is None else gone,
+        "measured": lambda normal: np.nan_to_num(of["normal"]) if measured else normal,
     }[thickness]
-    neutral = (colour == "mobilised" and mu == 0) or (colour == "known" and gone is None)
+    neutral = (
+        (colour == "mobilised" and mu == 0)
+        or (colour == "known" and gone is None)
+        or (colour == "deviation" and not measured)
+    )
     tones = {"ground": "#121212", "disk": "#3b444f", "pale": "#22272d", "edge": "#55606e"}
     if not dark:
         tones = {"ground": "#ffffff", "disk": "#d0d8e2", "pale": "#eef1f5", "edge": "#a9b7c8"}

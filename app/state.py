@@ -29,6 +29,7 @@ COLOURS = {
     "sign": "sign of fₙ − pinned fₙ",
     "load": "limit load",
     "known": "what is known: part of the interval gone",
+    "deviation": "inferred less measured fₙ, in σ",
 }
 WIDTHS = {
     "normal": "normal force fₙ",
@@ -36,6 +37,7 @@ WIDTHS = {
     "difference": "|fₙ − pinned fₙ|",
     "load": "limit load",
     "known": "what is known: length of the interval gone",
+    "measured": "measured fₙ",
 }
 SORTS = {
     "original": "original fₙ",
@@ -77,6 +79,7 @@ class AppState(param.Parameterized):
     cell = param.Parameter(doc="the Cell on screen, or None")
     replay = param.Parameter(doc="the Replay on screen, or None")
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
+    measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
     live = param.Parameter(doc="the Following of what is being computed, or None")
     arriving = param.Parameter(doc="the Arriving of exact intervals under way, or None")

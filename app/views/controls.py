@@ -54,6 +54,7 @@ def _frictions(found):
 def meaningful(state, labels, name):
     """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
     there = {"sign": state.reference, "difference": state.reference, "known": state.known}
+    there |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
     chosen = getattr(state, name)
     return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
 
@@ -168,7 +169,16 @@ class Controls:
         self.full.param.watch(self._scale, "value")
         self.stretch.param.watch(self._scale, "value")
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
-        looks = ["colour", "thickness", "full", "stretch", "overlay", "reference", "known"]
+        looks = [
+            "colour",
+            "thickness",
+            "full",
+            "stretch",
+            "overlay",
+            "reference",
+            "known",
+            "measured",
+        ]
         state.param.watch(self._look, looks)
         state.param.watch(self._command, ["selection", "missing", "replay", "known"])
         self._command()

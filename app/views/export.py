@@ -8,7 +8,7 @@ from ..data import SOURCES
 from ..jobs import reading
 from ..state import VIEW, WIDTHS
 from .handover import Handover
-from .packing import colour_bar, colour_words, exact_intervals, full_extent, gone, pins
+from .packing import colour_bar, colour_words, exact_intervals, full_extent, gone, measured, pins
 from .parts import note
 from .progress import Progress
 from .style import palettes
@@ -106,6 +106,7 @@ class View:
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
         possible = state.possible
         loads, given, known = state.loads, gone(state, replay), pins(state)
+        seen = measured(state, replay)
         view = {name: getattr(state, name) for name in VIEW}
         source = " ".join([state.source, *known_words(state)])
         told = {"link": state.link(), "command": state.command, "source": source}
@@ -124,7 +125,7 @@ class View:
                 most = full_extent(replay, bounds, view["full"])
                 names = ("colour", "thickness", "reference", "dark", "full", "stretch")
                 look = movies.shades(
-                    replay, bounds, palettes(view["dark"]), loads=loads, gone=given,
+                    replay, bounds, palettes(view["dark"]), loads=loads, gone=given, measured=seen,
                     most=most, **{name: view[name] for name in names},
                 )  # fmt: skip
                 content = movies.gif(
@@ -145,6 +146,7 @@ class View:
                 possible,
                 loads=loads,
                 gone=given,
+                measured=seen,
                 pins=known,
                 view=view,
                 outlined=outlined,

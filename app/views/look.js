@@ -1,5 +1,5 @@
 // How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
-// CHAIN_WIDTH and FULL_CHANGE are those of geometry.py, see player.py.
+// CHAIN_WIDTH, FULL_CHANGE and FULL_DEVIATION are those of geometry.py, see player.py.
 
 const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
@@ -27,6 +27,8 @@ class Look {
     this.loose = largest(this.extent)
     this.loads = model.loads?.length === walk.contacts ? model.loads : null
     this.mostLoad = Math.max(...(this.loads ?? [1]))
+    const measured = plain(model.measured ?? {})
+    this.measured = measured.normal?.length === walk.contacts ? measured : null
     this.gone = model.gone?.length === walk.contacts ? model.gone : null // of ΔFₙ, by what is known
   }
 
@@ -42,7 +44,8 @@ class Look {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
-    const told = !this.plain && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone)
+    const told = !this.plain && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
+      (colour !== "deviation" || this.measured)
     style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
@@ -63,6 +66,7 @@ class Look {
     if (thickness === "extent") return this.extent[c]
     if (thickness === "load" && this.loads) return this.loads[c]
     if (thickness === "known" && this.gone) return this.gone[c]
+    if (thickness === "measured" && this.measured) return this.measured.normal[c] || 0
     return thickness === "difference" ? Math.abs(normal[c] - this.pinned(c)) : normal[c]
   }
 
@@ -71,6 +75,7 @@ class Look {
     const { colour, most } = this.asked
     if (colour === "mobilised") return 0.5 + (this.mobilised(normal[c], tangential[c]) ?? 0) / 2
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
+    if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * FULL_DEVIATION)
     if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
     if (colour === "load") return this.loads ? this.loads[c] / this.asked.load : 0.5
     if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.asked.full)

@@ -4,7 +4,7 @@ import numpy as np
 import panel as pn
 
 from .. import live
-from ..geometry import CHAIN_WIDTH, FULL_CHANGE
+from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..state import COLOURS, WIDTHS
 from . import explanation
 from .player import Player, frames
@@ -37,6 +37,8 @@ EXPLAINED = {
     "difference": "difference",
     "load": "limit_load",
     "known": "gone",
+    "deviation": "deviation",
+    "measured": "measured",
 }
 LEGEND = """
 <div style="display:flex;flex-wrap:wrap;gap:3px 20px;align-items:center;font-size:12px">
@@ -82,7 +84,9 @@ class PackingView:
         self.player.param.watch(self._swing, "between")
         self.player.param.watch(self._explain, "pulled")
         state.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "between", "full"])
+        state.param.watch(
+            self._show, ["replay", "growing", "exact", "narrowed", "between", "full", "measured"]
+        )
         state.param.watch(self._pin, ["known", "ranked", "replay"])
         state.param.watch(self._displace, "displacement")
         state.param.watch(self._accompany, "twin")
@@ -121,6 +125,7 @@ class PackingView:
         changes = {
             "exact": exact,
             "gone": gone(state, replay),
+            "measured": measured(state, replay),
             "most": full_extent(replay, exact, state.full),
             "between": None if state.between is None else list(state.between),
         }
@@ -201,6 +206,15 @@ def gone(state, replay):
     return narrowed.gone.astype(np.float32)
 
 
+def measured(state, replay):
+    """Of an opened frame the measured f_n in ⟨f_n⟩ and how far off it is in σ; {} for others."""
+    found = state.measured
+    if found is None or state.selection is None or state.selection.packing != found.packing:
+        return {}
+    normal, off = found.force[replay.backbone] / replay.force_scale, found.off[replay.backbone]
+    return {"normal": normal.astype(np.float32), "off": off.astype(np.float32)}
+
+
 def normal_extent(replay, exact):
     """ΔF_n (N_c,) in ⟨f_n⟩: exact where known, else of all states."""
     if exact:
@@ -229,6 +243,7 @@ def colour_bar(state, pulled):
         "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
         "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads, state.full)),
         "change": change,
+        "deviation": (f"{FULL_DEVIATION:g} σ less", diverging, f"{FULL_DEVIATION:g} σ more"),
         "known": ("0", list(palettes(state.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[state.colour]

@@ -369,6 +369,7 @@ class Player {
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
       plane: () => { this.plots.plane = plain(model.plane); this.again() },
       loads: loaded(() => { this.look.measure(); this.again() }),
+      measured: loaded(() => { this.look.measure(); this.again() }),
       gone: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
       predict: loaded(() => this.predict.ask()),

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 import param
 
-from ..geometry import CHAIN_WIDTH, FULL_CHANGE
+from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from .scripts import FOLDER, Scripted, joined, said
 
 
@@ -27,6 +27,7 @@ class Player(Scripted):
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
     loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
     gone = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
+    measured = param.Dict(default={}, doc="of a frame, see packing.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
     plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
@@ -77,7 +78,10 @@ class Player(Scripted):
         "opening",
         "player",
     )
-    _esm = f"const CHAIN_WIDTH = {CHAIN_WIDTH}, FULL_CHANGE = {FULL_CHANGE}\n" + joined(*SCRIPTS)
+    _esm = (
+        f"const CHAIN_WIDTH = {CHAIN_WIDTH}, FULL_CHANGE = {FULL_CHANGE}, "
+        f"FULL_DEVIATION = {FULL_DEVIATION}\n" + joined(*SCRIPTS)
+    )
     _stylesheets: ClassVar = [FOLDER / "player.css"]
 
     def __init__(self, **params):

@@ -146,10 +146,11 @@ class View:
             options["pressure"] = positive(self.pressure.value, "the pressure")
         return options
 
-    def _show(self, brought):
+    def _show(self, brought, frame=None):
         """Report, and put the packing on the page; its walk is computed at once."""
         rows = "".join(ROW.format(*map(html.escape, row)) for row in uploads.told(brought.report))
         self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
+        self.state.measured = frame and photoelastic.measured(frame, brought.params)
         mu = brought.params["mu"]
         self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
 
@@ -164,7 +165,10 @@ class View:
         if self.task.running:
             return
         packing, source = frame.packing, f"{frame.source}, frame {frame.report['frame']}"
-        self.task.start(uploads.keep(self.state.library, packing, source), self._show)
+        self.task.start(
+            uploads.keep(self.state.library, packing, source),
+            lambda brought: self._show(brought, frame),
+        )
 
     def _clear(self):
         self.report.object = ""
