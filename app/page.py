@@ -19,7 +19,7 @@ from .data import Library
 from .grabs import Hand
 from .jobs import Task, computing, reading
 from .state import AppState
-from .views import explanation
+from .views import explanation, figure
 from .views.address import Address
 from .views.controls import Controls
 from .views.hints import Hints
@@ -209,6 +209,7 @@ def _large(document: Document, query: str) -> Any:
         yield
         right.append(tabs.tabs)
         yield
+        right.append(figure.panel(state))
         yield from tabs.filling(state.tab)
         yield from tabs.beside(middle)
         state.read_ahead()
