@@ -102,6 +102,10 @@ class AppState(param.Parameterized):
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
     )
     twin = param.Parameter(doc="the Shown of that μ, or None")
+    zoom = param.Tuple(
+        default=None, length=3, allow_None=True,
+        doc="middle and half width of what is seen, in largest radii; None: the whole packing",
+    )  # fmt: skip
     between = param.Tuple(
         default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
     )
@@ -516,6 +520,13 @@ def _pair(text: str) -> tuple[int, int]:
     return a, b
 
 
+def _place(text: str) -> tuple[float, ...]:
+    place = tuple(float(part) for part in text.split(":"))
+    if not all(abs(value) < 1e6 for value in place) or not place[-1] > 0:
+        raise ValueError("no place that can be seen")
+    return place
+
+
 def _tab(text: str) -> str:
     return {"projection": "plane"}.get(text, text)  # as older links call it
 
@@ -531,6 +542,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "frame": int,
     "reference": int,
     "between": _pair,
+    "zoom": _place,
     "split": _flag,
     "beside": float,
     "predict": int,
@@ -550,6 +562,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "dark": _flag,
 }
 SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": grabs.spelled, "known": known.spelled}
+SPELLED["zoom"] = lambda place: ":".join(f"{value:g}" for value in place)
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
 UNSEEN: View = {"contact": None, "second": None, "frame": 0, "reference": 0, "between": None}
 UNSEEN |= {"pulls": [], "known": []}

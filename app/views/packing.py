@@ -75,6 +75,7 @@ class PackingView:
             name="player",  # by which others in the page find it
             sizing_mode="stretch_width",
             palettes=palettes(state.dark),
+            zoom=None if state.zoom is None else list(state.zoom),
             **{name: getattr(state, name) for name in (*SHARED, *FOLLOWED)},
         )
         self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(2, 10))
@@ -82,6 +83,7 @@ class PackingView:
             self.player.param.watch(lambda event: state.param.update({event.name: event.new}), name)
         self._shown = None
         self.player.param.watch(self._swing, "between")
+        self.player.param.watch(self._look_at, "zoom")
         self.player.param.watch(self._explain, "pulled")
         state.param.watch(self._follow, [*SHARED, *FOLLOWED])
         state.param.watch(
@@ -112,6 +114,9 @@ class PackingView:
 
     def _swing(self, event):
         self.state.between = None if event.new is None else tuple(event.new)
+
+    def _look_at(self, event):
+        self.state.zoom = None if event.new is None else tuple(event.new)
 
     def _follow(self, *events):
         self.player.param.update({event.name: event.new for event in events})

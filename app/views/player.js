@@ -48,7 +48,7 @@ class Player {
     this.difference = new Difference(this)
     this.predict = new Predict(this)
     this.split = new Split(this)
-    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint() }
+    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
     this.scene.describe = {
       contact: (k) => this.look.contact(k, this.replay),
       grain: (k) => this.look.grain(k, this.replay),
@@ -62,6 +62,7 @@ class Player {
   load() {
     const { model, scene, playing } = this, walk = plain(model.walk)
     if (model.walk === this.loaded || !walk.contacts) return
+    const zoom = this.loaded ? null : model.zoom // of the link that opened the page
     this.loaded = model.walk
     this.difference.end()
     const view = this.live.leave(), place = this.grownInto(walk)
@@ -78,6 +79,7 @@ class Player {
     this.buttons.part("source").textContent = model.source
     this.tellAsked()
     scene.show(this.replay.walk)
+    if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
     this.split.show()
     scene.resize()
     scene.repaint()
@@ -160,6 +162,20 @@ class Player {
     this.paint()
     this.paintPlots()
     if (tell) this.model.frame = this.replay.frame
+  }
+
+  /** Where the view has come to rest, for links. */
+  tellView() {
+    const { scene, model } = this, { x, y, half } = scene.view, key = `${x},${y},${half}`
+    if (key === this.viewed || scene.frozen) return
+    this.viewed = key
+    clearTimeout(this.looking)
+    this.looking = setTimeout(() => {
+      const [left, right, low, high] = scene.geometry.window
+      const whole = [(left + right) / 2, (low + high) / 2, (right - left) / 2], now = [x, y, half]
+      const rounded = now.map((value) => Number(value.toPrecision(5)))
+      model.zoom = now.every((value, k) => Math.abs(value - whole[k]) < 1e-6) ? null : rounded
+    }, REST_MS)
   }
 
   /** A network that was pulled has changed. */

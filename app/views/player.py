@@ -47,6 +47,7 @@ class Player(Scripted):
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
     beside = param.Number(default=None, allow_None=True, doc="μ that is seen beside in its place")
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
+    zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
     between = param.List(default=None, allow_None=True)
     tab = param.String()
     views = param.Integer(doc="of tabs, so far")

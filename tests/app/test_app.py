@@ -482,6 +482,7 @@ def test_a_link_keeps_what_single_tabs_show(library, state, wait_for):
     from app.state import AppState
 
     chosen = {"figure": "force", "axis": "log", "pushing": "all", "axes": "stress"}
+    chosen["zoom"] = (3.5, 4.25, 2.0)
     state.param.update(**chosen)
     again = AppState(library, query=f"?{state.link()}")
     wait_for(again)
