@@ -15,6 +15,11 @@ from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 
 
+# Of the algorithm that makes packings. It is among their parameters, so that everything that rests
+# on a packing is named by it.
+PACKING_VERSION = 3
+
+
 def _as_asked(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
     return parameters
 
@@ -100,9 +105,10 @@ def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
 def is_current(kind: Kind, entry: Entry) -> bool:
     """Whether an entry is of the current version of its kind, and of its packing's."""
     packing = entry.params.get("packing")
-    # Packings of version 1 did not name the accuracy of their steps.
-    older = isinstance(packing, dict) and "n" in packing and "accuracy" not in packing
-    return entry.version == kind.version and not older
+    made = isinstance(packing, dict) and "n" in packing  # not imported
+    return entry.version == kind.version and (
+        not made or packing.get("version") == PACKING_VERSION
+    )
 
 
 ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")
