@@ -14,7 +14,6 @@ from granforce.study.keys import Parameters
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 
-
 # Of the algorithm that makes packings. It is among their parameters, so that everything that rests
 # on a packing is named by it.
 PACKING_VERSION = 3
@@ -106,9 +105,7 @@ def is_current(kind: Kind, entry: Entry) -> bool:
     """Whether an entry is of the current version of its kind, and of its packing's."""
     packing = entry.params.get("packing")
     made = isinstance(packing, dict) and "n" in packing  # not imported
-    return entry.version == kind.version and (
-        not made or packing.get("version") == PACKING_VERSION
-    )
+    return entry.version == kind.version and (not made or packing.get("version") == PACKING_VERSION)
 
 
 ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")
