@@ -104,8 +104,11 @@ def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
 def is_current(kind: Kind, entry: Entry) -> bool:
     """Whether an entry is of the current version of its kind, and of its packing's."""
     packing = entry.params.get("packing")
-    made = isinstance(packing, dict) and "n" in packing  # not imported
-    return entry.version == kind.version and (not made or packing.get("version") == PACKING_VERSION)
+    # Imported ones are named by what they are.
+    older = (
+        isinstance(packing, dict) and "n" in packing and packing.get("version") != PACKING_VERSION
+    )
+    return entry.version == kind.version and not older
 
 
 ROW = ("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "acceptance")
