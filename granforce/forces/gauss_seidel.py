@@ -169,7 +169,8 @@ def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
 
     The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the
-    grains and on the box besides the unknown contact forces. Δt = 1 throughout.
+    grains and on the box besides the unknown contact forces. Δt = 1 throughout. Grains whose balance
+    is left open stay where they are: they share a last row, of no inverse mass.
     """
     if ensemble.prescribed == "stress" or ensemble.known is not None:
         raise InputError(
@@ -179,17 +180,18 @@ def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     contacts, grains = ensemble.contacts, ensemble.grains
     longest = float(ensemble.packing.r.max())
     r = ensemble.packing.r[grains] / longest
-    row_of = np.full(len(ensemble.packing.r), -1)
+    row_of = np.full(len(ensemble.packing.r), len(grains))
     row_of[grains] = np.arange(len(grains))
     size = 1 + ensemble.per_contact
     count = len(contacts.i)
-    velocity = np.zeros((len(grains), 3))
+    held = int(np.any(row_of[np.concatenate([contacts.i, contacts.j])] == len(grains)))
+    velocity = np.zeros((len(grains) + held, 3))
     outer = -ensemble.b[: size * len(grains)].reshape(-1, size) / ensemble.force_scale
     mass = np.pi * r**2
     inertia = 0.5 * mass * r**2
-    velocity[:, :2] = outer[:, :2] / mass[:, None]
+    velocity[: len(grains), :2] = outer[:, :2] / mass[:, None]
     if size == 3:
-        velocity[:, 2] = outer[:, 2] * r / inertia
+        velocity[: len(grains), 2] = outer[:, 2] * r / inertia
     compliance = dilation = 0.0
     length = contacts.length / longest
     if ensemble.has_pressure_row:
@@ -208,13 +210,14 @@ def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
         np.zeros(count),
         np.empty(count),
         np.empty(count),
-        1 / mass,
-        1 / inertia,
+        np.append(1 / mass, np.zeros(held)),
+        np.append(1 / inertia, np.zeros(held)),
         compliance,
     )
     # What turns velocities (v_x, v_y, ω) and λ back into forces in ⟨f_n⟩.
     box_unit = 1 / (compliance * length.sum()) if compliance else 0.0
-    unit = np.append(np.column_stack([mass, mass, inertia / r]).ravel(), box_unit)
+    weight = np.column_stack([mass, mass, inertia / r]).ravel()
+    unit = np.concatenate([weight, np.zeros(3 * held), [box_unit]])
     return problem, velocity, dilation, unit
 
 
