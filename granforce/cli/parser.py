@@ -99,6 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     words.add_perturb(commands)
     words.add_study(commands)
     words.add_app(commands)
+    words.add_docs(commands)
     words.add_import(commands)
     words.add_bench(commands)
     words.add_cache(commands)

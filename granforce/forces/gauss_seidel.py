@@ -64,10 +64,16 @@ def gauss_seidel(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Relaxation:
-    """One step of contact dynamics from rest, with the given forces (N_c, 2) as first guess.
+    """One step of contact dynamics from rest, swept until it has ended; a Relaxation.
 
-    Options as of `SideBySide`. order: "sequential" or "random" (a fresh permutation each sweep,
-    from seed). cancel() returning True raises Cancelled.
+    start (N_c, 2): first guess, force. order: "sequential" or "random" (a fresh permutation each
+    sweep, from seed). options: tolerance (BALANCED), the residual in ⟨f_n⟩ that counts as balance;
+    rest (AT_REST), the one from which the nearest network takes the last digits, None to sweep
+    down to the tolerance; max_iterations, the most sweeps (100,000). ``converged`` is also True for
+    grains that are seen to move steadily: no equilibrium is near, and the residual says so.
+    cancel() returning True raises Cancelled.
+
+    Raises InputError where the whole stress is prescribed, or forces are known.
     """
     alone = SideBySide(ensemble, 1, **options)
     if order == "random":
@@ -169,8 +175,8 @@ def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
 
     The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the
-    grains and on the box besides the unknown contact forces. Δt = 1 throughout. Grains whose balance
-    is left open stay where they are: they share a last row, of no inverse mass.
+    grains and on the box besides the unknown contact forces. Δt = 1 throughout. Grains whose
+    balance is left open stay where they are: they share a last row, of no inverse mass.
     """
     if ensemble.prescribed == "stress" or ensemble.known is not None:
         raise InputError(

@@ -78,7 +78,10 @@ def nearest_of_many(
     max_iterations: int = MOST_STEPS,
     cancel: Cancel | None = None,
 ) -> list[Relaxation]:
-    """`nearest` of each start, LANES of them side by side: the same results, bit for bit."""
+    """`nearest` of each of the starts, a few of them side by side: the same results, bit for bit.
+
+    starts: arrays (N_c, 2), force. Other arguments as of `nearest`.
+    """
     if cancel is not None:
         with cancelling.watched(cancel):
             return nearest_of_many(

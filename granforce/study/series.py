@@ -282,8 +282,12 @@ def infer_series(
 ) -> Any:
     """All frames inferred into the store at path, found there where they are: (dataset, failed).
 
-    options: as for `parameters`. The dataset is that of `combined`; failed: (frame, message) of
-    frames that were refused, which the dataset does not have.
+    frames: by `frames_of`. workers: processes; scheduler: address of a dask scheduler to use in
+    their place. progress(done, total) counts frames. options: mu, states (draws for each frame),
+    seed and unmeasured as for `infer`, others as for `read_pegs`. The dataset has a line for each
+    frame; failed: (frame, message) of frames that were refused, which the dataset does not have.
+
+    Raises InputError where the store cannot be written.
     """
     cells = [Cell(FRAME, parameters(frame, **options)) for frame in frames]
     failed = run(path, cells, workers=workers, scheduler=scheduler, progress=progress)

@@ -60,9 +60,10 @@ def default_path() -> Path:
 
 
 def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Store:
-    """The store in a folder (by default `default_path()`), made if missing unless readonly.
+    """The Store in a folder, made if missing unless readonly.
 
-    A folder that cannot be written is opened all the same; saving to it raises InputError.
+    path: by default $GRANFORCE_CACHE, else the user's cache folder. A folder that cannot be written
+    is opened all the same; saving to it raises InputError.
 
     Raises InputError for a file, for a folder that holds something else, for one that cannot be
     made, for a store of a newer schema, unless readonly, and, if readonly, for a missing store.
