@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import html
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -151,10 +151,11 @@ def _article(entry: Entry, example: str) -> str:
         head, inside = f"{entry.name}({bases})" if bases else entry.name, _members(node, text)
     else:
         head, inside = _signature(node, entry.name), ""
+    arguments = [one.arg for one in ast.walk(node) if isinstance(one, ast.arg)]
     shown = f"<h4>Example</h4><pre>{html.escape(example)}</pre>" if example else ""
     return (
         f'<article id="{entry.name}"><h3>{entry.name}</h3>'
-        f"<pre class=head>{html.escape(head)}</pre>{_prose(entry.docstring)}{inside}{shown}"
+        f"<pre>{html.escape(head)}</pre>{_prose(entry.docstring, arguments)}{inside}{shown}"
         f"<details><summary>{place}:{node.lineno}</summary>"
         f"<pre>{html.escape(source)}</pre></details></article>"
     )
@@ -225,30 +226,34 @@ def _called(node: ast.FunctionDef) -> str:
     return signature.replace("()", "", 1) if is_property else signature
 
 
-def _prose(text: str) -> str:
+def _prose(text: str, arguments: Sequence[str] = ()) -> str:
     """Paragraphs of a docstring; what is set in is shown as it is."""
     return "".join(
         f"<pre>{html.escape(part)}</pre>"
         if part.startswith(" ")
-        else f"<p>{_inline(' '.join(part.splitlines()))}</p>"
+        else f"<p>{_inline(' '.join(part.splitlines()), arguments)}</p>"
         for part in re.split(r"\n\s*\n", text)
         if part.strip()
     )
 
 
-def _inline(text: str) -> str:
-    """Text with `names` as code, linked where they are public."""
+def _inline(text: str, arguments: Sequence[str] = ()) -> str:
+    """Text with `names`, and arguments where they are told, as code; public names are links."""
     public = {entry.name for entry in entries()}
+    records = "|".join(name for name in public if name[0].isupper())
+    told = "|".join(arguments) or "(?!)"
+    names = rf"`+([^`]+)`+|\*\*(\w)\*\*|\b({records})\b|\b({told})(?=:| \([^)]*\):|\()"
 
-    def named(match: re.Match[str]) -> str:
-        word = match[1].removeprefix("gf.")
-        return (
-            f'<a href="#{word}"><code>{word}</code></a>'
-            if word in public
-            else (f"<code>{match[1]}</code>")
-        )
+    def shown(match: re.Match[str]) -> str:
+        quoted, vector, record, argument = match.groups()
+        if vector:
+            return f"<b>{vector}</b>"
+        word = (quoted or record or argument).removeprefix("gf.")
+        if word in public and not argument:
+            return f'<a href="#{word}"><code>{word}</code></a>'
+        return f"<code>{word}</code>"
 
-    return re.sub(r"`+([^`]+)`+", named, html.escape(text, quote=False))
+    return re.sub(names, shown, html.escape(text, quote=False))
 
 
 _STYLE = """
