@@ -162,12 +162,12 @@ class SideBySide:
             forces = nearest(S, forces).forces
             residual = S.residual(forces)
         return Relaxation(
-            forces,
-            int(self.sweeps[lane]),
-            residual,
-            S.violation(forces),
-            bool(self.looks.state[lane] == SETTLED_DOWN or residual <= tolerance),
-            time.perf_counter() - self.begun[lane],
+            forces=forces,
+            iterations=int(self.sweeps[lane]),
+            residual=residual,
+            violation=S.violation(forces),
+            converged=bool(self.looks.state[lane] == SETTLED_DOWN or residual <= tolerance),
+            seconds=time.perf_counter() - self.begun[lane],
         )
 
 
@@ -206,19 +206,19 @@ def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
         compliance = 1 / (twice_volume * BOX_MASS)
         dilation = -length.sum() * compliance
     problem = StepProblem(
-        row_of[contacts.i],
-        row_of[contacts.j],
-        contacts.normal[:, 0].copy(),
-        contacts.normal[:, 1].copy(),
-        length,
-        contacts.arm_i / longest,
-        contacts.arm_j / longest,
-        np.zeros(count),
-        np.empty(count),
-        np.empty(count),
-        np.append(1 / mass, np.zeros(held)),
-        np.append(1 / inertia, np.zeros(held)),
-        compliance,
+        i=row_of[contacts.i],
+        j=row_of[contacts.j],
+        n_x=contacts.normal[:, 0].copy(),
+        n_y=contacts.normal[:, 1].copy(),
+        length=length,
+        arm_i=contacts.arm_i / longest,
+        arm_j=contacts.arm_j / longest,
+        closing=np.zeros(count),
+        stiff_n=np.empty(count),
+        stiff_t=np.empty(count),
+        inverse_mass=np.append(1 / mass, np.zeros(held)),
+        inverse_inertia=np.append(1 / inertia, np.zeros(held)),
+        box_compliance=compliance,
     )
     # What turns velocities (v_x, v_y, ω) and λ back into forces in ⟨f_n⟩.
     box_unit = 1 / (compliance * length.sum()) if compliance else 0.0

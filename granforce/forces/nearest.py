@@ -115,12 +115,12 @@ def _batch(
     seconds = (time.perf_counter() - begin) / len(starts)
     return [
         Relaxation(
-            forces[k],
-            search.steps[k],
-            float(residual[k]),
-            ensemble.violation(forces[k]),
-            bool(converged[k] and residual[k] <= tolerance),
-            seconds,
+            forces=forces[k],
+            iterations=search.steps[k],
+            residual=float(residual[k]),
+            violation=ensemble.violation(forces[k]),
+            converged=bool(converged[k] and residual[k] <= tolerance),
+            seconds=seconds,
         )
         for k in range(len(starts))
     ]

@@ -44,12 +44,12 @@ def nearest_piqp(
     forces = ensemble.to_forces(T @ y * ensemble.force_scale)
     residual = ensemble.residual(forces)
     return Relaxation(
-        forces,
-        steps,
-        residual,
-        ensemble.violation(forces),
-        bool(status == piqp.PIQP_SOLVED and residual <= tolerance),
-        time.perf_counter() - begin,
+        forces=forces,
+        iterations=steps,
+        residual=residual,
+        violation=ensemble.violation(forces),
+        converged=bool(status == piqp.PIQP_SOLVED and residual <= tolerance),
+        seconds=time.perf_counter() - begin,
     )
 
 

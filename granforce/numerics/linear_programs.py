@@ -184,7 +184,15 @@ def _outcome(
     multiplier = np.concatenate([at.v[:, lane], at.v_border[:, lane]])[problem.place]
     load = float(at.y[-1, lane]) if loaded >= 0 else 0.0
     y, z = at.y[:-1, lane].copy(), at.z[:-1, lane].copy()
-    return Outcome(int(number), int(loaded), y, load, multiplier, z, int(steps))
+    return Outcome(
+        number=int(number),
+        loaded=int(loaded),
+        y=y,
+        load=load,
+        multiplier=multiplier,
+        z=z,
+        steps=int(steps),
+    )
 
 
 def multipliers(

@@ -268,7 +268,9 @@ def regions(at: Floats, x: Floats) -> tuple[Integers, Floats]:
     return np.clip(((at - low) / side).astype(int), 0, REGIONS - 1) @ [REGIONS, 1], side
 
 
-FRAME = Kind("frame", 1, "frames", "frame", parameters, _inferred)
+FRAME = Kind(
+    name="frame", version=1, title="frames", unit="frame", parameters=parameters, compute=_inferred
+)
 
 
 def infer_series(

@@ -243,7 +243,12 @@ class Store(Mapping[str, xr.Dataset]):
         params = json.loads(attrs["parameters"])
         size = _folder_bytes(self.path / name)
         return Entry(
-            name, attrs["kind"], params, attrs["algorithm_version"], size, attrs["created"]
+            name=name,
+            kind=attrs["kind"],
+            params=params,
+            version=attrs["algorithm_version"],
+            bytes=size,
+            created=attrs["created"],
         )
 
     def entries(self) -> list[Entry]:

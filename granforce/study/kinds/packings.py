@@ -147,4 +147,11 @@ def check_complete(result: Any, what: str) -> None:
         raise InputError(f"{what} not certified: largest duality gap {result.max_gap:.1e} ⟨f_n⟩")
 
 
-PACKING = Kind("packing", 2, "compaction", "step", _packing_parameters, _packing)
+PACKING = Kind(
+    name="packing",
+    version=2,
+    title="compaction",
+    unit="step",
+    parameters=_packing_parameters,
+    compute=_packing,
+)
