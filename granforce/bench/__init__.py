@@ -13,7 +13,12 @@ from granforce.bench.conditions import knowledge
 from granforce.bench.frames import frames
 from granforce.bench.inference import inference
 from granforce.bench.kernel import growth, kernel, pushes, starts
-from granforce.bench.packings import compaction, compaction_frictions, compaction_growth
+from granforce.bench.packings import (
+    compaction,
+    compaction_frictions,
+    compaction_growth,
+    compaction_limit,
+)
 from granforce.bench.report import environment, note, table
 from granforce.bench.skips import skips
 from granforce.bench.solvers import contact_updates, relaxation, scaling, tile
@@ -28,6 +33,7 @@ __all__ = [
     "compaction",
     "compaction_frictions",
     "compaction_growth",
+    "compaction_limit",
     "contact_updates",
     "environment",
     "frames",
@@ -63,6 +69,10 @@ PARTS: dict[str, tuple[Callable[..., list[dict[str, Any]]], str]] = {
     "compaction": (compaction, "Compaction: run time and overlap by time step and sweeps"),
     "compaction_frictions": (compaction_frictions, "Compaction at each μ"),
     "compaction_growth": (compaction_growth, "Compaction against the number of disks"),
+    "compaction_limit": (
+        compaction_limit,
+        "Packings by how they are made: whether they have a limit",
+    ),
     "skips": (skips, "What skipping is worth"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),

@@ -237,11 +237,16 @@ def _step(motion, mu, pressure, pace, counters, stop):
 
 @within
 def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, stop):
-    """Sweep until the breach is small enough; returns λ."""
+    """Sweep until the breach is small enough; returns λ.
+
+    Where it does not get there, the step takes the forces that breached least on the way: from
+    μ = 1 on a few contacts go on opening and closing, and where sweeps happen to end is worse.
+    """
     count = force.shape[0]
     order, factor = np.arange(count), motion.pace[1]
     cautious = max(LEAST_RELAXATION, 1.6 - mu)
     _scale(problem, factor)
+    best, best_force, best_velocity, best_dilation = np.inf, force, velocity, dilation
     least, looks, breach = np.inf, 0, np.inf
     for done in range(1, pace.sweeps + 1):
         dilation, _, _ = sweep(problem, order, mu, force, velocity, dilation, ONE)
@@ -254,6 +259,9 @@ def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, s
         breach = _breach(problem, mu, force, velocity, dilation, factor)
         if breach <= max(pace.accuracy * _fastest(problem, force, velocity), ROUNDING / dt):
             break
+        if breach < best:
+            best, best_dilation = breach, dilation
+            best_force, best_velocity = force.copy(), velocity.copy()
         looks += 1
         if breach < FALLEN * least:
             least, looks = breach, 0
@@ -262,6 +270,7 @@ def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, s
             factor, least, looks = CAUTION * factor, breach, 0
     else:
         counters[UNFINISHED] += 1
+        force[:], velocity[:], dilation = best_force, best_velocity, best_dilation
     motion.pace[1] = min(COURAGE * factor, MOST_RELAXATION)
     return dilation
 

@@ -14,6 +14,10 @@ from granforce.study.keys import Parameters
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 
+# Of the algorithm that makes packings. It is among their parameters, so that everything that rests
+# on a packing is named by it.
+PACKING_VERSION = 3
+
 
 def _as_asked(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
     return parameters
@@ -100,8 +104,10 @@ def entries(store: Store, kind: Kind, **parameters: Any) -> list[Entry]:
 def is_current(kind: Kind, entry: Entry) -> bool:
     """Whether an entry is of the current version of its kind, and of its packing's."""
     packing = entry.params.get("packing")
-    # Packings of version 1 did not name the accuracy of their steps.
-    older = isinstance(packing, dict) and "n" in packing and "accuracy" not in packing
+    # Imported ones are named by what they are.
+    older = (
+        isinstance(packing, dict) and "n" in packing and packing.get("version") != PACKING_VERSION
+    )
     return entry.version == kind.version and not older
 
 

@@ -245,3 +245,13 @@ def test_uniform_states_against_size_reach_what_was_asked_for():
         *sizes, fit = [row for row in rows if row["rows"] == place]
         cost = [row["seconds_per_state"] for row in sizes]
         assert min(cost) > 0 and np.isclose(fit["exponent"], np.log(cost[1] / cost[0]) / np.log(4))
+
+
+def test_the_limit_of_packings_tells_means_with_errors_by_settings():
+    rows = bench.compaction_limit(True, n=20, frictions=(0.3,), seeds=2)
+    assert [row["settings"] for row in rows] == list(packings.SETTINGS)
+    for row in rows:
+        assert row["failed"] == 0
+        for key in ("phi", "z", "h", "exact_eta3", "eta2", "unfinished", "cpu_seconds"):
+            mean, error = map(float, row[key].split(" ± "))
+            assert mean >= 0 and error >= 0

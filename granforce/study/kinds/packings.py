@@ -19,7 +19,7 @@ from granforce.records import (
     whole,
 )
 from granforce.study import slices
-from granforce.study.cells import Kind, get, save
+from granforce.study.cells import PACKING_VERSION, Kind, get, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
 from granforce.study.keys import Parameters
@@ -65,6 +65,7 @@ def _packing_parameters(
         "box_mass": positive(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
         "accuracy": positive(accuracy, "accuracy"),
+        "version": PACKING_VERSION,
         # Only where it is not square: keys of packings in square boxes stay what they were.
         **({} if check_box(box) == "square" else {"box": box}),
     }
@@ -99,7 +100,8 @@ def _packing(
     if "imported" in parameters:
         raise InputError("the imported packing is not in this store: import it again")
     told: dict[str, Any] = {"progress": progress, "watch": watch}
-    return packing_dataset(pack(**parameters, max_steps=max_steps, **told))
+    asked = {name: value for name, value in parameters.items() if name != "version"}
+    return packing_dataset(pack(**asked, max_steps=max_steps, **told))
 
 
 def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[Packing, bool]:
@@ -149,7 +151,7 @@ def check_complete(result: Any, what: str) -> None:
 
 PACKING = Kind(
     name="packing",
-    version=2,
+    version=PACKING_VERSION,
     title="compaction",
     unit="step",
     parameters=_packing_parameters,
