@@ -24,7 +24,7 @@ _TYPES = {"_ArgumentGroup", "_SubParsersAction"}  # argparse's, in annotations t
 
 
 def used(path):
-    """Names of others in a file: attributes and modules that begin with _, and modules of a core."""
+    """Names of others in a file: attributes and modules that begin with _, and its cores."""
     tree = ast.parse(path.read_text())
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and node.attr.startswith("_"):
