@@ -52,7 +52,7 @@ def test_what_a_public_function_returns_is_public():
     records = {
         node.name
         for path in reference.HOUSE.rglob("*.py")
-        for node in reference._tree(path).body
+        for node in ast.parse(path.read_text()).body
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     }
     for name, entry in ENTRIES.items():

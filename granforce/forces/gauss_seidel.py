@@ -104,7 +104,7 @@ class SideBySide:
         self.ensemble, self.tolerance, self.rest = ensemble, tolerance, rest
         self.most = max_iterations
         self.rng: np.random.Generator | None = None
-        self.problem, self.at_rest, self.dilation, self.unit = _from_rest(ensemble)
+        self.problem, self.at_rest, self.dilation, self.unit = from_rest(ensemble)
         set_stiffness(self.problem)
         self.lanes = ONE if count == 1 else MANY
         width = len(self.lanes)
@@ -171,7 +171,7 @@ class SideBySide:
         )
 
 
-def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
+def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
 
     The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the

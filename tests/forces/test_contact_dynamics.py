@@ -6,7 +6,7 @@ from packings import packed, reference
 
 from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
 from granforce.forces.ensemble import ensemble
-from granforce.forces.gauss_seidel import SideBySide, _from_rest, gauss_seidel
+from granforce.forces.gauss_seidel import SideBySide, from_rest, gauss_seidel
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics.lanes import ONE
 from granforce.packing.scenes import scene
@@ -16,7 +16,7 @@ from granforce.packing.scenes import scene
 def swept(rng):
     """A step problem after three sweeps from random forces."""
     S = ensemble(reference("n100_mu0.1_s11"))
-    problem, velocity, dilation, _ = _from_rest(S)
+    problem, velocity, dilation, _ = from_rest(S)
     set_stiffness(problem)
     force = rng.uniform(-1, 2, (len(S.index), 2))
     velocity[:] = rng.normal(size=velocity.shape)

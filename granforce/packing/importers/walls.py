@@ -151,7 +151,7 @@ def wall_contacts(
             names=names,
             outline=None,
         )
-    outline = walls if isinstance(walls, Outline) else _fitted(walls, x, r, at_wall, listing.flag)
+    outline = walls if isinstance(walls, Outline) else fitted(walls, x, r, at_wall, listing.flag)
     gap, ways = outline.gaps(x, r)
     touching = at_wall[:, None] & (gap <= reach * r.mean())
     touching[np.flatnonzero(at_wall), gap[at_wall].argmin(axis=1)] = True
@@ -179,7 +179,7 @@ def _occurrence(grain: Integers) -> Integers:
     return which
 
 
-def _fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
+def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
     """The Outline of a shape that the grains at walls touch."""
     if at_wall.sum() < 4:
         raise InputError(
