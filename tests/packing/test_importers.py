@@ -441,13 +441,13 @@ def test_lammps_bounds_are_those_of_the_manual():
     text = lines(PARTICLES)
     text[3] = "1"
     text[4:8] = ["ITEM: BOX BOUNDS xy xz yz", "0 14.757069 4.91902", "0 8.52 0", "0 15 0"]
-    items = lammps._snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
-    low, cell = lammps._cell("dump", items)
+    items = lammps.snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
+    low, cell = lammps.cell_of("dump", items)
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == 4.91902
     text[5] = "-4.91902 9.838049 -4.91902"
-    items = lammps._snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
-    low, cell = lammps._cell("dump", items)
+    items = lammps.snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
+    low, cell = lammps.cell_of("dump", items)
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == -4.91902
 
