@@ -20,7 +20,7 @@ class Beside:
 
     def __init__(self, state: Any) -> None:
         self.state, self.task = state, state.task()
-        state.param.watch(self._follow, ["split", "beside", "cell"])
+        state.param.watch(self._follow, ["split", "beside", "cell", "missing"])
 
     def keep(self, wanted: Selection) -> None:
         """Another Selection was chosen: if only μ differs, what is on screen stays beside it."""
@@ -34,8 +34,9 @@ class Beside:
     def _follow(self, *events: Any) -> None:
         """Have the other packing found, or computed if no store has it."""
         state = self.state
-        if not state.split:
-            state.beside = None
+        came = any(event.name in ("cell", "missing") for event in events) and not state.missing
+        if not state.split or (came and state.cell is not None and state.beside == state.cell.mu):
+            state.beside = None  # nothing stands beside itself
         if state.beside is None or state.cell is None:
             self.task.cancel()
             state.twin = None

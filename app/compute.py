@@ -49,7 +49,7 @@ def states(library: Library, selection: Selection) -> Work:
             cell = library.find(selection.kind, params)
             if cell is None:
                 _make_packing(job, library, selection.packing)
-                job.begin("states")
+                job.begin("finding which contacts carry")
                 dataset, _ = study.get(
                     library.own,
                     kind,
@@ -71,6 +71,7 @@ def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, An
     walking = live.shared(live.Walking, params)
 
     def begun(S: Any) -> None:
+        job.begin("looking for the first state")
         walking.restart(first_replay(S, params["states"]))
 
     def add(found: Any) -> None:
@@ -142,12 +143,12 @@ def _compact(job: Job, library: Library, packing: Parameters) -> None:
         if steps:
             job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
 
-    job.begin("compaction")
+    job.begin("compressing")
     seen = live.shared(live.Compaction, packing)
     seen.restart()
 
     def look(glimpse: Any) -> None:
-        job.stage = f"compaction, step {glimpse.step}: {glimpse.state}"
+        job.stage = f"compressing, step {glimpse.step}"  # the rest is told beside the picture
         seen.add(glimpse)
 
     study.get(library.own, kinds.PACKING, packing, progress=tell, watch=look)

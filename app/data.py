@@ -22,6 +22,7 @@ from granforce.study.keys import Parameters
 from granforce.study.schema import dataset_packing
 from granforce.study.store import Store, open_store
 
+from .names import names
 from .replays import Replay, make_replay
 from .selection import Selection, selected, series
 
@@ -34,6 +35,7 @@ SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states
 
 OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
 SHOWN_KEPT = 16  # cells in memory, for all visitors
+STEPS_GROW = 0.3  # steps of a compaction ~ n to this power: 325 at 400 disks, 475 at 1600
 
 
 class Cell(NamedTuple):
@@ -109,7 +111,7 @@ class Library:
             for name in store:
                 key = store.path, name
                 if key not in self._known:
-                    self._known[key] = _cell(store, name)
+                    self._known[key] = self._cell(store, name)
                 cell = self._known[key]
                 if cell is not None and key not in self._damaged:
                     found.setdefault(name, cell)
@@ -125,8 +127,22 @@ class Library:
                     continue
                 self._damaged.discard((store.path, name))  # it was computed anew
             if name in store:
-                return _cell(store, name)
+                return self._cell(store, name)
         return None
+
+    def series(self, selection: Selection, parameters: Parameters | None = None) -> str:
+        """Everything but μ, in words; an upload is called by its files."""
+        known = names(self.cache) if selection.imported and self.cache is not None else {}
+        return series(selection, parameters, known.get(selection.packing.get("imported", "")))
+
+    def _cell(self, store: Store, name: str) -> Cell | None:
+        """The Cell of an entry; None where it holds no states of the current algorithms."""
+        entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
+        if entry is None or not study.is_current(SOURCES[entry.kind], entry):
+            return None
+        selection = selected(entry.kind, entry.params)
+        called = self.series(selection, entry.params)
+        return Cell(selection, called, entry.params, store, name)
 
     def dataset(self, cell: Cell) -> xr.Dataset:
         """The dataset of one cell; InputError if it is damaged, and then it is no longer listed."""
@@ -196,18 +212,22 @@ class Library:
             if found is not None:
                 kinds.keep_packing(own, params, dataset_packing(found))
 
-    def expected_steps(self, n: int, mu: float) -> int | None:
-        """Compaction steps of the stored packing of n grains with the nearest μ, or None."""
+    def expected_steps(self, n: int, mu: float) -> float | None:
+        """Compaction steps of n grains, from the stored packing nearest in n, then μ; or None."""
         known = []
         for store in self.stores:
-            for entry in study.entries(store, kinds.PACKING, n=n):
+            for entry in study.entries(store, kinds.PACKING):
+                if "n" not in entry.params:
+                    continue  # it was imported
+                larger = n / entry.params["n"]
                 away = abs(np.log((entry.params["mu"] + 1e-3) / (mu + 1e-3)))
-                known.append((away, entry.name, store))
+                known.append((abs(np.log(larger)), away, entry.name, store, larger))
         if not known:
             return None
-        _, name, store = min(known, key=lambda found: found[:2])
+        *_, name, store, larger = min(known, key=lambda found: found[:3])
         with suppress(InputError), readable(store, name) as found:
-            return json.loads(found.attrs["info"]).get("steps")
+            steps = json.loads(found.attrs["info"]).get("steps")
+            return steps and steps * larger**STEPS_GROW
         return None
 
 
@@ -222,15 +242,6 @@ def readable(store: Store, name: str) -> Iterator[xr.Dataset]:
 
 def _damage(store: Store, name: str) -> InputError:
     return InputError(f"entry {name} in {store.path} is damaged; compute it anew, or remove it")
-
-
-def _cell(store: Store, name: str) -> Cell | None:
-    """The Cell of a store's entry; None where it holds no states of the current algorithms."""
-    entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
-    if entry is None or not study.is_current(SOURCES[entry.kind], entry):
-        return None
-    selection = selected(entry.kind, entry.params)
-    return Cell(selection, series(selection, entry.params), entry.params, store, name)
 
 
 def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:

@@ -16,6 +16,7 @@ from granforce.study.keys import canonical
 from granforce.study.schema import packing_dataset
 
 from .data import Cell
+from .grabs import Held
 from .replays import Replay
 from .selection import command
 
@@ -33,9 +34,17 @@ class File(NamedTuple):
     content: bytes
 
 
-def contacts(replay: Replay, exact: xr.Dataset | None, frame: int) -> Columns:
-    """One row a contact of the backbone, forces in the packing's unit: {name: array}."""
+def contacts(
+    replay: Replay, exact: xr.Dataset | None, frame: int, held: Held | None = None
+) -> Columns:
+    """One row a contact of the backbone, forces in the packing's unit: {name: array}.
+
+    On screen is the state of this frame, or the network that pulls have led to.
+    """
     scale = replay.force_scale
+    normal, tangential = replay.normal[frame], replay.tangential[frame]
+    if held is not None:
+        normal, tangential = held.forces.T
     first = np.unique(replay.links.contact, return_index=True)[1]
     columns = {
         "contact": replay.backbone,
@@ -43,8 +52,8 @@ def contacts(replay: Replay, exact: xr.Dataset | None, frame: int) -> Columns:
         "j": replay.links.j[first],
         "f_n_original": replay.normal[0] * scale,
         "f_t_original": replay.tangential[0] * scale,
-        "f_n": replay.normal[frame] * scale,
-        "f_t": replay.tangential[frame] * scale,
+        "f_n": normal * scale,
+        "f_t": tangential * scale,
     }
     for k, part in enumerate(("f_n", "f_t")):
         columns[f"{part}_low"] = replay.low[:, k] * scale
@@ -63,8 +72,8 @@ COLUMNS = {
     "j": "number of the second grain",
     "f_n_original": "normal force that the packing came to rest with, force",
     "f_t_original": "tangential force with it, along t = (-n_y, n_x), force",
-    "f_n": "normal force in the state on screen, force",
-    "f_t": "tangential force in the state on screen, force",
+    "f_n": "normal force in the network on screen, force",
+    "f_t": "tangential force in the network on screen, force",
     "f_n_low": "smallest normal force of all states, force",
     "f_n_high": "largest normal force of all states, force",
     "f_t_low": "smallest tangential force of all states, force",
@@ -76,13 +85,20 @@ COLUMNS = {
 }
 
 
-def explained(columns: Iterable[str], replay: Replay, title: str) -> str:
+def on_screen(replay: Replay, frame: int, held: Held | None) -> str:
+    """Which network is on screen, in words."""
+    if held is not None:
+        return "Network: pulled by hand"
+    return f"Network: state {replay.number[frame]}" if frame else "Network: the original"
+
+
+def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
     """Lines, each after a #, that tell what a table holds and in which units."""
     unit = (
         f"Forces are in the packing's own unit (pressure times length): mean normal force "
         f"{replay.force_scale:.9g}. Lengths are in the packing's unit."
     )
-    lines = [title, unit, *(f"{name}: {COLUMNS[name]}" for name in columns)]
+    lines = [*titles, unit, *(f"{name}: {COLUMNS[name]}" for name in columns)]
     return "".join(f"# {line}\n" for line in lines)
 
 

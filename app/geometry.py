@@ -8,6 +8,10 @@ from granforce.records import Floats, Integers, Mask, Packing
 
 # Width of the strip around the periodic cell in which images are drawn, in largest radii.
 MARGIN = 1.0
+# Of a force chain: its width where it carries the mean normal force, in largest radii, and the
+# change in ⟨f_n⟩ at which its colour is full where nothing else is asked for.
+CHAIN_WIDTH, FULL_CHANGE = 0.23, 0.5
+FULL_DEVIATION = 4.0  # σ at which the colour of a deviation from what was measured is full
 
 
 class Disks(NamedTuple):

@@ -154,12 +154,13 @@ class Hand:
             self._task.start(work, self._done)
         else:
             self._task.cancel()
-            self._made, self._base = [], base
+            self._made, self._base, state.held = [], base, None
             self._tell({"held": None})
 
     def _done(self, found: tuple[Any, ...]) -> None:
         base, made, ready, refusal = found
         self._made, self._base = made, base
+        self.state.held = made[-1][1] if made else None
         if refusal:
             self.state.message = refusal
             self.state.pulls = [pull for pull, _ in made]

@@ -110,3 +110,4 @@ def read_limits(text: str | None = None) -> Limits:
 
 
 LIMITS = read_limits()
+SHARED = LIMITS_VARIABLE in os.environ  # whether the server is for others than its owner

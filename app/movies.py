@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from granforce.records import Cancel, Cancelled, Floats, Progress
 
+from .geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from .replays import Replay
 
 Look = Mapping[str, Any]  # of `shades`
@@ -21,8 +22,6 @@ FRAME_MS = 80
 MOST_BYTES = 5e6
 FEWER = (1.0, 0.7, 0.5, 0.35)  # parts of SIDE that are tried until it is small enough
 TONES = 64  # colours of the whole movie
-FULL = 0.5  # ⟨f_n⟩, the change at which its colour is full; as in look.js
-WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 
 
 def gif(
@@ -127,7 +126,7 @@ def _chains(
 ) -> None:
     place, scale = _place(replay, fine)
     links = replay.links
-    width = WIDTH * look["stretch"] * look["thickness"](normal) * scale
+    width = CHAIN_WIDTH * look["stretch"] * look["thickness"](normal) * scale
     colours = look["colours"]
     tone = np.clip(look["shade"](normal, tangential), 0, 1) * (len(colours) - 1)
     for k in np.argsort(width[links.contact], kind="stable"):
@@ -150,18 +149,20 @@ def shades(
     dark: bool,
     loads: Floats | None = None,
     gone: Floats | None = None,
+    measured: Mapping[str, Floats] | None = None,
     full: float | None = None,
     stretch: float = 1.0,
 ) -> Look:
     """How forces are drawn, as on screen: colours, and functions of the forces of a moment.
 
     exact: {"low", "high"} (N_c,) or empty; the others as in the state, most: ΔF_n at full colour,
-    loads (N_c,) limit loads or None; gone (N_c,) of ΔF_n by what is known, or None; full: ⟨f_n⟩ at
-    which colours are full, or None; stretch: how many times as wide chains are.
+    loads (N_c,) limit loads or None; gone (N_c,) of ΔF_n by what is known, or None; measured: of a
+    frame, "normal" and "off" (N_c,), or nothing; full: ⟨f_n⟩ at which colours are full, or None;
+    stretch: how many times as wide chains are.
     """
     low, high = (exact["low"], exact["high"]) if exact else (replay.low[:, 0], replay.high[:, 0])
     extent, first, pinned = high - low, replay.normal[0], replay.normal[reference]
-    mu = replay.summary["mu"]
+    mu, of = replay.summary["mu"], measured or {"off": np.zeros_like(first)}
 
     def mobilised(normal: Floats, tangential: Floats) -> Floats:
         limit = np.maximum(mu * normal, 1e-9)
@@ -170,13 +171,16 @@ def shades(
     shade = {
         "mobilised": mobilised,
         "extent": lambda normal, tangential: extent / (most or 1.0),
-        "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * (full or FULL)),
+        "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * (full or FULL_CHANGE)),
         "sign": lambda normal, tangential: 0.5 + 0.5 * np.sign(normal - pinned),
         "load": lambda normal, tangential: (
             np.full_like(normal, 0.5) if loads is None else loads / (full or loads.max())
         ),
         "known": lambda normal, tangential: (
             np.zeros_like(normal) if gone is None else gone / np.maximum(gone + extent, 1e-6)
+        ),
+        "deviation": lambda normal, tangential: (
+            0.5 + np.nan_to_num(of["off"]) / (2 * FULL_DEVIATION)
         ),
     }[colour]
     width = {
@@ -185,8 +189,13 @@ def shades(
         "difference": lambda normal: np.abs(normal - pinned),
         "load": lambda normal: normal if loads is None else loads,
         "known": lambda normal: normal if gone is None else gone,
+        "measured": lambda normal: np.nan_to_num(of["normal"]) if measured else normal,
     }[thickness]
-    neutral = (colour == "mobilised" and mu == 0) or (colour == "known" and gone is None)
+    neutral = (
+        (colour == "mobilised" and mu == 0)
+        or (colour == "known" and gone is None)
+        or (colour == "deviation" and not measured)
+    )
     tones = {"ground": "#121212", "disk": "#3b444f", "pale": "#22272d", "edge": "#55606e"}
     if not dark:
         tones = {"ground": "#ffffff", "disk": "#d0d8e2", "pale": "#eef1f5", "edge": "#a9b7c8"}

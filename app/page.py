@@ -19,7 +19,7 @@ from .data import Library
 from .grabs import Hand
 from .jobs import Task, computing, reading
 from .state import AppState
-from .views import explanation
+from .views import explanation, figure
 from .views.address import Address
 from .views.controls import Controls
 from .views.hints import Hints
@@ -187,7 +187,7 @@ def _large(document: Document, query: str) -> Any:
         left.extend(
             [
                 controls.beside,
-                controls.error_beside,
+                controls.error,
                 packing.legend,
                 explanation.view(state),
                 Address(state),
@@ -200,17 +200,16 @@ def _large(document: Document, query: str) -> Any:
         for k in range(0, len(widgets), 3):
             sidebar.extend(widgets[k : k + 3])
             yield
-        summary, volume = tiles(state), Volume(state).panel()
-        right.extend([of_which(state), summary, volume])
+        summary = tiles(state, Volume(state))
+        right.extend([of_which(state), summary])
         tabs = Tabs(state)
-        _pale_when_old(
-            [*tabs.pages.items(), ("summary", summary), ("volume", volume), ("plane", middle)]
-        )
+        _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
         packing.player.on_digit = tabs.choose
         state.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
         yield
         right.append(tabs.tabs)
         yield
+        right.append(figure.panel(state))
         yield from tabs.filling(state.tab)
         yield from tabs.beside(middle)
         state.read_ahead()
@@ -376,8 +375,10 @@ def _module(name: str) -> ModuleType:
 def _pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
     """Have parts (name, view) of other states than those asked for be pale; see player.js."""
     for name, part in parts:
+        old = "growing" if name in GROWING else "still"
         part.styles = part.styles | {
-            "opacity": f"var(--{'growing' if name in GROWING else 'still'}, 1)"
+            "opacity": f"var(--{old}, 1)",
+            "filter": f"var(--{old}-colours, none)",
         }
 
 

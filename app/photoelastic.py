@@ -13,6 +13,7 @@ from granforce.packing.importers.pegs import open_frames, take_frame
 from granforce.packing.importers.repair import KINDS
 from granforce.records import Packing
 from granforce.study import series
+from granforce.study.keys import Parameters
 from granforce.study.schema import dataset_packing
 
 from . import exports, uploads
@@ -49,6 +50,21 @@ class Frame(NamedTuple):
     region: np.ndarray  # (N_c,) number of the region that a contact lies in, see `series.regions`
     stress: np.ndarray  # (9, 3) xx, yy, xy by region, over the mean pressure
     stress_error: np.ndarray  # (9, 3)
+
+
+class Measured(NamedTuple):
+    """What was measured in a frame that was opened as a packing, for its contacts (N_c,)."""
+
+    packing: Parameters  # that name it
+    force: np.ndarray  # f_n in the packing's unit; NaN where it was not measured
+    off: np.ndarray  # inferred less measured f_n in σ, NaN likewise
+
+
+def measured(frame: Frame, packing: Parameters) -> Measured:
+    """What was measured of the contacts between the grains of a frame."""
+    between = (frame.ends < len(frame.r)).all(axis=1)
+    unit = frame.report["mean_measured_normal_force"]
+    return Measured(packing, unit * frame.measured[between, 0], frame.deviation[between, 0])
 
 
 def infer(

@@ -135,14 +135,16 @@ def _unusual(packing: Parameters) -> Parameters:
     return {name: packing[name] for name in OPTIONS if packing.get(name) != usual.get(name)}
 
 
-def series(selection: Selection, parameters: Parameters | None = None) -> str:
+def series(
+    selection: Selection, parameters: Parameters | None = None, called: str | None = None
+) -> str:
     """Everything but μ, in words: selections of one series form one η(μ).
 
-    parameters: those of the entry, where it is one.
+    parameters: those of the entry, where it is one; called: the files of an imported packing.
     """
     packing = selection.packing
     if selection.imported:
-        words = [f"imported {packing['imported'][:8]}"]
+        words = [f"{called or 'imported'} {packing['imported'][:8]}"]
     else:
         words = [f"N = {packing['n']}", f"seed {packing['seed']}"]
         words += [f"{name} {value}" for name, value in _unusual(packing).items()]

@@ -66,11 +66,12 @@ def html(
     outlined: planes.Outlined | None = None,
     loads: Floats | None = None,
     gone: Floats | None = None,
+    measured: Mapping[str, Any] | None = None,
     pins: Mapping[str, Any] | None = None,
 ) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
-    exact: under what is known; gone, pins: as the player has them.
+    exact: under what is known; gone, measured, pins: as the player has them.
     """
     intervals = exact_intervals(exact, replay)
     shown, acceptance = thinned(replay)
@@ -105,6 +106,7 @@ def html(
         "displacement": None,
         "loads": loads,
         "gone": gone,
+        "measured": measured or {},
         "pins": pins or {},
     }
     left = len(replay.normal) - len(shown.normal)
@@ -122,7 +124,7 @@ def html(
         else "",
         style=_script((FOLDER / "player.css").read_text()),
         given=_script({name: _plain(value) for name, value in given.items()}),
-        code=joined(*Player.SCRIPTS, "standalone"),
+        code="\n".join([Player._esm, joined("standalone")]),
     )
     return text.encode()
 

@@ -17,7 +17,7 @@ from .known import Knowledge
 from .limits import LIMITS
 from .live import Arriving, Following
 from .replays import Replay
-from .selection import Selection, command, link, read_link, series
+from .selection import Selection, command, link, read_link
 
 View = dict[str, Any]  # parameters of AppState by name
 
@@ -29,6 +29,7 @@ COLOURS = {
     "sign": "sign of fₙ − pinned fₙ",
     "load": "limit load",
     "known": "what is known: part of the interval gone",
+    "deviation": "inferred less measured fₙ, in σ",
 }
 WIDTHS = {
     "normal": "normal force fₙ",
@@ -36,6 +37,7 @@ WIDTHS = {
     "difference": "|fₙ − pinned fₙ|",
     "load": "limit load",
     "known": "what is known: length of the interval gone",
+    "measured": "measured fₙ",
 }
 SORTS = {
     "original": "original fₙ",
@@ -77,6 +79,7 @@ class AppState(param.Parameterized):
     cell = param.Parameter(doc="the Cell on screen, or None")
     replay = param.Parameter(doc="the Replay on screen, or None")
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
+    measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
     live = param.Parameter(doc="the Following of what is being computed, or None")
     arriving = param.Parameter(doc="the Arriving of exact intervals under way, or None")
@@ -94,14 +97,20 @@ class AppState(param.Parameterized):
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
+    predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
     beside = param.Number(
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
     )
     twin = param.Parameter(doc="the Shown of that μ, or None")
+    zoom = param.Tuple(
+        default=None, length=3, allow_None=True,
+        doc="middle and half width of what is seen, in largest radii; None: the whole packing",
+    )  # fmt: skip
     between = param.Tuple(
         default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
     )
     pulls = param.List(doc="what was pulled one after the other, from `frame` on; see `grabs`")
+    held = param.Parameter(doc="the grabs.Held that pulls have led to; None: `frame` is on screen")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
     known = param.List(doc="known.Statements: forces of contacts that are taken for known")
     narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
@@ -415,7 +424,7 @@ class AppState(param.Parameterized):
     def grow(self, replay: Replay) -> None:
         """Put the Replay of a walk that begins on screen."""
         asked = self.live.selection
-        source = f"μ = {asked.mu:g}, {series(asked)} (as they are found)"
+        source = f"μ = {asked.mu:g}, {self.library.series(asked)} (as they are found)"
         self.param.update(
             growing=replay, fourfold=0, plane=None, moving=False, source=source, displacement=None,
             **UNSEEN,
@@ -437,7 +446,7 @@ class AppState(param.Parameterized):
         """What was asked for and is not on screen, in words; empty where there is nothing."""
         if not self.missing or self.cell is None:
             return ""
-        words = f"μ = {self.selection.mu:g}, {series(self.selection)}"
+        words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
         if self.computation.running:
             return f"asked for: {words}"
         return f"of μ = {self.cell.mu:g}; not computed: {words}"
@@ -494,7 +503,9 @@ class AppState(param.Parameterized):
         view = {}
         for name in VIEW:
             value = getattr(self, name)
-            if value != self.param[name].default:
+            # Between the choice of another μ and its states, what is beside is still on screen.
+            alone = name == "beside" and value == self.selection.mu
+            if value != self.param[name].default and not alone:
                 view[name] = SPELLED.get(name, _spelled)(value)
         return link(self.selection, view)
 
@@ -507,6 +518,13 @@ def _read(library: Library, cell: Cell, job: Job) -> Shown:
 def _pair(text: str) -> tuple[int, int]:
     a, b = (int(part) for part in text.split("-"))
     return a, b
+
+
+def _place(text: str) -> tuple[float, ...]:
+    place = tuple(float(part) for part in text.split(":"))
+    if not all(abs(value) < 1e6 for value in place) or not place[-1] > 0:
+        raise ValueError("no place that can be seen")
+    return place
 
 
 def _tab(text: str) -> str:
@@ -524,8 +542,10 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "frame": int,
     "reference": int,
     "between": _pair,
+    "zoom": _place,
     "split": _flag,
     "beside": float,
+    "predict": int,
     "pulls": grabs.read,
     "known": known.read,
     "colour": str,
@@ -542,6 +562,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "dark": _flag,
 }
 SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": grabs.spelled, "known": known.spelled}
+SPELLED["zoom"] = lambda place: ":".join(f"{value:g}" for value in place)
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
 UNSEEN: View = {"contact": None, "second": None, "frame": 0, "reference": 0, "between": None}
 UNSEEN |= {"pulls": [], "known": []}

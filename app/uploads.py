@@ -1,4 +1,4 @@
-"""Packings that a visitor brings, read in memory: no name or path of theirs reaches the disk."""
+"""Packings that a visitor brings, read in memory: no name of theirs becomes a path."""
 
 import io
 import re
@@ -13,6 +13,7 @@ from granforce.study.keys import Parameters
 from .data import Library
 from .jobs import Job
 from .limits import LIMITS
+from .names import call
 
 Files = dict[str, tuple[str, bytes]]  # {role: (name, content)}
 
@@ -179,7 +180,10 @@ def bring(library: Library, files: Files, **options: Any) -> Callable[[Job], Bro
 
 
 def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Brought]:
-    """Work, for jobs.Task, that reports on a packing and keeps it in the cache; a Brought."""
+    """Work, for jobs.Task, that reports on a packing and keeps it in the cache; a Brought.
+
+    source: what it is: the names of its files, by which it is listed from then on.
+    """
 
     def work(job: Job) -> Brought:
         job.begin("looking for its backbone")
@@ -188,6 +192,7 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
             raise InputError("no cache folder can be written, so nothing can be taken in")
         params = kinds.imported_parameters(packing)
         kinds.keep_packing(library.cache, params, packing)
+        call(library.cache, str(params["imported"]), source.partition(": ")[2])
         return Brought(params, report, source)
 
     return work

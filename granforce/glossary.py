@@ -332,6 +332,17 @@ TERMS = {
         "within an error bar): as colour in parts of its length, 1 where nothing is left open; as "
         "width in ⟨fₙ⟩.",
     ),
+    "deviation": Term(
+        "inferred less measured fₙ",
+        "",
+        "Orange contacts carry more in the inferred network than was measured, blue ones less, in "
+        "standard deviations σ of the measurement; grey where nothing was measured.",
+    ),
+    "measured": Term(
+        "measured fₙ",
+        "",
+        "The normal force that was measured; none where there was no measurement.",
+    ),
     "carrying": Term(
         "carry for certain",
         "",

@@ -7,8 +7,8 @@ import param
 from ..state import VIEW
 from .scripts import FOLDER, Scripted, joined
 
-# Nobody goes back to the frame before, or to the other theme.
-PASSING = ("frame", "dark")
+# Nobody goes back to the frame before, to the view of a moment ago, or to the other theme.
+PASSING = ("frame", "dark", "zoom")
 
 
 class Address(Scripted):

@@ -10,6 +10,8 @@ const ICONS = {
   undo: "M12 5V1L6 6l6 5V7a6 6 0 1 1-6 6H4a8 8 0 1 0 8-8z",
   hold: "M8 2h8v2l-1 1v6l3 3v2h-5v6l-1 1-1-1v-6H6v-2l3-3V5L8 4z",
   between: "M4 12l5-5v3h6V7l5 5-5 5v-3H9v3z",
+  predict: "M12 3a6 6 0 0 1 6 6c0 4-5 4-5 8h-2c0-5 5-5 5-8a4 4 0 0 0-8 0H6a6 6 0 0 1 6-6zM11 19h2v2h-2z",
+  differ: "M3 5h8v14H3zM16 4a5 5 0 0 1 4 8l3 4-2 1-3-4a5 5 0 1 1-2-9zm0 2a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",
   split: "M3 5h8v14H3zM13 5h8v14h-8z",
   closer: "M11 4h2v7h7v2h-7v7h-2v-7H4v-2h7z",
   farther: "M4 11h16v2H4z",
@@ -54,6 +56,7 @@ const BUTTONS = `
         <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in ⟨fₙ⟩"></label>
     </span>
   </div>
+  <div class="quiz" role="status"></div>
   <div class="read">
     <span>network <b class="state"></b></span>
     <span class="running">
@@ -69,6 +72,8 @@ const VIEW = `
   ${button("whole", "the whole packing (double click)")}
   ${button("full", "full screen")}`
 const CLOSER = 0.7 // of the view, by a button
+const GAME = button("predict", "three questions, each asked before the page shows the answer", "Predict, then look") +
+  button("differ", "two networks without colour: which lines differ most?", "Spot the difference")
 const CHECKS = `<summary>Check this network</summary>
   <div class="read">
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
@@ -99,7 +104,10 @@ class Buttons {
     checks.className = "checks"
     checks.innerHTML = CHECKS
     checks.append(this.skips)
-    this.root.append(this.scenes, checks)
+    const game = document.createElement("div")
+    game.className = "game"
+    game.innerHTML = GAME
+    this.root.append(this.scenes, game, checks)
     this.scene = scene
     const zoom = (factor) => () => scene.zoom(factor, scene.size / 2, scene.size / 2)
     const all = {

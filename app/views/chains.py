@@ -3,6 +3,7 @@
 import numpy as np
 from bokeh.models import ColorBar, ColumnDataSource, LinearColorMapper, Title
 
+from ..geometry import FULL_DEVIATION
 from .parts import figure
 from .style import BLUE, EDGE, GREY, ORANGE, SERIES, corner, hover, legend_above, ramp
 
@@ -14,7 +15,6 @@ WORDS = {
 STRONG = 0.995  # quantile of f_n from which on chains are as wide as they get
 WIDEST = 0.5  # that width, in mean radii
 FAINT = 0.01  # of that width, below which nothing is drawn
-OFF = 4.0  # σ at which the colour of a difference ends
 AMBER = "#e69f00"  # suspects: a warning
 SCALE = "scale"  # tag of what is a scale
 QUIET = "#808080"  # scales, read by day and by night
@@ -55,7 +55,9 @@ def network(frame, **options):
         chains("inferred", normal, frame.added, color=ORANGE, legend_label="added"),
         chains("measured", measured, listed, color=BLUE),
     ]
-    colours = LinearColorMapper(palette=ramp(ORANGE, GREY, BLUE), low=-OFF, high=OFF)
+    colours = LinearColorMapper(
+        palette=ramp(BLUE, GREY, ORANGE), low=-FULL_DEVIATION, high=FULL_DEVIATION
+    )
     off = {"field": "off", "transform": colours}
     tips.append(chains("deviation", normal, np.isfinite(measured), color=off))
     rows = ("contact", "@contact"), ("fₙ", "@f{0.00} ± @error{0.00}"), ("off by", "@off{0.0} σ")

@@ -16,6 +16,7 @@ from .friction import FrictionSlider
 from .number import NumberField
 from .parts import EXTRA
 from .scenelist import SceneList
+from .select import Select
 
 WIDE = {"sizing_mode": "stretch_width"}
 SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
@@ -23,18 +24,17 @@ FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
 HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
 MADE, SCALES = "How it is made", "Scales of colour and width"
 FOLDED = {"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}}
-# Where the sidebar lies over the page, what went wrong is told at the page's lower edge.
+# What went wrong is told at the page's lower edge, whether the sidebar is open or closed.
 AT_EDGE = """
 :host { position: fixed; inset: auto 0 calc(var(--task, 0px) + var(--card, 0px)); z-index: 1400; }
-@media (min-width: 1200px) { :host { display: none !important } }
+@media (min-width: 1200px) { :host { inset: auto 16px 16px auto; max-width: 620px; } }
 """
 SAME = "the same μ"  # of a packing made with the friction of the ensemble
 
 
 def offered(state):
     """Options and value of the precomputed results: each series with where it has states."""
-    # The series on screen is among them even before the catalogue is read anew: a Select whose
-    # value is not on offer takes the first one, as if a visitor had chosen it.
+    # The series on screen is among them even before the catalogue is read anew.
     on_screen = [] if state.cell is None else [state.cell]
     series = {}
     for cell in [*state.catalogue, *on_screen]:
@@ -42,7 +42,7 @@ def offered(state):
     options = {f"{name} — {_frictions(sorted(found))}": name for name, found in series.items()}
     if state.missing:  # what was asked for has no states: those on screen are of another packing
         return {"options": {f"none with {differs(state)}": "", **options}, "value": ""}
-    return {"options": options, "value": state.cell.series if state.cell else None}
+    return {"options": options, "value": state.cell.series if state.cell else ""}
 
 
 def _frictions(found):
@@ -54,6 +54,7 @@ def _frictions(found):
 def meaningful(state, labels, name):
     """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
     there = {"sign": state.reference, "difference": state.reference, "known": state.known}
+    there |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
     chosen = getattr(state, name)
     return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
 
@@ -84,19 +85,18 @@ class Controls:
         self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
         self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
-        self.kind = pmui.Select(label="States from", options=_swap(kinds), **SMALL)
-        self.relax = pmui.Select(label="Relaxation", options=_swap(SOLVERS), **SMALL)
-        self.series = pmui.Select(label="Precomputed results", options=[], **SMALL)
+        self.kind = Select(label="States from", options=_swap(kinds), **FIELD)
+        self.relax = Select(label="Relaxation", options=_swap(SOLVERS), **FIELD)
+        self.series = Select(label="Precomputed results", **FIELD)
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
-        self.colour = pmui.Select(label="Colour", options=_swap(COLOURS), **SMALL)
-        self.thickness = pmui.Select(label="Width", options=_swap(WIDTHS), **SMALL)
+        self.colour = Select(label="Colour", options=_swap(COLOURS), **FIELD)
+        self.thickness = Select(label="Width", options=_swap(WIDTHS), **FIELD)
         self.full = pmui.TextInput(label="Full colour, ⟨fₙ⟩", placeholder="by itself", **SMALL)
         self.stretch = pmui.TextInput(label="Width, times", **SMALL)
         self.overlay = pmui.Switch(
             label="Strong and undetermined contacts", value=state.overlay, margin=(2, 10)
         )
-        self.error = pmui.Alert(severity="error", visible=False, **WIDE)
-        self.error_beside = pmui.Alert(
+        self.error = pmui.Alert(
             severity="error", variant="filled", visible=False, closeable=True, margin=0,
             stylesheets=[AT_EDGE],
         )  # fmt: skip
@@ -118,7 +118,6 @@ class Controls:
             SceneList(**WIDE),
             self.mu,
             self.go,
-            self.error,
             pn.Column(
                 pmui.Typography("Force chains", **HEADING),
                 self.colour,
@@ -170,12 +169,21 @@ class Controls:
         self.full.param.watch(self._scale, "value")
         self.stretch.param.watch(self._scale, "value")
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
-        looks = ["colour", "thickness", "full", "stretch", "overlay", "reference", "known"]
+        looks = [
+            "colour",
+            "thickness",
+            "full",
+            "stretch",
+            "overlay",
+            "reference",
+            "known",
+            "measured",
+        ]
         state.param.watch(self._look, looks)
         state.param.watch(self._command, ["selection", "missing", "replay", "known"])
         self._command()
         state.param.watch(self._tell, "message")
-        self.error_beside.param.watch(self._read, "closed")
+        self.error.param.watch(self._read, "closed")
         state.computation.param.watch(self._rest, "running")
         self._tell()
 
@@ -288,6 +296,5 @@ class Controls:
             self.state.message = ""
 
     def _tell(self, *events):
-        told = {"title": self.state.message, "visible": bool(self.state.message)}
-        self.error.param.update(**told)
-        self.error_beside.param.update(closed=False, **told)
+        message = self.state.message
+        self.error.param.update(title=message, visible=bool(message), closed=False)

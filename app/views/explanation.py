@@ -8,7 +8,7 @@ from .hints import term
 from .scripts import Scripted, joined
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL = "; drag a line to make your own"
+PULL = "; drag a line to make one"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }

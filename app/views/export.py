@@ -6,9 +6,10 @@ from .. import exports, movies, planes, standalone
 from ..compute import found_or_made
 from ..data import SOURCES
 from ..jobs import reading
-from ..state import VIEW, WIDTHS
+from ..state import VIEW
+from .captions import caption, known_words, stem
 from .handover import Handover
-from .packing import colour_bar, colour_words, exact_intervals, full_extent, gone, pins
+from .packing import exact_intervals, full_extent, gone, measured, pins
 from .parts import note
 from .progress import Progress
 from .style import palettes
@@ -36,7 +37,6 @@ computed again. Every plot is saved as PNG or SVG by the buttons above it. The a
 reopens this view; <code>granforce walk --packing packing.npz</code> goes on with the packing.
 """
 LONG = ("netcdf", "zarr", "gif", "html")  # with progress
-GROUND = ("#ffffff", "#121212")  # by day, by night
 
 
 class View:
@@ -69,36 +69,18 @@ class View:
         if state.replay is None:
             self.told.object = "There is nothing on screen yet."
             return
-        stem = _stem(state.cell.selection)
+        name = stem(state.cell.selection)
         if key in DRAWN:
-            self.buttons.hand_over_picture(f"{stem}.{key}", self._caption())
+            self.buttons.hand_over_picture(f"{name}.{key}", caption(state))
         elif key in LONG:
-            self.making.start(self._long(key, stem), self.buttons.hand_over)
+            self.making.start(self._long(key, name), self.buttons.hand_over)
         else:
-            self.task.start(self._making(key, stem), self.buttons.hand_over)
+            self.task.start(self._making(key, name), self.buttons.hand_over)
 
     def _rest(self, event):
         """What failed or was cancelled brings no file: its button rests, too."""
         if not event.new:
             self.buttons.rest()
-
-    def _caption(self):
-        """What a picture says about itself: background, colour bar, scale and words."""
-        state = self.state
-        pulled = bool(state.pulls)
-        low, stops, high = colour_bar(state, pulled)
-        contrast = "#f2f5f9" if state.dark else "#18191d"
-        return {
-            "background": GROUND[state.dark],
-            "ink": contrast,
-            "bar": {"low": low, "high": high, "stops": stops},
-            "lines": [
-                f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state, pulled)}.",
-                state.source,
-                *known_words(state),
-                f"granforce ?{state.link()}",
-            ],
-        }
 
     def _long(self, key, stem):
         """Work that makes a file that takes a while: all states, a movie, the page."""
@@ -106,6 +88,7 @@ class View:
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
         possible = state.possible
         loads, given, known = state.loads, gone(state, replay), pins(state)
+        seen = measured(state, replay)
         view = {name: getattr(state, name) for name in VIEW}
         source = " ".join([state.source, *known_words(state)])
         told = {"link": state.link(), "command": state.command, "source": source}
@@ -124,7 +107,7 @@ class View:
                 most = full_extent(replay, bounds, view["full"])
                 names = ("colour", "thickness", "reference", "dark", "full", "stretch")
                 look = movies.shades(
-                    replay, bounds, palettes(view["dark"]), loads=loads, gone=given,
+                    replay, bounds, palettes(view["dark"]), loads=loads, gone=given, measured=seen,
                     most=most, **{name: view[name] for name in names},
                 )  # fmt: skip
                 content = movies.gif(
@@ -145,6 +128,7 @@ class View:
                 possible,
                 loads=loads,
                 gone=given,
+                measured=seen,
                 pins=known,
                 view=view,
                 outlined=outlined,
@@ -159,14 +143,16 @@ class View:
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
         frame = min(state.frame, len(replay.normal) - 1)
-        source = state.source
+        source, held = state.source, state.held
         link, view = state.link(), {name: getattr(state, name) for name in VIEW}
 
         def work(job):
             job.begin("making the file")
             if key == "csv":
-                columns = exports.contacts(replay, exact, frame)
-                head = exports.explained(columns, replay, source)
+                columns = exports.contacts(replay, exact, frame, held)
+                head = exports.explained(
+                    columns, replay, source, exports.on_screen(replay, frame, held)
+                )
                 content = exports.csv(columns, head)
                 return exports.File(f"{stem}.csv", "text/csv", content)
             if key == "json":
@@ -182,28 +168,9 @@ class View:
             self.told.object = event.new
 
 
-NAMED = 4  # known forces that a caption names
-
-
-def known_words(state):
-    """What is known, in a line of a caption; none where nothing is."""
-    number = state.replay.backbone
-    told = [one.words(number[one.contact]) for one in state.known]
-    if told:
-        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
-        yield f"Known: {'; '.join(told[:NAMED])}{more}."
-
-
 def all_states(library, cell, job):
     """The dataset of a cell with all its states: those that were not kept are computed again."""
     if cell.params.get("keep") is None:
         return library.dataset(cell)
     params = cell.params | {"keep": None}
     return found_or_made(library, job, "all states", SOURCES[cell.kind], params)
-
-
-def _stem(selection):
-    """Name of a file without its ending."""
-    if selection.imported:
-        return f"granforce_{selection.packing['imported'][:8]}_mu{selection.mu:g}"
-    return f"granforce_n{selection.packing['n']}_mu{selection.mu:g}_s{selection.packing['seed']}"

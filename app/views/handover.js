@@ -123,11 +123,21 @@ export function render({ model, view }) {
     const caption = file.caption && deep(file.caption)
     const button = root.querySelector(".busy")
     let blob
+    if (file.width) return await together(file, caption)
     if (!caption) blob = new Blob([file.content], { type: file.mime })
     else if (file.name.endsWith(".webm")) blob = await recorded(caption, button)
     else blob = drawn(caption)
     if (caption && file.name.endsWith(".png")) blob = await rendered(blob)
     save(blob, file.name)
+    rest()
+  }
+
+  /** Packing and plots as one figure, to be saved or printed. */
+  async function together({ name, width }, caption) {
+    const plots = await plotsSeen(view.model.document), packing = player().scene.picture(caption)
+    const figure = composed(packing, plots, width, caption.background)
+    if (name.endsWith(".pdf")) printFigure(figure, width)
+    else save(new Blob([figure.text], { type: "image/svg+xml" }), name)
     rest()
   }
 

@@ -15,7 +15,7 @@ class Handover(Scripted):
 
     files = param.Dict(default={}, doc="{heading: {key: words}}")
 
-    _esm = joined("ask", "handover")
+    _esm = joined("ask", "figure", "handover")
     _stylesheets: ClassVar = [
         """
         :host { display: block; }
@@ -43,12 +43,13 @@ class Handover(Scripted):
         """Have the browser save an exports.File."""
         self._send_msg(file._asdict())
 
-    def hand_over_picture(self, name, caption):
+    def hand_over_picture(self, name, caption, width=None):
         """Have the browser draw the packing as on screen (SVG, PNG), or record it (WebM), and save.
 
-        caption: background, ink, bar {low, high, stops} and lines of words.
+        caption: background, ink, bar {low, high, stops} and lines of words; width: in mm, of one
+        figure with the plots that are seen (SVG, or PDF by printing).
         """
-        self._send_msg({"name": name, "caption": caption})
+        self._send_msg({"name": name, "caption": caption} | ({"width": width} if width else {}))
 
     def rest(self):
         """No file comes for what was asked."""

@@ -1,9 +1,9 @@
 // The glossary where its words stand. Marked are elements with data-term; of widgets the words of
-// their label, of the option chosen, or of the option under the pointer are looked up.
+// their label and of the option chosen are looked up.
 
 const WAIT_MS = 250 // before a hint opens under a resting pointer
-const WIDGETS = "[role=option], [role=menuitem], [role=tab], button, .number, .friction, " +
-  ".MuiFormControl-root, .MuiFormControlLabel-root"
+const WIDGETS = "[role=tab], button, .number, .friction, " +
+  ".choice, .MuiFormControl-root, .MuiFormControlLabel-root"
 const DEEP = 14 // levels above the pointer that may hold the word
 
 export function render({ model }) {
@@ -19,7 +19,7 @@ export function render({ model }) {
 
   /** Keys of the glossary that a widget's words stand for: its value's first, then its label's. */
   function keysOf(node) {
-    const value = words(node, "[role=combobox]"), label = words(node, "label, legend, .name")
+    const value = words(node, "option:checked"), label = words(node, "label, legend, .name")
     const found = [value, label, node.textContent.trim()].map((text) => labels[text])
     return [...new Set(found.filter(Boolean))].slice(0, 2)
   }

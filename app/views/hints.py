@@ -21,6 +21,7 @@ LABELS = {
     "Precomputed results": "store",
     "what is known: part of the interval gone": "gone",
     "what is known: length of the interval gone": "gone",
+    "inferred less measured fₙ, in σ": "deviation",
     "Colour": "mobilisation",
     "Width": "fn",
     "mobilisation fₜ/(μ fₙ)": "mobilisation",

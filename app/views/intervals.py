@@ -12,6 +12,7 @@ from .hints import term
 from .known import Known
 from .packing import exact_intervals
 from .parts import MOVES, figure, note
+from .select import Select
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
@@ -21,13 +22,13 @@ BARS += ("whole_low", "whole_high")  # exact intervals without what is known
 SEEN = 0.9  # width of a bar of what was seen, in that of one contact; see layer.js
 ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
 ETAS = ("eta1", "eta2", "eta3")
-SMALL = {"size": "small", "width": 190, "margin": (10, 8, 2, 8)}
+SMALL = {"width": 190, "margin": (6, 8, 2, 8)}
 
 
 HELP = f"""
 One bar for each contact. Pale: every force it can have in any network in balance
 ({term("exact", "possible")}); dark: what the states passed so far had; yellow: in the
-{term("original")}; dots: in the state on screen. Below: η of the states passed so far (of η3,
+{term("original")}; dots: in the state on screen. Curves: η of the states passed so far (of η3,
 {term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
 {term("known", "known")}, the faintest part of a bar is what was possible without that knowledge.
 Click a bar to find its contact in the packing.
@@ -51,7 +52,11 @@ class View:
         self.sort = _select("Sorted by", SORTS, state.sort)
         self.scale = _select("Scale", SCALES, state.scale)
         self.exact = pmui.Button(
-            label="Compute exact intervals", variant="outlined", size="small", margin=(14, 8, 2, 8)
+            label="Compute exact intervals",
+            variant="outlined",
+            color="default",
+            size="small",
+            margin=(14, 8, 2, 8),
         )
         self.told = note(HELP)
         self.left_out = pn.pane.HTML(margin=(0, 10), styles={"font-size": "12px", "opacity": "0.8"})
@@ -68,8 +73,8 @@ class View:
             pn.pane.Bokeh(self.figure, **wide),
             self.exact,  # below, as the plot must not move when the button goes
             self.left_out,
-            self.told,
             pn.pane.Bokeh(self.growth_figure, **wide),
+            self.told,
             Contacts(self.state),
             sizing_mode="stretch_width",
         )
@@ -81,7 +86,7 @@ class View:
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
         state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "sort", "scale"])
-        state.param.watch(self._offer, ["replay", "growing", "exact"])
+        state.param.watch(self._offer, ["replay", "growing", "exact", "arriving"])
         state.param.watch(self._mark, "contact")
         state.param.watch(self._catch_up, "tab")
         for task in (state.computation, state.knowledge.task):
@@ -117,7 +122,9 @@ class View:
 
     def _offer(self, *events):
         """Exact intervals are to be asked for only where none are there or under way."""
-        self.exact.visible = self.state.replay is not None and self.state.exact_wanted
+        state = self.state
+        self.exact.visible = state.replay is not None and state.exact_wanted
+        self.exact_item.visible = state.possible is not None or state.arriving is not None
 
     def _show_bars(self, replay, exact, ranks):
         contacts = self.contacts
@@ -247,7 +254,7 @@ class View:
             moving.tags = MOVES
         fig.name = "bars_figure"
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
-        self.whole_item = fig.legend[0].items[0]
+        self.whole_item, self.exact_item = fig.legend[0].items[:2]
         legend_above(fig, 5)
         corner(fig, "possible: exact; seen: so far")
         fig.add_tools(
@@ -320,7 +327,7 @@ def _source(name, columns):
 
 def _select(name, labels, value):
     options = {label: key for key, label in labels.items()}
-    return pmui.Select(label=name, options=options, value=value, **SMALL)
+    return Select(label=name, options=options, value=value, **SMALL)
 
 
 def _set_range(axis, low, high):

@@ -45,7 +45,7 @@ function moving({ box, tilt, x, radius, i, j, reach }) {
 function flickering({ normal, tangential, radius, mu }, palettes) {
   const colours = mu > 0 ? palettes.mobilised : [palettes.neutral], last = colours.length - 1
   const unit = radius.reduce((most, r) => Math.max(most, r), 0)
-  const width = normal.map((value) => unit * Math.min(WIDEST, WIDTH * value))
+  const width = normal.map((value) => unit * Math.min(WIDEST, CHAIN_WIDTH * value))
   const bin = Int16Array.from(normal, (value, c) => {
     const part = mu > 0 && value > CARRYING ? tangential[c] / (mu * value) : 0
     return Math.round(last * Math.max(0, Math.min(1, 0.5 + part / 2)))

@@ -1,7 +1,6 @@
 // How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
+// CHAIN_WIDTH, FULL_CHANGE and FULL_DEVIATION are those of geometry.py, see player.py.
 
-const WIDTH = 0.23 // of a chain that carries the mean normal force, in largest radii
-const FULL = 0.5 // ⟨fₙ⟩, the change at which its colour is full, where nothing else is asked for
 const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
 const THIN = 0.15 // of its width, a chain that a filter leaves out
@@ -13,6 +12,7 @@ class Look {
     this.walk = walk
     this.only = null // 1 for each contact that a filter leaves, or null
     this.before = null // fₙ before the pull whose changes are coloured
+    this.plain = false // whether colours would give something away, see difference.js
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     this.strong = largest(walk.normal.subarray(0, walk.contacts))
     this.measure()
@@ -27,6 +27,8 @@ class Look {
     this.loose = largest(this.extent)
     this.loads = model.loads?.length === walk.contacts ? model.loads : null
     this.mostLoad = Math.max(...(this.loads ?? [1]))
+    const measured = plain(model.measured ?? {})
+    this.measured = measured.normal?.length === walk.contacts ? measured : null
     this.gone = model.gone?.length === walk.contacts ? model.gone : null // of ΔFₙ, by what is known
   }
 
@@ -35,14 +37,15 @@ class Look {
     const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
     const colour = this.before ? "pulled" : model.colour
     // A model is slow to ask.
-    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? FULL }
+    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? FULL_CHANGE }
     this.asked.load = full ?? this.mostLoad
-    const unit = WIDTH * (stretch ?? 1)
+    const unit = CHAIN_WIDTH * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
-    const told = (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone)
+    const told = !this.plain && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
+      (colour !== "deviation" || this.measured)
     style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
@@ -63,6 +66,7 @@ class Look {
     if (thickness === "extent") return this.extent[c]
     if (thickness === "load" && this.loads) return this.loads[c]
     if (thickness === "known" && this.gone) return this.gone[c]
+    if (thickness === "measured" && this.measured) return this.measured.normal[c] || 0
     return thickness === "difference" ? Math.abs(normal[c] - this.pinned(c)) : normal[c]
   }
 
@@ -71,6 +75,7 @@ class Look {
     const { colour, most } = this.asked
     if (colour === "mobilised") return 0.5 + (this.mobilised(normal[c], tangential[c]) ?? 0) / 2
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
+    if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * FULL_DEVIATION)
     if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
     if (colour === "load") return this.loads ? this.loads[c] / this.asked.load : 0.5
     if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.asked.full)

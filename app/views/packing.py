@@ -4,12 +4,13 @@ import numpy as np
 import panel as pn
 
 from .. import live
+from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..state import COLOURS, WIDTHS
 from . import explanation
 from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
-SHARED = ("contact", "frame", "reference", "split", "beside")  # both ways
+SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
 FOLLOWED = (
     "second",
     "source",
@@ -17,7 +18,6 @@ FOLLOWED = (
     "tab",
     "views",
     "wide",
-    "colour",
     "thickness",
     "full",
     "stretch",
@@ -25,7 +25,6 @@ FOLLOWED = (
     "scale",
 )  # from the state
 
-WIDTH = 0.23  # of a chain that carries the mean normal force, in largest radii; as in look.js
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
 # What colours and widths show → key of the glossary.
@@ -38,6 +37,8 @@ EXPLAINED = {
     "difference": "difference",
     "load": "limit_load",
     "known": "gone",
+    "deviation": "deviation",
+    "measured": "measured",
 }
 LEGEND = """
 <div style="display:flex;flex-wrap:wrap;gap:3px 20px;align-items:center;font-size:12px">
@@ -74,6 +75,7 @@ class PackingView:
             name="player",  # by which others in the page find it
             sizing_mode="stretch_width",
             palettes=palettes(state.dark),
+            zoom=None if state.zoom is None else list(state.zoom),
             **{name: getattr(state, name) for name in (*SHARED, *FOLLOWED)},
         )
         self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(2, 10))
@@ -81,9 +83,12 @@ class PackingView:
             self.player.param.watch(lambda event: state.param.update({event.name: event.new}), name)
         self._shown = None
         self.player.param.watch(self._swing, "between")
+        self.player.param.watch(self._look_at, "zoom")
         self.player.param.watch(self._explain, "pulled")
         state.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "between", "full"])
+        state.param.watch(
+            self._show, ["replay", "growing", "exact", "narrowed", "between", "full", "measured"]
+        )
         state.param.watch(self._pin, ["known", "ranked", "replay"])
         state.param.watch(self._displace, "displacement")
         state.param.watch(self._accompany, "twin")
@@ -110,6 +115,9 @@ class PackingView:
     def _swing(self, event):
         self.state.between = None if event.new is None else tuple(event.new)
 
+    def _look_at(self, event):
+        self.state.zoom = None if event.new is None else tuple(event.new)
+
     def _follow(self, *events):
         self.player.param.update({event.name: event.new for event in events})
 
@@ -122,6 +130,7 @@ class PackingView:
         changes = {
             "exact": exact,
             "gone": gone(state, replay),
+            "measured": measured(state, replay),
             "most": full_extent(replay, exact, state.full),
             "between": None if state.between is None else list(state.between),
         }
@@ -129,6 +138,7 @@ class PackingView:
             self._shown = replay
             room = 0 if state.growing is None else len(live.numbers(replay.summary))
             changes["walk"] = frames(replay, room)
+            changes["free"] = replay.summary["dimension"]
         self.player.param.update(changes)
 
     def _accompany(self, *events):
@@ -201,6 +211,15 @@ def gone(state, replay):
     return narrowed.gone.astype(np.float32)
 
 
+def measured(state, replay):
+    """Of an opened frame the measured f_n in ⟨f_n⟩ and how far off it is in σ; {} for others."""
+    found = state.measured
+    if found is None or state.selection is None or state.selection.packing != found.packing:
+        return {}
+    normal, off = found.force[replay.backbone] / replay.force_scale, found.off[replay.backbone]
+    return {"normal": normal.astype(np.float32), "off": off.astype(np.float32)}
+
+
 def normal_extent(replay, exact):
     """ΔF_n (N_c,) in ⟨f_n⟩: exact where known, else of all states."""
     if exact:
@@ -219,8 +238,8 @@ def full_extent(replay, exact, asked=None):
 def colour_bar(state, pulled):
     """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
-    half = "½" if state.full is None else f"{state.full:.3g}"  # see FULL in look.js
-    change = f"{half} ⟨fₙ⟩ less", diverging, f"{half} ⟨fₙ⟩ more"
+    full = state.full or FULL_CHANGE
+    change = f"{full:.3g} ⟨fₙ⟩ less", diverging, f"{full:.3g} ⟨fₙ⟩ more"
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), state.full)
@@ -229,6 +248,7 @@ def colour_bar(state, pulled):
         "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
         "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads, state.full)),
         "change": change,
+        "deviation": (f"{FULL_DEVIATION:g} σ less", diverging, f"{FULL_DEVIATION:g} σ more"),
         "known": ("0", list(palettes(state.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
     }[state.colour]
@@ -260,7 +280,7 @@ def legend(state, pulled=False):
     tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
     return LEGEND.format(
         width=WIDTHS[state.thickness],
-        widest=2 / (WIDTH * state.stretch),
+        widest=2 / (CHAIN_WIDTH * state.stretch),
         width_term=EXPLAINED[state.thickness],
         colour_term=EXPLAINED[state.colour],
         colour=colour_words(state, pulled),

@@ -36,6 +36,9 @@ COMPUTED = (
     "inner half is the outline shrunk to half its lengths about its middle.</details>"
 )
 
+# No taller than the window leaves room for, where it has all of its width.
+WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 230px))"}
+
 HELP = f"""
 One point is one whole network of forces. Shown is the shadow ({term("principal", "projection")})
 that {term("s")} casts on a plane, not a section: the shaded {term("outline")} holds all of it.
@@ -76,7 +79,7 @@ class View(TabView):
         """Choice of the plane, plot, and what it says."""
         return pn.Column(
             pn.FlexBox(self.planes, self.also, sizing_mode="stretch_width"),
-            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
+            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0, styles=WHOLLY_SEEN),
             Progress(self.task),
             Progress(self.others),
             self.told,

@@ -4,8 +4,8 @@
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const SWING = 2.2 // s, for the displacement field to go to and fro
-const CROSSING = 8 // times as long as a step takes the way between two states
-const OLD = 0.35 // opacity of what is of other states than those asked for
+const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye
+const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
 const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
 const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
@@ -39,10 +39,16 @@ class Player {
     this.pins = new Pins(model)
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
-    this.scene.onMarks = (context, scene) => { this.pins.draw(context, scene); this.hand.draw(context, scene) }
+    this.scene.onMarks = (context, scene) => {
+      this.pins.draw(context, scene)
+      this.hand.draw(context, scene)
+      this.difference.draw(context, scene)
+    }
     this.scene.onSheet = (sheet, scene) => this.pins.onSheet(sheet, scene)
+    this.difference = new Difference(this)
+    this.predict = new Predict(this)
     this.split = new Split(this)
-    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint() }
+    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
     this.scene.describe = {
       contact: (k) => this.look.contact(k, this.replay),
       grain: (k) => this.look.grain(k, this.replay),
@@ -56,7 +62,9 @@ class Player {
   load() {
     const { model, scene, playing } = this, walk = plain(model.walk)
     if (model.walk === this.loaded || !walk.contacts) return
+    const zoom = this.loaded ? null : model.zoom // of the link that opened the page
     this.loaded = model.walk
+    this.difference.end()
     const view = this.live.leave(), place = this.grownInto(walk)
     this.playing = false
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
@@ -71,6 +79,7 @@ class Player {
     this.buttons.part("source").textContent = model.source
     this.tellAsked()
     scene.show(this.replay.walk)
+    if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
     this.split.show()
     scene.resize()
     scene.repaint()
@@ -78,6 +87,7 @@ class Player {
     this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
     this.follows = walk.room > 0 || (this.follows && place !== null)
     if (playing || walk.room) requestAnimationFrame(() => this.play(true))
+    else if (this.model.predict) this.predict.ask() // of a link
   }
 
   /** Where a walk that is finished goes on, if it is the one that was being computed; else null. */
@@ -116,8 +126,11 @@ class Player {
     this.buttons.root.classList.toggle("moving", live.moves)
     this.buttons.tellAsked(live.moves || this.grows ? "" : model.asked)
     // What is beside is pale by these: told by its own style, Bokeh would lay out the whole page anew.
-    style.setProperty("--still", model.asked ? OLD : 1)
-    style.setProperty("--growing", model.asked && !this.grows ? OLD : 1)
+    const pale = { "--still": model.asked, "--growing": model.asked && !this.grows }
+    for (const [name, old] of Object.entries(pale)) {
+      style.setProperty(name, old ? OLD : 1)
+      style.setProperty(`${name}-colours`, old ? "grayscale(1)" : "none")
+    }
   }
 
   select() {
@@ -151,6 +164,20 @@ class Player {
     if (tell) this.model.frame = this.replay.frame
   }
 
+  /** Where the view has come to rest, for links. */
+  tellView() {
+    const { scene, model } = this, { x, y, half } = scene.view, key = `${x},${y},${half}`
+    if (key === this.viewed || scene.frozen) return
+    this.viewed = key
+    clearTimeout(this.looking)
+    this.looking = setTimeout(() => {
+      const [left, right, low, high] = scene.geometry.window
+      const whole = [(left + right) / 2, (low + high) / 2, (right - left) / 2], now = [x, y, half]
+      const rounded = now.map((value) => Number(value.toPrecision(5)))
+      model.zoom = now.every((value, k) => Math.abs(value - whole[k]) < 1e-6) ? null : rounded
+    }, REST_MS)
+  }
+
   /** A network that was pulled has changed. */
   repaintHeld() {
     this.replay.mix()
@@ -162,6 +189,7 @@ class Player {
 
   /** Whether a network is on screen that was pulled: the legend says so, too. */
   tellHeld(held) {
+    if (held) this.difference.end()
     this.buttons.tellHeld(held)
     if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
   }
@@ -239,12 +267,17 @@ class Player {
 
   actions() {
     const loaded = (action) => (given) => { if (this.replay && !this.live.moves) action(this.replay, given) }
-    const halted = (action) => loaded((replay, given) => {
+    const other = (action) => loaded((replay, given) => {
+      this.difference.end()
+      action(replay, given)
+    })
+    const halted = (action) => other((replay, given) => {
       this.hand.free()
       this.follows = false
       this.play(false)
       action(replay, given)
     })
+    const { model } = this
     const step = ({ swinging }) => (swinging ? 0.05 : 1)
     return {
       less: loaded(() => this.hand.nudge(-1)),
@@ -252,7 +285,7 @@ class Player {
       hold: loaded((replay) => this.hold(replay)),
       undo: loaded((replay) => { if (replay.held) this.hand.tell({ undo: true }) }),
       free: loaded(() => this.hand.free()),
-      play: loaded((replay) => {
+      play: other((replay) => {
         this.hand.free()
         this.follows = false
         if (this.playing && this.resting === null) this.pause(replay)
@@ -266,12 +299,20 @@ class Player {
       next: loaded((replay) => this.choose(replay, 1)),
       previous: loaded((replay) => this.choose(replay, -1)),
       scrub: halted((replay, to) => this.show(to)),
-      pin: loaded((replay) => {
+      pin: other((replay) => {
         this.model.reference = replay.frame
         this.model.beside = null
       }),
-      between: loaded((replay) => this.between(replay)),
-      split: loaded(() => { this.model.split = !this.model.split }),
+      between: other((replay) => this.between(replay)),
+      split: other(() => { this.model.split = !this.model.split }),
+      predict: loaded(() => { model.predict = model.predict ? 0 : 1 }),
+      differ: loaded((replay) => {
+        model.predict = 0
+        if (this.difference.on) return this.difference.end()
+        this.play(false)
+        if (replay.swinging) this.model.between = null
+        this.difference.begin(replay)
+      }),
       tab: (number) => this.model.send_msg({ tab: number }),
     }
   }
@@ -344,14 +385,16 @@ class Player {
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
       plane: () => { this.plots.plane = plain(model.plane); this.again() },
       loads: loaded(() => { this.look.measure(); this.again() }),
+      measured: loaded(() => { this.look.measure(); this.again() }),
       gone: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
+      predict: loaded(() => this.predict.ask()),
       frame: loaded((replay) => {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
       pins: loaded(() => scene.drawMarks(this.look.style)),
-      contact: loaded(() => { this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
+      contact: loaded(() => { this.difference.guess(model.contact); this.predict.guess(model.contact); this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
       second: loaded(() => { this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
     }
   }

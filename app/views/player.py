@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 import param
 
+from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from .scripts import FOLDER, Scripted, joined, said
 
 
@@ -26,6 +27,7 @@ class Player(Scripted):
     exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
     loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
     gone = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
+    measured = param.Dict(default={}, doc="of a frame, see packing.measured")
     most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
     plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
@@ -40,9 +42,12 @@ class Player(Scripted):
     second = param.Integer(default=None, allow_None=True)
     frame = param.Integer(default=0)
     reference = param.Integer(default=0)
+    predict = param.Integer(default=0, doc="1 … 3 while a question is asked, see predict.js")
+    free = param.Integer(default=0, doc="dimension h of S")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
     beside = param.Number(default=None, allow_None=True, doc="μ that is seen beside in its place")
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
+    zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
     between = param.List(default=None, allow_None=True)
     tab = param.String()
     views = param.Integer(doc="of tabs, so far")
@@ -67,12 +72,17 @@ class Player(Scripted):
         "live",
         "pins",
         "split",
+        "difference",
+        "predict",
         "point",
         "grab",
         "opening",
         "player",
     )
-    _esm = joined(*SCRIPTS)
+    _esm = (
+        f"const CHAIN_WIDTH = {CHAIN_WIDTH}, FULL_CHANGE = {FULL_CHANGE}, "
+        f"FULL_DEVIATION = {FULL_DEVIATION}\n" + joined(*SCRIPTS)
+    )
     _stylesheets: ClassVar = [FOLDER / "player.css"]
 
     def __init__(self, **params):

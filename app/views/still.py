@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..jobs import Task
+from ..state import AppState
 from . import intervals, plane
 
 
@@ -22,20 +23,21 @@ class Light:
     dark = False
 
     def __init__(self, replay, exact, view, tab=None, loads=None):
-        self.__dict__.update(view)
-        self.dark, self.between = False, None
-        self.replay, self.exact, self.tab = replay, exact, tab
-        self.seen, self.possible, self.growing = replay, exact, None
-        self.second, self.loads, self.narrowed = None, loads, None
+        # All else as where nothing is computed, chosen or known.
+        state = {name: AppState.param[name].default for name in AppState.param}
+        told = {"dark": False, "between": None, "second": None, "tab": tab, "loads": loads}
+        self.__dict__.update(state | view | told)
+        self.replay = self.seen = replay
+        self.exact = self.possible = exact
         self.computation = SimpleNamespace(running=False, param=_Deaf())
         self.knowledge = SimpleNamespace(task=self.computation)
-        self.missing, self.cell, self.exact_wanted = False, None, False
+        self.exact_wanted = False
 
     def shows(self, name):
         """Whether what has this tab is on screen, as for AppState."""
         return name == self.tab
 
-    def task(self, pool=None, *, told=True):
+    def task(self, *arguments, **options):
         """A Task that is never started."""
         return Task()
 

@@ -48,6 +48,7 @@ def palettes(dark):
         "load": ramp(*EXTENT[dark]),
         "known": ramp(*EXTENT[dark]),
         "change": diverging,
+        "deviation": diverging,
         "sign": [BLUE, GREY, ORANGE],
         "neutral": NEUTRAL[dark],
         "plots": {

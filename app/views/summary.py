@@ -128,8 +128,8 @@ def left_out(summary):
     return line
 
 
-def tiles(state):
-    """The numbers of the replay on screen, and what they stand on, to be opened."""
+def tiles(state, volume):
+    """The numbers of the replay on screen, its Volume, and what they stand on, to be opened."""
     folded = Foldout(line="Check", sizing_mode="stretch_width", margin=(2, 12))
 
     def tell(*events):
@@ -138,7 +138,8 @@ def tiles(state):
     state.param.watch(tell, "replay")
     tell()
     shown = of_replay(state, numbers, STYLE, margin=(0, 10))
-    return pn.Column(shown, folded, sizing_mode="stretch_width")
+    last = pn.Row(folded, volume.measure, sizing_mode="stretch_width")
+    return pn.Column(shown, volume.tiles, last, sizing_mode="stretch_width")
 
 
 def of_which(state):

@@ -24,7 +24,7 @@ export function render({ model, view }) {
     </section>
     <div class="ring" hidden></div>`
   const part = (name) => root.querySelector(name), card = part(".card"), ring = part(".ring")
-  let shown = 0
+  let shown = 0, pointed = null // the step, and what it is about
 
   const remember = () => { try { window.localStorage.setItem(SEEN, "seen") } catch { /* private */ } }
   const known = () => { try { return window.localStorage.getItem(SEEN) !== null } catch { return true } }
@@ -44,14 +44,13 @@ export function render({ model, view }) {
     clear(step)
     card.hidden = !step
     part(".begin").hidden = Boolean(step)
-    if (step !== shown) ring.hidden = true
-    if (!step) { shown = 0; leaveRoom(); return }
+    if (step !== shown) { ring.hidden = true; pointed = null }
+    if (!step) { shown = 0; return }
     const [title, text] = steps[step - 1]
     part("h2").textContent = title
     part("p").textContent = text
     part(".count").textContent = `${step + model.before} of ${steps.length + model.before}`
     part(".on").textContent = step === steps.length ? "Finish" : "Next"
-    leaveRoom()
     if (step === shown) return
     shown = step
     remember()
@@ -75,6 +74,7 @@ export function render({ model, view }) {
   /** What lies under the card can be scrolled to, see page.py. */
   function leaveRoom() {
     document.documentElement.style.setProperty("--card", `${card.offsetHeight}px`)
+    if (shown) bringIntoView(pointed)
   }
 
   /** Bring what a step is about into view, as soon as it is there, and ring it while the step is on. */
@@ -83,10 +83,12 @@ export function render({ model, view }) {
     const all = every(document), found = all.find((e) => e.matches(TARGETS[name]) &&
       e.offsetHeight && e.checkVisibility({ visibilityProperty: true }))
     if (!found) return void setTimeout(() => point(name, step), LOOK_MS)
+    pointed = found
     encircle(found, all.find((e) => e.matches(".header")), step)
   }
 
   function bringIntoView(found) {
+    if (!found?.isConnected) return
     const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
     const block = { friction: "center", scene: "nearest" }[target()] ?? "start"
     found.scrollIntoView({ block, behavior: still ? "auto" : "smooth" })
@@ -124,7 +126,9 @@ export function render({ model, view }) {
   })
   model.on("step", show)
   model.on("steps", show)
-  model.on("remove", () => { shown = 0; clear(0) })
+  const room = new ResizeObserver(leaveRoom) // also once a card that a link opens is on the page
+  room.observe(card)
+  model.on("remove", () => { shown = 0; clear(0); room.disconnect() })
   show()
   if (model.first && !model.step && !known()) go(1)
   return root

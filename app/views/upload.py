@@ -8,12 +8,14 @@ import panel_material_ui as pmui
 from granforce.records import InputError, friction, make_cell, positive
 
 from .. import photoelastic, uploads
-from ..limits import LIMITS
+from ..limits import LIMITS, SHARED
 from ..selection import Selection
 from . import photoelastic as measured
 from .dropper import Dropper
+from .mine import Mine
 from .parts import note
 from .progress import Progress
+from .select import Select
 
 STATES = 200  # of the walk that is made at once
 HELP = """
@@ -59,9 +61,8 @@ class View:
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
         self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
         self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
-        self.walls = pmui.Select(
-            label="Walls", options={words: key for key, words in WALLS.items()}, **SMALL
-        )
+        walls = {words: key for key, words in WALLS.items()}
+        self.walls = Select(label="Walls", options=walls, width=150, margin=(4, 8))
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
@@ -86,6 +87,7 @@ class View:
             self.report,
             self.frame,
             note(HELP),
+            *([] if SHARED else [Mine(self.state)]),  # on a server for all it would show all theirs
             sizing_mode="stretch_width",
         )
 
@@ -144,10 +146,11 @@ class View:
             options["pressure"] = positive(self.pressure.value, "the pressure")
         return options
 
-    def _show(self, brought):
+    def _show(self, brought, frame=None):
         """Report, and put the packing on the page; its walk is computed at once."""
         rows = "".join(ROW.format(*map(html.escape, row)) for row in uploads.told(brought.report))
         self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
+        self.state.measured = frame and photoelastic.measured(frame, brought.params)
         mu = brought.params["mu"]
         self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
 
@@ -162,7 +165,10 @@ class View:
         if self.task.running:
             return
         packing, source = frame.packing, f"{frame.source}, frame {frame.report['frame']}"
-        self.task.start(uploads.keep(self.state.library, packing, source), self._show)
+        self.task.start(
+            uploads.keep(self.state.library, packing, source),
+            lambda brought: self._show(brought, frame),
+        )
 
     def _clear(self):
         self.report.object = ""

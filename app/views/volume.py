@@ -15,22 +15,22 @@ TILES = (
 
 
 class Volume:
-    """The volume of all networks of the packing on screen, once it is known; else an offer."""
+    """The volume of all networks of the packing on screen, once known: `tiles`; else `measure`."""
 
     def __init__(self, state):
         self.state, self.found = state, None
         self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
         self.measure = pmui.Button(
-            label="Measure the volume of S", variant="outlined", size="small", margin=(4, 10)
+            label="Measure the volume of S",
+            variant="outlined",
+            color="default",
+            size="small",
+            margin=(4, 10),
         )
         self.measure.on_click(lambda event: self._measure())
         state.param.watch(self._look, "replay")
         state.measuring.param.watch(self._offer, "running")
         self._look()
-
-    def panel(self):
-        """The tiles, or the button in their place."""
-        return pn.Column(self.tiles, self.measure, sizing_mode="stretch_width")
 
     def _look(self, *events):
         """Whether a store has it already."""

@@ -204,8 +204,10 @@ def test_the_last_cells_are_kept_in_memory_and_no_more(library, monkeypatch):
 
 
 def test_expected_steps_come_from_the_nearest_packing(library):
-    assert library.expected_steps(DISKS, 0.2) > 0
-    assert library.expected_steps(999, 0.2) is None
+    steps = library.expected_steps(DISKS, 0.2)
+    assert steps > 0
+    # Of larger ones, too: a compaction of 5000 disks once had no time left.
+    assert steps < library.expected_steps(10 * DISKS, 0.2) < 3 * steps
 
 
 # Links and commands
@@ -445,6 +447,21 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
     assert len(state.catalogue) == 3
 
 
+def test_a_friction_stands_beside_another_one_only(state, wait_for):
+    """Back after a comparison once showed 0.1 beside 0.1."""
+    first = state.cell.mu
+    state.split = True
+    links = []
+    state.param.watch(lambda *events: links.append(state.link()), ["beside", "selection", "cell"])
+    state.choose(mu=1)
+    wait_for(state)
+    assert state.beside == first and f"beside={first:g}" in state.link()
+    assert not any(f"mu={first:g}" in link and "beside" in link for link in links)
+    state.choose(mu=first)  # as Back does
+    wait_for(state)
+    assert state.beside is None and state.twin is None
+
+
 def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):
     from app.selection import select
 
@@ -465,6 +482,7 @@ def test_a_link_keeps_what_single_tabs_show(library, state, wait_for):
     from app.state import AppState
 
     chosen = {"figure": "force", "axis": "log", "pushing": "all", "axes": "stress"}
+    chosen["zoom"] = (3.5, 4.25, 2.0)
     state.param.update(**chosen)
     again = AppState(library, query=f"?{state.link()}")
     wait_for(again)
@@ -478,6 +496,19 @@ def test_what_is_pale_says_of_which_friction_it_is(state):
     assert not line.visible
     state.param.update(missing=True)
     assert line.visible and f"still of μ = {state.cell.mu:g}" in line.object
+
+
+def test_possible_is_in_the_legend_only_where_it_is_drawn(state, wait_for):
+    from app.views.intervals import View
+
+    state.choose(mu=1)
+    wait_for(state)
+    view = View(state)
+    assert not view.exact_item.visible
+    state.compute_exact()
+    assert view.exact_item.visible  # bounds are drawn as they arrive
+    wait_for(state)
+    assert view.exact_item.visible and view.exact_item.label.value == "possible"
 
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):

@@ -261,7 +261,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page.get_by_label("Full colour, ⟨fₙ⟩").fill("")
     page.get_by_label("Full colour, ⟨fₙ⟩").press("Enter")
     page.wait_for_function("() => !location.search.includes('full=')")
-    page.get_by_text("½ ⟨fₙ⟩ more").wait_for()
+    page.get_by_text("0.5 ⟨fₙ⟩ more").wait_for()
 
 
 def test_a_click_selects_the_contact_everywhere(page):
@@ -292,6 +292,7 @@ def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
     place = at(page, *free)
     outside = scene(page, "scene.counts.outside")
     assert outside > 0 and f"({outside} out of view" in page.locator(".skips").text_content()
+    page.wait_for_function("() => location.search.includes('zoom=')")  # links keep it
     page.mouse.down()
     page.mouse.move(x + 40, y + 25)
     page.mouse.up()
@@ -299,6 +300,7 @@ def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
     page.mouse.dblclick(x, y)
     page.wait_for_timeout(100)
     assert scene(page, "scene.view.half") == whole
+    page.wait_for_function("() => !location.search.includes('zoom=')")
 
 
 def test_leaving_out_thin_and_unseen_chains_changes_no_pixel(page):
@@ -603,8 +605,9 @@ def test_a_copied_link_reopens_the_view(page, visit):
     page.keyboard.press("Tab")
     contact, x, y = link_of(page)
     page.mouse.click(*at(page, x, y))
+    page.get_by_role("button", name="zoom in").click()
     page.wait_for_function(
-        "() => /frame=4/.test(location.search) && /contact/.test(location.search)"
+        "() => ['frame=4', 'contact', 'zoom'].every((part) => location.search.includes(part))"
     )
     page.get_by_role("button", name="Copy link").click()
     link = page.evaluate("navigator.clipboard.readText()")
@@ -613,6 +616,7 @@ def test_a_copied_link_reopens_the_view(page, visit):
         "e => e.scene.selected !== null", arg=again.locator(".scene").element_handle()
     )
     assert scene(again, "scene.selected") == contact
+    assert scene(again, "scene.view.half") == pytest.approx(scene(page, "scene.view.half"), 1e-4)
     assert again.locator("b.state").inner_text() == page.locator("b.state").inner_text()
 
 

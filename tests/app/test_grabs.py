@@ -161,3 +161,17 @@ def test_a_link_keeps_a_pull_to_the_end_of_an_interval():
     """Rounded to the next digit, it would be asked for beyond the end, and refused."""
     pulls = [(17, 2.545365301781461)]
     assert grabs.read(grabs.spelled(pulls)) == pulls
+
+
+def test_the_table_of_contacts_holds_what_was_pulled(page, state):
+    """A file with other numbers than the picture would be worse than none."""
+    from app.exports import contacts, on_screen
+
+    value = middle(page.hear(grab=4)["rail"])
+    page.hear(hold=[4, value])
+    replay = state.replay
+    table = contacts(replay, None, state.frame, state.held)
+    assert table["f_n"][4] == pytest.approx(value * replay.force_scale)
+    assert "pulled" in on_screen(replay, state.frame, state.held)
+    page.hear(undo=True)
+    assert state.held is None and "original" in on_screen(replay, state.frame, state.held)

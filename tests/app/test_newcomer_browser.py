@@ -60,12 +60,11 @@ def test_where_a_series_has_no_states_none_of_another_friction_is_named(visit, c
     page = visit(AT)
     shows(page, 0.1)
     chosen = how_it_is_made(page).get_by_role("combobox", name="Precomputed results")
-    assert chosen.inner_text().endswith("3 μ from 0 to 1")
+    assert chosen.locator("option:checked").inner_text().endswith("3 μ from 0 to 1")
     computing(page)
     cancelled(page)
-    page.get_by_role("combobox", name="Precomputed results").filter(
-        has_text="none with N = 9000"
-    ).wait_for()
+    none = chosen.locator("option:checked").filter(has_text="none with N = 9000")
+    none.wait_for(state="attached")
 
 
 # 2: what was opened stays open
@@ -251,3 +250,44 @@ def test_contacts_are_chosen_by_keyboard_and_found_in_a_table(visit):
         "e => e.scene.hand.player.look.only === null",
         arg=page.locator(".scene").element_handle(),
     )
+
+
+def test_the_difference_of_two_networks_is_spotted(visit):
+    page = visit(AT)
+    page.get_by_role("button", name="Spot the difference").click()
+    game, told = "scene.hand.player.difference", page.locator(".quiz")
+    told.get_by_text("Click the 5 lines that differ most").wait_for()
+    assert scene(page, "new Set(scene.style.bin).size") == 1  # no colour tells
+    changes = scene(page, f"Array.from({game}.change, Math.abs)")
+    most = sorted(range(len(changes)), key=changes.__getitem__)
+    for contact, words in ((most[0], "others differ more. 0 of 5"), (most[-1], "found. 1 of 5")):
+        scene(page, f"scene.onSelect({contact})")
+        told.get_by_text(words).wait_for()
+    for contact in most[-5:-1]:
+        scene(page, f"scene.onSelect({contact})")
+    told.get_by_text("That was the last one").wait_for()
+    assert scene(page, "new Set(scene.style.bin).size") > 3
+    page.locator("button.play").click()
+    assert told.inner_text() == ""
+
+
+def test_questions_are_asked_before_the_page_shows_the_answers(visit):
+    page = visit(AT + "&predict=2")
+    told = page.locator(".quiz")
+    told.get_by_text("Question 2 of 3").wait_for()
+    extent = scene(page, "Array.from(scene.hand.player.look.extent)")
+    order = sorted(range(len(extent)), key=lambda c: -extent[c])
+    scene(page, f"scene.onSelect({order[4]})")
+    told.get_by_text(f"place 5 of {len(order)}").wait_for()
+    assert scene(page, "scene.selected") == order[0]
+    page.wait_for_function("() => /colour=extent/.test(location.search)")  # told to the page, too
+    told.get_by_role("button", name="Next question").click()
+    told.get_by_role("button", name="More at first, then less").click()
+    told.get_by_text("Well predicted").wait_for()
+    page.wait_for_function("() => /tab=statistics/.test(location.search)")
+    told.get_by_role("button", name="Done").click()
+    told.wait_for(state="hidden")
+    page.get_by_role("button", name="Predict, then look").click()
+    told.get_by_role("button", name="No, others balance as well").click()
+    told.get_by_text("numbers are left free").wait_for()
+    page.locator(".stage.playing").wait_for()

@@ -1,6 +1,7 @@
 """The tabs beside the packing in a browser: what they show, and the files they take and give."""
 
 import io
+import re
 import time
 from pathlib import Path
 from xml.etree import ElementTree
@@ -8,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from packings import REFERENCE, reference, skewed
-from serving import CLOSED, MANY, MODEL, column, painted, scene, serve
+from serving import CLOSED, MANY, MODEL, bars_drawn, column, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 import granforce as gf
@@ -344,3 +345,31 @@ def test_closed_pages_are_forgotten(chromium, shipped, tmp_path):
         for page in pages:
             page.close()
         wait_for([0, 1])  # Panel may keep the last one until the next
+
+
+def test_packing_and_plots_are_one_figure_of_a_chosen_width(visit, tmp_path):
+    page = visit("", 1440, 900)
+    bars_drawn(page)
+    part = page.locator("section", has_text="Packing and plots as one figure")
+    width = page.get_by_role("spinbutton", name="Width, mm")
+    width.fill("180")
+    width.press("Enter")
+    with page.expect_download() as waited:
+        part.get_by_role("button", name="SVG").click()
+    waited.value.save_as(tmp_path / "figure.svg")
+    root = ElementTree.parse(tmp_path / "figure.svg").getroot()
+    wide, high = (float(side) for side in root.get("viewBox").split()[2:])
+    assert root.get("width") == "180mm"
+    assert float(root.get("height")[:-2]) == pytest.approx(180 * high / wide)
+    parts = [child for child in root if child.tag.endswith("}svg")]
+    assert len(parts) == 3  # the packing, the bars, the curves; side by side
+    assert [float(one.get("x")) > 0 for one in parts] == [False, True, True]
+    text = (tmp_path / "figure.svg").read_text()
+    assert "contacts, sorted by" in text and text.count("<line ") > 50
+    assert text.count("<image ") <= 7  # marks of legends
+    names = re.findall(r'\bid="([^"]+)"', text)
+    assert len(names) == len(set(names)) and set(re.findall(r"url\(#([^)]+)\)", text)) <= set(names)
+    part.get_by_role("button", name="PDF").click()
+    sheet = page.locator("iframe[title='The figure, to be printed']")
+    sheet.wait_for(state="attached")
+    assert "size: 180mm" in sheet.get_attribute("srcdoc")

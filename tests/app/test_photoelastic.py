@@ -8,6 +8,8 @@ from test_panels import opened, settled
 import granforce as gf
 from app import photoelastic, uploads
 from app.views import chains
+from app.views.controls import Controls
+from app.views.packing import PackingView
 from app.views.upload import View
 from granforce.forces.ensemble import ensemble
 from granforce.packing.importers import read_pegs
@@ -172,6 +174,16 @@ def test_a_frame_is_opened_as_a_packing(state):
     forces = frame.inferred[inner] * frame.report["mean_measured_normal_force"]
     shown = state.replay.normal[0] * state.replay.force_scale
     np.testing.assert_allclose(shown, forces[S.index, 0], rtol=1e-5, atol=1e-7 * S.force_scale)
+    # Chains can show what was measured, and how far off it is, as in the frame's own pictures.
+    player = PackingView(state).player
+    controls = Controls(state)
+    assert "deviation" in controls.colour.options.values()
+    assert "measured" in controls.thickness.options.values()
+    own = player.measured["normal"] * state.replay.force_scale
+    unit = frame.report["mean_measured_normal_force"]
+    np.testing.assert_allclose(own, unit * frame.measured[inner][S.index, 0], rtol=1e-5)
+    np.testing.assert_allclose(player.measured["off"], frame.deviation[inner][S.index, 0], 1e-5)
+    assert np.isnan(own).any() and np.isfinite(own).any()
     exact = gf.intervals(S)
     assert np.isfinite(exact.upper).all() and exact.max_gap < 1e-6
 

@@ -1,0 +1,47 @@
+"""Names that a visitor gave to what is in the cache, and those of files that were brought.
+
+They are kept in a hidden file of the store's folder: {entry, or digest of an upload: name}.
+"""
+
+import json
+import os
+import secrets
+import threading
+from contextlib import suppress
+
+from granforce.records import InputError
+from granforce.study.store import Store
+
+NAMES = ".names.json"
+LONGEST = 80  # characters of a name
+
+_lock = threading.Lock()
+
+
+def names(store: Store) -> dict[str, str]:
+    """All names that were given; none where the file is missing or damaged."""
+    with suppress(OSError, ValueError):
+        found = json.loads((store.path / NAMES).read_text())
+        if isinstance(found, dict):
+            return {str(key): str(value) for key, value in found.items()}
+    return {}
+
+
+def call(store: Store, key: str, name: str) -> None:
+    """Give an entry, or the digest of an upload, a name; an empty one takes it away."""
+    name = " ".join(name.split())[:LONGEST]
+    with _lock:
+        known = names(store)
+        known.pop(key, None)
+        if name:
+            known[key] = name
+        _write(store, known)
+
+
+def _write(store: Store, known: dict[str, str]) -> None:
+    new = store.path / f".tmp-{secrets.token_hex(4)}"  # which the store cleans away if it stays
+    try:
+        new.write_text(json.dumps(known, ensure_ascii=False))
+        os.replace(new, store.path / NAMES)
+    except OSError as error:
+        raise InputError(f"no name can be kept in {store.path}: {error.strerror}") from None

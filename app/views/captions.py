@@ -1,0 +1,41 @@
+"""What pictures and files say about themselves: captions, and their names."""
+
+from ..state import WIDTHS
+from .packing import colour_bar, colour_words
+
+GROUND = ("#ffffff", "#121212")  # by day, by night
+NAMED = 4  # known forces that a caption names
+
+
+def caption(state):
+    """What a picture says about itself: background, colour bar, scale and words."""
+    pulled = bool(state.pulls)
+    low, stops, high = colour_bar(state, pulled)
+    contrast = "#f2f5f9" if state.dark else "#18191d"
+    return {
+        "background": GROUND[state.dark],
+        "ink": contrast,
+        "bar": {"low": low, "high": high, "stops": stops},
+        "lines": [
+            f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state, pulled)}.",
+            state.source,
+            *known_words(state),
+            f"granforce ?{state.link()}",
+        ],
+    }
+
+
+def known_words(state):
+    """What is known, in a line of a caption; none where nothing is."""
+    number = state.replay.backbone
+    told = [one.words(number[one.contact]) for one in state.known]
+    if told:
+        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+        yield f"Known: {'; '.join(told[:NAMED])}{more}."
+
+
+def stem(selection):
+    """Name of a file without its ending."""
+    if selection.imported:
+        return f"granforce_{selection.packing['imported'][:8]}_mu{selection.mu:g}"
+    return f"granforce_n{selection.packing['n']}_mu{selection.mu:g}_s{selection.packing['seed']}"

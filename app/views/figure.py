@@ -1,0 +1,35 @@
+"""Packing and plots on screen as one figure, for print."""
+
+import panel as pn
+
+from .captions import caption, stem
+from .handover import Handover
+from .number import NumberField
+from .parts import note
+
+FILES = {"Packing and plots as one figure": {"svg": "SVG", "pdf": "PDF, by printing"}}
+WIDTH_MM = 170  # of a page's two columns
+HELP = """
+As they are seen now, as lines and letters. From 120 mm on the plots are beside the packing.
+"""
+
+
+def panel(state):
+    """The width, and a button for each kind of file; the browser makes them, see figure.js."""
+
+    def refuse(line):
+        state.message = line
+
+    def asked(kind):
+        if state.replay is None:
+            return buttons.rest()
+        name = f"{stem(state.cell.selection)}_figure.{kind}"
+        buttons.hand_over_picture(name, caption(state), width.value)
+
+    buttons = Handover(asked, files=FILES, margin=(12, 10, 0, 10))
+    width = NumberField(
+        refuse, label="Width, mm", value=WIDTH_MM, start=40, end=2000, step=5, width=150,
+        margin=(10, 10, 0, 0),
+    )  # fmt: skip
+    row = pn.Row(buttons, width, sizing_mode="stretch_width")
+    return pn.Column(row, note(HELP), sizing_mode="stretch_width")

@@ -1,0 +1,54 @@
+"""My computations: what is in the visitor's own cache, to be opened, named or deleted."""
+
+from typing import ClassVar
+
+import param
+
+from granforce.records import InputError
+
+from .. import mine, names
+from ..jobs import reading
+from .scripts import FOLDER, Scripted, joined, said
+
+
+class Mine(Scripted):
+    """A table of what was computed here, the newest first; see mine.js."""
+
+    rows = param.List(doc="dicts, see mine.rows; and `here`, whether it is on screen")
+
+    _esm = joined("ask", "mine")
+    _stylesheets: ClassVar = [FOLDER / "mine.css"]
+
+    def __init__(self, state, **params):
+        super().__init__(sizing_mode="stretch_width", **params)
+        self._state, self._task = state, state.task(reading)
+        state.param.watch(self._list, ["catalogue", "cell"])
+        self._list()
+
+    def _list(self, *events):
+        if self._state.library.cache is not None:
+            self._task.start(lambda job: mine.rows(self._state.library), self._show)
+
+    def _show(self, rows):
+        on_screen = self._state.cell and self._state.cell.name
+        self.rows = [row | {"here": row["entry"] == on_screen} for row in rows]
+
+    def _handle_msg(self, message):
+        """The visitor opens, names or deletes one of the rows."""
+        state, known = self._state, {row["entry"] for row in self.rows}
+        match said(message):
+            case {"open": str(entry)} if entry in known:
+                for cell in state.catalogue:
+                    if cell.name == entry:
+                        state.show(cell)
+            case {"call": [str(entry), str(name)]} if entry in known:
+                try:
+                    names.call(state.library.own, entry, name)
+                except InputError as error:
+                    state.message = str(error)
+                self._list()
+            case {"delete": str(entry)} if entry in known:
+                self._task.start(lambda job: mine.delete(state.library, entry), self._gone)
+
+    def _gone(self, nothing):
+        self._state.refresh()

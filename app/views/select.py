@@ -1,0 +1,21 @@
+"""One of several, chosen from a list."""
+
+from typing import ClassVar
+
+import param
+
+from .scripts import FOLDER, Scripted, joined
+
+
+class Select(Scripted):
+    """A list of which one is chosen; see select.js.
+
+    Not panel-material-ui's Select: its open menu is told to screen readers as one without options.
+    """
+
+    label = param.String()
+    options: dict[str, str] = param.Dict(default={}, doc="{words: value}")
+    value = param.String()
+
+    _esm = joined("select")
+    _stylesheets: ClassVar = [FOLDER / "select.css"]

@@ -1,0 +1,69 @@
+"""My computations: what is in the visitor's own cache, by name; and what deleting leaves."""
+
+import pytest
+from small_store import DISKS
+
+from app import mine, names
+from app.selection import select
+from app.views.mine import Mine
+from granforce.records import InputError
+
+
+@pytest.fixture
+def computed(state, wait_for):
+    """A page with two computations of one packing in its cache."""
+    for states in (3, 4):
+        state.ask(select(DISKS, 0.3, 2, states=states), at_once=True)
+        wait_for(state)
+    return state
+
+
+def test_computations_are_listed_named_opened_and_deleted(computed, wait_for):
+    state, view = computed, Mine(computed)
+    wait_for(state)
+    newest, older = view.rows
+    assert newest["here"] and not older["here"] and newest["when"] >= older["when"]
+    assert "3 states" in older["what"] and older["what"].startswith("μ = 0.3") and not older["name"]
+    assert older["megabytes"] > 0
+    view._handle_msg({"call": [older["entry"], "  the  short\none "]})
+    wait_for(state)
+    assert [row["name"] for row in view.rows] == ["", "the short one"]
+    view._handle_msg({"open": older["entry"]})
+    wait_for(state)
+    assert state.selection.states == 3
+    for row in (older, newest):
+        assert state.library.own.find("packing", n=DISKS, seed=2)  # as long as states need it
+        view._handle_msg({"delete": row["entry"]})
+        wait_for(state)
+    assert not view.rows and not list(state.library.own)  # nothing of it is left
+    assert names.names(state.library.own) == {}
+    assert state.replay is not None and state.message == ""  # what is on screen stays there
+
+
+def test_what_is_not_in_the_list_is_left_alone(computed, wait_for):
+    state, view = computed, Mine(computed)
+    wait_for(state)
+    before = sorted(state.library.own)
+    packing = next(name for name in before if name.startswith("packing"))
+    for entry in (packing, "../elsewhere", state.library.shipped.name("walk", {}, version=1)):
+        view._handle_msg({"delete": entry})
+        view._handle_msg({"call": [entry, "mine"]})
+        wait_for(state)
+    assert sorted(state.library.own) == before and names.names(state.library.own) == {}
+    with pytest.raises(InputError, match="no more"):
+        mine.delete(state.library, packing)
+
+
+def test_an_upload_is_called_by_its_files(state, wait_for):
+    from app import uploads
+
+    packing = state.library.packing(state.cell.params["packing"])
+    brought = uploads.keep(state.library, packing, "NPZ archive: heap.npz")
+    task = state.task()
+    found = []
+    task.start(brought, found.append)
+    wait_for(state)
+    state.ask(select(DISKS, 1, 1, states=3)._replace(packing=found[0].params, mu=1.0), at_once=True)
+    assert "heap.npz" in state.asked
+    wait_for(state)
+    assert state.cell.series.startswith("heap.npz ") and "heap.npz" in state.source
