@@ -194,12 +194,7 @@ def _flown(made: Walls, rows: billiard.Rows, rung: _Rung, count: int) -> _Rung:
     """The rung with so many more paths, in whole batches."""
     beta, end, found = rung.beta, rung.end, [rung.q]
     counts = np.zeros(2, dtype=np.int64)
-    limit = uniform.MOST_TURNS * (made.dimension + 1)
     middle = np.ones((1 if beta > 0 else 0, made.count))
-
-    def on(drawn: Any, flight: billiard.Flight, out: Floats) -> int:
-        return billiard.fly(rows, *drawn, middle, flight, limit, out, cancelling.flag())
-
     for _ in range(0, count, uniform.BATCH):
         speeds, parts = uniform.directions(made, end.rng, uniform.BATCH, unit=not beta)
         lengths = uniform.PATH * rung.reach * (0.5 + parts)
@@ -207,7 +202,7 @@ def _flown(made: Walls, rows: billiard.Rows, rung: _Rung, count: int) -> _Rung:
             # As long as those of uniform states, or a quarter of an oscillation.
             speeds /= np.sqrt(beta)
             lengths = np.minimum(lengths * np.sqrt(beta / made.dimension), 0.5 * np.pi)
-        (end,), outs, done = uniform.flown(made, rows, [end], on, [(speeds, lengths)])
+        (end,), outs, done = uniform.flown(made, rows, [end], [(speeds, lengths, middle)])
         found.append(((outs[0] - 1.0) ** 2).sum(axis=1))
         counts += done[0]
     turns, refused = rung.turns + int(counts[0]), rung.refused + int(counts[1])
@@ -272,10 +267,9 @@ def _extended(
     ]
     tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
 
-    def work(rows: billiard.Rows, group: list[Any]) -> tuple[list[Any], list[Any]]:
-        return [_flown(made, rows, *task) for task in group], []
-
-    done, _ = uniform.shared(stores, tasks, work)
+    done, _ = uniform.shared(
+        stores, tasks, lambda some, rows: ([_flown(made, rows, *task) for task in some], [])
+    )
     found = [list(way) for way in rungs]
     for (way, k), rung in zip(order, done, strict=True):
         found[way][k] = rung
