@@ -365,7 +365,7 @@ UNIFORM = Kind(
 INFERENCE = Kind(
     *("inference", 2, "inference", "draw", _inference_parameters, _inference), holds_states=True
 )
-VOLUME = Kind("volume", 1, "volume of S", "path", _volume_parameters, _volume)
+VOLUME = Kind("volume", 2, "volume of S", "path", _volume_parameters, _volume)
 INFORMATIVE = Kind(
     *("informative", 2, "which measurement next", "contact"), _informative_parameters, _informative
 )
