@@ -384,7 +384,7 @@ INFERENCE = Kind(
 )
 VOLUME = Kind(
     name="volume",
-    version=1,
+    version=2,
     title="volume of S",
     unit="path",
     parameters=_volume_parameters,
