@@ -29,7 +29,7 @@ NAMES = {
     "stress": ((MADE,), {"angles": 16}, "stress-f12d55576c08fad59c46"),
     "perturbation": ((MADE,), {"random": 4}, "perturbation-ce3dd457b9d89fd71e8c"),
     "informative": ((MADE,), {"k": 5}, "informative-3f546a071f56de0980bf"),
-    "volume": ((MADE, 0.1), {}, "volume-acfa5dfa7b27d7b8f187"),
+    "volume": ((MADE, 0.1), {}, "volume-286fb21e52e73e87f25a"),
     "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-198bc3d0422097038cb6"),
 }
 
