@@ -69,7 +69,7 @@ def test_packings_of_version_1_still_open_and_are_not_taken_for_the_new_ones():
 
 
 def test_states_of_older_packings_are_not_listed(tmp_path):
-    """Until version 3 packings did not name it: what a cache has of them stays, and is not listed."""
+    """Older packings did not name their version: what a cache has of them stays, unlisted."""
     shipped, entries = kept("start.zarr")
     walk = next(entry for entry in entries if entry.kind == "walk")
     older = dict(walk.params["packing"])
