@@ -21,7 +21,6 @@ from granforce.tolerances import LARGEST_UNIT, MU_DIGITS, RIGID_OVERLAP
 # Whole numbers up to here are exact in kernels, in JSON and in floats alike.
 LARGEST_WHOLE = 2**53
 
-
 # What arrays hold; their shapes stand in comments and docstrings.
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.integer[Any]]
@@ -65,8 +64,7 @@ class Contacts(NamedTuple):
 
     def joined(self, others: Contacts) -> Contacts:
         """These contacts, then the others."""
-        both = zip(self, others, strict=True)
-        return Contacts._make(np.concatenate(values) for values in both)
+        return Contacts._make(np.concatenate(both) for both in zip(self, others, strict=True))
 
 
 class Cell(NamedTuple):
@@ -312,13 +310,13 @@ def moderate(value: Any, name: str) -> float:
 def make_contacts(
     i: npt.ArrayLike, j: npt.ArrayLike, normal: npt.ArrayLike, length: npt.ArrayLike, r: Floats
 ) -> Contacts:
-    """Contacts from array-likes, cast once: grains i, j and centre distances (N_c,), normals.
+    """Contacts from array-likes, cast once.
 
-    Lever arms are the radii r where no contact overlaps by more than RIGID_OVERLAP (rigid disks),
-    and reach the middle of the overlap, a = r − overlap/2, otherwise (soft disks).
+    i, j (N_c,): grains, from 0. normal (N_c, 2): unit vectors from i to j. length (N_c,): centre
+    distances. r (N,): radii. Lever arms are the radii where no contact overlaps by more than
+    RIGID_OVERLAP, and reach the middle of the overlap, a = r − overlap/2, otherwise (soft disks).
 
-    Raises InputError for grain numbers outside 0 … N − 1, self-contacts, normals that are not unit
-    vectors, or distances ≤ 0.
+    Raises InputError for grains outside 0 … N − 1, self-contacts, no unit vectors, distances ≤ 0.
     """
     i, j = np.asarray(i), np.asarray(j)
     if i.ndim != 1 or i.shape != j.shape:
@@ -354,12 +352,17 @@ def make_packing(
     info: Mapping[str, Any] | None = None,
     tilt: float = 0.0,
 ) -> Packing:
-    """A Packing from array-likes, cast and validated once; see the fields of Packing.
+    """A Packing from array-likes, cast and validated once, all in one system of units.
 
-    A tilt beyond ±L_x/2 becomes the one between them that spans the same lattice.
+    x (N, 2): centres. r (N,): radii. box: sides (L_x, L_y) of the cell, inf in an open direction;
+    tilt: x component of its second vector. contacts: by `make_contacts`. forces (N_c, 2): f_n, f_t
+    of the network at hand, zeros if there is none. pressure: P0, force per length, NaN where none
+    is prescribed. load (N, 3): external force and torque on each grain, by default none; a row of
+    NaN leaves its balance open. info: plain values, kept with it. A tilt beyond ±L_x/2 becomes the
+    one between them that spans the same lattice.
 
-    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, a contact given twice, or a
-    cell in which a grain touches its own image.
+    Raises InputError for wrong shapes, non-finite numbers, radii ≤ 0, a contact given twice, and
+    grains that touch their own images.
     """
     r = float_array(r, (-1,), "radii")
     if np.any(r <= 0):
@@ -405,9 +408,7 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
 
 def _check_own_images(cell: Cell, diameter: float) -> None:
     if not cell.tilt and np.any(cell.box <= diameter):
-        raise InputError(
-            f"box sides must be two numbers above the largest diameter, got {cell.box}"
-        )
+        raise InputError(f"box sides must be above the largest diameter, got {cell.box}")
     # A tilted cell may be lower than a diameter, as its images lie aside; where it is lower than a
     # radius, every search would go through images by the hundred.
     if cell.tilt and cell.box[1] < diameter / 2:
@@ -433,17 +434,20 @@ def _loads(load: npt.ArrayLike, count: int) -> Floats:
 def repeated(contacts: Contacts) -> tuple[int, int] | None:
     """The first contact that was given before, behind the one that it repeats; None without any.
 
-    Two grains touch twice only through different images, whose normals differ by 60° or more.
+    Two grains touch twice only through different images, whose normals differ by 60° or more. No
+    more than eight directions are 41° (n·n′ = 0.75) apart, so a contact that is the first to repeat
+    one has at most eight of its pair before it.
     """
     low, high = np.minimum(contacts.i, contacts.j), np.maximum(contacts.i, contacts.j)
     normal = np.where((contacts.i > contacts.j)[:, None], -contacts.normal, contacts.normal)
     order = np.lexsort((high, low))
     found: list[tuple[int, int]] = []
-    for apart in range(1, len(order)):
+    for apart in range(1, min(len(order), 9)):
         a, b = order[:-apart], order[apart:]
         same = (low[a] == low[b]) & (high[a] == high[b])
         if not same.any():
             break
-        same &= np.sum(normal[a] * normal[b], axis=1) > 0.75
-        found += zip(a[same].tolist(), b[same].tolist(), strict=True)
+        alike = np.flatnonzero(same & (np.sum(normal[a] * normal[b], axis=1) > 0.75))
+        for first in alike[np.argsort(b[alike])][:1]:
+            found.append((int(a[first]), int(b[first])))
     return min(found, key=lambda pair: pair[::-1], default=None)

@@ -1,8 +1,25 @@
-"""Ctrl-C in tests, also behind a shell that has it ignored (`pytest &`)."""
+"""Ctrl-C in tests, also behind a shell that has it ignored (`pytest &`), sent once it matters."""
 
+import os
 import signal
+import time
+from pathlib import Path
 
 
 def heed():
     """Ctrl-C ends what runs here; for a child of subprocess.Popen, as its preexec_fn."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def computed(running):
+    """Seconds that a process has computed for (Linux)."""
+    told = Path(f"/proc/{running.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(told[11]) + int(told[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def until_it_computes(running, seconds=0.3, patience=300):
+    """Wait until a process has computed for so many seconds from now on, at whatever load."""
+    end, before = time.monotonic() + patience, computed(running)
+    while computed(running) < before + seconds:
+        assert time.monotonic() < end and running.poll() is None
+        time.sleep(0.01)

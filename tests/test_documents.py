@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.cli.parser import _parser, main
+from granforce.cli.parser import main, make_parser
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = ["README.md", "granforce/README.md", "data/README.md", "app/README.md"]
@@ -49,7 +49,7 @@ def small(code):
 
 def known():
     """The command line's own list of its commands, former names left out."""
-    (subparsers,) = (a for a in _parser()._actions if hasattr(a, "choices") and a.choices)
+    (subparsers,) = (a for a in make_parser()._actions if hasattr(a, "choices") and a.choices)
     return {name for name, parser in subparsers.choices.items() if parser.prog.endswith(f" {name}")}
 
 
@@ -111,7 +111,7 @@ def test_the_readme_tells_every_command():
 def test_every_command_is_understood(document):
     for words in commands(document):
         if words[1:]:
-            _parser().parse_args(words)
+            make_parser().parse_args(words)
         else:
             assert words[0] in known()
 

@@ -15,7 +15,7 @@ from scipy import sparse
 from granforce.bench.report import note
 from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.gauss_seidel import _from_rest
+from granforce.forces.gauss_seidel import from_rest
 from granforce.numerics.lanes import ONE
 from granforce.records import Floats
 
@@ -91,7 +91,7 @@ def _siconos(python: str, S: Ensemble, start: Floats, tolerance: float) -> dict[
 
 
 def _ours(S: Ensemble, start: Floats, sweeps: int) -> tuple[Floats, float]:
-    problem, velocity, _, _ = _from_rest(S)
+    problem, velocity, _, _ = from_rest(S)
     problem = problem._replace(box_compliance=0.0)
     velocity[:] = 0.0
     force = start.copy()

@@ -58,11 +58,11 @@ def relaxation(
         note(f"relaxation: N = {n}, μ = {mu:g}")
         S = ensemble(pack(n, mu, 1))
         starts = kicked(S, repeats, 0)
-        runs = {name: _run(S, starts, *solver) for name, solver in solvers(sweeps).items()}
+        runs = {name: runs_of(S, starts, *solver) for name, solver in solvers(sweeps).items()}
         baseline = runs[BASELINE]
         for name, run in runs.items():
             rows.append(
-                {"n": n, "mu": mu, "contacts": len(S.index), "solver": name, **_summary(run)}
+                {"n": n, "mu": mu, "contacts": len(S.index), "solver": name, **summary(run)}
                 | _ratio(baseline, run)
             )
     return rows
@@ -78,17 +78,19 @@ def kicked(S: Ensemble, count: int, seed: int) -> list[Floats]:
     return list(S.original + kicks)
 
 
-def _run(
+def runs_of(
     S: Ensemble,
     starts: Sequence[Floats],
     solver: Callable[..., Relaxation],
     options: dict[str, Any],
 ) -> list[Relaxation]:
+    """What a solver reached from each start (N_c, 2), without what only its first call takes."""
     solver(S, starts[0], **{**options, "max_iterations": 2})  # compiles, makes plans
     return [solver(S, start, **options) for start in starts]
 
 
-def _summary(run: list[Relaxation]) -> dict[str, Any]:
+def summary(run: list[Relaxation]) -> dict[str, Any]:
+    """Times, and how many of them reached the GOAL, in a row."""
     reached = [r.residual <= GOAL for r in run]
     return {
         "seconds": float(np.median([r.seconds for r in run])),
@@ -131,7 +133,7 @@ def contact_updates(
     n = n or (100 if quick else 400)
     S = ensemble(pack(n, mu, 1))
     options: dict[str, Any] = {"rest": None, "tolerance": 0.0, "max_iterations": sweeps}
-    runs = _run(S, kicked(S, 5, 0), gauss_seidel, options)
+    runs = runs_of(S, kicked(S, 5, 0), gauss_seidel, options)
     each = float(np.median([1e9 * r.seconds / (r.iterations * len(S.index)) for r in runs]))
     row = {"n": n, "mu": mu}
     told = f"{runs[0].iterations} sweeps, box free to dilate"
@@ -230,11 +232,12 @@ def scaling(
                 enough = 1 + int(min(len(starts) - 1, max(repeats - 1, 0.5 / run[0].seconds)))
                 run += [solver(S, start, **options) for start in starts[1:enough]]
             row = {"n": n * k * k, "mu": mu, "contacts": len(S.index), "solver": name}
-            rows.append(row | _summary(run) | {"first_call": setup})
-    return rows + _exponents(rows, mu)
+            rows.append(row | summary(run) | {"first_call": setup})
+    return rows + exponents(rows, mu)
 
 
-def _exponents(rows: Rows, mu: float) -> list[dict[str, Any]]:
+def exponents(rows: Rows, mu: float) -> list[dict[str, Any]]:
+    """A row for each solver: b of seconds ~ N^b over the sizes at which it reached the GOAL."""
     fits = []
     for name in solvers():
         points = [

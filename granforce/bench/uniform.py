@@ -217,7 +217,16 @@ def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
     try:
         import hopsy
     except ImportError:
-        return [_Run("hopsy", None, None, 0.0, 0.0, "not installed")]
+        return [
+            _Run(
+                method="hopsy",
+                states=None,
+                mixing=None,
+                seconds=0.0,
+                setup=0.0,
+                note="not installed",
+            )
+        ]
     h, count = made.dimension, len(made.moving)
     sides = -np.linalg.eigh(kept.values[:count, :count])[1][:, count - h :]
     begin = time.process_time()

@@ -18,7 +18,7 @@ from granforce.system import interrupts
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0, 1 (some cells failed), 2 (bad input) or 130 (Ctrl-C)."""
-    arguments = _parser().parse_args(argv)
+    arguments = make_parser().parse_args(argv)
     usual = warnings.formatwarning
     with interrupts.noted():
         try:
@@ -77,7 +77,7 @@ def _say_compiling() -> None:
     print("\rgranforce: compiling, once per machine …", file=sys.stderr)
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="granforce",
         description="Explore how undetermined the forces in a packing of rigid disks are.",
@@ -99,6 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     words.add_perturb(commands)
     words.add_study(commands)
     words.add_app(commands)
+    words.add_docs(commands)
     words.add_import(commands)
     words.add_bench(commands)
     words.add_cache(commands)

@@ -339,6 +339,18 @@ def add_app(commands: Commands) -> None:
     command.add_argument("--warm", action="store_true", help="be ready before the first visitor")
 
 
+def add_docs(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "docs",
+        "docs",
+        "open the reference of all public names, with examples and sources, in a browser",
+        "granforce docs\n  granforce docs --out reference.html",
+        reports=False,
+    )
+    command.add_argument("--out", metavar="FILE.html", help="write it to this file, open nothing")
+
+
 def add_import(commands: Commands) -> None:
     command = subcommand(
         commands,

@@ -8,13 +8,13 @@ on, bit for bit as if the row had been there, once it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from granforce.numerics import lanes
-from granforce.numerics.lanes import compiled, within
+from granforce.numerics.lanes import MANY, compiled, inline, within
 from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
 
@@ -25,10 +25,13 @@ if TYPE_CHECKING:  # it needs this file to run
 LANES = 64
 # Memory for rows of K, all threads together: those of 11,500 walls (3500 disks at μ = 0.1) fit.
 MEMORY = 1 << 30
+# Turns after which a path is not taken, per dimension; a usual path has less than one.
+MOST_TURNS = 10
 # Slacks stay above this: a point that rounding put on a wall turns there at once.
 _LEAST = 1e-300
-# What Flight.count counts.
-_PATH, _HITS, _TURNS, _REFUSED, _FLYING = range(5)
+# Flight.count: paths done, turns on this one, turns and paths not taken in all; whether on a path,
+# and the wall that is next on it.
+_PATH, _HITS, _TURNS, _REFUSED, _FLYING, _NEXT = range(6)
 
 
 class Rows(NamedTuple):
@@ -47,9 +50,8 @@ class Flight(NamedTuple):
     s: Floats  # (walls,) slacks
     w: Floats  # (walls,) their speeds
     start: Floats  # (walls,) slacks where the path began
-    rate: Floats  # (walls,) one over the time to each wall
-    left: Floats  # (1,) time that is left of the path
-    count: Integers  # type: ignore[assignment]  # (5,) path, its hits; turns and paths not taken in all; whether in flight
+    left: Floats  # (2,) time that is left of the path, one over that to the next wall
+    count: Integers  # type: ignore[assignment]  # (6,) path, its hits, turns, …, as named above
 
 
 def all_rows(walls: Walls) -> Rows | None:
@@ -101,38 +103,43 @@ def make_flight(slacks: Floats) -> Flight:
         s=slacks.copy(),
         w=np.empty_like(slacks),
         start=np.empty_like(slacks),
-        rate=np.empty_like(slacks),
-        left=np.zeros(1),
-        count=np.zeros(5, dtype=np.int64),
+        left=np.zeros(2),
+        count=np.zeros(6, dtype=np.int64),
     )
 
 
-def counted(flight: Flight) -> tuple[int, int]:
-    """Turns and paths not taken."""
-    return flight.count[_TURNS], flight.count[_REFUSED]
-
-
 def follow(
-    walls: Walls, rows: Rows, flights: Sequence[Flight], on: Callable[[int, Flight], int]
-) -> None:
-    """Carry flights to the end of their paths; on(number, flight) → the wall that it waits at.
+    walls: Walls,
+    rows: Rows,
+    starts: Sequence[Floats],
+    drawn: Sequence[tuple[Floats, Floats, Floats]],
+) -> tuple[Floats, Floats, Integers]:
+    """Paths of some chains, as `fly` takes them, from slacks starts (walls,) each.
 
-    Where rows are missing, those of the walls that are next for each flight are made side by side.
+    Returns slacks where they end (chains, walls) and after each path (chains, paths, walls), and
+    the turns and paths not taken (chains, 2). Where rows are missing, those of the walls that are
+    next for each chain are made side by side.
     """
-    waiting = dict(enumerate(flights))
+    flights, limit = [make_flight(s) for s in starts], MOST_TURNS * (walls.dimension + 1)
+    outs = np.ones((len(starts), len(drawn[0][0]), walls.count))
+    waiting = list(range(len(starts)))
     while waiting:
-        met = {number: on(number, flight) for number, flight in waiting.items()}
+        stop = cancelling.flag()
+        met = {k: fly(rows, *drawn[k], flights[k], limit, outs[k], stop) for k in waiting}
         cancelling.check("uniform sample")
-        waiting = {number: waiting[number] for number, wall in met.items() if wall >= 0}
+        waiting = [k for k in waiting if met[k] >= 0]
         each = lanes.LANES // max(1, len(waiting))
-        wanted = [met[number] for number in waiting]
-        for flight in waiting.values():
-            soon = np.where(rows.place < 0, flight.rate, -1.0)
+        wanted = [met[k] for k in waiting]
+        for k in waiting:
+            rates = -flights[k].w / np.maximum(flights[k].s, _LEAST)
+            soon = np.where(rows.place < 0, rates, -1.0)
             ahead = np.argpartition(-soon, each)[:each].tolist() if each else []
             wanted += [wall for wall in ahead if soon[wall] > 0]
         wanted = list(dict.fromkeys(wanted))[: max(lanes.LANES, len(waiting))]
         if wanted:
             make_rows(walls, rows, wanted)
+    counts = [flight.count[[_TURNS, _REFUSED]] for flight in flights]
+    return np.stack([flight.s for flight in flights]), outs, np.array(counts)
 
 
 @compiled
@@ -151,43 +158,31 @@ def fly(rows, speeds, times, middles, flight, limit, out, stop):
     (paths, walls) gets the slacks after each. Returns −1, or the wall whose row is missing. Ends
     early, with states that mean nothing, once stop[0] is raised.
     """
-    s, w, rate, left, count = flight.s, flight.w, flight.rate, flight.left, flight.count
-    top, still, harmonic = np.empty(LANES), rows.values[0], len(middles) > 0
+    s, w, count, harmonic = flight.s, flight.w, flight.count, len(middles) > 0
     while count[_PATH] < len(times):
         path = count[_PATH]
         middle = middles[min(path, len(middles) - 1)] if harmonic else s
         if not count[_FLYING]:
-            _begin(flight, speeds[path], times[path])
-        if harmonic:
-            _meetings(s, w, middle, rate)
-        else:
-            _advance(s, w, rate, still, 0.0, 0.0)
-        while True:
-            wall, soonest = _next_wall(rate, top)
-            if soonest * (np.tan(0.5 * left[0]) if harmonic else left[0]) <= 1.0:
-                if harmonic:
-                    _swing(s, w, middle, rate, still, np.cos(left[0]), np.sin(left[0]), 0.0)
-                else:
-                    _axpy(s, left[0], w)
-                break
-            if count[_HITS] == limit or stop[0]:
-                s[:] = flight.start
-                count[_REFUSED] += 1
-                break
+            flight.start[:], w[:], flight.left[0] = s, speeds[path], times[path]
+            count[_HITS], count[_FLYING] = 0, 1
+            _onward(flight, middle, harmonic, rows.values[0], 0.0, 0.0)
+        while count[_NEXT] >= 0 and count[_HITS] < limit and not stop[0]:
+            wall, time = count[_NEXT], 1.0 / flight.left[1]
             place = rows.place[wall]
             if place < 0:
                 return wall
             rows.used[place] = True
-            row, time = rows.values[place], 1.0 / soonest
+            row, speed = rows.values[place], w[wall]
             if harmonic:
                 time = 2.0 * np.arctan(time)
-                cos, sin = np.cos(time), np.sin(time)
-                kick = 2.0 * (cos * w[wall] - sin * (s[wall] - middle[wall])) / row[wall]
-                _swing(s, w, middle, rate, row, cos, sin, kick)
-            else:
-                _advance(s, w, rate, row, time, 2.0 * w[wall] / row[wall])
-            left[0] -= time
+                speed = np.cos(time) * speed - np.sin(time) * (s[wall] - middle[wall])
             count[_HITS] += 1
+            _onward(flight, middle, harmonic, row, time, 2.0 * speed / row[wall])
+        if count[_NEXT] < 0:
+            _end(s, w, middle, harmonic, flight.left[0])
+        else:
+            s[:] = flight.start
+            count[_REFUSED] += 1
         out[path] = s
         count[_TURNS] += count[_HITS]
         count[_PATH] += 1
@@ -196,103 +191,112 @@ def fly(rows, speeds, times, middles, flight, limit, out, stop):
 
 
 @compiled
-def chords(speeds, parts, s, rate):
+def chords(speeds, parts, s):
     """Hit-and-run (Smith, Oper. Res. 32, 1296 (1984)): a uniform point of each chord in turn.
 
     speeds (moves, walls) of random directions, parts (moves,) uniform in [0, 1]; s (walls,) is
     changed in place.
     """
-    top = np.empty(LANES)
     for move in range(len(parts)):
-        w = speeds[move]
-        _advance(s, w, rate, w, 0.0, 0.0)
-        ahead = 1.0 / _next_wall(rate, top)[1]
-        for k in range(len(rate)):
-            rate[k] = -rate[k]
-        behind = 1.0 / _next_wall(rate, top)[1]
-        _axpy(s, (ahead + behind) * parts[move] - behind, w)
+        w, nearest, behind = speeds[move], 0.0, 0.0
+        for k in range(len(s)):
+            rate = -w[k] / max(s[k], _LEAST)
+            nearest, behind = max(nearest, rate), min(behind, rate)
+        ahead, behind = 1.0 / nearest, -1.0 / behind
+        _end(s, w, s, False, (ahead + behind) * parts[move] - behind)
 
 
 @within
-def _begin(flight, speeds, left):
-    flight.start[:] = flight.s
-    flight.w[:] = speeds
-    flight.left[0] = left
-    flight.count[_HITS] = 0
-    flight.count[_FLYING] = 1
+def _onward(flight, middle, harmonic, row, time, kick):
+    """Go on for a time, turn (w −= kick · row), and find the wall that is next, −1 for none.
+
+    Both in one pass, by lanes: s ← m + (s − m) cos + w sin, of which straight paths, m = s, are the
+    case cos = 1, sin = t. A rate takes a division, or a root as well, and is found only where
+    products tell that a wall comes before those looked at so far and before the end of the path.
+    """
+    s, w, left = flight.s, flight.w, flight.left
+    left[0] -= time
+    rest = max(left[0], _LEAST)
+    soonest, next_wall = 1.0 / (np.tan(0.5 * rest) if harmonic else rest), -1
+    cos, sin = (np.cos(time), np.sin(time)) if harmonic else (1.0, time)
+    # Rounding must not move a harmonic path where it begins.
+    moves, lowest = kick != 0.0 or not harmonic, lanes.same(MANY, -np.inf if harmonic else _LEAST)
+    for first in range(0, len(s), LANES):
+        if moves:
+            _move(s, w, middle, row, cos, sin, kick, lowest, first)
+        if _some_nearer(s, w, middle, harmonic, soonest, first):
+            for k in range(first, first + LANES):
+                rate = _rate(s[k], w[k], middle[k], harmonic)
+                if rate > soonest:
+                    soonest, next_wall = rate, k
+    left[1], flight.count[_NEXT] = soonest, next_wall
 
 
-@within
-def _axpy(x, factor, y):
-    for i in range(len(x)):
-        x[i] += factor * y[i]
+@inline
+def _move(s, w, middle, row, cos, sin, kick, lowest, first):
+    """Motion and turn of LANES walls."""
+    cos, sin, kick = lanes.same(MANY, cos), lanes.same(MANY, sin), lanes.same(MANY, kick)
+    for k in range(first // lanes.LANES, (first + LANES) // lanes.LANES):
+        slack, speed, m = (
+            lanes.load(s, k, MANY),
+            lanes.load(w, k, MANY),
+            lanes.load(middle, k, MANY),
+        )
+        away = slack - m
+        lanes.store(s, k, MANY, lanes.larger(m + cos * away + sin * speed, lowest))
+        lanes.store(w, k, MANY, cos * speed - sin * away - kick * lanes.load(row, k, MANY))
 
 
-@within
-def _advance(s, w, rate, row, time, kick):
-    """Go on for a time, turn (w −= kick · row), and note the inverse of each wall's own time."""
-    for k in range(len(s)):
-        slack = s[k] + time * w[k]
-        slack = slack if slack > _LEAST else _LEAST
-        speed = w[k] - kick * row[k]
-        s[k] = slack
-        w[k] = speed
-        rate[k] = -speed / slack
+@inline
+def _some_nearer(s, w, middle, harmonic, soonest, first):
+    """Whether any of LANES walls has a larger rate than `soonest`, but for rounding."""
+    soonest, nearer, one, zero = (
+        lanes.same(MANY, soonest),
+        lanes.same(MANY, 0.0),
+        lanes.same(MANY, 1.0),
+        lanes.same(MANY, 0.0),
+    )
+    for k in range(first // lanes.LANES, (first + LANES) // lanes.LANES):
+        slack, speed = (
+            lanes.larger(lanes.load(s, k, MANY), lanes.same(MANY, _LEAST)),
+            lanes.load(w, k, MANY),
+        )
+        by = soonest * slack + speed
+        if harmonic:
+            # The larger root of s q² + 2 w q + r (`_rate`) is above q where that is negative, or
+            # falls while there are roots.
+            rest = lanes.same(MANY, 2.0) * lanes.load(middle, k, MANY) - slack
+            roots = lanes.pick(speed * speed, rest * slack, one, zero)
+            nearer = nearer + lanes.pick(
+                zero, soonest * (by + speed) + rest, one, lanes.pick(zero, by, roots, zero)
+            )
+        else:
+            nearer = nearer + lanes.pick(zero, by, one, zero)
+    return not lanes.vanishes(nearer)
 
 
-@within
-def _swing(s, w, middle, rate, row, cos, sin, kick):
-    """As `_advance` on harmonic paths, by the cosine and sine of a time, in one pass."""
-    for k in range(len(s)):
-        away, speed = s[k] - middle[k], w[k]
-        slack = middle[k] + cos * away + sin * speed
-        speed = cos * speed - sin * away - kick * row[k]
-        s[k] = slack
-        w[k] = speed
-        rate[k] = _meeting(slack, speed, middle[k])
+@inline
+def _rate(slack, speed, middle, harmonic):
+    """The inverse of the time t at which a slack is 0 first; at most 0 if it never is.
 
-
-@within
-def _meetings(s, w, middle, rate):
-    """The rate of each wall where a harmonic path begins."""
-    for k in range(len(s)):
-        rate[k] = _meeting(s[k], w[k], middle[k])
-
-
-@within
-def _meeting(slack, speed, middle):
-    """The inverse of tan(t/2) for the time t < π at which a slack is 0 first; 0 if it never is.
-
-    middle + (s − middle) cos t + w sin t = 0 is, for the inverse q of tan(t/2), the quadratic
-    equation s q² + 2 w q + 2 middle − s = 0; of the two forms of its larger root the one is taken
-    in which nothing cancels.
+    Of a harmonic path that of tan(t/2), t < π: middle + (s − middle) cos t + w sin t = 0 is, for
+    the inverse q of tan(t/2), the quadratic equation s q² + 2 w q + 2 middle − s = 0; of the two
+    forms of its larger root the one is taken in which nothing cancels.
     """
     slack = slack if slack > _LEAST else _LEAST
+    if not harmonic:
+        return -speed / slack
     rest = 2.0 * middle - slack
     square = speed * speed - rest * slack
-    reaches = square > 0.0
-    root = np.sqrt(square if reaches else 0.0)
-    above = root - speed if speed < 0.0 else -rest
-    below = slack if speed < 0.0 else root + speed
-    return above / below if reaches else 0.0
+    if not square > 0.0:
+        return 0.0
+    root = np.sqrt(square)
+    return (root - speed) / slack if speed < 0.0 else -rest / (root + speed)
 
 
 @within
-def _next_wall(rate, top):
-    """The wall with the largest rate, and that rate; by lanes, as that is what vectorises."""
-    top[:] = 0.0
-    for first in range(0, len(rate), LANES):
-        part = rate[first : first + LANES]
-        for lane in range(LANES):
-            top[lane] = part[lane] if part[lane] > top[lane] else top[lane]
-    lane = 0
-    for other in range(LANES):
-        if top[other] > top[lane]:
-            lane = other
-    fastest = top[lane]
-    if fastest == 0.0:
-        return lane, fastest
-    wall = lane
-    while rate[wall] != fastest:
-        wall += LANES
-    return wall, fastest
+def _end(s, w, middle, harmonic, time):
+    """Motion without a turn."""
+    cos, sin = (np.cos(time), np.sin(time)) if harmonic else (1.0, time)
+    for k in range(len(s)):
+        s[k] = middle[k] + cos * (s[k] - middle[k]) + sin * w[k]

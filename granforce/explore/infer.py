@@ -9,8 +9,8 @@ walls of S: what is known of the forces once balance and Coulomb's law are. Draw
 standard error of every force, of those that were not measured too.
 """
 
-import copy
 import time
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -25,7 +25,6 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, Likeliest, checked, likeliest
 from granforce.records import Cancel, Floats, Integers, Progress, whole
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED
 
 # Residuals beyond so many standard errors are told.
 SUSPECT = 3.0
@@ -35,8 +34,8 @@ _TIME = np.pi / 2
 _PATHS = 4
 # Paths whose speeds are drawn side by side.
 _AT_ONCE = 8
-# States dropped at the start of each chain, and states between two calls of progress.
-_DROPPED, _ROUND = 20, 20
+# States dropped at the start of each chain.
+_DROPPED = 20
 
 
 Kind = TypeVar("Kind", bound="Inference")
@@ -131,16 +130,28 @@ def infer(
     Raises InputError for shapes that do not fit and σ ≤ 0, NotJammedError where S is empty.
     """
     begin = time.perf_counter()
-    states = whole(states, "the number of draws")
-    chains, workers = whole(chains, "chains", 1), whole(workers, "workers", 1)
-    m, s = checked(ensemble, measured, sigma)
-    best = likeliest(ensemble, m, s, unmeasured)
+    numbers = states, chains, workers
+    m, s, best, numbers = asked(ensemble, measured, sigma, unmeasured, numbers)
     draws = None
-    if states:
-        draws = _draws(
-            ensemble, *_fit(ensemble, m, s, unmeasured), states, chains, seed, workers, progress
-        )
+    if numbers[0]:
+        fit = _fit(ensemble, m, s, unmeasured)
+        draws = _draws(ensemble, *fit, *numbers, seed, progress)
     return told(Inference, ensemble, best, draws, begin)
+
+
+def asked(
+    ensemble: Ensemble,
+    measured: npt.ArrayLike,
+    sigma: npt.ArrayLike,
+    unmeasured: float,
+    numbers: tuple[int, int, int],
+    least: int = 0,
+) -> tuple[Floats, Floats, Likeliest, tuple[int, int, int]]:
+    """(m, σ, the likeliest network, numbers) of arguments; numbers: draws, chains, workers."""
+    names = ("the number of draws", least), ("chains", 1), ("workers", 1)
+    draws, chains, workers = (whole(n, *name) for n, name in zip(numbers, names, strict=True))
+    m, s = checked(ensemble, measured, sigma)
+    return m, s, likeliest(ensemble, m, s, unmeasured), (draws, chains, workers)
 
 
 def told(
@@ -169,8 +180,8 @@ def judged(
 ) -> Draws:
     """The Draws of states (chains, k, N_c, 2), by the judges of the ensemble and their mixing."""
     residual, violation = ensemble.residual(found), ensemble.violation(found)
-    inside = residual.max() <= BALANCED and violation.max() <= ADMISSIBLE
-    return Draws(found, residual, violation, worth, bool(inside and mixed), counts, *seconds)
+    good = bool(uniform.inside(residual, violation) and mixed)
+    return Draws(found, residual, violation, worth, good, counts, *seconds)
 
 
 def _fit(ensemble: Ensemble, m: Floats, s: Floats, unmeasured: float) -> tuple[Floats, Floats]:
@@ -186,8 +197,8 @@ def _draws(
     m: Floats,
     states: int,
     chains: int,
-    seed: int,
     workers: int,
+    seed: int,
     progress: Progress | None,
 ) -> Draws:
     begin = time.perf_counter()
@@ -195,12 +206,12 @@ def _draws(
     rows = uniform.stores(made, billiard.all_rows(made), chains, workers)
     ends = [uniform.init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
     ready = time.perf_counter()
-    parts, counts, have, target = [], {"turns": 0, "refused": 0}, -_DROPPED, -(-states // chains)
+    parts, have, target = [], -_DROPPED, -(-states // chains)
+    counts = {"turns": 0, "refused": 0, "dropped": _DROPPED * chains}
     while have < target:
-        count = min(_ROUND, target - have) if have >= 0 else -have
-        ends, moves = uniform.shared(rows, ends, partial(_stepped, made, count))
-        for name in counts:
-            counts[name] += sum(getattr(one, name) for one in moves)
+        count = min(uniform.ROUND, target - have) if have >= 0 else -have
+        ends, moves = uniform.shared(rows, ends, partial(step, made, count=count))
+        counts = uniform.counted(counts, moves)
         if have >= 0:
             parts.append(uniform.forces_of(ensemble, made, np.stack([m.slacks for m in moves])))
             if progress is not None:
@@ -209,19 +220,17 @@ def _draws(
     found = np.concatenate(parts, axis=1)
     drawn = time.perf_counter()
     worth = mixing(found, uniform.varying(ensemble, made))
-    counts |= {"dropped": _DROPPED * chains, "held": len(made.centre) - len(made.moving)}
+    counts["held"] = len(made.centre) - len(made.moving)
     mixed = not made.dimension or worth.worst_r_hat <= uniform.MIXED
     return judged(ensemble, found, worth, mixed, counts, ready - begin, drawn - ready)
 
 
-def _stepped(
-    made: Walls, count: int, rows: billiard.Rows, ends: list[uniform.ChainState]
-) -> tuple[list[uniform.ChainState], list[uniform.Moves]]:
-    return step(made, ends, count, rows)
-
-
 def step(
-    made: Walls, ends: list[uniform.ChainState], count: int, rows: billiard.Rows | None = None
+    made: Walls,
+    ends: Sequence[uniform.ChainState],
+    rows: billiard.Rows | None = None,
+    *,
+    count: int,
 ) -> tuple[list[uniform.ChainState], list[uniform.Moves]]:
     """The next `count` states of some chains, as `uniform.step` gives them.
 
@@ -230,34 +239,19 @@ def step(
     point that one solve gives, cut by the walls: a harmonic path for a quarter of an oscillation
     draws from it. Without a measurement that leaves uniform states.
     """
-    ends = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends]
-    if not made.dimension:
-        return ends, [uniform.Moves(np.ones((count, made.count)), 0, 0)] * len(ends)
-    rows = billiard.some_rows(made, 1.0) if rows is None else rows
-    limit, times = uniform.MOST_TURNS * (made.dimension + 1), np.array([_TIME])
+    ahead: list[Any] = []
+    pulls, times = np.broadcast_to(made.pull, (len(ends), made.pull.size)), np.array([_TIME])
 
-    def on(drawn: Any, flight: billiard.Flight, out: Floats) -> int:
-        speeds, middles = drawn
-        return billiard.fly(rows, speeds, times, middles, flight, limit, out, cancelling.flag())
-
-    pulls = np.broadcast_to(made.pull, (len(ends), made.pull.size))
-    found: list[Floats] = []
-    counts: Any = 0
-    for path in range(count * _PATHS):
-        if path % _AT_ONCE == 0:
-            drawn = [_drawn(made, end.rng, min(_AT_ONCE, count * _PATHS - path)) for end in ends]
-        shifts = [
-            one[1][path % _AT_ONCE] + end.slacks for one, end in zip(drawn, ends, strict=True)
-        ]
+    def draw(ends: Sequence[uniform.ChainState], left: int) -> list[Any]:
+        if not ahead:
+            drawn = [_drawn(made, end.rng, min(_AT_ONCE, left)) for end in ends]
+            ahead.extend(zip(*(zip(*one, strict=True) for one in drawn), strict=True))
+        speeds, errors = zip(*ahead.pop(0), strict=True)
+        shifts = [error + end.slacks for error, end in zip(errors, ends, strict=True)]
         middles = 1.0 + made.moved(np.stack(shifts) - 1.0, pulls)
-        paths = [
-            (one[0][path % _AT_ONCE][None], m[None]) for one, m in zip(drawn, middles, strict=True)
-        ]
-        ends, outs, done = uniform.flown(made, rows, ends, on, paths)
-        found.append(outs)
-        counts = counts + done
-    slacks = np.concatenate(found, axis=1)[:, _PATHS - 1 :: _PATHS]
-    return ends, [uniform.moves(made, *one) for one in zip(slacks, counts, strict=True)]
+        return [(w[None], times, m[None]) for w, m in zip(speeds, middles, strict=True)]
+
+    return uniform.walked(made, rows, ends, count, _PATHS, draw)
 
 
 def _drawn(made: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:

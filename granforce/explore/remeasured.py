@@ -18,12 +18,12 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from granforce.explore.infer import Inference, judged, told
+from granforce.explore.infer import Inference, asked, judged, told
 from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.likeliest import checked, fitted_many, likeliest
+from granforce.forces.likeliest import fitted_many
 from granforce.numerics.lanes import LANES
-from granforce.records import Cancel, Floats, Progress, positive, whole
+from granforce.records import Cancel, Floats, Progress
 from granforce.system import cancelling
 
 # Forces that were not measured are known to so many ⟨f_n⟩ beforehand.
@@ -73,14 +73,11 @@ def remeasured(
     Raises InputError for shapes that do not fit and σ ≤ 0, NotJammedError where S is empty.
     """
     begin = time.perf_counter()
-    states, chains = whole(states, "the number of draws", 1), whole(chains, "chains", 1)
-    workers = whole(workers, "workers", 1)
-    scale = positive(unmeasured, "unmeasured") * ensemble.force_scale
-    m, s = checked(ensemble, measured, sigma)
-    best = likeliest(ensemble, m, s, unmeasured)
+    numbers = states, chains, workers
+    m, s, best, numbers = asked(ensemble, measured, sigma, unmeasured, numbers, least=1)
     ready = time.perf_counter()
-    width = np.where(np.isnan(m), scale, s)
-    found = _again(ensemble, best.forces, width, states, chains, seed, workers, progress)
+    width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)
+    found = _again(ensemble, best.forces, width, *numbers, seed, progress)
     # Independent draws: there is nothing to mix, and nothing is said of it.
     worth = Mixing(*np.full((3, *s.shape), np.nan))
     counts = {"turns": 0, "refused": 0, "dropped": 0, "held": 0}
@@ -94,8 +91,8 @@ def _again(
     s: Floats,
     states: int,
     chains: int,
-    seed: int,
     workers: int,
+    seed: int,
     progress: Progress | None,
 ) -> Floats:
     """Networks (chains, k, N_c, 2) of the network measured again, at least `states` in all."""

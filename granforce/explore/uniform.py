@@ -7,6 +7,7 @@ as their stationary one (see `billiard`), from whatever state they start.
 import copy
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -34,15 +35,13 @@ MOVES_PER_DIMENSION = 20
 # States dropped at the start of each chain; from the first part comes the length of the paths of
 # the second, and from that the length for good.
 WARM_UP = 20, 40
-# Turns after which a path is not taken, per dimension; a usual path has less than one.
-MOST_TURNS = 10
 # Chains whose R̂ exceeds this have not mixed (Gelman et al., Bayesian Data Analysis, 3rd ed., 11.4);
 # the largest R̂ of 1300 components of chains that have is 1.01 for 1000 states, 1.06 for 200.
 MIXED = 1.1
 # A run that wants an effective sample size ends at this many times as many states.
 MOST_STATES = 10
 # States of each chain between two calls of progress and cancel.
-_ROUND = 20
+ROUND = 20
 
 METHODS = ("billiard", "hit_and_run")
 
@@ -113,10 +112,10 @@ def init(made: Walls, seed: int | np.random.SeedSequence) -> ChainState:
 def step(
     made: Walls,
     ends: Sequence[ChainState],
+    rows: Rows | None = None,
     *,
     count: int,
     reach: float,
-    rows: Rows | None = None,
     method: str = "billiard",
 ) -> tuple[list[ChainState], list[Moves]]:
     """The next `count` states of some chains: (ChainState of each, Moves of each).
@@ -125,55 +124,64 @@ def step(
     reach: how far states are from the centre (root mean square of |s − 1|), which sets the length
     of the billiard's paths; any fixed number leaves the measure uniform.
     """
-    ends = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends]
-    if not made.dimension:
-        nothing = Moves(np.ones((count, made.count)), 0, 0)
-        return ends, [nothing] * len(ends)
-    if method == "hit_and_run":
-        return _hit_and_run(made, ends, count)
-    rows = billiard.some_rows(made, 1.0) if rows is None else rows
-    limit, lengths = MOST_TURNS * (made.dimension + 1), PATH * reach
+    if method == "hit_and_run" and made.dimension:
+        return _hit_and_run(made, _apart(ends), count)
     straight = np.ones((0, made.count))
 
-    def on(drawn: Any, flight: billiard.Flight, out: Floats) -> int:
-        return billiard.fly(rows, *drawn, straight, flight, limit, out, cancelling.flag())
-
-    found: list[Floats] = []
-    counts: Any = 0
-    left = count * PATHS_PER_STATE
-    while left:
+    def draw(ends: Sequence[ChainState], left: int) -> list[Any]:
         paths = min(left, BATCH - ends[0].paths % BATCH)
         drawn = [directions(made, end.rng, paths) for end in ends]
-        drawn = [(speeds, lengths * (0.5 + parts)) for speeds, parts in drawn]
-        ends, outs, done = flown(made, rows, ends, on, drawn)
+        return [(speeds, PATH * reach * (0.5 + parts), straight) for speeds, parts in drawn]
+
+    return walked(made, rows, ends, count, PATHS_PER_STATE, draw)
+
+
+def _apart(ends: Sequence[ChainState]) -> list[ChainState]:
+    return [end._replace(rng=copy.deepcopy(end.rng)) for end in ends]
+
+
+def walked(
+    made: Walls,
+    rows: Rows | None,
+    ends: Sequence[ChainState],
+    count: int,
+    paths: int,
+    draw: Callable[[Sequence[ChainState], int], list[Any]],
+) -> tuple[list[ChainState], list[Moves]]:
+    """The next `count` states of some chains, so many paths between them, as `step` gives them.
+
+    draw(ends, left): speeds, times and middles, as `billiard.fly` takes them, of the next paths of
+    each chain, up to `left`.
+    """
+    ends, left = _apart(ends), count * paths
+    if not made.dimension:
+        return ends, [Moves(np.ones((count, made.count)), 0, 0)] * len(ends)
+    rows = billiard.some_rows(made, 1.0) if rows is None else rows
+    found: list[Floats] = []
+    counts: Any = 0
+    while left:
+        ends, outs, done = flown(made, rows, ends, draw(ends, left))
         found.append(outs)
         counts = counts + done
-        left -= paths
-    slacks = np.concatenate(found, axis=1)[:, PATHS_PER_STATE - 1 :: PATHS_PER_STATE]
-    return ends, [moves(made, *one) for one in zip(slacks, counts, strict=True)]
+        left -= outs.shape[1]
+    slacks = np.concatenate(found, axis=1)[:, paths - 1 :: paths]
+    numbers = counts.tolist()
+    return ends, [Moves(made.on_hull(s), *n) for s, n in zip(slacks, numbers, strict=True)]
 
 
 def flown(
-    made: Walls, rows: Rows, ends: Sequence[ChainState], on: Callable[..., int], drawn: Any
+    made: Walls, rows: Rows, ends: Sequence[ChainState], drawn: list[Any]
 ) -> tuple[list[ChainState], Floats, Integers]:
     """Chains on by a batch of paths: (ends, slacks (chains, paths, walls), turns and refused).
 
-    on(drawn, flight, out): as `billiard.fly`, for what was drawn for the paths of a chain.
+    drawn: speeds, times and middles of the paths of each chain.
     """
-    flights = [billiard.make_flight(end.slacks) for end in ends]
-    outs = np.ones((len(ends), len(drawn[0][0]), made.count))
-    billiard.follow(made, rows, flights, lambda k, flight: on(drawn[k], flight, outs[k]))
-    cancelling.check("uniform sample")
-    slacks, paths = np.stack([flight.s for flight in flights]), ends[0].paths + outs.shape[1]
+    slacks, outs, counts = billiard.follow(made, rows, [end.slacks for end in ends], drawn)
+    paths = ends[0].paths + outs.shape[1]
     if paths % BATCH == 0:
         slacks = made.on_hull(slacks)
     ends = [ChainState(s, end.rng, paths) for s, end in zip(slacks, ends, strict=True)]
-    return ends, outs, np.array([billiard.counted(flight) for flight in flights])
-
-
-def moves(made: Walls, slacks: Floats, counts: Integers) -> Moves:
-    """The Moves of a chain, rounding taken off."""
-    return Moves(made.on_hull(slacks), *(int(number) for number in counts))
+    return ends, outs, counts
 
 
 def directions(
@@ -190,9 +198,9 @@ def directions(
 
 
 def _hit_and_run(
-    made: Walls, ends: Sequence[ChainState], count: int
+    made: Walls, ends: list[ChainState], count: int
 ) -> tuple[list[ChainState], list[Moves]]:
-    moves, rate, done, found = MOVES_PER_DIMENSION * made.dimension, np.empty(made.count), [], []
+    moves, done, found = MOVES_PER_DIMENSION * made.dimension, [], []
     for end in ends:
         out = np.empty((count, made.count))
         s = end.slacks.copy()
@@ -200,7 +208,7 @@ def _hit_and_run(
             for first in range(0, moves, BATCH):
                 cancelling.check("uniform sample")
                 drawn = directions(made, end.rng, min(BATCH, moves - first))
-                billiard.chords(*drawn, s, rate)
+                billiard.chords(*drawn, s)
             s = made.on_hull(s[None])[0]
             out[state] = s
         done.append(end._replace(slacks=s))
@@ -250,7 +258,8 @@ def sample_uniform(
         enough = not h or not effective or sample.effective >= effective
         if enough or not complete or done >= most:
             mixed = not h or sample.mixing.worst_r_hat <= MIXED
-            return sample._replace(reached=bool(complete and enough and mixed and _inside(sample)))
+            good = complete and enough and mixed and inside(sample.residual, sample.violation)
+            return sample._replace(reached=bool(good))
         growth = 1.1 * (effective or 0.0) / max(sample.effective, 1.0)
         states = int(min(most, int(done * min(2.0, max(1.1, growth))) + 1))
 
@@ -293,24 +302,22 @@ def together(
 ) -> tuple[list[ChainState], list[Moves]]:
     """All chains on by `count` states, over as many threads as stores: ends, and Moves of each."""
 
-    def work(rows: Rows, group: list[ChainState]) -> tuple[list[ChainState], list[Moves]]:
-        return step(made, group, count=count, reach=reach, rows=rows, method=method)
-
-    return shared(stores, list(ends), work)
+    on = partial(step, made, count=count, reach=reach, method=method)
+    return shared(stores, list(ends), on)
 
 
 def shared(
     stores: Sequence[Any],
     ends: list[Any],
-    work: Callable[[Any, list[Any]], tuple[list[Any], list[Any]]],
+    work: Callable[[list[Any], Any], tuple[list[Any], list[Any]]],
 ) -> tuple[list[Any], list[Any]]:
-    """work(rows, some of the chains) → (ends, moves), over threads, put together again."""
+    """work(some of the chains, rows) → (ends, moves), over threads, put together again."""
     groups = [[int(k) for k in part] for part in np.array_split(np.arange(len(ends)), len(stores))]
     if len(stores) == 1:
-        return work(stores[0], ends)
+        return work(ends, stores[0])
     with cancelling.threads(len(stores)) as pool:
         parts = [[ends[k] for k in group] for group in groups]
-        done = list(pool.map(work, stores, parts))
+        done = list(pool.map(work, parts, stores))
     return [end for part in done for end in part[0]], [one for part in done for one in part[1]]
 
 
@@ -331,7 +338,7 @@ def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int
         violation=nothing,
         mixing=cast("Mixing", None),  # until there are states
         reached=False,
-        counts=_counted(counts, dropped),
+        counts=counted(counts, dropped),
         setup_seconds=ready - begin,
         sampling_seconds=time.perf_counter() - ready,
         diagnosis_seconds=0.0,
@@ -343,7 +350,8 @@ def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int
     )
 
 
-def _counted(counts: dict[str, Any], moves: Sequence[Moves]) -> dict[str, Any]:
+def counted(counts: dict[str, Any], moves: Sequence[Moves]) -> dict[str, Any]:
+    """Counts, and those of some moves."""
     turns, refused = sum(m.turns for m in moves), sum(m.refused for m in moves)
     return {**counts, "turns": counts["turns"] + turns, "refused": counts["refused"] + refused}
 
@@ -359,14 +367,14 @@ def _extend(
     rows = stores(made, sample.rows, chains, workers)
     parts = [(sample.states, sample.residual, sample.violation)]
     while have < target and not cancelling.cancelled():
-        count = min(_ROUND, target - have)
+        count = min(ROUND, target - have)
         try:
             ends, moves = together(made, rows, ends, count, sample.reach, sample.method)
         except Cancelled:
             break
         new = forces_of(ensemble, made, np.stack([one.slacks for one in moves]))
         parts.append((new, ensemble.residual(new), ensemble.violation(new)))
-        counts = _counted(counts, moves)
+        counts = counted(counts, moves)
         have += count
         if progress is not None:
             progress(have * chains, target * chains)
@@ -394,9 +402,10 @@ def _extend(
     return sample, have >= target and not cancelling.cancelled()
 
 
-def _inside(sample: UniformSample) -> bool:
-    balanced = sample.residual.max(initial=0.0) <= BALANCED
-    return balanced and sample.violation.max(initial=0.0) <= ADMISSIBLE
+def inside(residual: Floats, violation: Floats) -> bool:
+    """Whether all states are in S, by the judges of the ensemble."""
+    balanced = residual.max(initial=0.0) <= BALANCED
+    return bool(balanced and violation.max(initial=0.0) <= ADMISSIBLE)
 
 
 def forces_of(ensemble: Ensemble, made: Walls, slacks: Floats) -> Floats:

@@ -8,9 +8,11 @@ averaged has a standard deviation of STEP:
     Z(β′)/Z(β) = ⟨exp(½ (β − β′) q)⟩_β = 1/⟨exp(−½ (β − β′) q)⟩_β′
 
 The geometric mean of both takes off the bias of either to first order. Draws follow harmonic paths
-between the walls (`billiard.fly`). Two ladders are climbed by chains of their own, one down
-from the narrowest distribution and one up from uniform states: were chains too short to forget
-where they came from, both would differ.
+between the walls (`billiard.fly`) from random speeds w. Near the top of the ladder |w|², which has
+a known distribution (χ² with h degrees of freedom), tells most of q: what it tells is taken off
+(control variates), by slopes that the other ladder has found. Two ladders are climbed by chains of
+their own, one down from the narrowest distribution and one up from uniform states: were chains too
+short to forget where they came from, both would differ.
 """
 
 import math
@@ -36,6 +38,8 @@ _INSIDE, _TRIED, _COUNTED = 0.8, 256, 4096
 _PILOT, _FORGOTTEN = 48, 16
 # Paths on each rung at first, and batches of them whose scatter tells the error.
 _FIRST, _BATCHES = 256, 16
+# Paths whose speeds are drawn side by side; after each such batch rounding is taken off.
+_BATCH = 32
 # Rounds of more paths, each at most so many times as many, until the error is the wanted one.
 _MOST_ROUNDS, _GROWTH = 30, 4.0
 # A turn costs about so many passes over the walls less than a path does besides.
@@ -150,6 +154,7 @@ class _Rung(NamedTuple):
     reach: float  # √⟨q⟩ nearby: sets the length of paths
     end: uniform.ChainState
     q: Floats  # (paths,) |s − 1|²
+    x: Floats  # (paths,) β|w|² of the speeds at first, less its mean, over its standard deviation
     turns: int
     refused: int
 
@@ -172,7 +177,10 @@ def _climbed(made: Walls, rows: billiard.Rows, top: float, seed: int) -> list[li
         slacks = up[-1].end.slacks
     rungs = down, up[::-1]
     # More of the same: what the ladder was built by has no part in the result.
-    return [[rung._replace(q=rung.q[:0], turns=0, refused=0) for rung in way] for way in rungs]
+    return [
+        [rung._replace(q=rung.q[:0], x=rung.x[:0], turns=0, refused=0) for rung in way]
+        for way in rungs
+    ]
 
 
 def _settled(
@@ -185,33 +193,30 @@ def _settled(
 ) -> _Rung:
     """A rung whose chain has left where it came from, with the paths after that."""
     end = uniform.ChainState(slacks, np.random.default_rng(seed))
-    fresh = _Rung(beta, reach, end, np.zeros(0), 0, 0)
+    fresh = _Rung(beta, reach, end, np.zeros(0), np.zeros(0), 0, 0)
     begun = _flown(made, rows, fresh, _PILOT)
-    return begun._replace(q=begun.q[_FORGOTTEN:])
+    return begun._replace(q=begun.q[_FORGOTTEN:], x=begun.x[_FORGOTTEN:])
 
 
 def _flown(made: Walls, rows: billiard.Rows, rung: _Rung, count: int) -> _Rung:
     """The rung with so many more paths, in whole batches."""
-    beta, end, found = rung.beta, rung.end, [rung.q]
+    h, beta, end, found, drawn = made.dimension, rung.beta, rung.end, [rung.q], [rung.x]
     counts = np.zeros(2, dtype=np.int64)
-    limit = uniform.MOST_TURNS * (made.dimension + 1)
     middle = np.ones((1 if beta > 0 else 0, made.count))
-
-    def on(drawn: Any, flight: billiard.Flight, out: Floats) -> int:
-        return billiard.fly(rows, *drawn, middle, flight, limit, out, cancelling.flag())
-
-    for _ in range(0, count, uniform.BATCH):
-        speeds, parts = uniform.directions(made, end.rng, uniform.BATCH, unit=not beta)
+    for _ in range(0, count, _BATCH):
+        speeds, parts = uniform.directions(made, end.rng, _BATCH, unit=not beta)
+        drawn.append(((speeds**2).sum(axis=1) - (h if beta else 1)) / np.sqrt(2 * h))
         lengths = uniform.PATH * rung.reach * (0.5 + parts)
         if beta > 0:
             # As long as those of uniform states, or a quarter of an oscillation.
             speeds /= np.sqrt(beta)
-            lengths = np.minimum(lengths * np.sqrt(beta / made.dimension), 0.5 * np.pi)
-        (end,), outs, done = uniform.flown(made, rows, [end], on, [(speeds, lengths)])
+            lengths = np.minimum(lengths * np.sqrt(beta / h), 0.5 * np.pi)
+        (end,), outs, done = uniform.flown(made, rows, [end], [(speeds, lengths, middle)])
         found.append(((outs[0] - 1.0) ** 2).sum(axis=1))
         counts += done[0]
     turns, refused = rung.turns + int(counts[0]), rung.refused + int(counts[1])
-    return _Rung(beta, rung.reach, end, np.concatenate(found), turns, refused)
+    q, x = np.concatenate(found), np.concatenate(drawn)
+    return _Rung(beta, rung.reach, end, q, x, turns, refused)
 
 
 def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:
@@ -219,17 +224,29 @@ def _summed(rungs: list[list[_Rung]]) -> tuple[Floats, Floats]:
     betas = np.array([rung.beta for rung in rungs[0]])
     step = 0.5 * -np.diff(betas)
     sums, variance = np.zeros(2), np.zeros((2, len(betas)))
-    for way, ladder in enumerate(rungs):
-        for number, rung in enumerate(ladder):
+    for number, both in enumerate(zip(*rungs, strict=True)):
+        told = []
+        for way, rung in enumerate(both):
             influence = np.zeros(len(rung.q))
             for k, sign in ((number, 1.0), (number - 1, -1.0)):
                 if 0 <= k < len(step):
                     log, weight = _log_mean(sign * step[k] * rung.q)
                     sums[way] += 0.5 * sign * log
                     influence += 0.5 * sign * weight
-            parts = np.array([part.mean() for part in np.array_split(influence, _BATCHES)])
+            told.append((influence, _controls(rung.x)))
+        slopes = [np.linalg.lstsq(x, one - one.mean(), rcond=None)[0] for one, x in told]
+        for way, (influence, x) in enumerate(told):
+            known = x @ slopes[1 - way]
+            sums[way] -= known.mean()
+            parts = np.array([part.mean() for part in np.array_split(influence - known, _BATCHES)])
             variance[way, number] = 0.25 * parts.var(ddof=1) / _BATCHES
     return sums, variance
+
+
+def _controls(x: Floats) -> Floats:
+    """Numbers (paths, 4) of mean 0 that q goes with, from x of its path and the one before."""
+    before = np.append(0.0, x[:-1])
+    return np.stack([x, before, x * before, np.where(x, x * x - 1.0, 0.0)], axis=1)
 
 
 def _log_mean(values: Floats) -> tuple[float, Floats]:
@@ -272,10 +289,9 @@ def _extended(
     ]
     tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
 
-    def work(rows: billiard.Rows, group: list[Any]) -> tuple[list[Any], list[Any]]:
-        return [_flown(made, rows, *task) for task in group], []
-
-    done, _ = uniform.shared(stores, tasks, work)
+    done, _ = uniform.shared(
+        stores, tasks, lambda some, rows: ([_flown(made, rows, *task) for task in some], [])
+    )
     found = [list(way) for way in rungs]
     for (way, k), rung in zip(order, done, strict=True):
         found[way][k] = rung

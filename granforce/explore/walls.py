@@ -151,6 +151,11 @@ class _Frame(NamedTuple):
         """Coordinates of the cones; those of known bounds come after."""
         return self.ensemble.per_contact * len(self.stiff)
 
+    @property
+    def weight(self) -> Floats:
+        """W (N_c, 2), 0 for what is known."""
+        return np.where(self.stiff < PINNED, self.stiff, 0.0)
+
     def forces(self, y: Floats) -> Floats:
         """f_n, f_t/μ (N_c, 2) of y (n,)."""
         pairs = y[: self.cones].reshape(len(self.stiff), -1)
@@ -160,8 +165,7 @@ class _Frame(NamedTuple):
 
     def pull(self, y: Floats) -> Floats:
         """W (m − f) (2 N_c,)."""
-        free = np.where(self.stiff < PINNED, self.stiff, 0.0)
-        return (free * (self.target - self.forces(y))).ravel()
+        return (self.weight * (self.target - self.forces(y))).ravel()
 
 
 def _frame(
@@ -234,7 +238,6 @@ def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
 
 def _centred(frame: _Frame, y: Floats) -> Floats:
     """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps."""
-    weight = np.where(frame.stiff < PINNED, frame.stiff, 0.0)
     for _ in range(_MOST_NEWTON_STEPS):
         cancelling.check("uniform sample")
         matrix, moving = _matrix(frame, y, frame.stiff)
@@ -251,7 +254,7 @@ def _centred(frame: _Frame, y: Floats) -> Floats:
             for _ in range(_POLISH):
                 y = _shifted(y, moving, wall_matrix.balancing(matrix, *_rest(frame, y))[:w])
             return _polished(frame, y)
-        slope, curve = float(pull @ change.ravel()), float(np.sum(weight * change**2))
+        slope, curve = float(pull @ change.ravel()), float(np.sum(frame.weight * change**2))
         step = min(1.0, 0.95 / max(-relative.min(), 1e-300))
         while _rise(step, relative, slope, curve) < 0.1 * step * gain:
             step /= 2
@@ -280,8 +283,7 @@ def _shifted(y: Floats, moving: Integers, relative: Floats) -> Floats:
 
 def _walls(frame: _Frame, y: Floats) -> Walls:
     """The Walls around y."""
-    known = np.where(frame.stiff < PINNED, 0.0, PINNED)
-    weight = np.where(frame.stiff < PINNED, frame.stiff, 0.0)
+    known, weight = np.where(frame.stiff < PINNED, 0.0, PINNED), frame.weight
     barrier, moving = _matrix(frame, y, known)
     h, shape = _shape(frame, _barrier(frame, y), known)
     # f_t is in units of μ: its own length is μ times that.

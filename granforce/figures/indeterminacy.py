@@ -87,7 +87,8 @@ def extents(
     """Figure 4: P(ΔF_n) for several μ, linear, and semi-logarithmic by ranges of μ.
 
     groups: {μ: list of arrays (N_c,) of ΔF_n, one for each packing}. ΔF_n is drawn in units of its
-    mean, or in the unit that it has and that is named, such as "⟨f_n⟩"; bars are standard errors
+    mean, or in the unit that it has and that is named, such as "⟨f_n⟩"; it is
+    drawn up to the largest value that is given, in so many bins. Bars are standard errors
     over packings, empty bins interrupt the lines, and tails P(ΔF_n > x) ~ exp(−(λx)^b) are fitted
     beyond the upper quartile.
     """

@@ -67,9 +67,10 @@ def force_densities(
 
 
 def ratio_counts(original: Floats, states: Floats) -> Integers:
-    """How many states (S, N_c) have f_n / f_n,orig in each bin of RATIOS: (N_c, bins).
+    """How many states have f_n / f_n,orig in each bin of RATIOS: (N_c, bins).
 
-    States beyond the last edge are in none; contacts without a force are not counted.
+    original (N_c,) and states (S, N_c): f_n. States beyond the last edge are in none; contacts
+    without a force are not counted.
     """
     counts = np.zeros((len(original), len(RATIOS) - 1), dtype=np.int64)
     for c in np.flatnonzero(original > 0):

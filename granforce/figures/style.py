@@ -232,7 +232,7 @@ def page(frames: Sequence[Any], backend: str, columns: int = 3) -> hv.Layout:
 
 
 def save(figure: Any, path: str | Path, caption: str = "") -> None:
-    """Write a figure: a page that needs no network (.html), or a picture (.png, .svg).
+    """Write a figure to path: a page that needs no network (.html), or a picture (.png, .svg).
 
     Pages are for figures made with the backend "bokeh", pictures with "matplotlib": no browser.
     caption: what the figure shows, kept in the file: the title of a page, the Description of a PNG,

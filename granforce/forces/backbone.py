@@ -10,14 +10,7 @@ y ≥ 0,
     Σ f_n = g·y = b·v + (g − Aᵀ v)·y ≤ b·v  where  Aᵀ v ≥ g,
 
 and b·v = 0 to what `certificates.proves_small` allows. As f_n ≥ 0, each of them is 0, in every
-network, whichever were known.
-
-| word | meaning |
-|---|---|
-| idle | presses in no network that is known so far |
-| dead | cannot press, as its own grains could not balance it: a proof from few rows |
-| pressing | presses in the network at hand, beyond SEEN_CARRYING: not idle any more |
-| trusted | a network that both judges of S admit: it shows what it shows |
+network, whichever were known. What idle, dead, pressing and trusted mean: granforce/README.md.
 """
 
 from __future__ import annotations

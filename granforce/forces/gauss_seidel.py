@@ -64,10 +64,16 @@ def gauss_seidel(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Relaxation:
-    """One step of contact dynamics from rest, with the given forces (N_c, 2) as first guess.
+    """One step of contact dynamics from rest, swept until it has ended; a Relaxation.
 
-    Options as of `SideBySide`. order: "sequential" or "random" (a fresh permutation each sweep,
-    from seed). cancel() returning True raises Cancelled.
+    start (N_c, 2): first guess, force. order: "sequential" or "random" (a fresh permutation each
+    sweep, from seed). options: tolerance (BALANCED), the residual in ⟨f_n⟩ that counts as balance;
+    rest (AT_REST), the one from which the nearest network takes the last digits, None to sweep
+    down to the tolerance; max_iterations, the most sweeps (100,000). ``converged`` is also True for
+    grains that are seen to move steadily: no equilibrium is near, and the residual says so.
+    cancel() returning True raises Cancelled.
+
+    Raises InputError where the whole stress is prescribed, or forces are known.
     """
     alone = SideBySide(ensemble, 1, **options)
     if order == "random":
@@ -98,7 +104,7 @@ class SideBySide:
         self.ensemble, self.tolerance, self.rest = ensemble, tolerance, rest
         self.most = max_iterations
         self.rng: np.random.Generator | None = None
-        self.problem, self.at_rest, self.dilation, self.unit = _from_rest(ensemble)
+        self.problem, self.at_rest, self.dilation, self.unit = from_rest(ensemble)
         set_stiffness(self.problem)
         self.lanes = ONE if count == 1 else MANY
         width = len(self.lanes)
@@ -156,20 +162,21 @@ class SideBySide:
             forces = nearest(S, forces).forces
             residual = S.residual(forces)
         return Relaxation(
-            forces,
-            int(self.sweeps[lane]),
-            residual,
-            S.violation(forces),
-            bool(self.looks.state[lane] == SETTLED_DOWN or residual <= tolerance),
-            time.perf_counter() - self.begun[lane],
+            forces=forces,
+            iterations=int(self.sweeps[lane]),
+            residual=residual,
+            violation=S.violation(forces),
+            converged=bool(self.looks.state[lane] == SETTLED_DOWN or residual <= tolerance),
+            seconds=time.perf_counter() - self.begun[lane],
         )
 
 
-def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
+def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     """The step problem in units of r_max and ⟨f_n⟩, and the velocities before contact forces act.
 
     The right-hand side b of the balance (loads, frozen contacts, pressure) is what acts on the
-    grains and on the box besides the unknown contact forces. Δt = 1 throughout.
+    grains and on the box besides the unknown contact forces. Δt = 1 throughout. Grains whose
+    balance is left open stay where they are: they share a last row, of no inverse mass.
     """
     if ensemble.prescribed == "stress" or ensemble.known is not None:
         raise InputError(
@@ -179,17 +186,18 @@ def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     contacts, grains = ensemble.contacts, ensemble.grains
     longest = float(ensemble.packing.r.max())
     r = ensemble.packing.r[grains] / longest
-    row_of = np.full(len(ensemble.packing.r), -1)
+    row_of = np.full(len(ensemble.packing.r), len(grains))
     row_of[grains] = np.arange(len(grains))
     size = 1 + ensemble.per_contact
     count = len(contacts.i)
-    velocity = np.zeros((len(grains), 3))
+    held = int(np.any(row_of[np.concatenate([contacts.i, contacts.j])] == len(grains)))
+    velocity = np.zeros((len(grains) + held, 3))
     outer = -ensemble.b[: size * len(grains)].reshape(-1, size) / ensemble.force_scale
     mass = np.pi * r**2
     inertia = 0.5 * mass * r**2
-    velocity[:, :2] = outer[:, :2] / mass[:, None]
+    velocity[: len(grains), :2] = outer[:, :2] / mass[:, None]
     if size == 3:
-        velocity[:, 2] = outer[:, 2] * r / inertia
+        velocity[: len(grains), 2] = outer[:, 2] * r / inertia
     compliance = dilation = 0.0
     length = contacts.length / longest
     if ensemble.has_pressure_row:
@@ -198,23 +206,24 @@ def _from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
         compliance = 1 / (twice_volume * BOX_MASS)
         dilation = -length.sum() * compliance
     problem = StepProblem(
-        row_of[contacts.i],
-        row_of[contacts.j],
-        contacts.normal[:, 0].copy(),
-        contacts.normal[:, 1].copy(),
-        length,
-        contacts.arm_i / longest,
-        contacts.arm_j / longest,
-        np.zeros(count),
-        np.empty(count),
-        np.empty(count),
-        1 / mass,
-        1 / inertia,
-        compliance,
+        i=row_of[contacts.i],
+        j=row_of[contacts.j],
+        n_x=contacts.normal[:, 0].copy(),
+        n_y=contacts.normal[:, 1].copy(),
+        length=length,
+        arm_i=contacts.arm_i / longest,
+        arm_j=contacts.arm_j / longest,
+        closing=np.zeros(count),
+        stiff_n=np.empty(count),
+        stiff_t=np.empty(count),
+        inverse_mass=np.append(1 / mass, np.zeros(held)),
+        inverse_inertia=np.append(1 / inertia, np.zeros(held)),
+        box_compliance=compliance,
     )
     # What turns velocities (v_x, v_y, ω) and λ back into forces in ⟨f_n⟩.
     box_unit = 1 / (compliance * length.sum()) if compliance else 0.0
-    unit = np.append(np.column_stack([mass, mass, inertia / r]).ravel(), box_unit)
+    weight = np.column_stack([mass, mass, inertia / r]).ravel()
+    unit = np.concatenate([weight, np.zeros(3 * held), [box_unit]])
     return problem, velocity, dilation, unit
 
 

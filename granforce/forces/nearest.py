@@ -78,7 +78,10 @@ def nearest_of_many(
     max_iterations: int = MOST_STEPS,
     cancel: Cancel | None = None,
 ) -> list[Relaxation]:
-    """`nearest` of each start, LANES of them side by side: the same results, bit for bit."""
+    """`nearest` of each of the starts, a few of them side by side: the same results, bit for bit.
+
+    starts: arrays (N_c, 2), force. Other arguments as of `nearest`.
+    """
     if cancel is not None:
         with cancelling.watched(cancel):
             return nearest_of_many(
@@ -112,12 +115,12 @@ def _batch(
     seconds = (time.perf_counter() - begin) / len(starts)
     return [
         Relaxation(
-            forces[k],
-            search.steps[k],
-            float(residual[k]),
-            ensemble.violation(forces[k]),
-            bool(converged[k] and residual[k] <= tolerance),
-            seconds,
+            forces=forces[k],
+            iterations=search.steps[k],
+            residual=float(residual[k]),
+            violation=ensemble.violation(forces[k]),
+            converged=bool(converged[k] and residual[k] <= tolerance),
+            seconds=seconds,
         )
         for k in range(len(starts))
     ]

@@ -30,8 +30,9 @@ def nearest_piqp(
 ) -> Relaxation:
     """The point of S with the least Σ |F_c − F_start,c|².
 
-    start (N_c, 2). Solved in cone coordinates y ≥ 0 (p = f_n + f_t/μ, q = f_n − f_t/μ), in units
-    of ⟨f_n⟩. Returns a Relaxation; ``converged`` is False where S is empty.
+    start (N_c, 2), force. tolerance: of the solver's residuals and its duality gap, relative;
+    max_iterations: of interior points. Solved in cone coordinates y ≥ 0 (p = f_n + f_t/μ, q = f_n −
+    f_t/μ), in units of ⟨f_n⟩. Returns a Relaxation; ``converged`` is False where S is empty.
 
     Every call sets up its own solver: one kept for the ensemble and updated with each start would
     save a tenth to a fifth of the time, but carries rounding over (1e-9 ⟨f_n⟩) from what it
@@ -43,12 +44,12 @@ def nearest_piqp(
     forces = ensemble.to_forces(T @ y * ensemble.force_scale)
     residual = ensemble.residual(forces)
     return Relaxation(
-        forces,
-        steps,
-        residual,
-        ensemble.violation(forces),
-        bool(status == piqp.PIQP_SOLVED and residual <= tolerance),
-        time.perf_counter() - begin,
+        forces=forces,
+        iterations=steps,
+        residual=residual,
+        violation=ensemble.violation(forces),
+        converged=bool(status == piqp.PIQP_SOLVED and residual <= tolerance),
+        seconds=time.perf_counter() - begin,
     )
 
 

@@ -55,12 +55,15 @@ def intervals_seen(states: Floats) -> tuple[Floats, Floats]:
 
 
 def normal_extent(low: Floats, high: Floats) -> Floats:
-    """ΔF_n, the length of the interval of f_n of each contact, shape (N_c,)."""
+    """ΔF_n (N_c,), the length of the interval of f_n of each contact, from low, high (N_c, 2)."""
     return high[:, 0] - low[:, 0]
 
 
 def correlation(normal_forces: Floats, extent: Floats) -> float:
-    """corr(f_n, ΔF_n) over contacts (Pearson); nan where one of them does not vary."""
+    """corr(f_n, ΔF_n) over contacts (Pearson); nan where one of them does not vary.
+
+    normal_forces (N_c,): f_n. extent (N_c,): ΔF_n.
+    """
     if np.ptp(extent) <= 1e-12 * np.abs(normal_forces).max(initial=0) or np.ptp(normal_forces) == 0:
         return float("nan")
     return float(stats.pearsonr(normal_forces, extent).statistic)
@@ -69,14 +72,14 @@ def correlation(normal_forces: Floats, extent: Floats) -> float:
 def correlation_range(states: Floats, extent: Floats) -> tuple[float, float]:
     """Smallest and largest corr(f_n, ΔF_n) with any state in place of the original network.
 
-    The paper's error bar of the correlation.
+    states (S, N_c, 2), extent (N_c,): ΔF_n. It is the paper's error bar of the correlation.
     """
     values = [correlation(state[:, 0], extent) for state in _some(states)]
     return float(np.min(values)), float(np.max(values))
 
 
 def distances(states: Floats, centre: Floats) -> Floats:
-    """Distance |F − centre| of each state in force space, shape (S,)."""
+    """Distance |F − centre| of each of the states (S, N_c, 2) in force space, (S,)."""
     return np.sqrt(((states - centre) ** 2).sum(axis=(1, 2)))
 
 

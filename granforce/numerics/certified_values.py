@@ -69,7 +69,16 @@ def make_system(
             combination = _bounding_rows(A, b)
             weight = A.T @ combination
         total = float(b @ combination)
-    return System(problem, middle, A.tocsc(), b, loads, weight, total, -(loads.T @ combination))
+    return System(
+        problem=problem,
+        middle=middle,
+        A=A.tocsc(),
+        b=b,
+        loads=loads,
+        weight=weight,
+        total=total,
+        gains=-(loads.T @ combination),
+    )
 
 
 def _centre_multipliers(problem: Problem, middle: Centre, A: sparse.csr_matrix) -> Floats:
@@ -317,7 +326,15 @@ def _outcome(
             y, multiplier = highs.vertex(A, system.b, cost, *basis)
     y = np.maximum(y, 0.0)
     load = float(y[-1]) if task.loaded >= 0 else 0.0
-    outcome = Outcome(number, task.loaded, y[: len(system.weight)], load, multiplier, None, 0)
+    outcome = Outcome(
+        number=number,
+        loaded=task.loaded,
+        y=y[: len(system.weight)],
+        load=load,
+        multiplier=multiplier,
+        z=None,
+        steps=0,
+    )
     if np.abs(A @ y - system.b).max(initial=0.0) <= BALANCED:
         return outcome
     return linear_programs.balanced(system.problem, system.middle, [outcome])[0]

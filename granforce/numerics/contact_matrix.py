@@ -67,12 +67,14 @@ def make_network(
     )
     high, low = np.maximum(at_i, at_j), np.minimum(at_i, at_j)
     return Network(
-        layout,
-        high,
-        low,
-        block_of(layout, high, low),
-        np.ascontiguousarray(columns.transpose(0, 2, 1)).reshape(len(high), 12),
-        np.ascontiguousarray(border.transpose(0, 2, 1)).reshape(len(high), 2 * border.shape[1]),
+        layout=layout,
+        high=high,
+        low=low,
+        block=block_of(layout, high, low),
+        columns=np.ascontiguousarray(columns.transpose(0, 2, 1)).reshape(len(high), 12),
+        border=np.ascontiguousarray(border.transpose(0, 2, 1)).reshape(
+            len(high), 2 * border.shape[1]
+        ),
     )
 
 
@@ -82,8 +84,11 @@ def make_factors(network: Network, width: int, symmetric: bool = True) -> Factor
     m = network.border.shape[1] // 2
     other = 0 if symmetric else 1
     return Factors(
-        *(room(count, width) for count in (9 * blocks, 9 * blocks * other)),
-        *(room(count, width) for count in (m * rows, m * rows * other, m * m)),
+        lower=room(9 * blocks, width),
+        upper=room(9 * blocks * other, width),
+        sides=room(m * rows, width),
+        tops=room(m * rows * other, width),
+        corner=room(m * m, width),
     )
 
 

@@ -157,7 +157,19 @@ def make_problem(
     count, none = len(network.high), np.zeros(0)
     w = np.tile([1.0, mu * mu], count)
     start, side = np.ones(2 * count), np.zeros(0, dtype=np.int64)
-    return Problem(network, b, b_border, diagonal, mu, place, w, start, side, none, none)
+    return Problem(
+        network=network,
+        b=b,
+        b_border=b_border,
+        diagonal=diagonal,
+        mu=mu,
+        place=place,
+        w=w,
+        start=start,
+        side=side,
+        sign=none,
+        limit=none,
+    )
 
 
 def without_rows(problem: Problem, idle: Floats, out: Mask) -> Problem:

@@ -130,7 +130,7 @@ def _work(
     at = contact_program.make_iterate(problem, width)
     work = contact_program.make_workspace(problem, width)
     steps = np.zeros(width, dtype=np.int64)
-    number = np.array([_fill(middle, at, lane, programs, waiting) for lane in range(width)])
+    number = np.array([fill(middle, at, lane, programs, waiting) for lane in range(width)])
     arrived = []
     while True:
         cancelling.check()
@@ -142,7 +142,7 @@ def _work(
         for lane in left.tolist():
             loaded = programs[number[lane]].loaded
             arrived.append(_outcome(problem, at, lane, number[lane], loaded, steps[lane]))
-            number[lane] = _fill(middle, at, lane, programs, waiting)
+            number[lane] = fill(middle, at, lane, programs, waiting)
             steps[lane] = 0
         while len(arrived) >= width or (arrived and not np.any(number >= 0)):
             finished(balanced(problem, middle, arrived[:width], work, lanes))
@@ -155,7 +155,7 @@ def _work(
         steps += 1
 
 
-def _fill(
+def fill(
     middle: Centre, at: Iterate, lane: int, programs: Sequence[Program], waiting: deque[int]
 ) -> int:
     """Start the next program in a lane; its number, or −1 where none is waiting."""
@@ -184,7 +184,15 @@ def _outcome(
     multiplier = np.concatenate([at.v[:, lane], at.v_border[:, lane]])[problem.place]
     load = float(at.y[-1, lane]) if loaded >= 0 else 0.0
     y, z = at.y[:-1, lane].copy(), at.z[:-1, lane].copy()
-    return Outcome(int(number), int(loaded), y, load, multiplier, z, int(steps))
+    return Outcome(
+        number=int(number),
+        loaded=int(loaded),
+        y=y,
+        load=load,
+        multiplier=multiplier,
+        z=z,
+        steps=int(steps),
+    )
 
 
 def multipliers(

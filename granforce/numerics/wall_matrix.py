@@ -173,8 +173,13 @@ def make_scratch(matrix: WallMatrix, width: int) -> Scratch:
     """Scratch of `width` right-hand sides, all zero."""
     grains, m = len(matrix.network.layout.position), matrix.network.border.shape[1] // 2
     walls = len(matrix.contact)
-    sizes = 2 * len(matrix.C), 3 * grains, m, walls, walls
-    return Scratch(*(room(size, width) for size in sizes))
+    return Scratch(
+        f=room(2 * len(matrix.C), width),
+        x=room(3 * grains, width),
+        y=room(m, width),
+        g=room(walls, width),
+        out=room(walls, width),
+    )
 
 
 @compiled

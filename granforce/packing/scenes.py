@@ -223,13 +223,13 @@ def _behind(x: Floats, r: Floats, walls: Floats, pressing: Floats, tolerance: fl
     load[: len(lids)] = np.column_stack([inwards * pressing[lids, None], np.zeros(len(lids))])
     centres = (walls[lids, :2] + walls[lids, 2:]) / 2 - inwards * lid
     return _Behind(
-        disk,
-        grain,
-        away,
-        np.concatenate([centres, place[held] + away[held] * stud[:, None]]),
-        np.concatenate([np.full(len(lids), lid), stud]),
-        load,
-        lids,
+        disk=disk,
+        grain=grain,
+        away=away,
+        x=np.concatenate([centres, place[held] + away[held] * stud[:, None]]),
+        r=np.concatenate([np.full(len(lids), lid), stud]),
+        load=load,
+        lids=lids,
     )
 
 

@@ -306,4 +306,14 @@ def _finding(
 
 
 def _told(statement: str, value: float, low: float, high: float) -> Claim:
-    return Claim(statement, "", OURS, statement, value, low, high, "", "measured")
+    return Claim(
+        statement=statement,
+        sampler="",
+        source=OURS,
+        measured=statement,
+        value=value,
+        low=low,
+        high=high,
+        criterion="",
+        verdict="measured",
+    )

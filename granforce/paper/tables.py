@@ -122,7 +122,15 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     known = {_name(row) for row in rows}
     missing = sum((t.part, t.n, t.mu, t.seed) not in known for t in wanted)
     skipped = {"missing_cells": missing}
-    return Table(plan._asdict(), rows, joined, shown, packings, skipped, tails)
+    return Table(
+        plan=plan._asdict(),
+        rows=rows,
+        samples=joined,
+        shown=shown,
+        packings=packings,
+        skipped=skipped,
+        tails=tails,
+    )
 
 
 def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:

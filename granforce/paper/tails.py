@@ -65,8 +65,14 @@ def fitted(packings: Sequence[Floats]) -> Tail | None:
     left = y @ y - (x @ y) ** 2 / (x * x).sum(axis=1)
     off = np.sqrt(np.maximum(left, 0.0) / len(f))
     best, one, two = int(np.argmin(off)), *(np.argmin(np.abs(_POWERS - b)) for b in (1.0, 2.0))
-    ends = float(f[0]), float(f[-1])
-    return Tail(float(_POWERS[best]), *ends, *(float(off[k]) for k in (best, one, two)))
+    return Tail(
+        power=float(_POWERS[best]),
+        low=float(f[0]),
+        high=float(f[-1]),
+        off=float(off[best]),
+        off_exponential=float(off[one]),
+        off_gaussian=float(off[two]),
+    )
 
 
 def told(table: Table) -> str:

@@ -193,17 +193,17 @@ def _raised(
     loaded = forces.copy()
     loaded[position, 0] += low
     return CriticalForce(
-        contact,
-        low * S.force_scale,
-        high * S.force_scale,
-        limit * S.force_scale,
-        forces * S.force_scale,
-        S.residual(loaded * S.force_scale),
-        S.violation(forces * S.force_scale),
-        moving,
-        bool(moving is None or moving.converged),
-        counts,
-        counts.pop("seconds"),
+        contact=contact,
+        low=low * S.force_scale,
+        high=high * S.force_scale,
+        limit_load=limit * S.force_scale,
+        forces=forces * S.force_scale,
+        residual=S.residual(loaded * S.force_scale),
+        violation=S.violation(forces * S.force_scale),
+        moving=moving,
+        converged=bool(moving is None or moving.converged),
+        counts=counts,
+        seconds=counts.pop("seconds"),
     )
 
 
@@ -306,16 +306,16 @@ def _response(
     opened = normal <= 0
     slid = ~opened & (np.abs(tangential) >= S.mu * normal)
     return Response(
-        contact,
-        float(load),
-        displacement,
-        rotation,
-        float(box / unit / S.contacts.length.sum()),
-        relative[:, 0],
-        opened,
-        slid,
-        ~opened & ~slid,
-        moving.breach,
-        float(np.abs(relative).max()),
-        bool(moving.breach <= STEADY),
+        contact=contact,
+        force=float(load),
+        displacement=displacement,
+        rotation=rotation,
+        dilation=float(box / unit / S.contacts.length.sum()),
+        opening=relative[:, 0],
+        opened=opened,
+        slid=slid,
+        kept=~opened & ~slid,
+        breach=moving.breach,
+        fastest=float(np.abs(relative).max()),
+        converged=bool(moving.breach <= STEADY),
     )

@@ -76,7 +76,7 @@ def decay(packing: Packing, radius: Floats, profiles: Floats) -> Decay:
 
     alpha, low, high = statistics.bootstrap(lambda rows: exponent(*rows), [profiles])
     others = np.array([decay_exponent(radius, profiles, *other) for other in ranges])
-    return Decay(alpha, low, high, fit, ranges, others)
+    return Decay(exponent=alpha, low=low, high=high, fit=fit, ranges=ranges, exponents=others)
 
 
 def decay_exponent(radius: Floats, profiles: Floats, inner: float, outer: float) -> float:

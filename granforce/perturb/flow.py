@@ -187,14 +187,14 @@ def outcome_of(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
     rows = np.concatenate([flows.velocity.rows[:, lane], flows.velocity.border[:, lane]])
     ended, breach = bool(flows.ended[lane]), float(flows.lately[0, lane])
     return Outcome(
-        flows.forces[:, lane].reshape(-1, 2).copy(),
-        rows[step.place],
-        ended and breach == 0.0,
-        ended,
-        breach,
-        int(flows.steps[lane]),
-        int(flows.iterations[lane]),
-        float(seconds),
+        forces=flows.forces[:, lane].reshape(-1, 2).copy(),
+        velocity=rows[step.place],
+        at_rest=ended and breach == 0.0,
+        converged=ended,
+        breach=breach,
+        steps=int(flows.steps[lane]),
+        iterations=int(flows.iterations[lane]),
+        seconds=float(seconds),
     )
 
 

@@ -41,7 +41,7 @@ def hull(packing: Packing) -> Hull:
     left, values, right = np.linalg.svd(A)
     rank = int(np.sum(values > _RANK * values.max(initial=0.0)))
     lift = right[:rank].T @ (left[:, :rank] / values[:rank]).T
-    return Hull(A, whole.b, lift, right[rank:], whole.grains, rank)
+    return Hull(A=A, b=whole.b, lift=lift, axes=right[rank:], grains=whole.grains, equations=rank)
 
 
 def fall(packing: Packing) -> Floats | None:

@@ -63,9 +63,15 @@ class Puller:
         stops = np.linspace(low, high, FEW_STOPS if many else STOPS)
         values = np.union1d(stops, np.clip(state[position, 0], low, high))
         found = pull(self._S, contact, values, state)
-        sliding = ends.sliding != 0
-        bounds = ends.lower, ends.upper
-        return Rail(*bounds, found.values, found.states, found.residual, ends.opened, sliding)
+        return Rail(
+            lower=ends.lower,
+            upper=ends.upper,
+            values=found.values,
+            states=found.states,
+            residual=found.residual,
+            opened=ends.opened,
+            sliding=ends.sliding != 0,
+        )
 
     def at(self, contact: int, value: float, state: Floats) -> tuple[Floats, float]:
         """The network (N_c, 2) nearest to `state` with f_n = value on a contact, and its residual.

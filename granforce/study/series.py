@@ -268,7 +268,9 @@ def regions(at: Floats, x: Floats) -> tuple[Integers, Floats]:
     return np.clip(((at - low) / side).astype(int), 0, REGIONS - 1) @ [REGIONS, 1], side
 
 
-FRAME = Kind("frame", 1, "frames", "frame", parameters, _inferred)
+FRAME = Kind(
+    name="frame", version=1, title="frames", unit="frame", parameters=parameters, compute=_inferred
+)
 
 
 def infer_series(
@@ -282,8 +284,12 @@ def infer_series(
 ) -> Any:
     """All frames inferred into the store at path, found there where they are: (dataset, failed).
 
-    options: as for `parameters`. The dataset is that of `combined`; failed: (frame, message) of
-    frames that were refused, which the dataset does not have.
+    frames: by `frames_of`. workers: processes; scheduler: address of a dask scheduler to use in
+    their place. progress(done, total) counts frames. options: mu, states (draws for each frame),
+    seed and unmeasured as for `infer`, others as for `read_pegs`. The dataset has a line for each
+    frame; failed: (frame, message) of frames that were refused, which the dataset does not have.
+
+    Raises InputError where the store cannot be written.
     """
     cells = [Cell(FRAME, parameters(frame, **options)) for frame in frames]
     failed = run(path, cells, workers=workers, scheduler=scheduler, progress=progress)

@@ -60,9 +60,10 @@ def default_path() -> Path:
 
 
 def open_store(path: str | Path | None = None, *, readonly: bool = False) -> Store:
-    """The store in a folder (by default `default_path()`), made if missing unless readonly.
+    """The Store in a folder, made if missing unless readonly.
 
-    A folder that cannot be written is opened all the same; saving to it raises InputError.
+    path: by default $GRANFORCE_CACHE, else the user's cache folder. A folder that cannot be written
+    is opened all the same; saving to it raises InputError.
 
     Raises InputError for a file, for a folder that holds something else, for one that cannot be
     made, for a store of a newer schema, unless readonly, and, if readonly, for a missing store.
@@ -242,7 +243,12 @@ class Store(Mapping[str, xr.Dataset]):
         params = json.loads(attrs["parameters"])
         size = _folder_bytes(self.path / name)
         return Entry(
-            name, attrs["kind"], params, attrs["algorithm_version"], size, attrs["created"]
+            name=name,
+            kind=attrs["kind"],
+            params=params,
+            version=attrs["algorithm_version"],
+            bytes=size,
+            created=attrs["created"],
         )
 
     def entries(self) -> list[Entry]:

@@ -21,7 +21,7 @@ def find_a_place() -> None:
     """
     if os.environ.get("NUMBA_CACHE_DIR") or any(map(_writable, _usual_places())):
         return
-    place = _temporary_place()
+    place = temporary_place()
     os.environ["NUMBA_CACHE_DIR"] = place  # workers get it from here
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = place
@@ -82,7 +82,7 @@ def _writable(folder: Path) -> bool:
     return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
 
 
-def _temporary_place() -> str:
+def temporary_place() -> str:
     """The same folder each time, so that kernels are compiled once; a new one if it is not ours."""
     if not hasattr(os, "getuid"):
         return tempfile.mkdtemp(prefix="granforce-")

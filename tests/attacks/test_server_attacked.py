@@ -19,6 +19,7 @@ import pytest
 from bokeh.client.websocket import WebSocketClientConnectionWrapper
 from bokeh.protocol import Protocol
 from bokeh.protocol.receiver import Receiver
+from heeding import computed
 from serving import CLOSED, serve
 from small_store import ROOT, cell_parameters
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
@@ -304,7 +305,7 @@ def test_a_hundred_sessions_leave_nothing(served):
 def test_a_server_told_to_end_while_it_computes_leaves_no_process(tmp_path, times):
     for _ in range(times):
         with serve(tmp_path, GRANFORCE_LIMITS=LIMITS) as (url, server):
-            visits(_computing(url))
+            visits(_computing(url, server))
             children = Path(f"/proc/{server.pid}/task/{server.pid}/children").read_text().split()
             os.kill(server.pid, signal.SIGTERM)
             server.wait(PATIENCE)
@@ -315,8 +316,10 @@ def test_a_server_told_to_end_while_it_computes_leaves_no_process(tmp_path, time
         assert not [child for child in children if Path(f"/proc/{child}").exists()]
 
 
-async def _computing(url):
+async def _computing(url, server):
     clients = [await Client.opened(url, LONG.format(k)) for k in range(3)]
     for client in clients:
         await client.ready()
-    await asyncio.sleep(3)
+    before = computed(server)
+    while computed(server) < before + 1.0:
+        await asyncio.sleep(0.05)

@@ -51,9 +51,9 @@ def test_ending_in_motion_is_not_called_converged():
     S = ensemble(packed(30, 0.3))
     run = [
         S_run._replace(residual=1e-3, converged=True)
-        for S_run in solvers._run(S, [S.original], *solvers.solvers()["nearest"])
+        for S_run in solvers.runs_of(S, [S.original], *solvers.solvers()["nearest"])
     ]
-    told = solvers._summary(run)
+    told = solvers.summary(run)
     assert told["reached"] == 0 and told["no_equilibrium"] == 1
     assert told["note"] == "1 ended in motion"
 
@@ -94,7 +94,7 @@ def test_an_exponent_is_the_slope_of_the_sizes_that_were_reached():
         for n in (100, 400, 1600)
     ]
     rows.append({**rows[-1], "n": 6400, "seconds": 1e9, "reached": 0})
-    fit = named(solvers._exponents(rows, 0.1), "solver", "nearest")
+    fit = named(solvers.exponents(rows, 0.1), "solver", "nearest")
     assert fit["exponent"] == pytest.approx(1.25)
     assert fit["note"] == "N = 100 … 1600"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from heeding import heed
+from heeding import heed, until_it_computes
 
 import granforce as gf
 from granforce.cli import commands
@@ -405,7 +405,7 @@ def test_a_call_that_is_left_behind_does_not_abort_the_process():
         preexec_fn=heed,
     )
     assert running.stdout.readline() == "begun\n"
-    time.sleep(1)  # usually within the solver; wherever it is, the command ends the same way
+    until_it_computes(running)  # within the solver
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60)
     assert (running.returncode, err) == (130, "granforce: interrupted; finished entries are kept\n")

@@ -218,7 +218,7 @@ def test_what_is_not_reached_is_told(S, monkeypatch):
 
 
 def test_stuck_chains_are_recognised(S, monkeypatch):
-    monkeypatch.setattr(uniform, "MOST_TURNS", 0)
+    monkeypatch.setattr(billiard, "MOST_TURNS", 0)
     sample = sample_uniform(S, 40)
     assert sample.counts["refused"] > 0.9 * 4 * uniform.PATHS_PER_STATE * 40
     assert not sample.reached and sample.mixing.worst_r_hat > 2

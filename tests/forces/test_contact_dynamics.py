@@ -6,16 +6,17 @@ from packings import packed, reference
 
 from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
 from granforce.forces.ensemble import ensemble
-from granforce.forces.gauss_seidel import SideBySide, _from_rest, gauss_seidel
+from granforce.forces.gauss_seidel import SideBySide, from_rest, gauss_seidel
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics.lanes import ONE
+from granforce.packing.scenes import scene
 
 
 @pytest.fixture
 def swept(rng):
     """A step problem after three sweeps from random forces."""
     S = ensemble(reference("n100_mu0.1_s11"))
-    problem, velocity, dilation, _ = _from_rest(S)
+    problem, velocity, dilation, _ = from_rest(S)
     set_stiffness(problem)
     force = rng.uniform(-1, 2, (len(S.index), 2))
     velocity[:] = rng.normal(size=velocity.shape)
@@ -105,6 +106,14 @@ def test_motion_is_no_equilibrium(rng):
     found = gauss_seidel(slippery, S.original, max_iterations=200_000)
     assert found.residual > 1e-3
     assert not nearest_piqp(slippery, S.original).converged
+
+
+@pytest.mark.parametrize("name", ["groove", "pyramid", "column"])
+def test_what_a_wall_holds_does_not_move(name):
+    """Its balance is left open, so that it is none of the ensemble's grains."""
+    S = ensemble(scene(name))
+    found = gauss_seidel(S, np.zeros_like(S.original), rest=None, tolerance=1e-9)
+    assert found.residual < 1e-9 and found.violation < 1e-9
 
 
 def test_too_few_sweeps_are_not_called_converged(rng):

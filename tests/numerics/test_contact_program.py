@@ -23,7 +23,7 @@ def unbalances(S, mode, lanes=ONE):
     work = contact_program.make_workspace(problem, len(lanes))
     for lane in range(len(lanes)):
         programs = [bound_of(S, (7 + lane) % len(S.index), 0, 1)]
-        linear_programs._fill(middle, at, lane, programs, deque([0]))
+        linear_programs.fill(middle, at, lane, programs, deque([0]))
     found = []
     for _ in range(40):
         interior_point.look(problem, True, at, work, lanes)

@@ -41,7 +41,8 @@ def check(packing):
 @pytest.mark.parametrize("mu", [0.001, 0.1, 1.0, 10.0])
 def test_packings_are_jammed_at_every_friction(mu):
     S = check(packed(60, mu))
-    assert 3 <= S.coordination < 4.1
+    # As many contacts as balance needs at the least: 2 N_c ≥ 3 M − 1.
+    assert 3 - 1 / len(S.grains) <= S.coordination < 4.1
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -2,6 +2,7 @@
 
 import io
 import json
+import tracemalloc
 import warnings
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from granforce.packing.importers import (
     save_packing,
 )
 from granforce.packing.importers.text import make_table
-from granforce.records import InputError, NotJammedError, make_contacts, make_packing
+from granforce.records import InputError, NotJammedError, make_contacts, make_packing, repeated
 
 HERE = Path(__file__).parents[1]
 REFERENCES = sorted((HERE / "reference").glob("n*_s??.npz"))
@@ -441,13 +442,13 @@ def test_lammps_bounds_are_those_of_the_manual():
     text = lines(PARTICLES)
     text[3] = "1"
     text[4:8] = ["ITEM: BOX BOUNDS xy xz yz", "0 14.757069 4.91902", "0 8.52 0", "0 15 0"]
-    items = lammps._snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
-    low, cell = lammps._cell("dump", items)
+    items = lammps.snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
+    low, cell = lammps.cell_of("dump", items)
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == 4.91902
     text[5] = "-4.91902 9.838049 -4.91902"
-    items = lammps._snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
-    low, cell = lammps._cell("dump", items)
+    items = lammps.snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
+    low, cell = lammps.cell_of("dump", items)
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == -4.91902
 
@@ -739,6 +740,24 @@ def test_wrong_tables_are_refused_with_a_reason(grains, contacts, options, messa
     with pytest.raises(InputError, match=message) as caught:
         read_table(file(grains), file(contacts), **{"mu": 0.5, **options})
     assert "\n" not in str(caught.value)
+
+
+def test_a_contact_given_again_and_again_is_found_in_little_memory():
+    """The first that repeats one, as comparing all with all would find it."""
+    rng = np.random.default_rng(0)
+    i, j, angle = rng.integers(3, size=50), rng.integers(3, 6, size=50), rng.uniform(0, 7, 50)
+    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    few = make_contacts(i, j, normal, np.ones(50), np.ones(6))
+    alike = (i == i[:, None]) & (j == j[:, None]) & (normal @ normal.T > 0.75)
+    again, before = np.nonzero(np.tril(alike, -1))
+    assert repeated(few) == (before[0], again[0])
+
+    none = np.zeros(3000, dtype=int)
+    many = make_contacts(none, none + 1, [[1.0, 0.0]] * 3000, none + 2.0, np.ones(2))
+    tracemalloc.start()
+    assert repeated(many) == (0, 1)
+    assert tracemalloc.get_traced_memory()[1] < 10_000_000  # all pairs fill 50 times it
+    tracemalloc.stop()
 
 
 # Whatever the bytes: a packing or InputError

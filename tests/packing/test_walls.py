@@ -81,12 +81,12 @@ def test_an_annulus_is_found_from_the_grains_at_its_walls(rng):
     from granforce.packing.importers import walls
 
     flag = np.where(inner, -1, 1)
-    found = walls._fitted("annulus", x, r, np.ones(80, bool), flag)
+    found = walls.fitted("annulus", x, r, np.ones(80, bool), flag)
     assert np.allclose(found.numbers, [300, 400, 50, 200], atol=1e-3)
     gap, ways = found.gaps(x, r)
     assert np.allclose(gap[np.arange(80), np.where(inner, 0, 1)], 0, atol=1e-3)
     assert np.allclose(np.hypot(*ways[:, 0].T), 1)
-    circle = walls._fitted("circle", x[~inner], r[~inner], np.ones(50, bool), flag[~inner])
+    circle = walls.fitted("circle", x[~inner], r[~inner], np.ones(50, bool), flag[~inner])
     assert np.allclose(circle.numbers, [300, 400, 200], atol=1e-3)
 
 

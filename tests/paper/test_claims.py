@@ -62,10 +62,10 @@ def rise_and_fall(mu):
 
 def judged(table, families=None, sampler="gauss_seidel"):
     """{statement: verdict} of the claims about one sampler and those about packings."""
-    found = claims.judged(table)
-    if families is not None:
-        named = [family(table, sampler) for family in families]
-        found = [claim for family in named for claim in family]
+    if families is None:
+        found = claims.judged(table)
+    else:
+        found = [claim for family in families for claim in family(table, sampler)]
     return {c.statement: c.verdict for c in found if c.sampler in (sampler, "")}
 
 

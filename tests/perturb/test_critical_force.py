@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from packings import lattice, packed
+from packings import lattice, packed, reference
 
 from granforce.explore.intervals import limit_load_bounds, limit_loads
 from granforce.forces import contact_dynamics as dynamics
 from granforce.forces.ensemble import ensemble
-from granforce.forces.gauss_seidel import _from_rest
+from granforce.forces.gauss_seidel import from_rest
 from granforce.numerics.lanes import ONE
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay, flow
@@ -65,10 +65,10 @@ def test_loads_rise_by_the_part_of_the_way_that_is_asked_for():
 
 
 def test_sliding_lets_grains_set_off_below_the_limit_load():
-    S = ensemble(packed(60, 0.3))
-    limit = limit_loads(S)
-    part = [critical_force(S, S.index[k], limit_load=limit[k]).low / limit[k] for k in (12, 24)]
-    assert min(part) < 0.8
+    S = ensemble(reference("n100_mu1_s12"))
+    contacts = S.index[[0, 48]]
+    pairs = zip(contacts, limit_loads(S, contacts), strict=True)
+    assert all(critical_force(S, c, limit_load=load).low < 0.6 * load for c, load in pairs)
 
 
 def test_what_is_given_up_too_early_is_followed_before_it_counts_as_motion():
@@ -116,7 +116,7 @@ def test_what_fails_in_one_thread_ends_the_others():
 
 def swept(S, forces, position, load, sweeps):
     """Gauss–Seidel sweeps under a pair: forces and unbalance, in ⟨f_n⟩."""
-    problem, velocity, dilation, _ = _from_rest(S)
+    problem, velocity, dilation, _ = from_rest(S)
     force, pair = forces.copy(), np.zeros_like(forces)
     pair[position, 0] = load
     dynamics.set_stiffness(problem)
@@ -140,13 +140,9 @@ def test_sweeps_of_contact_dynamics_decide_alike():
         assert above > 1e-4
 
 
-def first_motion(mu=0.1, n=60, k=17):
-    S = ensemble(packed(n, mu))
-    return S, k, critical_force(S, S.index[k])
-
-
 def test_motion_obeys_momentum_balance_and_coulombs_law():
-    S, k, critical = first_motion()
+    S, k = ensemble(reference("n100_mu0.1_s11")), 128
+    critical = critical_force(S, S.index[k])
     step, moving = make_step(S), critical.moving
     assert critical.converged
     f, U = moving.forces, moving.velocity

@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 import pytest
-from heeding import heed
+from heeding import heed, until_it_computes
 from packings import packed
 from scipy import sparse
 
@@ -218,7 +218,7 @@ def test_ctrl_c_ends_a_kernel_in_the_main_thread():
     ) as child:
         try:
             assert child.stdout.readline() == "begun\n"
-            time.sleep(1.0)
+            until_it_computes(child)  # within the kernel
             child.send_signal(signal.SIGINT)
             _, errors = child.communicate(timeout=SOON)
         finally:

@@ -77,11 +77,11 @@ def test_a_folder_of_somebody_else_is_not_taken(tmp_path, monkeypatch):
     """Kernels are code: who can write them can run anything."""
     monkeypatch.setattr(compiled.tempfile, "tempdir", str(tmp_path))
     usual = tmp_path / f"granforce-kernels-{os.getuid()}"
-    assert compiled._temporary_place() == str(usual)
+    assert compiled.temporary_place() == str(usual)
     usual.chmod(0o777)
-    other = compiled._temporary_place()
+    other = compiled.temporary_place()
     assert other != str(usual) and stat.S_IMODE(os.stat(other).st_mode) == 0o700
     usual.rmdir()
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     usual.symlink_to(tmp_path / "elsewhere")
-    assert compiled._temporary_place() != str(usual)
+    assert compiled.temporary_place() != str(usual)

@@ -1,4 +1,4 @@
-"""The study, the page, the benchmark and the store."""
+"""The study, the page, the reference, the benchmark and the store."""
 
 import argparse
 import json
@@ -6,10 +6,14 @@ import re
 import runpy
 import socket
 import sys
+import webbrowser
 from pathlib import Path
+
+import platformdirs
 
 from granforce.records import InputError, whole
 from granforce.study.store import open_store
+from granforce.system.files import make_folder, written
 from granforce.system.terminal import print_list, report
 
 
@@ -63,6 +67,20 @@ def _check_address(address: str, port: int) -> None:
             f"cannot listen at {address[:40]!r}, port {port}: {reason}; choose another with "
             "--address and --port"
         ) from None
+
+
+def docs(arguments: argparse.Namespace) -> None:
+    """The reference, written to a file, or to the user's cache folder and opened from there."""
+    from granforce.cli import reference
+
+    path = Path(
+        arguments.out or make_folder(platformdirs.user_cache_path("granforce")) / "reference.html"
+    )
+    with written(path) as file:
+        file.write(reference.page().encode())
+    print(path)
+    if not arguments.out:
+        webbrowser.open(path.as_uri())
 
 
 def bench(arguments: argparse.Namespace) -> None:

@@ -6,15 +6,18 @@ Whatever a file holds, these functions return a validated Packing or raise Input
 from granforce.packing.importers.dem import read_mercury, read_yade
 from granforce.packing.importers.known import read_known
 from granforce.packing.importers.lammps import read_lammps
-from granforce.packing.importers.measurements import read_measurement
+from granforce.packing.importers.measurements import Measurement, read_measurement
 from granforce.packing.importers.network import report
 from granforce.packing.importers.npz import load_packing, save_packing
-from granforce.packing.importers.pegs import read_pegs
-from granforce.packing.importers.synthetic import synthetic_frame
+from granforce.packing.importers.pegs import Photoelastic, read_pegs
+from granforce.packing.importers.synthetic import SyntheticFrame, synthetic_frame
 from granforce.packing.importers.tables import read_columns, read_table
 from granforce.packing.importers.walls import read_wall_force
 
 __all__ = [
+    "Measurement",
+    "Photoelastic",
+    "SyntheticFrame",
     "load_packing",
     "read_columns",
     "read_known",

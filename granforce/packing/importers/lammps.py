@@ -65,7 +65,7 @@ def read_lammps(
     Raises InputError naming file and line.
     """
     mu = friction(mu)
-    first, second = _snapshots(particles), _snapshots(contacts)
+    first, second = snapshots(particles), snapshots(contacts)
     steps = [step for step in first[1] if step in second[1]]
     if not steps:
         raise InputError(
@@ -75,7 +75,7 @@ def read_lammps(
     atoms = _table(first[0], first[1][step], "ATOMS")
     check_grains(len(atoms.rows), most_grains, first[0])
     pairs = _table(second[0], second[1][step], "ENTRIES")
-    low, cell = _cell(first[0], first[1][step])
+    low, cell = cell_of(first[0], first[1][step])
     x, r, index = _disks(atoms, low, cell)
     joined, forces, skipped = _contacts(pairs, columns, x, r, cell, index)
     info = {"source": "lammps"}
@@ -83,7 +83,7 @@ def read_lammps(
     return adopt(packing, timestep=step, contacts_skipped=skipped)
 
 
-def _snapshots(source: Source) -> tuple[str, dict[int, dict[str, _Item]]]:
+def snapshots(source: Source) -> tuple[str, dict[int, dict[str, _Item]]]:
     """Name of the file and its snapshots: {timestep: {title: _Item}}, in the file's order."""
     name, text = read_text(source)
     snapshots: dict[int, dict[str, _Item]] = {}
@@ -140,7 +140,7 @@ def _table(name: str, items: dict[str, _Item], title: str) -> Table:
     return make_table(name, item.words, item.body, lines)
 
 
-def _cell(name: str, items: dict[str, _Item]) -> tuple[Floats, Cell]:
+def cell_of(name: str, items: dict[str, _Item]) -> tuple[Floats, Cell]:
     """Origin (2,) and Cell of the box, open along directions that are not periodic.
 
     Bounds of a tilted box (title ``xy xz yz``, tilts in a third column) are those of the rectangle

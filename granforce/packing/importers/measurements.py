@@ -31,10 +31,11 @@ class Measurement(NamedTuple):
 
 
 def read_measurement(source: Source) -> Measurement:
-    """The Measurement in a CSV file (a path or an open file).
+    """The Measurement in a CSV file, as `infer` wants it once it is `on` the contacts of a packing.
 
-    Columns: contact (its number in the packing), f_n, f_t, sigma_n, sigma_t; empty or nan where a
-    component was not measured. Contacts without a line were not measured.
+    source: a path or an open file. Columns: contact (its number in the packing), f_n, f_t, sigma_n,
+    sigma_t; empty or nan where a component was not measured. Contacts without a line were not
+    measured.
 
     Raises InputError naming file and line.
     """

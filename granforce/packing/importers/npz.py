@@ -32,11 +32,12 @@ _UNPACKED = 10**9
 def load_packing(
     source: Source, *, unpacked: int = _UNPACKED, most_grains: int | None = None
 ) -> Packing:
-    """The Packing in an NPZ file (a path or an open binary file), its contacts as they are.
+    """The Packing in an NPZ file, its contacts as they are.
 
-    Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if none), mu, i, j, nx, ny, branch, fn, ft;
-    seed, load, tilt, arm_i, arm_j and info (JSON) if there. unpacked: most bytes of all arrays
-    together; most_grains: how many are taken. Raises InputError naming what is wrong.
+    source: a path or an open binary file. Arrays: x, r, L (or Lx, Ly, inf if open), P (nan if
+    none), mu, i, j, nx, ny, branch, fn, ft; seed, load, tilt, arm_i, arm_j and info (JSON) if
+    there. unpacked: most bytes of all arrays together; most_grains: how many are taken. Raises
+    InputError naming what is wrong.
     """
     name = str(getattr(source, "name", "the given file") if hasattr(source, "read") else source)
     arrays = _arrays(source, name, unpacked, most_grains)
@@ -51,9 +52,9 @@ def load_packing(
 
 
 def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
-    """Write a packing as NPZ to be read by load_packing, exactly, to a path or an open binary file.
+    """Write a packing as NPZ, to be read by `load_packing` exactly.
 
-    A path gets the whole file or none, see `granforce.system.files.written`.
+    target: a path, which gets the whole file or none, or an open binary file.
 
     Raises InputError where info is not plain numbers and strings, or the path cannot be written.
     """

@@ -289,7 +289,14 @@ def _listed(listing: Listing, rows: Integers) -> _Listed:
         spread = np.where(np.isfinite(mean), 0.5 * (high - low), np.nan)
     times = np.bincount(which, minlength=len(pairs))
     unequal = int(np.sum(np.nan_to_num(spread).any(axis=1)))
-    return _Listed(pairs, mean, spread, factor, int(np.sum(times > 1)), unequal)
+    return _Listed(
+        pairs=pairs,
+        forces=mean,
+        spread=spread,
+        factor=factor,
+        twice=int(np.sum(times > 1)),
+        unequal=unequal,
+    )
 
 
 def _gain_by_reversing(x: Floats, listed: _Listed, at_wall: Mask) -> float:

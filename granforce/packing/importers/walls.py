@@ -143,9 +143,15 @@ def wall_contacts(
         which = _occurrence(grain[told])
         names = tuple(f"{_ANY} {k + 1}" if k else _ANY for k in range(which.max() + 1))
         return WallContacts(
-            grain[told], which, normal[told], forces[told], factor[told], names, None
+            grain=grain[told],
+            wall=which,
+            normal=normal[told],
+            forces=forces[told],
+            factor=factor[told],
+            names=names,
+            outline=None,
         )
-    outline = walls if isinstance(walls, Outline) else _fitted(walls, x, r, at_wall, listing.flag)
+    outline = walls if isinstance(walls, Outline) else fitted(walls, x, r, at_wall, listing.flag)
     gap, ways = outline.gaps(x, r)
     touching = at_wall[:, None] & (gap <= reach * r.mean())
     touching[np.flatnonzero(at_wall), gap[at_wall].argmin(axis=1)] = True
@@ -158,7 +164,9 @@ def wall_contacts(
         else:
             best = mine[np.argmin(gap[g[mine], w[mine]])]
         m[best], f[best] = forces[k], factor[k]
-    return WallContacts(g, w, ways[g, w], m, f, outline.names, outline)
+    return WallContacts(
+        grain=g, wall=w, normal=ways[g, w], forces=m, factor=f, names=outline.names, outline=outline
+    )
 
 
 def _occurrence(grain: Integers) -> Integers:
@@ -171,7 +179,7 @@ def _occurrence(grain: Integers) -> Integers:
     return which
 
 
-def _fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
+def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
     """The Outline of a shape that the grains at walls touch."""
     if at_wall.sum() < 4:
         raise InputError(
@@ -256,9 +264,12 @@ def bodies(
     sigma = np.full((len(i), 2), np.nan)
     sigma[len(found.grain) :] = values[:, 2:]
     return Bodies(
-        *(total, radii[len(x) :], load, contacts),
-        np.concatenate([found.forces, held]),
-        sigma,
-        np.concatenate([found.factor, np.ones(len(cells))]),
-        (*found.names, *(f"cell of the {name} wall" for name in cells)),
+        x=total,
+        r=radii[len(x) :],
+        load=load,
+        contacts=contacts,
+        measured=np.concatenate([found.forces, held]),
+        sigma=sigma,
+        factor=np.concatenate([found.factor, np.ones(len(cells))]),
+        names=(*found.names, *(f"cell of the {name} wall" for name in cells)),
     )

@@ -96,26 +96,31 @@ def over_all(
     groups: {μ: [(disks, value)]}, with values of any shape; least: so many it takes.
     """
     ranges = Ranges(good, good if fair is None else fair)
-    said, unknown = (statement, sampler, source, measured), (float("nan"),) * 3
+    claim = _missing(statement, sampler, source, measured, ranges)
     if len(groups) < least:
-        return Claim(*said, *unknown, str(ranges), MISSING)
+        return claim
     keys = np.array(list(groups), dtype=float)
     values = [np.array([value for _, value in group]) for group in groups.values()]
     means = np.array([value.mean(axis=0) for value in values])
     value = float(statistic(keys, means))
     if not np.isfinite(value):
-        return Claim(*said, *unknown, str(ranges), MISSING)
+        return claim
+    claim = claim._replace(value=value)
     drawn = statistics.resampled_means(values)
     found = np.array([statistic(keys, draw) for draw in drawn])
     single = max(map(len, values)) < 2
     few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
     if single or few or np.isfinite(found).mean() < 0.9:
-        ends = unknown[:2] if single else statistics.percentile_ends(found)[0]
-        return Claim(*said, value, *ends, str(ranges), FEW)
+        claim = claim._replace(verdict=FEW)
+        if single:
+            return claim
+        low, high = statistics.percentile_ends(found)[0]
+        return claim._replace(low=low, high=high)
     (low, high), farthest = statistics.percentile_ends(found[np.isfinite(found)])
     verdict = ranges.verdict(low, high)
+    claim = claim._replace(low=low, high=high, verdict=verdict)
     if verdict == UNDECIDED:
-        return Claim(*said, value, low, high, str(ranges), verdict)
+        return claim
     turned = {None: ranges.verdict(*farthest)}  # by the μ left out; None: another draw
     for k, key in enumerate(keys) if len(keys) > least else ():
         without = statistic(np.delete(keys, k), np.delete(means, k, axis=0))
@@ -126,7 +131,22 @@ def over_all(
         # What is outside of the good range for certain does not become open.
         outside = {verdict, *turned.values()} <= {DIFFERS, FAILED}
         verdict = DIFFERS if outside else UNDECIDED
-    return Claim(*said, value, low, high, str(ranges), verdict, why)
+    return claim._replace(verdict=verdict, why=why)
+
+
+def _missing(statement: str, sampler: str, source: str, measured: str, ranges: Ranges) -> Claim:
+    """The Claim before anything is known of it."""
+    return Claim(
+        statement=statement,
+        sampler=sampler,
+        source=source,
+        measured=measured,
+        value=np.nan,
+        low=np.nan,
+        high=np.nan,
+        criterion=str(ranges),
+        verdict=MISSING,
+    )
 
 
 def _turns(turned: Any, verdict: str) -> str:
@@ -161,11 +181,9 @@ def at_each(
     """
     ranges = Ranges(good, good if fair is None else fair)
     interval = interval or statistics.mean_interval
+    claim = _missing(statement, sampler, source, measured, ranges)
     if not groups:
-        lost = float("nan")
-        return Claim(
-            statement, sampler, source, measured, lost, lost, lost, str(ranges), verdict=MISSING
-        )
+        return claim
     level = 1 - (1 - statistics.LEVEL) / len(groups)
     found, verdicts = {}, {}
     for mu, group in groups.items():
@@ -177,9 +195,7 @@ def at_each(
     where = f"{measured}, at the worst μ ({place:g})" if len(found) > 1 else measured
     value, low, high = found[place]
     verdict, why = _together(verdicts)
-    return Claim(
-        statement, sampler, source, where, value, low, high, str(ranges), verdict=verdict, why=why
-    )
+    return claim._replace(measured=where, value=value, low=low, high=high, verdict=verdict, why=why)
 
 
 def _beyond(value: float, ends: Ends) -> float:

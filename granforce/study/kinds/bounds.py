@@ -184,7 +184,35 @@ def _stress(
     return stress_dataset(S, found, seconds=seconds)
 
 
-INTERVALS = Kind("intervals", 1, "exact bounds", "bound", _exact_parameters, _intervals)
-LIMIT_LOADS = Kind("limit_loads", 1, "limit loads", "contact", _exact_parameters, _limit_loads)
-OUTLINE = Kind("outline", 1, "outline of S", "program", _outline_parameters, _outline)
-STRESS = Kind("stress", 1, "outline of stresses", "program", _stress_parameters, _stress)
+INTERVALS = Kind(
+    name="intervals",
+    version=1,
+    title="exact bounds",
+    unit="bound",
+    parameters=_exact_parameters,
+    compute=_intervals,
+)
+LIMIT_LOADS = Kind(
+    name="limit_loads",
+    version=1,
+    title="limit loads",
+    unit="contact",
+    parameters=_exact_parameters,
+    compute=_limit_loads,
+)
+OUTLINE = Kind(
+    name="outline",
+    version=1,
+    title="outline of S",
+    unit="program",
+    parameters=_outline_parameters,
+    compute=_outline,
+)
+STRESS = Kind(
+    name="stress",
+    version=1,
+    title="outline of stresses",
+    unit="program",
+    parameters=_stress_parameters,
+    compute=_stress,
+)

@@ -149,4 +149,11 @@ def check_complete(result: Any, what: str) -> None:
         raise InputError(f"{what} not certified: largest duality gap {result.max_gap:.1e} ⟨f_n⟩")
 
 
-PACKING = Kind("packing", PACKING_VERSION, "compaction", "step", _packing_parameters, _packing)
+PACKING = Kind(
+    name="packing",
+    version=PACKING_VERSION,
+    title="compaction",
+    unit="step",
+    parameters=_packing_parameters,
+    compute=_packing,
+)

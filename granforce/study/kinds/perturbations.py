@@ -166,9 +166,18 @@ def _perturbed_contact(
 
 
 PERTURBATION = Kind(
-    *("perturbation", 1, "local perturbation", "contact"), _perturbation_parameters, _perturbation
+    name="perturbation",
+    version=1,
+    title="local perturbation",
+    unit="contact",
+    parameters=_perturbation_parameters,
+    compute=_perturbation,
 )
 PERTURBED_CONTACT = Kind(
-    *("perturbed_contact", PERTURBATION.version, "perturbed contact", "load"),
-    *(_perturbed_contact_parameters, _perturbed_contact),
+    name="perturbed_contact",
+    version=PERTURBATION.version,
+    title="perturbed contact",
+    unit="load",
+    parameters=_perturbed_contact_parameters,
+    compute=_perturbed_contact,
 )

@@ -355,17 +355,46 @@ def _informative(
 
 
 WALK = Kind(
-    *("walk", 1, "random walk", "state", _walk_parameters, _walk),
+    name="walk",
+    version=1,
+    title="random walk",
+    unit="state",
+    parameters=_walk_parameters,
+    compute=_walk,
     holds_states=True,
     reached=_walk_reached,
 )
 UNIFORM = Kind(
-    "uniform", 3, "uniform sample", "state", _uniform_parameters, _uniform, holds_states=True
+    name="uniform",
+    version=3,
+    title="uniform sample",
+    unit="state",
+    parameters=_uniform_parameters,
+    compute=_uniform,
+    holds_states=True,
 )
 INFERENCE = Kind(
-    *("inference", 2, "inference", "draw", _inference_parameters, _inference), holds_states=True
+    name="inference",
+    version=2,
+    title="inference",
+    unit="draw",
+    parameters=_inference_parameters,
+    compute=_inference,
+    holds_states=True,
 )
-VOLUME = Kind("volume", 1, "volume of S", "path", _volume_parameters, _volume)
+VOLUME = Kind(
+    name="volume",
+    version=2,
+    title="volume of S",
+    unit="path",
+    parameters=_volume_parameters,
+    compute=_volume,
+)
 INFORMATIVE = Kind(
-    *("informative", 2, "which measurement next", "contact"), _informative_parameters, _informative
+    name="informative",
+    version=2,
+    title="which measurement next",
+    unit="contact",
+    parameters=_informative_parameters,
+    compute=_informative,
 )

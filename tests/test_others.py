@@ -1,0 +1,77 @@
+"""Names of other libraries that are not meant for us: each in one file, and known by a test.
+
+Where one of these tests fails after an update, it says what no longer works, and where to mend it.
+"""
+
+import ast
+import importlib
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import pytest
+
+HOUSE = Path(__file__).parents[1] / "granforce"
+# Where it is used, what, and what it is for.
+NAMES = {
+    "figures/style.py": ("_close_figures", "an inset leaves the figure open that it is drawn into"),
+    "study/scan.py": ("_processes", "workers are ended where the work is interrupted"),
+    "study/entries.py": ("zarr.core.metadata", "metadata of an array is written as Zarr does"),
+    "numerics/lanes.py": ("numba.core", "LLVM's own functions are called for all lanes at once"),
+    "system/compiled.py": ("numba.core", "a listener tells that kernels are compiled"),
+}
+_OURS = {"_asdict", "_fields", "_make", "_replace", "_exit"}  # documented, in spite of their names
+_TYPES = {"_ArgumentGroup", "_SubParsersAction"}  # argparse's, in annotations that nobody reads
+
+
+def used(path):
+    """Names of others in a file: attributes and modules that begin with _, and its cores."""
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and node.attr.startswith("_"):
+            is_own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+            if not (node.attr.startswith("__") or is_own):
+                yield node.attr
+        elif isinstance(node, ast.ImportFrom) and not (node.module or "").startswith("granforce"):
+            parts = (node.module or "").split(".")
+            if "core" in parts or any(p.startswith("_") and p[1:2] != "_" for p in parts):
+                yield node.module
+
+
+def test_names_of_others_are_used_where_they_are_known():
+    files = sorted(HOUSE.rglob("*.py"))
+    text = "\n".join(path.read_text() for path in files)
+    found = {
+        (str(path.relative_to(HOUSE)), name)
+        for path in files
+        for name in used(path)
+        if name not in _OURS | _TYPES and f"def {name}(" not in text and f"{name} = {{" not in text
+    }
+    assert found == {(file, name) for file, (name, _) in NAMES.items()}
+
+
+def told(file):
+    name, purpose = NAMES[file]
+    return f"granforce/{file} needs {name}, so that {purpose}"
+
+
+def test_holoviews_can_be_told_to_leave_a_figure_open():
+    plot = importlib.import_module("holoviews.plotting.mpl.plot").MPLPlot
+    assert hasattr(plot, "_close_figures"), told("figures/style.py")
+
+
+def test_a_pool_of_processes_knows_its_workers():
+    with ProcessPoolExecutor(1) as pool:
+        pool.submit(int).result()
+        assert [p.is_alive() for p in pool._processes.values()] == [True], told("study/scan.py")
+
+
+@pytest.mark.parametrize(
+    ("file", "module", "name"),
+    [
+        ("study/entries.py", "zarr.core.metadata", "ArrayV3Metadata"),
+        ("numerics/lanes.py", "numba.core.cgutils", "get_or_insert_function"),
+        ("system/compiled.py", "numba.core.event", "Listener"),
+    ],
+)
+def test_what_is_imported_is_there(file, module, name):
+    assert hasattr(importlib.import_module(module), name), told(file)
