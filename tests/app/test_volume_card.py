@@ -7,8 +7,6 @@ import pytest
 def view(state, wait_for):
     from app.views.volume import Volume
 
-    state.choose(mu=1)
-    wait_for(state)
     made = Volume(state)
     wait_for(state)
     return made
