@@ -610,7 +610,7 @@ def test_all_that_a_link_may_name_is_limited():
     from app.limits import NAMES
     from app.selection import OPTIONS
 
-    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii", "box"}
+    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii", "box", "version"}
 
 
 def test_limits_are_read_and_wrong_ones_refused():
@@ -1084,13 +1084,13 @@ def test_scripts_of_one_component_name_nothing_twice():
 
 
 def test_states_of_older_packings_in_a_cache_are_not_offered(tmp_path):
-    """Packings of version 1 named no accuracy of steps; a page once failed over them."""
+    """A page once failed over those of packings that named less than today's."""
     from app.data import Library
 
     shipped = Library(cache=tmp_path / "none")
     cell = next(cell for cell in shipped.cells() if cell.kind == "walk")
     older = dict(cell.params["packing"])
-    del older["accuracy"]
+    del older["version"], older["sweeps"]
     cache = open_store(tmp_path / "cache")
     named, dtypes = cell.params | {"packing": older}, {"states": "float32"}
     study.save(cache, kinds.WALK, named, shipped.dataset(cell), dtypes=dtypes)
