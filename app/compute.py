@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import xarray as xr
 
+from granforce.records import InputError, NotJammedError
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
@@ -50,18 +52,34 @@ def states(library: Library, selection: Selection) -> Work:
             if cell is None:
                 _make_packing(job, library, selection.packing)
                 job.begin("finding which contacts carry")
-                dataset, _ = study.get(
-                    library.own,
-                    kind,
-                    params,
-                    progress=lambda done, total: _counted(job, done, total),
-                    **_watched(job, selection, params),
-                )
+                with _told_of_friction(selection):
+                    dataset, _ = study.get(
+                        library.own,
+                        kind,
+                        params,
+                        progress=lambda done, total: _counted(job, done, total),
+                        **_watched(job, selection, params),
+                    )
                 cell = library.find(selection.kind, kind.reached(params, dataset))
             assert cell is not None  # as it was kept
         return library.shown(cell)
 
     return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
+
+
+@contextmanager
+def _told_of_friction(selection: Selection) -> Iterator[None]:
+    """Where no forces balance, say so of a friction smaller than that of the packing."""
+    try:
+        yield
+    except NotJammedError as error:
+        own = selection.packing["mu"]
+        if selection.mu >= own:
+            raise
+        raise InputError(
+            f"no forces hold this packing at μ = {selection.mu:g}: it was made at μ = {own:g}, "
+            "and needs some of that friction; try a larger μ"
+        ) from error
 
 
 def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, Any]:

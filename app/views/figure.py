@@ -26,10 +26,9 @@ def panel(state):
         name = f"{stem(state.cell.selection)}_figure.{kind}"
         buttons.hand_over_picture(name, caption(state), width.value)
 
-    buttons = Handover(asked, files=FILES, margin=(12, 10, 0, 10))
+    buttons = Handover(asked, files=FILES, margin=(12, 10, -8, 10))
     width = NumberField(
         refuse, label="Width, mm", value=WIDTH_MM, start=40, end=2000, step=5, width=150,
-        margin=(10, 10, 0, 0),
+        margin=(0, 10, 4, 10),
     )  # fmt: skip
-    row = pn.Row(buttons, width, sizing_mode="stretch_width")
-    return pn.Column(row, note(HELP), sizing_mode="stretch_width")
+    return pn.Column(buttons, width, note(HELP), sizing_mode="stretch_width")

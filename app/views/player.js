@@ -4,7 +4,8 @@
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const SWING = 2.2 // s, for the displacement field to go to and fro
-const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye
+const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
+const LONGEST_S = 6 // but no longer than this
 const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
 const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
@@ -247,7 +248,7 @@ class Player {
     const { replay } = this, took = Math.max(0, now - this.before)
     const behind = this.follows ? (replay.last - replay.position) / CATCH_UP : 0
     const speed = Math.max(this.buttons.speed, behind)
-    const steps = (took * speed) / 1000 / (replay.swinging ? CROSSING : 1)
+    const steps = (took / 1000) * (replay.swinging ? Math.max(speed / CROSSING, 1 / LONGEST_S) : speed)
     this.before = now
     if (this.resting !== null) {
       if (this.rest(replay, took)) return

@@ -392,8 +392,6 @@ def test_a_series_without_states_at_a_friction_asks_for_them(state, wait_for):
 def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_for):
     from app.views.intervals import View
 
-    state.choose(mu=1)
-    wait_for(state)
     view = View(state)
     assert view.exact.visible
     state.compute_exact()
@@ -405,6 +403,15 @@ def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_f
     assert state.knowledge.task.running and not view.exact.visible
     wait_for(state)
     assert state.exact is not None and not view.exact.visible
+
+
+def test_too_little_friction_for_a_packing_is_called_that(state, wait_for):
+    """ "Not jammed, or contacts are missing" is no help to who has only moved a slider."""
+    before = state.cell
+    state.ask(small(0.0, packed_mu=1.0), at_once=True)
+    wait_for(state)
+    assert "made at μ = 1" in state.message and "larger μ" in state.message
+    assert state.cell == before
 
 
 def test_a_link_to_missing_states_computes_them(library, wait_for):
@@ -610,7 +617,8 @@ def test_all_that_a_link_may_name_is_limited():
     from app.limits import NAMES
     from app.selection import OPTIONS
 
-    assert {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS} <= {*NAMES, "radii", "box", "version"}
+    named = {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS}
+    assert named <= {*NAMES, "radii", "box", "version"}  # which no link names
 
 
 def test_limits_are_read_and_wrong_ones_refused():
@@ -1084,13 +1092,13 @@ def test_scripts_of_one_component_name_nothing_twice():
 
 
 def test_states_of_older_packings_in_a_cache_are_not_offered(tmp_path):
-    """A page once failed over those of packings that named less than today's."""
+    """Packings of version 1 named neither accuracy nor version; a page once failed over them."""
     from app.data import Library
 
     shipped = Library(cache=tmp_path / "none")
     cell = next(cell for cell in shipped.cells() if cell.kind == "walk")
     older = dict(cell.params["packing"])
-    del older["version"], older["sweeps"]
+    del older["accuracy"], older["version"]
     cache = open_store(tmp_path / "cache")
     named, dtypes = cell.params | {"packing": older}, {"states": "float32"}
     study.save(cache, kinds.WALK, named, shipped.dataset(cell), dtypes=dtypes)
