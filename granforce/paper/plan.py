@@ -88,11 +88,13 @@ class Plan(NamedTuple):
     stress_uniform_packings: int = 3
     stress_states: int = 300
     volume_packings: int = 10
-    volume_accuracy: float = 0.1  # of ln V, which differs by far more from packing to packing
+    # Of ln V, which differs by far more from packing to packing; in proportion to N beyond n.
+    volume_accuracy: float = 0.1
     tails_n: int = 1600
     tails_frictions: tuple[float, ...] = (0.01, 0.1, 1)
-    tails_packings: int = 2
-    tails_states: int = 200
+    # 8 million forces of each kind: ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵.
+    tails_packings: int = 3
+    tails_states: int = 1000
 
 
 QUICK = Plan(
@@ -362,7 +364,7 @@ def _volumes(plan: Plan, seed: int) -> list[Task]:
 
 def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:
     packing = kinds.PACKING.parameters(n, mu, seed)
-    named = kinds.VOLUME.parameters(packing, plan.volume_accuracy)
+    named = kinds.VOLUME.parameters(packing, plan.volume_accuracy * max(1.0, n / plan.n))
     return Task(part, Cell(kinds.VOLUME, named), n, mu, seed)
 
 
