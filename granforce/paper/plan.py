@@ -92,9 +92,10 @@ class Plan(NamedTuple):
     volume_accuracy: float = 0.1
     tails_n: int = 1600
     tails_frictions: tuple[float, ...] = (0.01, 0.1, 1)
-    # 8 million forces of each kind: ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵.
-    tails_packings: int = 3
-    tails_states: int = 1000
+    # 9 million forces of each kind, ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵. Where S is
+    # narrow the largest forces are those of few contacts: many packings count, not many states.
+    tails_packings: int = 16
+    tails_states: int = 200
 
 
 QUICK = Plan(
@@ -370,7 +371,9 @@ def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:
 
 def _tails(plan: Plan, seed: int) -> list[Task]:
     found = []
-    for mu in plan.tails_frictions if seed <= min(plan.tails_packings, plan.packings) else ():
+    if seed > min(plan.tails_packings, max(plan.packings, plan.many_packings)):
+        return []
+    for mu in plan.tails_frictions:
         packing = kinds.PACKING.parameters(plan.tails_n, mu, seed)
         for part, asked in (("tails", {}), ("tails_stress", {"prescribed": "stress"})):
             named = kinds.UNIFORM.parameters(packing, plan.tails_states, **asked)
