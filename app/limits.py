@@ -30,8 +30,8 @@ class Limits(NamedTuple):
             if name == "radii":
                 _check_radii(value)
                 continue
-            if name == "box":
-                continue  # one of two names, which was checked when it was given
+            if name in ("box", "version"):
+                continue  # a name that was checked when it was given; of the algorithm
             least, most = RANGES.get(name) or (1, getattr(self, name))
             if not least <= value <= most:  # nor if it is NaN
                 raise InputError(

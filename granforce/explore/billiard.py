@@ -56,10 +56,9 @@ class Flight(NamedTuple):
 
 def all_rows(walls: Walls) -> Rows | None:
     """The Rows of all walls where they fit into MEMORY, None where not."""
-    count = walls.count
-    if 8 * count**2 > MEMORY:
+    rows = some_rows(walls, 1.0)
+    if len(rows.owner) < walls.count:
         return None
-    rows = _room(count, count)
     for first in range(0, len(walls.moving), lanes.LANES):
         cancelling.check("uniform sample")
         make_rows(walls, rows, range(first, min(first + lanes.LANES, len(walls.moving))))
@@ -68,17 +67,14 @@ def all_rows(walls: Walls) -> Rows | None:
 
 def some_rows(walls: Walls, part: float) -> Rows:
     """Rows with room in a part of MEMORY, none of them there yet."""
-    return _room(walls.count, max(2 * lanes.LANES, int(part * MEMORY / (8 * max(1, walls.count)))))
-
-
-def _room(count: int, places: int) -> Rows:
-    places = min(max(1, places), max(1, count))
+    count = max(1, walls.count)
+    places = min(count, max(2 * lanes.LANES, int(part * MEMORY / (8 * count))))
     return Rows(
-        np.zeros((places, count)),
-        np.full(count, -1),
-        np.full(places, -1),
-        np.zeros(places, dtype=bool),
-        np.zeros(1, dtype=np.int64),
+        values=np.zeros((places, walls.count)),
+        place=np.full(walls.count, -1),
+        owner=np.full(places, -1),
+        used=np.zeros(places, dtype=bool),
+        hand=np.zeros(1, dtype=np.int64),
     )
 
 

@@ -135,7 +135,7 @@ def infer(
     draws = None
     if numbers[0]:
         fit = _fit(ensemble, m, s, unmeasured)
-        draws = _draws(ensemble, *fit, *numbers, seed, progress)
+        draws = _draws(ensemble, *fit, numbers, seed, progress)
     return told(Inference, ensemble, best, draws, begin)
 
 
@@ -195,13 +195,11 @@ def _draws(
     ensemble: Ensemble,
     weight: Floats,
     m: Floats,
-    states: int,
-    chains: int,
-    workers: int,
+    numbers: tuple[int, int, int],
     seed: int,
     progress: Progress | None,
 ) -> Draws:
-    begin = time.perf_counter()
+    begin, (states, chains, workers) = time.perf_counter(), numbers
     made = walls(ensemble, weight, m)
     rows = uniform.stores(made, billiard.all_rows(made), chains, workers)
     ends = [uniform.init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
@@ -239,19 +237,21 @@ def step(
     point that one solve gives, cut by the walls: a harmonic path for a quarter of an oscillation
     draws from it. Without a measurement that leaves uniform states.
     """
-    ahead: list[Any] = []
+    rows = billiard.some_rows(made, 1.0) if rows is None else rows
     pulls, times = np.broadcast_to(made.pull, (len(ends), made.pull.size)), np.array([_TIME])
+    ahead: list[Any] = []
 
-    def draw(ends: Sequence[uniform.ChainState], left: int) -> list[Any]:
+    def on(ends: list[uniform.ChainState], left: int) -> uniform.Flown:
         if not ahead:
             drawn = [_drawn(made, end.rng, min(_AT_ONCE, left)) for end in ends]
             ahead.extend(zip(*(zip(*one, strict=True) for one in drawn), strict=True))
         speeds, errors = zip(*ahead.pop(0), strict=True)
         shifts = [error + end.slacks for error, end in zip(errors, ends, strict=True)]
         middles = 1.0 + made.moved(np.stack(shifts) - 1.0, pulls)
-        return [(w[None], times, m[None]) for w, m in zip(speeds, middles, strict=True)]
+        paths = [(w[None], times, m[None]) for w, m in zip(speeds, middles, strict=True)]
+        return uniform.flown(made, rows, ends, paths)
 
-    return uniform.walked(made, rows, ends, count, _PATHS, draw)
+    return uniform.walked(made, ends, count, _PATHS, on)
 
 
 def _drawn(made: Walls, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:

@@ -62,6 +62,11 @@ class Moves(NamedTuple):
     refused: int  # paths that were not taken, for their number of turns
 
 
+# Chains where they end, their slacks (chains, paths, walls) after each path, turns and paths that
+# were refused (chains, 2).
+Flown = tuple[list[ChainState], Floats, Integers]
+
+
 class UniformSample(NamedTuple):
     """Uniform states of S by chain, and whether they can be trusted."""
 
@@ -124,43 +129,38 @@ def step(
     reach: how far states are from the centre (root mean square of |s − 1|), which sets the length
     of the billiard's paths; any fixed number leaves the measure uniform.
     """
-    if method == "hit_and_run" and made.dimension:
-        return _hit_and_run(made, _apart(ends), count)
+    if method == "hit_and_run":
+        return walked(made, ends, count, 1, lambda ends, left: _chords(made, ends))
+    rows = billiard.some_rows(made, 1.0) if rows is None else rows
     straight = np.ones((0, made.count))
 
-    def draw(ends: Sequence[ChainState], left: int) -> list[Any]:
+    def on(ends: list[ChainState], left: int) -> Flown:
         paths = min(left, BATCH - ends[0].paths % BATCH)
         drawn = [directions(made, end.rng, paths) for end in ends]
-        return [(speeds, PATH * reach * (0.5 + parts), straight) for speeds, parts in drawn]
+        paths_of = [(speeds, PATH * reach * (0.5 + parts), straight) for speeds, parts in drawn]
+        return flown(made, rows, ends, paths_of)
 
-    return walked(made, rows, ends, count, PATHS_PER_STATE, draw)
-
-
-def _apart(ends: Sequence[ChainState]) -> list[ChainState]:
-    return [end._replace(rng=copy.deepcopy(end.rng)) for end in ends]
+    return walked(made, ends, count, PATHS_PER_STATE, on)
 
 
 def walked(
     made: Walls,
-    rows: Rows | None,
     ends: Sequence[ChainState],
     count: int,
     paths: int,
-    draw: Callable[[Sequence[ChainState], int], list[Any]],
+    on: Callable[[list[ChainState], int], Flown],
 ) -> tuple[list[ChainState], list[Moves]]:
     """The next `count` states of some chains, so many paths between them, as `step` gives them.
 
-    draw(ends, left): speeds, times and middles, as `billiard.fly` takes them, of the next paths of
-    each chain, up to `left`.
+    on(ends, left): each chain on by some paths, up to `left`.
     """
-    ends, left = _apart(ends), count * paths
+    ends, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
     if not made.dimension:
         return ends, [Moves(np.ones((count, made.count)), 0, 0)] * len(ends)
-    rows = billiard.some_rows(made, 1.0) if rows is None else rows
     found: list[Floats] = []
     counts: Any = 0
     while left:
-        ends, outs, done = flown(made, rows, ends, draw(ends, left))
+        ends, outs, done = on(ends, left)
         found.append(outs)
         counts = counts + done
         left -= outs.shape[1]
@@ -169,13 +169,8 @@ def walked(
     return ends, [Moves(made.on_hull(s), *n) for s, n in zip(slacks, numbers, strict=True)]
 
 
-def flown(
-    made: Walls, rows: Rows, ends: Sequence[ChainState], drawn: list[Any]
-) -> tuple[list[ChainState], Floats, Integers]:
-    """Chains on by a batch of paths: (ends, slacks (chains, paths, walls), turns and refused).
-
-    drawn: speeds, times and middles of the paths of each chain.
-    """
+def flown(made: Walls, rows: Rows, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
+    """Chains on by a batch of paths; drawn: their speeds, times and middles (`billiard.fly`)."""
     slacks, outs, counts = billiard.follow(made, rows, [end.slacks for end in ends], drawn)
     paths = ends[0].paths + outs.shape[1]
     if paths % BATCH == 0:
@@ -197,23 +192,16 @@ def directions(
     return speeds / np.sqrt((speeds * speeds).sum(axis=1, keepdims=True)), parts
 
 
-def _hit_and_run(
-    made: Walls, ends: list[ChainState], count: int
-) -> tuple[list[ChainState], list[Moves]]:
-    moves, done, found = MOVES_PER_DIMENSION * made.dimension, [], []
-    for end in ends:
-        out = np.empty((count, made.count))
-        s = end.slacks.copy()
-        for state in range(count):
-            for first in range(0, moves, BATCH):
-                cancelling.check("uniform sample")
-                drawn = directions(made, end.rng, min(BATCH, moves - first))
-                billiard.chords(*drawn, s)
-            s = made.on_hull(s[None])[0]
-            out[state] = s
-        done.append(end._replace(slacks=s))
-        found.append(Moves(out, 0, 0))
-    return done, found
+def _chords(made: Walls, ends: list[ChainState]) -> Flown:
+    """Chains on by one state of hit-and-run."""
+    slacks, moves = np.stack([end.slacks for end in ends]), MOVES_PER_DIMENSION * made.dimension
+    for s, end in zip(slacks, ends, strict=True):
+        for first in range(0, moves, BATCH):
+            cancelling.check("uniform sample")
+            billiard.chords(*directions(made, end.rng, min(BATCH, moves - first)), s)
+    pairs = zip(ends, made.on_hull(slacks), strict=True)
+    ends = [end._replace(slacks=s) for end, s in pairs]
+    return ends, slacks[:, None], np.zeros((len(ends), 2), dtype=int)
 
 
 @cancelling.cancellable
@@ -277,7 +265,8 @@ def warm_up(
     reach, dropped = float(np.sqrt(made.dimension)), []
     stores = stores or [billiard.some_rows(made, 1.0)]
     for count in WARM_UP if made.dimension else ():
-        ends, moves = together(made, stores, ends, count, reach, method)
+        on = partial(step, made, count=count, reach=reach, method=method)
+        ends, moves = shared(stores, ends, on)
         dropped += moves
         square = np.mean([np.sum((one.slacks - 1) ** 2, axis=1) for one in moves])
         reach = float(np.sqrt(square))
@@ -292,29 +281,15 @@ def stores(made: Walls, kept: Rows | None, chains: int, workers: int) -> Sequenc
     return [billiard.some_rows(made, 1 / groups) for _ in range(groups)]
 
 
-def together(
-    made: Walls,
-    stores: Sequence[Rows],
-    ends: Sequence[ChainState],
-    count: int,
-    reach: float,
-    method: str = "billiard",
-) -> tuple[list[ChainState], list[Moves]]:
-    """All chains on by `count` states, over as many threads as stores: ends, and Moves of each."""
-
-    on = partial(step, made, count=count, reach=reach, method=method)
-    return shared(stores, list(ends), on)
-
-
 def shared(
     stores: Sequence[Any],
-    ends: list[Any],
+    ends: Sequence[Any],
     work: Callable[[list[Any], Any], tuple[list[Any], list[Any]]],
 ) -> tuple[list[Any], list[Any]]:
-    """work(some of the chains, rows) → (ends, moves), over threads, put together again."""
+    """work(some chains, rows) → (ends, moves), over a thread for each store, put together again."""
     groups = [[int(k) for k in part] for part in np.array_split(np.arange(len(ends)), len(stores))]
     if len(stores) == 1:
-        return work(ends, stores[0])
+        return work(list(ends), stores[0])
     with cancelling.threads(len(stores)) as pool:
         parts = [[ends[k] for k in group] for group in groups]
         done = list(pool.map(work, parts, stores))
@@ -369,7 +344,8 @@ def _extend(
     while have < target and not cancelling.cancelled():
         count = min(ROUND, target - have)
         try:
-            ends, moves = together(made, rows, ends, count, sample.reach, sample.method)
+            on = partial(step, made, count=count, reach=sample.reach, method=sample.method)
+            ends, moves = shared(rows, ends, on)
         except Cancelled:
             break
         new = forces_of(ensemble, made, np.stack([one.slacks for one in moves]))

@@ -4,7 +4,8 @@ A kernel written with `load`, `store` and the arithmetic below works on plain do
 called with `ONE`, and on LANES independent problems at a time where it is called with `MANY`; every
 operation is then one vector instruction. Lanes never mix, and products are added with a single
 rounding (`fma`) in either width: a problem gives the same result, bit for bit, alone or in any
-company. Arrays hold the lanes of one number next to each other: shape (…, 1) or (…, LANES).
+company. A double that meets lanes in arithmetic stands for itself in each of them. Arrays hold the
+lanes of one number next to each other: shape (…, 1) or (…, LANES).
 
 Left to the compiler, loops over lanes spend most of their time proving that arrays do not overlap:
 a factorisation of 400 disks took 0.11 ms a matrix, with explicit lanes it takes 0.028 ms (16 lanes
@@ -240,21 +241,31 @@ def larger(typing, a, b):
 
 
 def _operate(operation, instruction, count):
-    """Make an operation of `count` equal Lanes one instruction; overloads are compiled apart."""
+    """Make an operation of Lanes, or of Lanes and a number for all of them, one instruction."""
 
     @type_callable(operation)
     def kind(context):
         def of_two(a, b):
-            return a if isinstance(a, Lanes) and a == b else None
+            if isinstance(a, Lanes):
+                return a if a == b or isinstance(b, types.Float) else None
+            return b if isinstance(a, types.Float) and isinstance(b, Lanes) else None
 
         def of_one(a):
             return a if isinstance(a, Lanes) else None
 
         return of_two if count == 2 else of_one
 
-    @lower_builtin(operation, *(Lanes,) * count)
     def emit(context, builder, signature, args):
-        return getattr(builder, instruction)(*args)
+        width = signature.return_type.width
+        vectors = (
+            value if isinstance(kind, Lanes) else _in_all(builder, value, width)
+            for kind, value in zip(signature.args, args, strict=True)
+        )
+        return getattr(builder, instruction)(*vectors)
+
+    mixed = [(Lanes, types.Float), (types.Float, Lanes)] if count == 2 else []
+    for kinds in [(Lanes,) * count, *mixed]:
+        lower_builtin(operation, *kinds)(emit)
 
 
 for _operation, _instruction, _count in (

@@ -88,10 +88,13 @@ class Plan(NamedTuple):
     stress_uniform_packings: int = 3
     stress_states: int = 300
     volume_packings: int = 10
-    volume_accuracy: float = 0.1  # of ln V, which differs by far more from packing to packing
+    # Of ln V, which differs by far more from packing to packing; in proportion to N beyond n.
+    volume_accuracy: float = 0.1
     tails_n: int = 1600
     tails_frictions: tuple[float, ...] = (0.01, 0.1, 1)
-    tails_packings: int = 2
+    # 9 million forces of each kind, ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵. Where S is
+    # narrow the largest forces are those of few contacts: many packings count, not many states.
+    tails_packings: int = 16
     tails_states: int = 200
 
 
@@ -362,13 +365,15 @@ def _volumes(plan: Plan, seed: int) -> list[Task]:
 
 def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:
     packing = kinds.PACKING.parameters(n, mu, seed)
-    named = kinds.VOLUME.parameters(packing, plan.volume_accuracy)
+    named = kinds.VOLUME.parameters(packing, plan.volume_accuracy * max(1.0, n / plan.n))
     return Task(part, Cell(kinds.VOLUME, named), n, mu, seed)
 
 
 def _tails(plan: Plan, seed: int) -> list[Task]:
     found = []
-    for mu in plan.tails_frictions if seed <= min(plan.tails_packings, plan.packings) else ():
+    if seed > min(plan.tails_packings, max(plan.packings, plan.many_packings)):
+        return []
+    for mu in plan.tails_frictions:
         packing = kinds.PACKING.parameters(plan.tails_n, mu, seed)
         for part, asked in (("tails", {}), ("tails_stress", {"prescribed": "stress"})):
             named = kinds.UNIFORM.parameters(packing, plan.tails_states, **asked)

@@ -20,7 +20,7 @@ PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress pres
 _FROM, _ENOUGH = 2.0, 10
 # Fewer bins tell no power: a range of 1 ⟨f_n⟩.
 _FEWEST = 8
-_POWERS = np.linspace(0.3, 4.0, 371)
+_POWERS = np.linspace(0.3, 9.0, 871)
 
 
 class Tail(NamedTuple):

@@ -333,14 +333,12 @@ def _measure(step, flows, lanes):
     pace = load(flows.pace, 0, lanes)
     heaviest = answered = fastest = zero
     for k in range(len(step.mass)):
-        heaviest = larger(size(same(lanes, step.mass[k]) * load(velocity.rows, k, lanes)), heaviest)
+        heaviest = larger(size(step.mass[k] * load(velocity.rows, k, lanes)), heaviest)
     for k in range(len(step.mass_border)):
-        moved = same(lanes, step.mass_border[k]) * load(velocity.border, k, lanes)
-        heaviest = larger(size(moved), heaviest)
+        heaviest = larger(size(step.mass_border[k] * load(velocity.border, k, lanes)), heaviest)
     for k in range(len(flows.forces)):
         change = size(load(flows.following, k, lanes) - load(flows.forces, k, lanes))
-        stiffness = same(lanes, step.stiffness[k // 2, k % 2])
-        answered = larger(change / (pace * stiffness), answered)
+        answered = larger(change / (pace * step.stiffness[k // 2, k % 2]), answered)
     for c in range(len(step.stiffness)):
         w_n, w_t = contact_matrix.pull(step.network, c, velocity.rows, velocity.border, lanes)
         fastest = larger(size(w_n), larger(size(w_t), fastest))
@@ -356,13 +354,13 @@ def _factor(step, flows, stop, lanes):
     contact_matrix.begin(network, step.mass, factors, lanes)
     for a in range(m):
         store(factors.corner, m * a + a, lanes, same(lanes, step.mass_border[a]))
-    zero, half, pace = same(lanes, 0.0), same(lanes, 0.5), load(flows.pace, 0, lanes)
+    zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
     closed, sliding = same(lanes, 0.5), same(lanes, 1.5)
     for c in range(len(step.stiffness)):
         state = load(flows.before, c, lanes)
-        normal = pace * same(lanes, step.stiffness[c, 0])
-        tangential = pace * same(lanes, step.stiffness[c, 1])
-        across = half * state * same(lanes, step.mu) * normal
+        normal = pace * step.stiffness[c, 0]
+        tangential = pace * step.stiffness[c, 1]
+        across = 0.5 * state * step.mu * normal
         slides = size(state)
         normal = pick(slides, closed, normal, zero)
         across = pick(slides, sliding, across, zero)
@@ -376,10 +374,10 @@ def _answer(step, flows, lanes):
     """Forces Π(f − τ D Aᵀ U), states of the contacts and A f⁺ − b − M U; the latter's Σ /M."""
     velocity, rest = flows.velocity, flows.rest
     for k in range(len(step.mass)):
-        moved = same(lanes, step.mass[k]) * load(velocity.rows, k, lanes)
+        moved = step.mass[k] * load(velocity.rows, k, lanes)
         store(rest.rows, k, lanes, -load(flows.load.rows, k, lanes) - moved)
     for k in range(len(step.mass_border)):
-        moved = same(lanes, step.mass_border[k]) * load(velocity.border, k, lanes)
+        moved = step.mass_border[k] * load(velocity.border, k, lanes)
         store(rest.border, k, lanes, -load(flows.load.border, k, lanes) - moved)
     store(flows.changed, 0, lanes, same(lanes, 0.0))
     for c in range(len(step.stiffness)):
@@ -388,10 +386,10 @@ def _answer(step, flows, lanes):
     merit = same(lanes, 0.0)
     for k in range(len(step.mass)):
         off = load(rest.rows, k, lanes)
-        merit = merit + off * off / same(lanes, step.mass[k])
+        merit = merit + off * off / step.mass[k]
     for k in range(len(step.mass_border)):
         off = load(rest.border, k, lanes)
-        merit = merit + off * off / same(lanes, step.mass_border[k])
+        merit = merit + off * off / step.mass_border[k]
     store(flows.least, 0, lanes, merit)
 
 
@@ -401,10 +399,10 @@ def _next_forces(step, flows, c, lanes):
     zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
     rows, border = flows.velocity.rows, flows.velocity.border
     w_n, w_t = contact_matrix.pull(step.network, c, rows, border, lanes)
-    f_n = load(flows.forces, 2 * c, lanes) - pace * same(lanes, step.stiffness[c, 0]) * w_n
-    f_t = load(flows.forces, 2 * c + 1, lanes) - pace * same(lanes, step.stiffness[c, 1]) * w_t
+    f_n = load(flows.forces, 2 * c, lanes) - pace * step.stiffness[c, 0] * w_n
+    f_t = load(flows.forces, 2 * c + 1, lanes) - pace * step.stiffness[c, 1] * w_t
     f_n = larger(f_n, zero)
-    limit = same(lanes, step.mu) * f_n
+    limit = step.mu * f_n
     slides, sticks = same(lanes, 1.0 * SLIDING), same(lanes, 1.0 * STICKING)
     state = pick(f_t, limit, slides, pick(-limit, f_t, -slides, sticks))
     f_t = pick(f_t, limit, limit, pick(-limit, f_t, -limit, f_t))

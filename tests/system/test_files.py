@@ -182,11 +182,16 @@ def test_a_packing_goes_down_a_pipe(tmp_path):
 @pytest.mark.parametrize(
     "words, said",
     [
-        (["pack", "--mu", "0.3", "--seed", "-1"], "seed must be at least 0"),
         (["walk", "--mu", "0.3", "--states", "1" + "0" * 13], "GB of memory"),
-        (["pack", "--mu", "0.3", "--cache", "~nouser/x"], "no such user"),
         (["study", "--quick", "--out", "/proc/none"], "cannot write /proc/none"),
-        (["intervals", "-n", "8", "--mu", "0.3", "--contacts", ""], "separated by commas"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)  # each begins Python anew
+            for case in (
+                (["pack", "--mu", "0.3", "--seed", "-1"], "seed must be at least 0"),
+                (["pack", "--mu", "0.3", "--cache", "~nouser/x"], "no such user"),
+                (["intervals", "-n", "8", "--mu", "0.3", "--contacts", ""], "separated by commas"),
+            )
+        ),
     ],
 )
 def test_bad_lines_from_a_shell(tmp_path, words, said):

@@ -1,0 +1,24 @@
+"""Lanes: arithmetic of lanes, and of lanes with one number, is that of each lane alone."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from granforce.numerics.lanes import MANY, ONE, load, root, store
+
+
+@njit(error_model="numpy")
+def answered(x, factor, out, lanes):
+    for k in range(len(x)):
+        a = load(x, k, lanes)
+        b = 1.0 / root(a) - factor * a
+        store(out, k, lanes, (b + 0.25) * a / factor - (factor - a) * (a - 0.5) + b / a)
+
+
+@pytest.mark.parametrize("lanes", [ONE, MANY])
+def test_a_number_that_meets_lanes_stands_for_itself_in_each(lanes, rng):
+    x = rng.uniform(0.1, 2.0, (50, len(lanes)))
+    found = np.empty_like(x)
+    answered(x, 0.3, found, lanes)
+    b = 1.0 / np.sqrt(x) - 0.3 * x
+    assert np.array_equal(found, (b + 0.25) * x / 0.3 - (0.3 - x) * (x - 0.5) + b / x)
