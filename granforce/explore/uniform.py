@@ -16,9 +16,10 @@ from scipy.sparse.linalg import norm
 from granforce.explore import billiard
 from granforce.explore.billiard import Rows
 from granforce.explore.mixing import Mixing, mixing
-from granforce.explore.walls import PROBES, Walls, walls
+from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import lanes
+from granforce.numerics.wall_matrix import PROBES
 from granforce.records import Cancel, Cancelled, Floats, InputError, Integers, Mask, Progress
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT

@@ -24,7 +24,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics import highs as programs
 from granforce.numerics.contact_program import PINNED, Problem
-from granforce.numerics.wall_matrix import WallMatrix
+from granforce.numerics.wall_matrix import DEPENDENT, PROBES, WallMatrix
 from granforce.records import Floats, InputError, Integers, Mask
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, FLAT
@@ -36,8 +36,6 @@ _MOST_NEWTON_STEPS = 200
 _NEAR_CENTRE, _POLISH = 1e-3, 3
 # Dimensions up to which they are counted by dense matrices as well.
 _THIN = 4
-# Random forces that tell what varies in S.
-PROBES = 8
 
 
 class Walls(NamedTuple):
@@ -51,6 +49,7 @@ class Walls(NamedTuple):
     root: Floats  # (2 N_c,) √W
     barrier: Floats  # (N_c, 3) conductances of the barrier alone
     units: float  # ln of the volume of S in ⟨f_n⟩ over that in s
+    dense: tuple[Floats, Floats] | None  # of rows that K had to leave out, see `_dense`
 
     @property
     def count(self) -> int:  # type: ignore[override]
@@ -66,9 +65,15 @@ class Walls(NamedTuple):
         return wall_matrix.moved(self.matrix, g, pulls)
 
     def on_hull(self, slacks: Floats) -> Floats:
-        """The slacks (k, count), or next to them, that balance lets be."""
+        """The slacks (k, count), or next to them, that balance lets be and walls, too."""
         # With the barrier's own conductances f − f° is read off the slacks, contact by contact.
-        return 1.0 + wall_matrix.moved(self.matrix, slacks - 1.0, None, _POLISH, self.barrier)
+        away = wall_matrix.moved(self.matrix, slacks - 1.0, None, _POLISH, self.barrier)
+        if self.dense is not None:
+            balance, back = self.dense
+            moving = away[:, : len(self.moving)]
+            moving -= moving @ balance.T @ back.T
+        # Beyond a wall by rounding: to where the way from the centre meets it.
+        return 1.0 - away / away.min(axis=1, initial=-1.0, keepdims=True)
 
     def points(self, slacks: Floats) -> Floats:
         """y (…, n) ≥ 0 of slacks (…, count)."""
@@ -189,7 +194,7 @@ def _frame(
     frame = _Frame(ensemble, problem, contact, normal, held, stiff, target)
     if held.any():
         C, _, _ = _conductances(frame, _barrier(frame, y), stiff)
-        _, out = wall_matrix.factored(problem.network, C, problem.diagonal, wall_matrix.DEPENDENT)
+        _, out = wall_matrix.factored(problem.network, C, problem.diagonal, DEPENDENT)
         without = contact_program.without_rows(problem, problem.diagonal, out)
         frame = frame._replace(problem=without)
     return frame
@@ -292,16 +297,38 @@ def _walls(frame: _Frame, y: Floats) -> Walls:
     if h <= _THIN and frame.ensemble.A.shape[0] <= MOST_DENSE:
         dense = _thin_shape(frame.ensemble, y, moving)
         h, units = (h, units) if dense[0] == h else dense
+    matrix = _matrix(frame, y, frame.stiff)[0] if weight.any() else barrier
+    matrix = wall_matrix.restored(matrix)
     return Walls(
         centre=y,
         moving=moving,
-        matrix=_matrix(frame, y, frame.stiff)[0] if weight.any() else barrier,
+        matrix=matrix,
         dimension=h,
         pull=frame.pull(y),
         root=np.sqrt(weight).ravel(),
         barrier=barrier.C,
         units=units,
+        dense=_dense(frame.ensemble, y, moving, matrix),
     )
+
+
+def _dense(
+    ensemble: Ensemble, y: Floats, moving: Integers, matrix: WallMatrix
+) -> tuple[Floats, Floats] | None:
+    """The balance (rows, w) of relative slacks and its inverse (w, rows), where K breaks it.
+
+    Rows that all but follow from others have no pivot beside what is held. None where K keeps the
+    balance, and for more rows than are inverted densely.
+    """
+    A, _, _ = ensemble.scaled_form
+    if A.shape[0] > MOST_DENSE:
+        return None
+    g = np.random.default_rng(0).standard_normal((PROBES, matrix.contact.size))
+    change = wall_matrix.moved(matrix, g, None, _POLISH)[:, : len(moving)]
+    balance = A.tocsc()[:, moving].toarray() * y[moving]
+    if np.abs(change @ balance.T).max(initial=0.0) <= BALANCED / 10:
+        return None
+    return balance, np.linalg.pinv(balance, rcond=DEPENDENT)
 
 
 def _thin_shape(ensemble: Ensemble, y: Floats, moving: Integers) -> tuple[int, float]:

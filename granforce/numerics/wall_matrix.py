@@ -38,6 +38,11 @@ from granforce.system import cancelling
 
 # Rows whose pivot is below this, relative to the diagonal, follow from others.
 DEPENDENT = 1e-13
+# Random forces that tell what varies in S.
+PROBES = 8
+# Balance is restored so often at most; until the slacks of random forces change by less than this,
+# relative to the largest: usually 10⁻⁹ or less after the first time, 10⁻⁵ and more otherwise.
+_MOST_TIMES, _STEADY = 12, 1e-7
 
 
 class WallMatrix(NamedTuple):
@@ -48,6 +53,7 @@ class WallMatrix(NamedTuple):
     normal: Floats  # (walls, 2) B: what unit f_n, f_t/μ add to its slack
     C: Floats  # (N_c, 3) nn, nt, tt of each conductance
     factors: Factors  # of A C Aᵀ, one number for all lanes
+    times: int = 1  # how often balance is restored
 
 
 class Scratch(NamedTuple):
@@ -137,8 +143,9 @@ def moved(
 ) -> Floats:
     """B Q (Bᵀ g + p), (k, walls), of g (k, walls) and p (2 N_c,) or (k, 2 N_c).
 
-    times: how often balance is restored: once, what is left of the unbalance is that of rounding
-    and of the weights together. C (N_c, 3): where forces come from, if not the matrix's own.
+    times: how many times as often as the matrix says balance is restored: once, what is left of the
+    unbalance is that of rounding and of the weights together. C (N_c, 3): where forces come from,
+    if not the matrix's own.
     """
     found = np.empty_like(g)
     for first in range(0, len(g), LANES):
@@ -149,9 +156,25 @@ def moved(
         at.g[:, :count] = g[part].T
         if pulls is not None:
             at.f[:, :count] = pulls[:, None] if pulls.ndim == 1 else pulls[part].T
-        _move(matrix, matrix.C if C is None else C, times, at, lanes)
+        _move(matrix, matrix.C if C is None else C, times * matrix.times, at, lanes)
         found[part] = at.out[:, :count].T
     return found
+
+
+def restored(matrix: WallMatrix) -> WallMatrix:
+    """The matrix, balance restored as often as it takes until once more changes nothing.
+
+    Where rows of A all but follow from others, as those of the stress do at μ < 10⁻⁵, each time
+    takes but a part off; else once is enough.
+    """
+    g = np.random.default_rng(0).standard_normal((PROBES, len(matrix.contact)))
+    before = moved(matrix, g)
+    for times in range(1, _MOST_TIMES):
+        after = moved(matrix, g, None, times + 1)
+        if np.abs(after - before).max(initial=0.0) <= _STEADY * np.abs(after).max(initial=0.0):
+            return matrix._replace(times=times)
+        before = after
+    return matrix._replace(times=_MOST_TIMES)
 
 
 def rows(matrix: WallMatrix, walls: Integers) -> Floats:
