@@ -85,10 +85,10 @@ def save_packing(packing: Packing, target: str | Path | IO[bytes]) -> None:
         **_seed(packing.info),
     }
     if hasattr(target, "write"):
-        np.savez_compressed(target, allow_pickle=False, **arrays)
+        np.savez_compressed(target, **arrays)
     else:
         with written(target) as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays)
+            np.savez_compressed(file, **arrays)
 
 
 def _seed(info: dict[str, Any]) -> dict[str, Any]:
