@@ -60,7 +60,7 @@ const BUTTONS = `
   <div class="read">
     <span>network <b class="state"></b></span>
     <span class="running">
-      <span>(<b class="played"></b> shown so far); of these:</span>
+      <span>(<b class="played"></b> shown so far):</span>
       <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
       <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
       <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
