@@ -108,10 +108,10 @@ def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
         )
     if plane.kind == STRESS:
         return "(σₓₓ − σᵧᵧ) / 2P", "σₓᵧ / P"
-    ordinals = ("first", "second")
+    most = ("networks differ most", "second most")
     return tuple(
-        f"{word} principal axis ({part:.0%} of the variance) / ⟨fₙ⟩"
-        for word, part in zip(ordinals, plane.share, strict=True)
+        f"{words} ({part:.0%} of the variance) / ⟨fₙ⟩"
+        for words, part in zip(most, plane.share, strict=True)
     )
 
 

@@ -41,8 +41,8 @@ const BUTTONS = `
     ${button("back", "one state back (←)")}
     ${button("play", "space", "Play")}
     ${button("step", "one state on (→)")}
-    <input class="scrub" type="range" min="0" value="0" step="1" aria-label="state">
-    <label title="speed, states per second"><input class="speed" type="range" min="0" max="6" step="0.25" value="3"
+    <label class="along">network <input class="scrub" type="range" min="0" value="0" step="1" aria-label="network"></label>
+    <label title="speed, networks per second">speed <input class="speed" type="range" min="0" max="6" step="0.25" value="3"
       aria-label="speed"><span class="rate"></span></label>
   </div>
   <div class="bar tools">
@@ -60,7 +60,7 @@ const BUTTONS = `
   <div class="read">
     <span>network <b class="state"></b></span>
     <span class="running">
-      <span>of the <b class="played"></b> played so far:</span>
+      <span>(<b class="played"></b> shown so far):</span>
       <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
       <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
       <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>

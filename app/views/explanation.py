@@ -8,7 +8,7 @@ from .hints import term
 from .scripts import Scripted, joined
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL = "; drag a line to make one"
+PULL = "; drag a line for your own"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }

@@ -144,7 +144,10 @@ class View(TabView):
             known = self.loads is not None
             if known:
                 tiles.append(("limit load", f"{self.loads.load[state.contact]:.3f} ⟨fₙ⟩"))
-            text = "Push: the two forces grow until the disks find no balance any more."
+            text = (
+                "Push: two opposite forces, along the line through the centres of the two disks, "
+                "grow until the disks find no balance any more."
+            )
             self._say(text, numbers=_tiles(tiles))
             return
         pushed = self.pushed[0]
@@ -156,18 +159,22 @@ class View(TabView):
             ("kept", f"{pushed.kept}"),
         ]
         text = (
-            f"The {term('critical_force', 'critical force')} lies between {pushed.low:.3f} and "
-            f"{pushed.high:.3f} ⟨fₙ⟩, never above the {term('limit_load', 'limit load')}, beyond "
-            "which no network in balance exists. Above it the disks set off: |u| is how far each "
-            "moves first. Of the contacts some open, some slide, the others are kept."
+            f"<b>Pushed apart with about {pushed.low:.2g} times the mean force, the packing gives "
+            f"way:</b> {pushed.opened} of its contacts open, {pushed.slid} slide, {pushed.kept} "
+            f"hold. The {term('critical_force', 'critical force')} lies between "
+            f"{pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩, never above the "
+            f"{term('limit_load', 'limit load')}, beyond which no network in balance exists. "
+            "Above it the disks set off: |u| is how far each moves first."
         )
         if np.isfinite(pushed.exponent):  # not in boxes too small for a fit
             tiles.append(("α", f"{pushed.exponent:.2f}"))
             inner, outer = pushed.fit
             text += (
-                f" Its mean in shells goes like r<sup>−α</sup> with α = {pushed.exponent:.2f}, "
-                f"fitted from r = {inner:.1f} to {outer:.1f} largest radii (shaded); other "
-                f"ranges give α from {pushed.spread[0]:.2f} to {pushed.spread[1]:.2f}."
+                " <details><summary>How fast the motion decays</summary>"
+                f"The mean of |u| in shells goes like r<sup>−α</sup> with "
+                f"α = {pushed.exponent:.2f}, fitted from r = {inner:.1f} to {outer:.1f} largest "
+                "radii (shaded); other ranges give α "
+                f"from {pushed.spread[0]:.2f} to {pushed.spread[1]:.2f}.</details>"
             )
         self._say(text, [self._decay(pushed)], _tiles(tiles))
 

@@ -39,10 +39,13 @@ COMPUTED = (
 # No taller than the window leaves room for, where it has all of its width.
 WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 230px))"}
 
+LEAD = (
+    "<b>A shadow of all possible networks</b>{flattened}. Each dot is one network; the red one, "
+    '"now", is the one on screen: drag it, and the forces follow.'
+)
 HELP = f"""
-One point is one whole network of forces. Shown is the shadow ({term("principal", "projection")})
-that {term("s")} casts on a plane, not a section: the shaded {term("outline")} holds all of it.
-Drag the point "now": the network follows.
+Shown is the shadow ({term("principal", "projection")}) that {term("s")} casts on a plane, not a
+section: the shaded {term("outline")} holds all of it.
 """
 
 
@@ -67,7 +70,7 @@ class View(TabView):
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
         self.others, self.other = state.task(), None  # who finds the other states; their Replay
         self.also.param.watch(lambda event: together(self._fetch), "value")
-        self.told = note()
+        self.lead, self.told = note(), note()
         self.placing.param.watch(self._failed, "message")
         self.planes.param.watch(self._turn, "value")
         state.param.watch(self._keep_first, "contact")
@@ -78,6 +81,7 @@ class View(TabView):
     def panel(self):
         """Choice of the plane, plot, and what it says."""
         return pn.Column(
+            self.lead,
             pn.FlexBox(self.planes, self.also, sizing_mode="stretch_width"),
             pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0, styles=WHOLLY_SEEN),
             Progress(self.task),
@@ -94,6 +98,7 @@ class View(TabView):
         state, replay = self.state, self.state.seen
         if replay is None:
             return
+        self.lead.object = _lead(replay.summary["dimension"])
         wanted = replay, self.planes.value, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
@@ -356,6 +361,12 @@ class View(TabView):
         corner(fig, "exact outline; sampled states")
         fig.add_tools(hover([states], ("state", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
+
+
+def _lead(free):
+    """What the plane shows of a space with so many dimensions."""
+    flattened = f": {free} directions flattened to 2" if free > 2 else ""
+    return LEAD.format(flattened=flattened)
 
 
 def _shown(state, cell):

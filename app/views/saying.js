@@ -46,7 +46,7 @@ function counted({ h, count, scene, empty, consistent, whole, corners }) {
     return `<b>${2 * count} unknown forces, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
-  return `<b>${2 * count} unknown forces − ${equations} equations = ${h} free${point}</b> <span>(${forces}; ${sum}${why})</span>`
+  return `<b>${2 * count} unknown forces − ${equations} equations = ${h} free ${h === 1 ? "number" : "numbers"}${point}</b> <span>(${forces}; ${sum}${why})</span>`
 }
 
 /** The sum that gives the number of equations, and what its parts are. */

@@ -26,7 +26,7 @@ class View(TabView):
         super().__init__(state, "replay", "exact", "catalogue")
         self.what, self.scale = chosen(FIGURES, state, "figure"), chosen(AXES, state, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
-        self.told = note()
+        self.lead, self.told = note(), note()
         self.task = state.task(reading)
         self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
         self.chosen = ColumnDataSource({"x": [], "y": []})
@@ -42,6 +42,7 @@ class View(TabView):
         return pn.Column(
             pn.FlexBox(self.what, self.scale, sizing_mode="stretch_width"),
             self.bar,
+            self.lead,
             self.plots,
             self.told,
             sizing_mode="stretch_width",
@@ -60,7 +61,7 @@ class View(TabView):
         self.scale.visible = what in SCALED
         self.task.cancel()
         if what != self._drawn:  # another figure's plot is no answer to this choice
-            self.plots.objects, self.told.object = [], ""
+            self.plots.objects, self.lead.object, self.told.object = [], "", ""
             self._drawn = what
         if state.replay is None:
             return
@@ -78,7 +79,7 @@ class View(TabView):
         self.state.piecewise(self._showing(found))
 
     def _showing(self, found):
-        figures, self.told.object = found
+        figures, self.lead.object, self.told.object = found
         panes = self._panes(figures)
         self.plots.objects = panes[:1]
         yield
@@ -205,7 +206,7 @@ def _pane(fig):
 
 
 def over_friction(library, cells, mu, what, log):
-    """Work that reads the cells and draws a figure of the paper: ([Bokeh figures], caption)."""
+    """Work that draws a figure of the paper from the cells: ([Bokeh figures], lead, caption)."""
 
     def work(job):
         job.begin(f"reading {len(cells)} results and the finished study")
@@ -213,7 +214,8 @@ def over_friction(library, cells, mu, what, log):
         exact = distributions.exact_rows(library, cells)
         job.begin("drawing")
         drawn, text = DRAWN[what](rows, exact, mu, log)
-        return drawn, text + studied.claims(what)
+        lead = studied.most_undetermined(rows) if what == "eta" else ""
+        return drawn, lead, text + studied.claims(what)
 
     return work
 

@@ -1,6 +1,7 @@
 """Figures over μ: the finished study with its error bars, and on top what is on the page."""
 
 import html
+from collections import Counter
 
 import numpy as np
 from bokeh.models import ColumnDataSource, FixedTicker
@@ -109,6 +110,22 @@ def indeterminacy(own, exact, log):
         f"{term('uniform')}, and {term('exact', 'exact')}."
     )
     return [etas, seen, z], text
+
+
+def most_undetermined(own):
+    """Where η is largest, and why this page's symbols are not on the lines; empty without both."""
+    walks = studied.rows("walk")
+    if not walks or not own:
+        return ""
+    points = [statistics.means(walks, name) for name, _, _ in MEASURES]
+    peaks = sorted({max(curve, key=lambda point: point[1])[0] for curve in points})
+    where = " to ".join(f"{mu:g}" for mu in dict.fromkeys((peaks[0], peaks[-1])))
+    many, few = (max(Counter(row["mu"] for row in part).values()) for part in (walks, own))
+    return (
+        f"<b>How undetermined are the forces? Most at friction {where}.</b> Filled symbols are "
+        f"means over {many} packings at each friction, open ones over {few} on this page: "
+        "packings made alike differ."
+    )
 
 
 def correlations(own, exact):

@@ -28,7 +28,7 @@ TILES = (
     ("free numbers h", "dimension", "d", "h", "forces less equations"),
     ("spread η1", "eta1", ".4f", "eta1", "of one force"),
     ("distance η2", "eta2", ".4f", "eta2", "of two networks"),
-    ("range η3", "eta3", ".4f", "eta3", "of all that was seen"),
+    ("range η3", "eta3", ".4f", "eta3", "over all states"),
 )
 # The same of what only those look at who check.
 CHECKS = (

@@ -13,7 +13,7 @@ from panel.pane import Bokeh
 from small_store import KEPT, STATES
 
 import granforce as gf
-from app import distributions, exports, perturbations, planes, uploads
+from app import distributions, exports, perturbations, planes, studied, uploads
 from app.views import labels
 from app.views import plane as plane_view
 from app.views import studied as drawn_study
@@ -396,6 +396,8 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     if what in wanted:
         assert np.isclose(drawn, wanted[what], rtol=1e-6).any()
     assert len(drawn) > 5 and view.told.object
+    most = max(studied.hill(), key=lambda point: point[1])[0]
+    assert (f"{most:g}" in view.lead.object) == (what == "eta")
 
 
 def test_a_tap_on_a_point_selects_its_contact(state):
