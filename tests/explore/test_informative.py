@@ -34,14 +34,13 @@ def extent(body):
 
 
 def test_the_best_measurement_shortens_the_exact_intervals_most(S):
-    """Against each contact held in turn: what is proposed is among the best tenth."""
+    """Against each contact held at its mean in turn: what is proposed is among the best tenth."""
     found = informative(S, 5, check=5)
     assert len(found.contacts) == 5 and np.all(np.diff(found.after) >= 0)
     assert found.before == pytest.approx(extent(S)) and found.after[0] < found.before
-    states = intervals(S)
-    middle = 0.5 * (states.lower[:, 0] + states.upper[:, 0])
+    mean = sample_uniform(S, 400, seed=1).flat.mean(axis=0)[:, 0]
     after = []
-    for c, value in zip(S.index[::3], middle[::3], strict=True):
+    for c, value in zip(S.index[::3], mean[::3], strict=True):
         low, high = [[value, -np.inf]], [[value, np.inf]]
         after.append(extent(ensemble(S.packing, known=Known([c], low, high))))
     assert np.mean(np.array(after) < found.after[0]) < 0.1
