@@ -9,6 +9,7 @@ from granforce import measures, notebook
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.ensemble import Ensemble
+from granforce.forces.nearest import some_network
 from granforce.records import Cancel, Floats, InputError, Integers, Progress, whole
 from granforce.system import cancelling
 from granforce.tolerances import FLAT
@@ -55,7 +56,9 @@ def informative(
     """
     k, check = whole(k, "k", 1), whole(check, "check")
     sample = sample_uniform(ensemble, states, seed=seed, workers=workers)
-    normal, mean = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)
+    normal, held = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)
+    if not ensemble.admits(held):  # states of an S as thin as rounding may keep an unbalance
+        held = some_network(ensemble, held)
     expected = _expected(normal)
     if not expected.any():
         raise InputError("nothing is left to measure: every force is known by balance")
@@ -69,7 +72,7 @@ def informative(
     for done, c in enumerate(best):
         if not done:
             before = _mean_extent(ensemble, workers)
-        with_it = ensemble.with_normal(c, mean[c, 0], mean)
+        with_it = ensemble.with_normal(c, held[c, 0], held)
         after[done] = _mean_extent(with_it, workers)
         if progress is not None:
             progress(done + 1, len(best))
