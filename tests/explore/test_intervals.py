@@ -59,7 +59,7 @@ def square_lattice(side, mu):
 
 def test_what_frozen_surroundings_leave_open_is_certified():
     # Rounding of the frozen forces once kept these programs from ending in balance at all.
-    packing = packed(400, 1.0, 3)
+    packing = packed(400, 1.0, 5)
     S = ensemble(packing, frozen=slices.outside(packing, (0.2, 0.8, 0.2, 0.8)))
     found = intervals(S)
     assert found.converged
