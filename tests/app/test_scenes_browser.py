@@ -294,7 +294,11 @@ def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
     axes[0, 0, 0] = axes[1, 0, 1] = 1
     exact = gf.outline(S, axes, tolerance=1e-4).inner * S.force_scale
     seen = np.reshape(ask(page, "[...small.space.outline.points]"), (-1, 2))
-    np.testing.assert_allclose(seen, exact, atol=1e-7)
+    # As far in every direction: S is flat in this plane, and corners between its ends are rounding.
+    angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    directions = np.array([np.cos(angle), np.sin(angle)])
+    reach = [(points @ directions).max(axis=0) for points in (seen, exact)]
+    np.testing.assert_allclose(*reach, atol=1e-7)
     dots = np.array(ask(page, "small.space.dots.map(u => small.space.flat(u).slice(0, 2))"))
     assert len(dots) > 100
     assert np.all((seen.min(axis=0) - 1e-3 < dots) & (dots < seen.max(axis=0) + 1e-3))
