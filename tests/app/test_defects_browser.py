@@ -233,7 +233,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     files = [lammps / f"lammps_n400_mu0.3.{part}.dump" for part in ("particles", "contacts")]
     page.locator("input[type=file]").set_input_files(files)
     searched(page, "packing=")
-    page.locator(".source", has_text="imported").wait_for()
+    page.locator(".source", has_text="lammps_n400").wait_for()
     assert how_it_is_made(page).get_by_role("spinbutton", name="Disks N").input_value() == "400"
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
 

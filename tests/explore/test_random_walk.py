@@ -159,7 +159,8 @@ def test_a_walk_can_be_cancelled(S):
 
 
 def test_an_original_outside_the_cones_is_replaced_by_the_nearest():
-    S = ensemble(packed(40, 0.3), mu=0.28)
+    S = ensemble(packed(60, 0.3), mu=0.28)
+    assert not S.admits(S.original)
     assert S.admits(init(S, 0).forces)
 
 
