@@ -184,7 +184,7 @@ def test_dumps_are_dropped_reported_and_shown(visit):
     page.get_by_text("Now drop the dump of the contacts").wait_for()
     page.locator("input[type=file]").set_input_files(files[1:])
     page.get_by_text("dimension h of S").wait_for()
-    page.get_by_text("imported").first.wait_for()
+    page.locator(".source", has_text="lammps_n400").wait_for()
     page.wait_for_function("() => /packing=/.test(location.search)")
 
 
@@ -194,7 +194,7 @@ def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
     gf.save_packing(packing, tmp_path / "tilted.npz")
     page = visit("?tab=upload")
     page.locator("input[type=file]").set_input_files(tmp_path / "tilted.npz")
-    page.get_by_text("imported").first.wait_for()
+    page.locator(".source", has_text="tilted").wait_for()
     page.wait_for_function(
         "e => e.scene.geometry.tilt !== 0", arg=page.locator(".scene").element_handle()
     )
