@@ -7,7 +7,9 @@ from .handover import Handover
 from .number import NumberField
 from .parts import note
 
-FILES = {"Packing and plots as one figure": {"svg": "SVG", "pdf": "PDF, by printing"}}
+FILES = {
+    "Packing and plots as one figure": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}
+}
 WIDTH_MM = 170  # of a page's two columns
 HELP = """
 As they are seen now, as lines and letters. From 120 mm on the plots are beside the packing.

@@ -472,7 +472,7 @@ def test_limit_loads_are_shown_as_colour_and_width(visit):
     widths = np.array(scene(page, "Array.from(scene.style.width)"))
     bins = np.array(scene(page, "Array.from(scene.style.bin)"))
     assert (np.diff(bins[np.argsort(widths)]) >= 0).all() and bins.max() == 32
-    page.get_by_text("limit load").first.wait_for()
+    page.get_by_text("limit load").filter(visible=True).first.wait_for()
 
 
 # Counts progress bars that are seen at once, for as long as the page is open.

@@ -183,6 +183,10 @@ def test_what_pauses_does_not_start_again(visit, action):
     page.wait_for_function(
         "e => !e.closest('.stage').classList.contains('playing')", arg=handle(page)
     )
+    # A pause goes on to the nearest network, and rests there.
+    still = """e => { const before = window.painted; window.painted = e.scene.painted
+        return before === window.painted }"""
+    page.wait_for_function(still, arg=handle(page), polling=500)
     count = scene(page, "scene.painted")
     page.wait_for_timeout(1000)  # longer than the page rests at an end
     assert scene(page, "scene.painted") <= count + 2

@@ -14,7 +14,7 @@ from granforce.packing.importers import load_packing
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
-    grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1)
+    grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1, seed=2)
     frames.write(tmp_path, grains, rows)
     return tmp_path
 
