@@ -27,7 +27,8 @@ def test_computations_are_listed_named_opened_and_deleted(computed, wait_for):
     assert older["megabytes"] > 0
     view._handle_msg({"call": [older["entry"], "  the  short\none "]})
     wait_for(state)
-    assert [row["name"] for row in view.rows] == ["", "the short one"]
+    called = {row["entry"]: row["name"] for row in view.rows}
+    assert called == {newest["entry"]: "", older["entry"]: "the short one"}
     view._handle_msg({"open": older["entry"]})
     wait_for(state)
     assert state.selection.states == 3
