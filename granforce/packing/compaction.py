@@ -43,8 +43,8 @@ from granforce.tolerances import LARGEST_FRICTION
 
 INITIAL_FRACTION = 0.5
 # A network is looked for every so many steps, once no grain's momentum changes by more than this in
-# a step, in ⟨f_n⟩. Looked for at 0.3, h and exact η3 were a tenth too small at μ = 0.3, and one
-# packing in five bore no load at all; at 0.003 both are within their scatter of those at 3e-6. From
+# a step, in ⟨f_n⟩. Looked for at 0.3, exact η3 was a sixth to a half too small at μ = 0.3, and one
+# packing in five bore no load; at 0.003 h and η3 are within their scatter of those at 3e-6. From
 # μ = 1 on sweeps seldom get below a few thousandths, and time would go into waiting for it.
 CHECK_EVERY = 25
 NEARLY_BALANCED, NEARLY_BALANCED_AT_LARGE = 0.003, 0.01
