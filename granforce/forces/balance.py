@@ -23,7 +23,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from granforce.records import Contacts, Floats, InputError, Integers, Mask, Packing, float_array
+from granforce.records import (
+    Contacts,
+    Floats,
+    InputError,
+    Integers,
+    Mask,
+    Packing,
+    are_whole,
+    float_array,
+)
 from granforce.tolerances import BALANCED, ROUNDING
 
 
@@ -199,3 +208,15 @@ def _held_in_balance(A: sparse.csr_matrix, b: Floats, original: Floats, toleranc
     """
     balanced = A @ original.ravel()
     return balanced if np.abs(balanced - b).max(initial=0.0) <= tolerance else b
+
+
+def frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
+    """Positions (k,) of the frozen of so many contacts, from a mask (N_c,) or positions."""
+    frozen = np.asarray(frozen)
+    if frozen.dtype == bool:
+        if frozen.shape != (count,):
+            raise InputError(f"frozen must mask {count} contacts, got shape {frozen.shape}")
+        return np.flatnonzero(frozen)
+    if not are_whole(frozen, count - 1).all():
+        raise InputError(f"a frozen contact lies outside 0 … {count - 1}")
+    return frozen.astype(np.int64)

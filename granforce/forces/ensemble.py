@@ -22,6 +22,7 @@ from scipy import sparse
 from granforce import notebook
 from granforce.forces import backbone, balance, knowledge
 from granforce.forces.knowledge import Known
+from granforce.forces.nearest import nearest
 from granforce.records import (
     Contacts,
     Floats,
@@ -30,7 +31,6 @@ from granforce.records import (
     Mask,
     NotJammedError,
     Packing,
-    are_whole,
     friction,
 )
 from granforce.system import cancelling
@@ -327,7 +327,7 @@ def ensemble(
     count = len(packing.contacts.i)
     held = np.zeros(count, dtype=bool)
     if frozen is not None:
-        held[_frozen_positions(frozen, count)] = True
+        held[balance.frozen_positions(frozen, count)] = True
     loaded = np.nan_to_num(packing.load).any()
     if np.isnan(packing.pressure) and not packing.forces.any() and not loaded:
         raise InputError(
@@ -343,9 +343,7 @@ def ensemble(
     _check_frozen_and_known(packing, held, bounds, full.force_scale)
     if not prune:
         return full
-    carrying, found = backbone.carrying(full)
-    pruned = full if carrying.all() else _assemble(packing, asked, free[carrying])
-    pruned = replace(pruned, found=None if found is None else found[carrying])
+    pruned = _pruned(full, asked)
     _check_idle_and_known(pruned, bounds)
     return pruned
 
@@ -357,6 +355,28 @@ class _Asked(NamedTuple):
     held: Mask  # (contacts,) bool, frozen
     stress: Floats | None  # prescribed: (1,) pressure, (3,) xx, yy, xy, or None
     bounds: Floats | None  # (contacts, 2, 2) force, by knowledge.bounds_of
+
+
+def _pruned(full: Ensemble, asked: _Asked) -> Ensemble:
+    """The same without contacts that carry nothing.
+
+    Up to CARRYING counts as nothing, but others may rest on it (where forces are frozen at that):
+    where no network balances without, what presses in the one at hand is kept.
+    """
+    carrying, found = backbone.carrying(full)
+    S = _picked(full, asked, carrying, found)
+    if found is None or S.member is not None:
+        return S
+    near = nearest(S, S.original).forces
+    if S.admits(near):
+        return replace(S, found=near)
+    pressing = found[:, 0] > BALANCED / 10 * full.force_scale
+    return _picked(full, asked, carrying | pressing, found)
+
+
+def _picked(full: Ensemble, asked: _Asked, kept: Mask, found: Floats | None) -> Ensemble:
+    S = full if kept.all() else _assemble(full.packing, asked, full.index[kept])
+    return replace(S, found=None if found is None else found[kept])
 
 
 def _check_frozen_and_known(
@@ -385,17 +405,6 @@ def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
             f"contact {out[worst]} carries nothing in any network of these conditions; what is "
             f"known of it would have to give {short[worst]:.3g}"
         )
-
-
-def _frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
-    frozen = np.asarray(frozen)
-    if frozen.dtype == bool:
-        if frozen.shape != (count,):
-            raise InputError(f"frozen must mask {count} contacts, got shape {frozen.shape}")
-        return np.flatnonzero(frozen)
-    if not are_whole(frozen, count - 1).all():
-        raise InputError(f"a frozen contact lies outside 0 … {count - 1}")
-    return frozen.astype(np.int64)
 
 
 def _assemble(packing: Packing, asked: _Asked, free: Integers) -> Ensemble:

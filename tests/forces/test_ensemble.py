@@ -5,10 +5,11 @@ import pytest
 from packings import REFERENCE, lattice, packed, reference, two_disks
 from scipy.optimize import linprog
 
+from granforce.explore.intervals import intervals
 from granforce.forces import backbone
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.records import Contacts, NotJammedError, make_packing
+from granforce.records import Contacts, NotJammedError, make_contacts, make_packing
 
 REFERENCES = ["n100_mu0.1_s11", "n100_mu1_s12", "n400_mu0.1_s13"]
 
@@ -193,6 +194,20 @@ def test_opened_cone_holds_the_frictionless_network():
     assert S.mu == 0.4
     assert S.dimension > 0
     assert S.admits(S.original)
+
+
+def test_a_faint_contact_that_a_load_rests_on_stays():
+    """8e-8 ⟨f_n⟩ is less than what counts as carrying, but nothing balances without it."""
+    faint = 4e-8
+    x, r = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], np.full(3, 0.5)
+    contacts = make_contacts([0, 1], [1, 2], [[1.0, 0.0], [0.0, 1.0]], [1.0, 1.0], r)
+    load = np.array([[1.0, 0, 0], [-1.0, faint, 0], [0, -faint, 0]])
+    forces = [[1.0, 0.0], [faint, 0.0]]
+    S = ensemble(make_packing(x, r, [np.inf, np.inf], contacts, forces, 0.5, np.nan, load))
+    assert len(S.index) == 2 and S.member is not None
+    bounds = intervals(S)
+    assert bounds.converged
+    np.testing.assert_allclose(bounds.upper[:, 0], [1.0, faint], atol=1e-9)
 
 
 def test_frozen_contacts_drop_the_pressure_and_keep_the_balance():
