@@ -6,16 +6,17 @@ one of a radius equal to the number of walls (Nesterov, Nemirovskii, Interior-po
 algorithms, 1994): it is nearly round. Slacks move together as the matrix K of `wall_matrix` says.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from granforce.explore.billiard import LANES
+from granforce.explore.thin import ThinMatrix, thin_matrix
 from granforce.forces import knowledge
 from granforce.forces.contact_problem import (
     MOST_DENSE,
-    in_balance,
     independent_problem_of,
     inner_network,
     is_a_point,
@@ -25,7 +26,7 @@ from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics import highs as programs
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import DEPENDENT, PROBES, WallMatrix
-from granforce.records import Floats, InputError, Integers, Mask
+from granforce.records import Floats, InputError, Integers, Mask, UndecidedError
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, FLAT
 
@@ -49,7 +50,7 @@ class Walls(NamedTuple):
     root: Floats  # (2 N_c,) √W
     barrier: Floats  # (N_c, 3) conductances of the barrier alone
     units: float  # ln of the volume of S in ⟨f_n⟩ over that in s
-    dense: tuple[Floats, Floats] | None  # of rows that K had to leave out, see `_dense`
+    thin: ThinMatrix | None  # K where S is too thin for the matrix, whatever its number of walls
 
     @property
     def count(self) -> int:  # type: ignore[override]
@@ -58,20 +59,23 @@ class Walls(NamedTuple):
 
     def rows(self, walls: Integers) -> Floats:
         """Rows (k, count) of K."""
+        if self.thin is not None:
+            return self.thin.moved(np.eye(self.count)[walls])
         return wall_matrix.rows(self.matrix, walls)
 
     def moved(self, g: Floats, pulls: Floats | None = None) -> Floats:
         """K g + B Q p, (k, count), of g (k, count) and forces p (k, 2 N_c)."""
+        if self.thin is not None:
+            return self.thin.moved(g, pulls)
         return wall_matrix.moved(self.matrix, g, pulls)
 
     def on_hull(self, slacks: Floats) -> Floats:
         """The slacks (k, count), or next to them, that balance lets be and walls, too."""
-        # With the barrier's own conductances f − f° is read off the slacks, contact by contact.
-        away = wall_matrix.moved(self.matrix, slacks - 1.0, None, _POLISH, self.barrier)
-        if self.dense is not None:
-            balance, back = self.dense
-            moving = away[:, : len(self.moving)]
-            moving -= moving @ balance.T @ back.T
+        if self.thin is not None:
+            away = self.thin.on_hull(slacks - 1.0)
+        else:
+            # With the barrier's own conductances f − f° is read off the slacks, contact by contact.
+            away = wall_matrix.moved(self.matrix, slacks - 1.0, None, _POLISH, self.barrier)
         # Beyond a wall by rounding: to where the way from the centre meets it.
         return 1.0 - away / away.min(axis=1, initial=-1.0, keepdims=True)
 
@@ -92,7 +96,7 @@ def walls(
     W in its stiffness.
 
     Raises NotJammedError where S is empty, InputError where the centre lies at infinity,
-    UndecidedError where no solver could tell.
+    UndecidedError where no solver could tell, or S is thinner than rounding.
     """
     A, b, _ = ensemble.scaled_form
     y = inner_network(ensemble)
@@ -101,7 +105,15 @@ def walls(
     else:
         held = (y == 0) | is_a_point(ensemble)
     frame = _frame(ensemble, y, held, weight, measured)
-    return _walls(frame, _centred(frame, y))
+    if not _is_thin(frame, y):
+        return _walls(frame, _centred(frame, y, _metric), None)
+    y = _centred(frame, y, _thin_metric)
+    if not np.all(y >= 0):
+        raise UndecidedError(
+            "these conditions leave so little room to the forces that rounding hides it: take a "
+            "larger friction coefficient, or prescribe less"
+        )
+    return _walls(frame, y, _thin_metric(frame, y).matrix)
 
 
 def inner_point(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Mask]:
@@ -241,38 +253,108 @@ def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
     return rest[: len(problem.b)], rest[len(problem.b) :]
 
 
-def _centred(frame: _Frame, y: Floats) -> Floats:
+class _Metric(NamedTuple):
+    """K at a point, by the sparse factor."""
+
+    frame: _Frame
+    matrix: WallMatrix
+    moving: Integers  # (w,) positions in y
+
+    def balanced(self, y: Floats) -> Floats:
+        """y, what it lacks of the balance added."""
+        lacking = wall_matrix.balancing(self.matrix, *_rest(self.frame, y))
+        return _shifted(y, self.moving, lacking[: len(self.moving)])
+
+    def uphill(self, pull: Floats) -> Floats:
+        """Relative change (w,) of slacks by Newton's step to the centre."""
+        ones = np.ones((1, self.matrix.contact.size))
+        return wall_matrix.moved(self.matrix, ones, pull)[0, : len(self.moving)]
+
+
+class _ThinMetric(NamedTuple):
+    """The same by singular values."""
+
+    frame: _Frame
+    matrix: ThinMatrix
+
+    @property
+    def moving(self) -> Integers:
+        return self.matrix.moving
+
+    def balanced(self, y: Floats) -> Floats:
+        A, b, _ = self.frame.ensemble.scaled_form
+        return _shifted(y, self.moving, self.matrix.inverse @ (b - A @ y))
+
+    def uphill(self, pull: Floats) -> Floats:
+        return self.matrix.moved(np.ones((1, len(self.moving))), pull)[0]
+
+
+def _metric(frame: _Frame, y: Floats) -> _Metric:
+    return _Metric(frame, *_matrix(frame, y, frame.stiff))
+
+
+def _thin_metric(frame: _Frame, y: Floats) -> _ThinMetric:
+    moving = _matrix(frame, y, frame.stiff)[1]
+    levers = np.zeros((frame.weight.size, len(y)))
+    for k in range(2):
+        cones = np.arange(frame.cones)
+        levers[2 * frame.contact[cones] + k, cones] = 0.5 * frame.normal[cones, k] * y[cones]
+    if frame.ensemble.mu == 0:
+        levers *= 2.0
+    balance = _balance_of_slacks(frame.ensemble, y, moving)
+    return _ThinMetric(frame, thin_matrix(balance, moving, levers[:, moving], frame.weight.ravel()))
+
+
+def _balance_of_slacks(ensemble: Ensemble, y: Floats, moving: Integers) -> Floats:
+    """The balance (rows, w) of relative slacks."""
+    return ensemble.scaled_form[0].tocsc()[:, moving].toarray() * y[moving]
+
+
+def _is_thin(frame: _Frame, y: Floats) -> bool:
+    """Whether the sparse factor lost rows of the balance at y, as dense matrices tell."""
+    ensemble = frame.ensemble
+    A, b, _ = ensemble.scaled_form
+    at = _metric(frame, y)
+    if A.shape[0] > MOST_DENSE or not len(at.moving):
+        return False
+    for _ in range(_POLISH):
+        y = at.balanced(y)
+    if not (np.abs(A @ y - b).max(initial=0.0) <= BALANCED / 10 and y[at.moving].min() > 0):
+        return True
+    g = np.random.default_rng(0).standard_normal((PROBES, at.matrix.contact.size))
+    change = wall_matrix.moved(at.matrix, g, None, _POLISH)[:, : len(at.moving)]
+    balance = _balance_of_slacks(ensemble, y, at.moving)
+    if not np.abs(change @ balance.T).max(initial=0.0) <= BALANCED / 10:
+        return True
+    h, _ = _shape(frame, _barrier(frame, y), np.where(frame.stiff < PINNED, 0.0, PINNED))
+    return h <= _THIN and h != null_space(A.toarray()[:, at.moving]).shape[1]
+
+
+def _centred(
+    frame: _Frame, y: Floats, metric: Callable[[_Frame, Floats], _Metric | _ThinMetric]
+) -> Floats:
     """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps."""
     for _ in range(_MOST_NEWTON_STEPS):
         cancelling.check("uniform sample")
-        matrix, moving = _matrix(frame, y, frame.stiff)
-        if not len(moving):
+        at = metric(frame, y)
+        if not len(at.moving):
             return y
-        w = len(moving)
-        y = _shifted(y, moving, wall_matrix.balancing(matrix, *_rest(frame, y))[:w])
+        y = at.balanced(y)
         pull = frame.pull(y)
-        relative = wall_matrix.moved(matrix, np.ones((1, matrix.contact.size)), pull)[0, :w]
-        change = frame.forces(_shifted(y, moving, relative)) - frame.forces(y)
+        relative = at.uphill(pull)
+        change = frame.forces(_shifted(y, at.moving, relative)) - frame.forces(y)
         # The decrement squared: the growth of the sum along the step, to first order.
         gain = float(relative.sum() + pull @ change.ravel())
         if gain < _NEAR_CENTRE**2:
             for _ in range(_POLISH):
-                y = _shifted(y, moving, wall_matrix.balancing(matrix, *_rest(frame, y))[:w])
-            return _polished(frame, y)
+                y = at.balanced(y)
+            return y
         slope, curve = float(pull @ change.ravel()), float(np.sum(frame.weight * change**2))
         step = min(1.0, 0.95 / max(-relative.min(), 1e-300))
         while _rise(step, relative, slope, curve) < 0.1 * step * gain:
             step /= 2
-        y = _shifted(y, moving, step * relative)
+        y = _shifted(y, at.moving, step * relative)
     raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
-
-
-def _polished(frame: _Frame, y: Floats) -> Floats:
-    """y, its balance restored by dense matrices where rows had been left out."""
-    A, b, _ = frame.ensemble.scaled_form
-    if np.abs(A @ y - b).max(initial=0.0) <= BALANCED / 10 or A.shape[0] > MOST_DENSE:
-        return y
-    return in_balance(A, b, y)
 
 
 def _rise(step: float, relative: Floats, slope: float, curve: float) -> float:
@@ -286,19 +368,23 @@ def _shifted(y: Floats, moving: Integers, relative: Floats) -> Floats:
     return y
 
 
-def _walls(frame: _Frame, y: Floats) -> Walls:
+def _walls(frame: _Frame, y: Floats, thin: ThinMatrix | None) -> Walls:
     """The Walls around y."""
     known, weight = np.where(frame.stiff < PINNED, 0.0, PINNED), frame.weight
     barrier, moving = _matrix(frame, y, known)
-    h, shape = _shape(frame, _barrier(frame, y), known)
-    # f_t is in units of μ: its own length is μ times that.
-    plain = np.maximum(known, knowledge.units(frame.ensemble.mu) ** 2)
-    units = _shape(frame, np.zeros_like(y), plain)[1] - shape
-    if h <= _THIN and frame.ensemble.A.shape[0] <= MOST_DENSE:
-        dense = _thin_shape(frame.ensemble, y, moving)
-        h, units = (h, units) if dense[0] == h else dense
-    matrix = _matrix(frame, y, frame.stiff)[0] if weight.any() else barrier
-    matrix = wall_matrix.restored(matrix)
+    matrix = barrier
+    if thin is None:
+        h, shape = _shape(frame, _barrier(frame, y), known)
+        # f_t is in units of μ: its own length is μ times that.
+        plain = np.maximum(known, knowledge.units(frame.ensemble.mu) ** 2)
+        units = _shape(frame, np.zeros_like(y), plain)[1] - shape
+        matrix = _matrix(frame, y, frame.stiff)[0] if weight.any() else barrier
+        matrix = wall_matrix.restored(matrix)
+    else:
+        h = thin.null.shape[1]
+        T = frame.ensemble.scaled_form[2].tocsc()[:, moving]
+        forces = T @ (y[moving, None] * thin.null)
+        units = 0.5 * float(np.linalg.slogdet(forces.T @ forces)[1])
     return Walls(
         centre=y,
         moving=moving,
@@ -308,39 +394,8 @@ def _walls(frame: _Frame, y: Floats) -> Walls:
         root=np.sqrt(weight).ravel(),
         barrier=barrier.C,
         units=units,
-        dense=_dense(frame.ensemble, y, moving, matrix),
+        thin=thin,
     )
-
-
-def _dense(
-    ensemble: Ensemble, y: Floats, moving: Integers, matrix: WallMatrix
-) -> tuple[Floats, Floats] | None:
-    """The balance (rows, w) of relative slacks and its inverse (w, rows), where K breaks it.
-
-    Rows that all but follow from others have no pivot beside what is held. None where K keeps the
-    balance, and for more rows than are inverted densely.
-    """
-    A, _, _ = ensemble.scaled_form
-    if A.shape[0] > MOST_DENSE:
-        return None
-    g = np.random.default_rng(0).standard_normal((PROBES, matrix.contact.size))
-    change = wall_matrix.moved(matrix, g, None, _POLISH)[:, : len(moving)]
-    balance = A.tocsc()[:, moving].toarray() * y[moving]
-    if np.abs(change @ balance.T).max(initial=0.0) <= BALANCED / 10:
-        return None
-    return balance, np.linalg.pinv(balance, rcond=DEPENDENT)
-
-
-def _thin_shape(ensemble: Ensemble, y: Floats, moving: Integers) -> tuple[int, float]:
-    """Dimension h, and ln of the volume in ⟨f_n⟩ over that in slacks, by dense matrices.
-
-    A whole stress leaves rows that follow from others where S is thin: pivots do not tell those.
-    """
-    A, _, T = ensemble.scaled_form
-    null = null_space(A.toarray()[:, moving])
-    forces, slacks = T.tocsc()[:, moving] @ null, null / y[moving, None]
-    logs = [np.linalg.slogdet(part.T @ part)[1] for part in (forces, slacks)]
-    return null.shape[1], 0.5 * float(logs[0] - logs[1])
 
 
 def null_space(dense: Floats) -> Floats:

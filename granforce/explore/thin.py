@@ -1,0 +1,53 @@
+"""K of a thin S by singular values, where pivots of A C Aᵀ do not tell its rows apart.
+
+Those pivots are squares: at μ = 10⁻⁷, what friction adds to a row that else follows from others
+(as the rows of the stress do) is 10⁻¹⁴ of it, which is rounding. With the columns of N orthonormal
+in the null space of the balance of relative slacks, and H = 1 + Nᵀ Lᵀ W L N for forces L w of
+slacks 1 + w and a weight W on them, K = N H⁻¹ Nᵀ.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from granforce.numerics.wall_matrix import DEPENDENT
+from granforce.records import Floats, Integers
+from granforce.system import cancelling
+
+
+class ThinMatrix(NamedTuple):
+    """K of `moving` walls, dense; walls beyond them are padding."""
+
+    moving: Integers  # (w,) positions of the walls in y
+    null: Floats  # (w, h) N
+    root: Floats  # (w, h) G: K = G Gᵀ
+    levers: Floats  # (2 N_c, w) L, f_n and f_t/μ
+    inverse: Floats  # (w, rows) of the balance of relative slacks
+
+    def moved(self, g: Floats, pulls: Floats | None = None) -> Floats:
+        """K (g + Lᵀ p), (k, count), of g (k, count) and p (2 N_c,) or (k, 2 N_c)."""
+        w = len(self.moving)
+        push = g[:, :w] if pulls is None else g[:, :w] + pulls @ self.levers
+        found = np.zeros_like(g)
+        found[:, :w] = push @ self.root @ self.root.T
+        return found
+
+    def on_hull(self, away: Floats) -> Floats:
+        """The nearest to away (k, count) that the balance lets be."""
+        w = len(self.moving)
+        found = np.zeros_like(away)
+        found[:, :w] = away[:, :w] @ self.null @ self.null.T
+        return found
+
+
+def thin_matrix(balance: Floats, moving: Integers, levers: Floats, weight: Floats) -> ThinMatrix:
+    """The ThinMatrix of a balance (rows, w) of relative slacks; weight (2 N_c,): W on levers."""
+    left, values, right = cancelling.apart(np.linalg.svd, balance)
+    rank = int(np.sum(values > DEPENDENT * values.max(initial=0.0)))
+    null = right[rank:].T
+    along = levers @ null
+    H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
+    root = linalg.solve_triangular(np.linalg.cholesky(H), null.T, lower=True).T
+    inverse = (right[:rank].T / values[:rank]) @ left[:, :rank].T
+    return ThinMatrix(moving, null, root, levers, inverse)
