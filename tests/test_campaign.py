@@ -33,6 +33,13 @@ def test_small_packings_stand(block):
     assert not wrong and not undecided and done > 40  # packings of too few disks are refused
 
 
+@pytest.mark.parametrize("number", [118])
+def test_thin_spaces_stand(number):
+    """Where pivots of squares lose rows: a bounded S was called unbounded."""
+    wrong, undecided, _ = judged([number])
+    assert not wrong and not undecided
+
+
 @pytest.mark.stress
 @pytest.mark.parametrize("block", range(10))
 def test_packings_of_every_kind_stand(block):
