@@ -142,11 +142,7 @@ def weak_first(mu, rng):
             "F_crit is similar at equal η on both sides of the maximum",
             {"critical_force": lambda mu: 3 if mu > 0.1 else 1 + rise_and_fall(mu)},
         ),
-        (
-            claims.vanishing,
-            "η vanishes at μ = 0 within 10⁻⁷",
-            {"eta2": lambda mu: 0.01 + mu},
-        ),
+        (claims.vanishing, "η vanishes at μ = 0 within 10⁻⁷", {"eta2": lambda mu: 0.01 + mu}),
         (claims.coordination, "z → 3 at the largest μ", {"coordination": lambda mu: 3.5}),
         (claims.coordination, "z falls with μ", {"coordination": lambda mu: 3 + mu}),
         (

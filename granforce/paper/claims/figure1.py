@@ -64,11 +64,7 @@ def agreement(table: Table, sampler: str) -> Iterator[Claim]:
 
 
 def peaked(
-    claim: str,
-    groups: Groups,
-    what: str = PEAK,
-    good: Ends = (0.05, 0.2),
-    fair: Ends = (0.02, 0.5),
+    claim: str, groups: Groups, what: str = PEAK, good: Ends = (0.05, 0.2), fair: Ends = (0.02, 0.5)
 ) -> Claim:
     """A claim of the paper that what is grouped by μ is largest near 0.1."""
     return over_all(claim, what, peak, groups, good=good, fair=fair, least=3)

@@ -33,9 +33,7 @@ def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:
 def counts(table: Table, sampler: str) -> Iterator[Claim]:
     """As many strong forces as large extents at μ = 0.1."""
     groups = _marked(
-        table,
-        sampler,
-        lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan,
+        table, sampler, lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan
     )
     yield at_each(
         "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about as many contacts (μ = 0.1)",

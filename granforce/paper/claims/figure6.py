@@ -59,11 +59,7 @@ def error_bars(table: Table, sampler: str) -> Iterator[Claim]:
     rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
     for word, span, test in (
         ("excludes 0 at intermediate", MIDDLE, lambda r: r["correlation_low"] > 0),
-        (
-            "holds 0 at large",
-            LARGE,
-            lambda r: r["correlation_low"] <= 0 <= r["correlation_high"],
-        ),
+        ("holds 0 at large", LARGE, lambda r: r["correlation_low"] <= 0 <= r["correlation_high"]),
     ):
         yield at_each(
             f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
