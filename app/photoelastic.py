@@ -9,7 +9,7 @@ import xarray as xr
 
 from granforce.packing.importers.listing import plain
 from granforce.packing.importers.network import alone
-from granforce.packing.importers.pegs import open_frames, take_frame
+from granforce.packing.importers.pegs import open_frames, read_pegs
 from granforce.packing.importers.repair import KINDS
 from granforce.records import Packing
 from granforce.study import series
@@ -86,8 +86,8 @@ def infer(
         job.begin("looking for forces that balance the grains, near the measured ones")
         roles = next(roles for roles in ROLES if roles[0] in files)
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
-        found = take_frame(
-            frames, number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n
+        found = read_pegs(
+            frames, frame=number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n
         )
         job.begin("measuring the likeliest network again and again, for error bars")
         dataset = series.infer_frame(found, states=DRAWS)

@@ -49,10 +49,7 @@ WALK = {
     "--chains": [*WHOLE, "1000", LONG],
 }
 KNOWN = {"--known": [*FILES, "grains.csv", "file", "nothing.csv", "letters.csv", "beyond.csv"]}
-CONDITIONS = {
-    "--prescribe": ["", "strain"],
-    "--stress": ["", "1,1,0", "a,b,c", "nan,1,0"],
-}
+CONDITIONS = {"--prescribe": ["", "strain"], "--stress": ["", "1,1,0", "a,b,c", "nan,1,0"]}
 WALK |= CONDITIONS | KNOWN
 EXACT = {
     "--ensemble-mu": FRICTION,
@@ -184,10 +181,7 @@ COMMANDS = {
         },
     ),
     "bench": ([], {"--out": ["file", "file/x", "loop", "x" * 300, "a\0b", "/proc/none"]}),
-    "cache": (
-        ["list"],
-        {"--cache": CACHES},
-    ),
+    "cache": (["list"], {"--cache": CACHES}),
 }
 IMPORTS = [
     *(["table", name, "--mu", "0.3"] for name in FILES),

@@ -1,15 +1,42 @@
 """Fixtures of all tests, and the examples that properties are tried on."""
 
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
+from granforce.system.compiled import are_kept
+
 # The same examples in every run, as all other random numbers here; HYPOTHESIS_PROFILE=default
 # looks for new ones.
 settings.register_profile("same", derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+# What makes packings, and all else: each takes half of the time to compile.
+KERNELS = (
+    "warm_up(set())",
+    "import packings; warm_up(packing=packings.reference('n100_mu0.1_s11'))",
+)
+
+
+def pytest_configure(config):
+    """Kernels are compiled once, before several workers would compile all of them each."""
+    is_worker, count = hasattr(config, "workerinput"), config.getoption("numprocesses", 0)
+    if is_worker or not count or config.option.collectonly or are_kept("flow.until_one_ends"):
+        return
+    begin = "from granforce.study.scan import warm_up; "
+    paths = os.pathsep.join([str(config.rootpath), str(config.rootpath / "tests")])
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", begin + rest], env=os.environ | {"PYTHONPATH": paths}
+        )
+        for rest in KERNELS
+    ]
+    for process in both:
+        process.wait()
 
 
 @pytest.fixture

@@ -117,7 +117,4 @@ def _spoilt(
     m[chosen, 0] += _BY * unit
     told = remeasured(S, m, s, states=2, chains=1, unmeasured=2.0).suspects
     right = np.isin(told, S.index[chosen])
-    return {
-        "suspected": right.sum() / _SPOILT,
-        "told": right.mean() if len(told) else np.nan,
-    }
+    return {"suspected": right.sum() / _SPOILT, "told": right.mean() if len(told) else np.nan}

@@ -40,13 +40,7 @@ def skips(quick: bool = True, *, n: int | None = None, mu: float = 0.1) -> list[
 
 def _row(what: str, count: int, seconds: float, without: float) -> dict[str, Any]:
     ratio = without / seconds
-    return {
-        "skipped": what,
-        "count": count,
-        "seconds": seconds,
-        "without": without,
-        "ratio": ratio,
-    }
+    return {"skipped": what, "count": count, "seconds": seconds, "without": without, "ratio": ratio}
 
 
 def _seconds(action: Callable[[], object], repeats: int = 5) -> float:

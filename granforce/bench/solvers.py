@@ -28,10 +28,7 @@ def solvers(sweeps: int = LONGEST) -> dict[str, tuple[Callable[..., Relaxation],
     """Name → (solver, options) of all that are compared."""
     return {
         BASELINE: (gauss_seidel, {"rest": None, "tolerance": GOAL, "max_iterations": sweeps}),
-        "Gauss–Seidel, exact finish": (
-            gauss_seidel,
-            {"tolerance": GOAL, "max_iterations": sweeps},
-        ),
+        "Gauss–Seidel, exact finish": (gauss_seidel, {"tolerance": GOAL, "max_iterations": sweeps}),
         "nearest (PIQP)": (nearest_piqp, {"tolerance": GOAL}),
         "nearest": (nearest, {"tolerance": GOAL}),
     }

@@ -17,14 +17,7 @@ from granforce.bench.report import exponent, note
 from granforce.bench.solvers import tile
 from granforce.explore.billiard import all_rows, make_rows, some_rows
 from granforce.explore.mixing import Mixing, mixing
-from granforce.explore.uniform import (
-    METHODS,
-    forces_of,
-    sample_uniform,
-    step,
-    varying,
-    warm_up,
-)
+from granforce.explore.uniform import METHODS, forces_of, sample_uniform, step, varying, warm_up
 from granforce.explore.walls import walls
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics.lanes import LANES

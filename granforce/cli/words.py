@@ -130,9 +130,7 @@ def add_infer(commands: Commands) -> None:
         "again and again (without: all networks are alike before the measurement)",
     )
     group.add_argument(
-        "--states",
-        type=int,
-        help="draws for error bars (default 1000, with --frames 200; 0: none)",
+        "--states", type=int, help="draws for error bars (default 1000, with --frames 200; 0: none)"
     )
     group.add_argument(
         "--certain",

@@ -284,13 +284,7 @@ class _Chain:
     """One chain of a walk, and the states it has found."""
 
     def __init__(
-        self,
-        ensemble: Ensemble,
-        number: int,
-        states: int,
-        seed: Seed,
-        limit: int,
-        whole: bool,
+        self, ensemble: Ensemble, number: int, states: int, seed: Seed, limit: int, whole: bool
     ) -> None:
         self.ensemble, self.number = ensemble, number
         self.limit, self.whole, self.ended = limit, whole, False

@@ -59,12 +59,7 @@ def indeterminacy(
     )
     z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
     contacts = style.frame(
-        style.curves(z, backend, logx=True),
-        backend,
-        title="Coordination",
-        x="μ",
-        y="z",
-        logx=True,
+        style.curves(z, backend, logx=True), backend, title="Coordination", x="μ", y="z", logx=True
     )
     both = style.inset(linear, log, (0.25, 0.56, 0.72, 0.42), backend)
     # In pictures the legend stands beside the last frame.

@@ -97,12 +97,7 @@ def left_open_in(packing: Packing) -> Mask:
 
 
 def equations(
-    packing: Packing,
-    free: Integers,
-    grains: Integers,
-    held: Mask,
-    mu: float,
-    stress: Floats | None,
+    packing: Packing, free: Integers, grains: Integers, held: Mask, mu: float, stress: Floats | None
 ) -> tuple[sparse.csr_matrix, Floats, float]:
     """A (rows, unknowns), b (rows,) of the free contacts (k,), and the scale ⟨f_n⟩ of forces.
 

@@ -18,15 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.numerics.elimination import Pattern, block_of, pattern
-from granforce.numerics.lanes import (
-    fma,
-    inline,
-    load,
-    room,
-    same,
-    store,
-    within,
-)
+from granforce.numerics.lanes import fma, inline, load, room, same, store, within
 from granforce.records import Floats, Integers
 
 

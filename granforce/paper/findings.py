@@ -51,8 +51,7 @@ def measure(table: Table) -> Iterator[Claim]:
     rows = [row for row in table.part("uniform") if "walk_ratio" in row]
     for name, label in (("original_ratio", "the original network"), ("walk_ratio", "walk states")):
         yield from _by_range(
-            _values(rows, name),
-            f"distance of {label} from the centre over that of uniform states",
+            _values(rows, name), f"distance of {label} from the centre over that of uniform states"
         )
 
 

@@ -287,12 +287,7 @@ def response(
 
 
 def _response(
-    S: Ensemble,
-    step: Step,
-    contact: int,
-    position: int,
-    load: float,
-    moving: Outcome,
+    S: Ensemble, step: Step, contact: int, position: int, load: float, moving: Outcome
 ) -> Response:
     velocity = grain_velocities(S, moving.velocity)
     unit = np.sqrt(np.mean(np.sum(velocity[:, :2] ** 2, axis=1)))

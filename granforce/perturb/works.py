@@ -48,10 +48,7 @@ def relax(step: Step, asked: Push) -> Outcome:
 
 
 def follow(
-    step: Step,
-    works: Sequence[Work],
-    finished: Callable[[int, Any], object],
-    workers: int = 1,
+    step: Step, works: Sequence[Work], finished: Callable[[int, Any], object], workers: int = 1
 ) -> None:
     """Carry works side by side on threads: generators of Push that are sent the Outcome of each.
 

@@ -25,7 +25,7 @@ from granforce.explore.uniform import sample_uniform
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
-from granforce.records import InputError, Progress
+from granforce.records import InputError, Packing, Progress
 from granforce.study import kinds
 from granforce.study.cells import Cell, get, load, row
 from granforce.study.keys import Parameters
@@ -273,12 +273,13 @@ def _over_dask(
             raise
 
 
-def warm_up(needed: Any = None) -> None:
+def warm_up(needed: Any = None, packing: Packing | None = None) -> None:
     """Compile (or load from numba's cache) kernels once, before workers do it each.
 
-    needed: the kinds that they are compiled for, by default all.
+    needed: the kinds that they are compiled for, by default all. packing: what they are run on, by
+    default one that is made, for which the kernels that make packings are compiled, too.
     """
-    S = ensemble(pack(12, 0.5, 0))
+    S = ensemble(pack(12, 0.5, 0) if packing is None else packing)
     for its_kinds, run in _FIRST_RUNS:
         if needed is None or its_kinds & needed:
             run(S)

@@ -20,7 +20,7 @@ import xarray as xr
 
 from granforce.explore.remeasured import remeasured
 from granforce.forces.ensemble import ensemble
-from granforce.packing.importers.pegs import Photoelastic, open_frames, take_frame
+from granforce.packing.importers.pegs import Photoelastic, open_frames, read_pegs
 from granforce.packing.importers.repair import KINDS
 from granforce.records import (
     Contacts,
@@ -168,13 +168,8 @@ def _inferred(
     """Dataset of one frame: its packing, measured and inferred forces with errors, its account."""
     frames = open_frames(parameters["positions"], parameters["adjacency"])
     number = parameters["frame"] if len(frames.frames) > 1 else None
-    found = take_frame(
-        frames,
-        number,
-        mu=parameters["mu"],
-        wall_forces=parameters["wall_forces"],
-        **parameters["options"],
-    )
+    chosen = {name: parameters[name] for name in ("mu", "wall_forces")} | parameters["options"]
+    found = read_pegs(frames, frame=number, **chosen)
     return infer_frame(
         found,
         states=parameters["states"],

@@ -47,14 +47,19 @@ def tell_when_compiling(say: Callable[[], object]) -> None:
     event.register("numba:compile", Listener())
 
 
+def are_kept(last: str) -> bool:
+    """Whether kernels are kept from an earlier run; last: "module.kernel" that is compiled last."""
+    places = [os.environ.get("NUMBA_CACHE_DIR"), Path(__file__).parents[1], *_usual_places()]
+    return any(next(Path(place).rglob(f"{last}-*.nbi"), None) for place in places if place)
+
+
 def compile_ahead(statement: str, last: str) -> bool:
     """Run a statement that compiles kernels in a process of its own, where none are kept yet.
 
-    last: "module.kernel" that is compiled last. The process ends with this one at the latest.
-    Returns whether there was nothing to do.
+    last: as for `are_kept`. The process ends with this one at the latest. Returns whether there was
+    nothing to do.
     """
-    places = [os.environ.get("NUMBA_CACHE_DIR"), Path(__file__).parents[1], *_usual_places()]
-    if any(next(Path(place).rglob(f"{last}-*.nbi"), None) for place in places if place):
+    if are_kept(last):
         return True
     called = [sys.executable, "-c", f"import os; getattr(os, 'nice', int)(10); {statement}"]
     process = subprocess.Popen(called, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)

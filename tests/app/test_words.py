@@ -21,7 +21,7 @@ def test_every_symbol_and_option_has_its_sentence():
             assert words in known, words
     for _, _, _, term, _ in TILES:
         assert term in TERMS
-    for word, _, sentence in TERMS.values():
+    for word, sentence, _ in TERMS.values():
         assert re.fullmatch(r"[^.].*\.", sentence) and len(sentence) < 320, word
 
 

@@ -7,13 +7,7 @@ from packings import packed
 from granforce.forces.balance import stress_of
 from granforce.forces.ensemble import ensemble
 from granforce.packing.closing import _strained, _stretch, cell_of, margin
-from granforce.packing.compaction import (
-    WATCH_EVERY,
-    _dilute_gas,
-    _leant_back,
-    draw_radii,
-    pack,
-)
+from granforce.packing.compaction import WATCH_EVERY, _dilute_gas, _leant_back, draw_radii, pack
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import Cancelled, Cell, InputError, NotJammedError
 from granforce.tolerances import APART, CLOSED, LARGEST_FRICTION

@@ -395,11 +395,7 @@ def test_lammps_tilted_boxes_are_read(basis):
     assert packing.pressure == pytest.approx(plain.pressure, rel=1e-11)
     assert packing.info["residual"] < 1e-9
     S, T = ensemble(plain), ensemble(packing)
-    assert (T.dimension, len(T.grains), len(T.index)) == (
-        S.dimension,
-        len(S.grains),
-        len(S.index),
-    )
+    assert (T.dimension, len(T.grains), len(T.index)) == (S.dimension, len(S.grains), len(S.index))
 
 
 def test_isotropic_packings_come_back_from_lammps():

@@ -142,11 +142,7 @@ def weak_first(mu, rng):
             "F_crit is similar at equal η on both sides of the maximum",
             {"critical_force": lambda mu: 3 if mu > 0.1 else 1 + rise_and_fall(mu)},
         ),
-        (
-            claims.vanishing,
-            "η vanishes at μ = 0 within 10⁻⁷",
-            {"eta2": lambda mu: 0.01 + mu},
-        ),
+        (claims.vanishing, "η vanishes at μ = 0 within 10⁻⁷", {"eta2": lambda mu: 0.01 + mu}),
         (claims.coordination, "z → 3 at the largest μ", {"coordination": lambda mu: 3.5}),
         (claims.coordination, "z falls with μ", {"coordination": lambda mu: 3 + mu}),
         (
@@ -276,7 +272,7 @@ def packings(values, n=400):
 
 
 def over_all(groups, good, fair=None, statistic=verdicts.slope):
-    return verdicts.over_all("", "", "", "", statistic, groups, good=good, fair=fair)
+    return verdicts.over_all("", "", statistic, groups, good=good, fair=fair)
 
 
 def test_a_verdict_at_a_knife_edge_is_undecided(rng):
@@ -318,20 +314,18 @@ def test_another_seed_of_the_bootstrap_never_turns_a_verdict(rng, monkeypatch):
 
 def test_a_change_of_sign_at_one_friction_is_not_averaged_away(rng):
     values = {mu: 0.5 + 0.02 * rng.normal(size=10) for mu in (0.1, 1, 10)}
-    claim = verdicts.at_each("", "", "", "", packings(values), good=(0, 1))
+    claim = verdicts.at_each("", "", packings(values), good=(0, 1))
     assert claim.verdict == verdicts.REPRODUCED
     values[1] = 1.2 + 0.02 * rng.normal(size=10)
-    claim = verdicts.at_each("", "", "", "distance", packings(values), good=(0, 1))
+    claim = verdicts.at_each("", "distance", packings(values), good=(0, 1))
     assert claim.verdict == verdicts.DIFFERS
     assert claim.why == "not reproduced at 1; reproduced at 0.1, 10"
     assert claim.value == pytest.approx(1.2, abs=0.05)
     assert claim.measured == "distance, at the worst μ (1)"
     values = {mu: group + 1 for mu, group in values.items()}
-    claim = verdicts.at_each("", "", "", "", packings(values), good=(0, 1))
+    claim = verdicts.at_each("", "", packings(values), good=(0, 1))
     assert claim.verdict == verdicts.FAILED
-    assert verdicts.at_each("", "", "", "", packings(values, 1), good=(0, 1)).verdict == (
-        verdicts.FEW
-    )
+    assert verdicts.at_each("", "", packings(values, 1), good=(0, 1)).verdict == (verdicts.FEW)
 
 
 def test_a_peak_that_packings_of_different_width_hide_shows_in_their_own_units(rng):

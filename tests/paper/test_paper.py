@@ -392,10 +392,7 @@ def test_a_killed_study_goes_on_where_it_was(done, tmp_path):
     assert sum(name.startswith("walk") for name in kept) >= 3
     words = [*WORDS, "--out", str(tmp_path), "--workers", "1", "--formats", ""]
     found = subprocess.run(
-        [sys.executable, "-m", "granforce.cli", *words],
-        check=True,
-        capture_output=True,
-        text=True,
+        [sys.executable, "-m", "granforce.cli", *words], check=True, capture_output=True, text=True
     )
     assert "Traceback" not in found.stderr
     # Nothing that was finished was made again, and one worker made what two had made.

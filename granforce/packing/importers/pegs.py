@@ -100,13 +100,14 @@ def read_pegs(
 ) -> Photoelastic:
     """A Photoelastic of one frame, from files or open files of positions and contacts.
 
-    Without adjacency, positions is a *_solved.mat of PeGS 2. frame: its number, by default the last
-    one that both files have. scale: factor on the radii as listed. reach: largest gap between the
-    disks of a candidate, in mean radii (0: no candidates). error: standard error of a measured
-    component, force; by default the one that makes χ² equal to its degrees of freedom; half the
-    difference of what was listed twice is added in quadrature. reverse: take f_t with the other
-    sign (programs differ). repair: mend what is wrong by itself, up to a tenth of the data (or the
-    part that is given); False: the first thing wrong raises. most_grains: how many are taken.
+    Without adjacency, positions is a *_solved.mat of PeGS 2, or frames that `open_frames` has read.
+    frame: its number, by default the last one that both files have. scale: factor on the radii as
+    listed. reach: largest gap between the disks of a candidate, in mean radii (0: no candidates).
+    error: standard error of a measured component, force; by default the one that makes χ² equal to
+    its degrees of freedom; half the difference of what was listed twice is added in quadrature.
+    reverse: take f_t with the other sign (programs differ). repair: mend what is wrong by itself,
+    up to a tenth of the data (or the part that is given); False: the first thing wrong raises.
+    most_grains: how many are taken.
 
     walls: "open" (the balance of grains at walls is not asked for), "box", "annulus" or "circle",
     found from the grains at walls or with numbers (`walls.read_outline`); by default contacts with
@@ -119,41 +120,12 @@ def read_pegs(
 
     Raises InputError naming file and line.
     """
-    return take_frame(
-        *(open_frames(positions, adjacency), frame),
-        mu=mu,
-        reach=reach,
-        scale=scale,
-        error=error,
-        reverse=reverse,
-        repair=repair,
-        walls=walls,
-        wall_forces=wall_forces,
-        most_grains=most_grains,
-    )
-
-
-def take_frame(
-    frames: Frames,
-    frame: float | None = None,
-    *,
-    mu: float,
-    reach: float = 0.5,
-    scale: float = 1.0,
-    error: float | None = None,
-    reverse: bool = False,
-    repair: bool = True,
-    walls: str | None = None,
-    wall_forces: Mapping[str, Sequence[float]] | None = None,
-    most_grains: int | None = None,
-) -> Photoelastic:
-    """The Photoelastic of one frame of `open_frames`; everything else as for `read_pegs`."""
     mu, scale = friction(mu), positive(scale, "scale")
     if not 0 <= reach <= 2:
         raise InputError(f"reach is in mean radii and must lie between 0 and 2, got {reach}")
     if walls is not None and not hasattr(walls, "gaps"):
         walls = read_outline(walls)
-    listing = frames.listing(frame)
+    listing = open_frames(positions, adjacency).listing(frame)
     check_grains(len(listing.ids), most_grains, listing.names[0])
     listing = listing._replace(r=scale * listing.r)
     if reverse:

@@ -77,5 +77,6 @@ def judged(table: Table) -> list[Claim]:
                 continue
             for claim in family(table, sampler):
                 lacking = claim.verdict == MISSING and table.rows and sampler in ("", *known)
-                found.append(claim._replace(verdict=FEW) if lacking else claim)
+                verdict = FEW if lacking else claim.verdict
+                found.append(claim._replace(sampler=sampler, verdict=verdict))
     return found

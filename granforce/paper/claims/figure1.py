@@ -18,7 +18,6 @@ from granforce.paper.claims.groups import (
 )
 from granforce.paper.claims.verdicts import (
     NEAR_PEAK,
-    PRE,
     PRL,
     UNMEASURED,
     Claim,
@@ -47,8 +46,6 @@ def agreement(table: Table, sampler: str) -> Iterator[Claim]:
         told = "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor"
         yield over_all(
             f"{told}: {word} is constant",
-            sampler,
-            PRE,
             f"largest {word} over the smallest, μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.ptp(logs)),
             groups,
@@ -58,8 +55,6 @@ def agreement(table: Table, sampler: str) -> Iterator[Claim]:
         )
         yield over_all(
             f"{told}: value of {word}",
-            sampler,
-            PRE,
             f"geometric mean of {word} over μ ≥ {LEAST_DYNAMIC:g}",
             lambda _, logs: np.exp(np.mean(logs)),
             groups,
@@ -69,15 +64,10 @@ def agreement(table: Table, sampler: str) -> Iterator[Claim]:
 
 
 def peaked(
-    claim: str,
-    sampler: str,
-    groups: Groups,
-    what: str = PEAK,
-    good: Ends = (0.05, 0.2),
-    fair: Ends = (0.02, 0.5),
+    claim: str, groups: Groups, what: str = PEAK, good: Ends = (0.05, 0.2), fair: Ends = (0.02, 0.5)
 ) -> Claim:
     """A claim of the paper that what is grouped by μ is largest near 0.1."""
-    return over_all(claim, sampler, PRE, what, peak, groups, good=good, fair=fair, least=3)
+    return over_all(claim, what, peak, groups, good=good, fair=fair, least=3)
 
 
 def maximum(table: Table, sampler: str) -> Iterator[Claim]:
@@ -87,8 +77,8 @@ def maximum(table: Table, sampler: str) -> Iterator[Claim]:
     for name, label in names:
         groups = positive_friction(items(rows, name, positive=(name,)))
         rises_and_falls: dict[str, Any] = {"good": (0.02, 0.5), "fair": (0.005, 2)}
-        yield peaked(f"{label}(μ) is not monotonic", sampler, groups, **rises_and_falls)
-        yield peaked(f"{label}(μ) is largest near μ = 0.1", sampler, groups)
+        yield peaked(f"{label}(μ) is not monotonic", groups, **rises_and_falls)
+        yield peaked(f"{label}(μ) is largest near μ = 0.1", groups)
 
 
 def _measure_of(sampler: str) -> tuple[str, str]:
@@ -108,13 +98,12 @@ def small_friction(table: Table, sampler: str) -> Iterator[Claim]:
         span = f", μ = {min(few):g} … {max(few):g}" if few else ""
         yield over_all(
             f"η ∝ μ at small μ: {word}",
-            sampler,
-            PRL,
             f"slope of log {label} against log μ{span}",
             slope,
             few,
             good=(0.9, 1.1),
             fair=(0.7, 1.3),
+            source=PRL,
         )
 
 
@@ -125,11 +114,10 @@ def vanishing(table: Table, sampler: str) -> list[Claim]:
     measured = [row for row in at_rest if sampler == "exact" or not skipped(row)]
     claim = at_each(
         "η vanishes at μ = 0 within 10⁻⁷",
-        sampler,
-        PRL,
         f"mean {label} at μ = 0",
         items(measured, lambda row: abs(row[name])),
         good=(-np.inf, 1e-7),
+        source=PRL,
     )
     if at_rest and not measured:
         why = "S is one point there: no state was relaxed or drawn"
@@ -152,8 +140,6 @@ def measure(table: Table, sampler: str) -> Iterator[Claim]:
     ]
     yield at_each(
         "η3 does not depend on how states are drawn",
-        sampler,
-        PRE,
         f"η3 over exact η3 of the same packing, μ ≥ {LEAST_DYNAMIC:g}",
         items(rows, "part_seen"),
         good=(0.9, 1.1),
@@ -170,11 +156,9 @@ def coordination(table: Table, sampler: str) -> Iterator[Claim]:
         ends, ("smallest", "largest"), (4, 3), ((3.9, 4.0), (3.0, 3.1)), strict=True
     ):
         told = f"z → {limit} at the {word} μ"
-        yield at_each(told, sampler, PRE, "mean z there", group, good=good)
+        yield at_each(told, "mean z there", group, good=good)
     yield over_all(
         "z falls with μ",
-        sampler,
-        PRE,
         "rank correlation of mean z with μ",
         statistics.rank_correlation,
         groups,
@@ -195,8 +179,6 @@ def size(table: Table, sampler: str) -> Iterator[Claim]:
         span = f", N = {min(groups)} … {max(groups)}" if groups else ""
         yield over_all(
             f"η hardly depends on N (μ = {mu:g})",
-            sampler,
-            PRE,
             f"slope of log {label} against log N{span}",
             slope,
             groups,

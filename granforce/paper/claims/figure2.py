@@ -8,7 +8,7 @@ import numpy as np
 from granforce.measures import statistics
 from granforce.paper.claims.figure1 import peaked
 from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
-from granforce.paper.claims.verdicts import PRE, Claim, over_all
+from granforce.paper.claims.verdicts import Claim, over_all
 from granforce.paper.tables import Table
 
 _ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
@@ -18,7 +18,7 @@ def perturbation(table: Table, sampler: str) -> Iterator[Claim]:
     """F_crit and α are largest near μ = 0.1."""
     for name, label in _ANSWERS:
         groups = positive_friction(items(table.responses(), name))
-        yield peaked(f"{label} is largest near μ = 0.1", sampler, groups)
+        yield peaked(f"{label} is largest near μ = 0.1", groups)
 
 
 def response(table: Table, sampler: str) -> Iterator[Claim]:
@@ -30,8 +30,6 @@ def response(table: Table, sampler: str) -> Iterator[Claim]:
         groups = positive_friction(groups)
         yield over_all(
             f"{label} rises with η",
-            sampler,
-            PRE,
             f"rank correlation of mean {label} with mean {word} over μ > 0",
             lambda _, means: statistics.rank_correlation(*means.T),
             groups,
@@ -41,8 +39,6 @@ def response(table: Table, sampler: str) -> Iterator[Claim]:
         )
         yield over_all(
             f"{label} is similar at equal η on both sides of the maximum",
-            sampler,
-            PRE,
             f"{label} beyond the maximum of {word}(μ) over that below it at the same {word}, "
             "mean of the ratios",
             lambda _, means: branches(means),

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from granforce.paper.claims.groups import LEAST_DYNAMIC, drawn, dynamic, items, positive_friction
-from granforce.paper.claims.verdicts import PRE, PRL, Claim, at_each
+from granforce.paper.claims.verdicts import PRL, Claim, at_each
 from granforce.paper.tables import Table
 
 
@@ -13,8 +13,6 @@ def pairs(table: Table, sampler: str) -> Iterator[Claim]:
     """Distances of pairs of states are sharply peaked."""
     yield at_each(
         "distances between pairs of states are sharply peaked",
-        sampler,
-        PRE,
         f"their standard deviation over their mean, μ ≥ {LEAST_DYNAMIC:g}",
         items(dynamic(drawn(table, sampler)), "pair_spread"),
         good=(-np.inf, 0.2),
@@ -32,9 +30,8 @@ def centre(table: Table, sampler: str) -> Iterator[Claim]:
     ]
     yield at_each(
         "the original network lies closer to the centre than sampled states",
-        sampler,
-        PRL,
         "its distance over their mean distance",
         positive_friction(items(rows, name)),
         good=(-np.inf, 1),
+        source=PRL,
     )

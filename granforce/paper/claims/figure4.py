@@ -18,7 +18,7 @@ from granforce.paper.claims.groups import (
     told,
     within,
 )
-from granforce.paper.claims.verdicts import PRE, Claim, at_each, over_all
+from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import Table
 from granforce.records import Floats
 
@@ -40,8 +40,6 @@ def shape(table: Table, sampler: str) -> Iterator[Claim]:
             yield at_each(
                 f"P(ΔF_n) at {word} μ {'has a peak' if has_peak else 'falls monotonically'}, "
                 f"in {unit}",
-                sampler,
-                PRE,
                 "part of the contacts that lie too far right for a density that never rises "
                 "(departure; 0 where chance makes as much)",
                 within(groups, span),
@@ -75,8 +73,6 @@ def tails(table: Table, sampler: str) -> Iterator[Claim]:
         ):
             yield at_each(
                 f"tail of P(ΔF_n) at {word} μ, beyond the {beyond}: {how}",
-                sampler,
-                PRE,
                 f"b of exp(−(λ ΔF_n)^b) beyond the {beyond}",
                 within(everywhere, span),
                 good=good,
@@ -102,7 +98,7 @@ def widths(table: Table, sampler: str) -> Iterator[Claim]:
         (np.std, "P(ΔF_n) is broadest at intermediate μ", "the standard deviation of ΔF_n/⟨f_n⟩"),
     ):
         groups = each(everywhere, measure)
-        yield peaked(statement, sampler, groups, f"{PEAK}, of {what}", good=(0.05, 0.3))
+        yield peaked(statement, groups, f"{PEAK}, of {what}", good=(0.05, 0.3))
 
 
 def elongation(table: Table, sampler: str) -> Iterator[Claim]:
@@ -113,8 +109,6 @@ def elongation(table: Table, sampler: str) -> Iterator[Claim]:
         groups = middle | within(ratio, span)
         yield over_all(
             f"S is more elongated at {word} than at intermediate μ",
-            sampler,
-            PRE,
             f"mean std/mean of ΔF_n of μ in {told(span)} over that in {told(MIDDLE)}",
             lambda keys, means, span=span: _over_middle(keys, means, span),
             dict(sorted(groups.items())),

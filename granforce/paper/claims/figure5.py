@@ -15,7 +15,7 @@ from granforce.paper.claims.groups import (
     told,
     within,
 )
-from granforce.paper.claims.verdicts import PRE, PRL, Claim, at_each
+from granforce.paper.claims.verdicts import PRL, Claim, at_each
 from granforce.paper.tables import Table
 
 
@@ -33,14 +33,10 @@ def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:
 def counts(table: Table, sampler: str) -> Iterator[Claim]:
     """As many strong forces as large extents at μ = 0.1."""
     groups = _marked(
-        table,
-        sampler,
-        lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan,
+        table, sampler, lambda strong, loose: strong.sum() / loose.sum() if loose.any() else np.nan
     )
     yield at_each(
         "f_n > 2⟨f_n⟩ and ΔF_n > ⟨ΔF_n⟩ hold for about as many contacts (μ = 0.1)",
-        sampler,
-        PRE,
         "number of the first over that of the second",
         within(groups, (0.1, 0.1)),
         good=(0.8, 1.25),
@@ -59,8 +55,6 @@ def enrichment(table: Table, sampler: str) -> Iterator[Claim]:
     )
     yield at_each(
         "strong contacts are less determined at intermediate μ",
-        sampler,
-        PRE,
         "part with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
         f"μ in {told(MIDDLE)}",
         within(groups, MIDDLE),
@@ -73,8 +67,6 @@ def place(table: Table, sampler: str) -> Iterator[Claim]:
     rows = [row for row in table.part("exact") if row["mu"] > 0 and row.get("contacts")]
     yield at_each(
         "with only the pressure prescribed, indeterminacy is everywhere",
-        sampler,
-        PRE,
         "undetermined part of the contacts that carry",
         items(rows, "undetermined_part"),
         good=(0.9, np.inf),
@@ -82,8 +74,6 @@ def place(table: Table, sampler: str) -> Iterator[Claim]:
     )
     yield at_each(
         "and not in clusters",
-        sampler,
-        PRE,
         "number of clusters of undetermined contacts",
         items([row for row in rows if row["undetermined"]], "clusters"),
         good=(-np.inf, 1.1),
@@ -124,10 +114,9 @@ def frozen(table: Table, sampler: str) -> Iterator[Claim]:
         ):
             yield at_each(
                 f"with frozen boundary forces, {claim} ({word})",
-                sampler,
-                PRL,
                 f"{measured}, μ in {told(span)}",
                 within(items(rows, what), span),
                 good=good,
                 fair=fair,
+                source=PRL,
             )

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from granforce.paper.claims.groups import LARGE, MIDDLE, SMALL, Ends, drawn, items, told, within
-from granforce.paper.claims.verdicts import PRE, Claim, at_each, over_all
+from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import Table
 from granforce.records import Floats
 
@@ -26,8 +26,6 @@ def correlation(table: Table, sampler: str) -> Iterator[Claim]:
     ):
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ",
-            sampler,
-            PRE,
             f"mean over packings, μ in {told(span)}",
             within(everywhere, span),
             good=good,
@@ -35,8 +33,6 @@ def correlation(table: Table, sampler: str) -> Iterator[Claim]:
         )
         yield at_each(
             f"corr(f_n, ΔF_n) {word} μ, against chance",
-            sampler,
-            PRE,
             "the same in standard deviations 1/√(N_c − 1) of a packing whose f_n are shuffled",
             within(scores, span),
             good=limits,
@@ -45,8 +41,6 @@ def correlation(table: Table, sampler: str) -> Iterator[Claim]:
     for word, span in (("small", SMALL), ("large", LARGE)):
         yield over_all(
             f"corr(f_n, ΔF_n) is weaker at {word} than at intermediate μ",
-            sampler,
-            PRE,
             f"mean of μ in {told(span)} less that in {told(MIDDLE)}",
             lambda keys, means, span=span: _mean_difference(keys, means, span),
             dict(sorted((within(everywhere, MIDDLE) | within(everywhere, span)).items())),
@@ -65,16 +59,10 @@ def error_bars(table: Table, sampler: str) -> Iterator[Claim]:
     rows = [row for row in drawn(table, sampler) if np.isfinite(row.get("correlation", np.nan))]
     for word, span, test in (
         ("excludes 0 at intermediate", MIDDLE, lambda r: r["correlation_low"] > 0),
-        (
-            "holds 0 at large",
-            LARGE,
-            lambda r: r["correlation_low"] <= 0 <= r["correlation_high"],
-        ),
+        ("holds 0 at large", LARGE, lambda r: r["correlation_low"] <= 0 <= r["correlation_high"]),
     ):
         yield at_each(
             f"the paper's error bar of corr(f_n, ΔF_n) {word} μ",
-            sampler,
-            PRE,
             "part of packings in which the range over all other networks of the walk does so",
             within(items(rows, lambda r, test=test: float(test(r))), span),
             good=(0.9, np.inf),

@@ -44,10 +44,7 @@ def dynamic(rows: Rows) -> list[dict[str, Any]]:
 
 
 def items(
-    rows: Rows,
-    what: str | Callable[..., Any],
-    by: str = "mu",
-    positive: Collection[str] = (),
+    rows: Rows, what: str | Callable[..., Any], by: str = "mu", positive: Collection[str] = ()
 ) -> Groups:
     """{μ: [(disks, value)]} in order of μ; what: a name, or a function of the row.
 

@@ -81,14 +81,13 @@ def _range(ends: Ends) -> str:
 
 def over_all(
     statement: str,
-    sampler: str,
-    source: str,
     measured: str,
     statistic: Callable[..., float],
     groups: Groups,
     *,
     good: Ends,
     fair: Ends | None = None,
+    source: str = PRE,
     least: int = 2,
 ) -> Claim:
     """The Claim about one number, statistic(keys, means over packings), of all groups.
@@ -96,7 +95,7 @@ def over_all(
     groups: {μ: [(disks, value)]}, with values of any shape; least: so many it takes.
     """
     ranges = Ranges(good, good if fair is None else fair)
-    claim = _missing(statement, sampler, source, measured, ranges)
+    claim = _missing(statement, source, measured, ranges)
     if len(groups) < least:
         return claim
     keys = np.array(list(groups), dtype=float)
@@ -134,11 +133,11 @@ def over_all(
     return claim._replace(verdict=verdict, why=why)
 
 
-def _missing(statement: str, sampler: str, source: str, measured: str, ranges: Ranges) -> Claim:
-    """The Claim before anything is known of it."""
+def _missing(statement: str, source: str, measured: str, ranges: Ranges) -> Claim:
+    """The Claim before anything is known of it; `judged` says which sampler it is about."""
     return Claim(
         statement=statement,
-        sampler=sampler,
+        sampler="",
         source=source,
         measured=measured,
         value=np.nan,
@@ -165,13 +164,12 @@ def _turns(turned: Any, verdict: str) -> str:
 
 def at_each(
     statement: str,
-    sampler: str,
-    source: str,
     measured: str,
     groups: Groups,
     *,
     good: Ends,
     fair: Ends | None = None,
+    source: str = PRE,
     interval: Callable[[Any, float], tuple[float, float, float]] | None = None,
 ) -> Claim:
     """The Claim about a number at each μ: what is told is the one farthest from the good range.
@@ -181,7 +179,7 @@ def at_each(
     """
     ranges = Ranges(good, good if fair is None else fair)
     interval = interval or statistics.mean_interval
-    claim = _missing(statement, sampler, source, measured, ranges)
+    claim = _missing(statement, source, measured, ranges)
     if not groups:
         return claim
     level = 1 - (1 - statistics.LEVEL) / len(groups)

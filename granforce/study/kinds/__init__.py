@@ -4,30 +4,10 @@ A kind is added by one more record in the file of its family, and by its name he
 the command line and the page take it from `KINDS`.
 """
 
-from granforce.study.kinds.bounds import (
-    INTERVALS,
-    LIMIT_LOADS,
-    OUTLINE,
-    STRESS,
-)
-from granforce.study.kinds.packings import (
-    PACKING,
-    get_packing,
-    imported_parameters,
-    keep_packing,
-)
-from granforce.study.kinds.perturbations import (
-    PERTURBATION,
-    PERTURBED_CONTACT,
-)
-from granforce.study.kinds.states import (
-    INFERENCE,
-    INFORMATIVE,
-    RELAXATIONS,
-    UNIFORM,
-    VOLUME,
-    WALK,
-)
+from granforce.study.kinds.bounds import INTERVALS, LIMIT_LOADS, OUTLINE, STRESS
+from granforce.study.kinds.packings import PACKING, get_packing, imported_parameters, keep_packing
+from granforce.study.kinds.perturbations import PERTURBATION, PERTURBED_CONTACT
+from granforce.study.kinds.states import INFERENCE, INFORMATIVE, RELAXATIONS, UNIFORM, VOLUME, WALK
 
 __all__ = [
     "INFERENCE",

@@ -1,6 +1,5 @@
 """Bounds of S that are kept: intervals, limit loads, and outlines."""
 
-import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -11,13 +10,7 @@ from granforce.explore.intervals import intervals, limit_load_bounds
 from granforce.explore.outline import outline
 from granforce.explore.stress_outline import stress_outline
 from granforce.forces.ensemble import Ensemble
-from granforce.records import (
-    Floats,
-    InputError,
-    Progress,
-    positive,
-    whole,
-)
+from granforce.records import Floats, InputError, Progress, positive, whole
 from granforce.study import slices
 from granforce.study.bounds import (
     intervals_dataset,
@@ -27,7 +20,13 @@ from granforce.study.bounds import (
 )
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
-from granforce.study.kinds.packings import check_complete, chosen_contacts, cones_of, ensemble_of
+from granforce.study.kinds.packings import (
+    check_complete,
+    chosen_contacts,
+    cones_of,
+    ensemble_of,
+    timed,
+)
 from granforce.study.store import Store
 from granforce.system import cancelling
 
@@ -71,9 +70,8 @@ def _intervals(
     S = ensemble_of(store, parameters)
     if begun:
         begun(S)
-    begin = time.perf_counter()
-    bounds = intervals(S, parameters["contacts"], workers=workers, progress=progress, **options)
-    seconds = time.perf_counter() - begin
+    options |= {"workers": workers, "progress": progress}
+    bounds, seconds = timed(intervals, S, parameters["contacts"], **options)
     check_complete(bounds, "exact bounds")
     return intervals_dataset(S, bounds, seconds=seconds)
 
@@ -83,9 +81,8 @@ def _limit_loads(
 ) -> xr.Dataset:
     """Dataset of the limit loads of contacts."""
     S = ensemble_of(store, parameters)
-    begin = time.perf_counter()
-    loads = limit_load_bounds(S, parameters["contacts"], workers=workers, progress=progress)
-    seconds = time.perf_counter() - begin
+    options: dict[str, Any] = {"workers": workers, "progress": progress}
+    loads, seconds = timed(limit_load_bounds, S, parameters["contacts"], **options)
     check_complete(loads, "limit loads")
     return limit_loads_dataset(S, loads, seconds=seconds)
 
@@ -141,9 +138,8 @@ def _outline(
     """
     S = ensemble_of(store, parameters)
     plane = _component_axes(S, parameters["components"]) if axes is None else axes
-    begin = time.perf_counter()
-    found = outline(S, plane, tolerance=parameters["tolerance"], workers=workers, progress=progress)
-    seconds = time.perf_counter() - begin
+    options = {"tolerance": parameters["tolerance"], "workers": workers, "progress": progress}
+    found, seconds = timed(outline, S, plane, **options)
     cancelling.check("outline")
     if not found.converged:
         raise InputError(f"outline not closed: a gap of {found.gap:.1e} ⟨f_n⟩ is left")
@@ -175,9 +171,8 @@ def _stress(
 ) -> xr.Dataset:
     """Dataset of the outline of stresses."""
     S = ensemble_of(store, parameters)
-    begin = time.perf_counter()
-    found = stress_outline(S, parameters["angles"], workers=workers, progress=progress)
-    seconds = time.perf_counter() - begin
+    options: dict[str, Any] = {"workers": workers, "progress": progress}
+    found, seconds = timed(stress_outline, S, parameters["angles"], **options)
     cancelling.check("outline of stresses")
     if not found.converged:
         raise InputError("the outline of stresses did not close")

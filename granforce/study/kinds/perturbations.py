@@ -15,14 +15,7 @@ from granforce.perturb.critical_force import (
     critical_force,
     critical_forces,
 )
-from granforce.records import (
-    InputError,
-    Integers,
-    Progress,
-    positive,
-    random_seed,
-    whole,
-)
+from granforce.records import InputError, Integers, Progress, positive, random_seed, whole
 from granforce.study.cells import Kind, load, save
 from granforce.study.keys import Parameters
 from granforce.study.kinds.packings import check_complete, chosen_contacts, cones_of, ensemble_of

@@ -19,20 +19,11 @@ from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.records import (
-    InputError,
-    Progress,
-    positive,
-    random_seed,
-    whole,
-)
-from granforce.study.bounds import (
-    informative_dataset,
-    volume_dataset,
-)
+from granforce.records import InputError, Progress, positive, random_seed, whole
+from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load
 from granforce.study.keys import Parameters
-from granforce.study.kinds.packings import cones_of, ensemble_of, hash_of
+from granforce.study.kinds.packings import cones_of, ensemble_of, hash_of, timed
 from granforce.study.samples import inference_dataset, uniform_dataset, walk_dataset, walk_of
 from granforce.study.store import Store
 from granforce.system import cancelling
@@ -137,8 +128,8 @@ def _walk(
     options["skip"] = parameters.get("skip", True)
     if begun is not None:
         begun(S)
-    begin = time.perf_counter()
-    done = walk(
+    done, seconds = timed(
+        walk,
         S,
         parameters["states"],
         parameters["seed"],
@@ -150,7 +141,6 @@ def _walk(
         enough=enough,
         **options,
     )
-    seconds = time.perf_counter() - begin
     return walk_dataset(S, done, keep=parameters["keep"], seconds=seconds)
 
 
@@ -214,8 +204,8 @@ def _uniform(
     A sample that did not reach the wanted effective size is kept too, and says so in `reached`.
     """
     S = ensemble_of(store, parameters)
-    begin = time.perf_counter()
-    drawn = sample_uniform(
+    drawn, seconds = timed(
+        sample_uniform,
         S,
         parameters["states"],
         parameters["chains"],
@@ -225,7 +215,6 @@ def _uniform(
         progress=progress,
     )
     cancelling.check("uniform sample")
-    seconds = time.perf_counter() - begin
     return uniform_dataset(S, drawn, keep=parameters["keep"], seconds=seconds)
 
 
@@ -347,11 +336,11 @@ def _informative(
 ) -> xr.Dataset:
     """Dataset of the most informative contacts; watch as for `informative`."""
     S = ensemble_of(store, parameters)
-    begin = time.perf_counter()
     options = {name: parameters[name] for name in ("k", "check", "states", "seed")}
-    found = informative(S, **options, workers=workers, watch=watch, progress=progress)
+    options |= {"workers": workers, "watch": watch, "progress": progress}
+    found, seconds = timed(informative, S, **options)
     cancelling.check("which measurement next")
-    return informative_dataset(S, found, seconds=time.perf_counter() - begin)
+    return informative_dataset(S, found, seconds=seconds)
 
 
 WALK = Kind(
