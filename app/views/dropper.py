@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 NAME_LENGTH = 120  # of a file's name, as shown in messages
 MOST_FILES = 16  # of one drop; a packing has two at most
@@ -19,7 +19,7 @@ class Dropper(Scripted):
     label = param.String()
     most = param.Integer(doc="bytes of all files of one drop together")
 
-    _esm = joined("ask", "dropper")
+    _esm = module("dropper")
     _stylesheets: ClassVar = [FOLDER / "dropper.css"]
 
     def __init__(self, on_files, on_refusal, **params):

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import Scripted, joined
+from .scripts import Scripted, module
 
 
 class Handover(Scripted):
@@ -15,7 +15,7 @@ class Handover(Scripted):
 
     files = param.Dict(default={}, doc="{heading: {key: words}}")
 
-    _esm = joined("ask", "figure", "handover")
+    _esm = module("handover")
     _stylesheets: ClassVar = [
         """
         :host { display: block; }

@@ -8,7 +8,7 @@ from granforce.records import InputError
 
 from .. import mine, names
 from ..jobs import reading
-from .scripts import FOLDER, Scripted, joined, said
+from .scripts import FOLDER, Scripted, module, said
 
 
 class Mine(Scripted):
@@ -16,7 +16,7 @@ class Mine(Scripted):
 
     rows = param.List(doc="dicts, see mine.rows; and `here`, whether it is on screen")
 
-    _esm = joined("ask", "mine")
+    _esm = module("mine")
     _stylesheets: ClassVar = [FOLDER / "mine.css"]
 
     def __init__(self, state, **params):

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 
 class NumberField(Scripted):
@@ -21,7 +21,7 @@ class NumberField(Scripted):
     step = param.Integer(default=1, doc="of the arrow keys and buttons")
     disabled = param.Boolean()
 
-    _esm = joined("ask", "number")
+    _esm = module("number")
     _stylesheets: ClassVar = [FOLDER / "number.css"]
 
     def __init__(self, on_wrong=None, **params):

@@ -6,7 +6,9 @@ import numpy as np
 import param
 
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
-from .scripts import FOLDER, Scripted, joined, said
+from .scripts import FOLDER, Scripted, module, said
+
+SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
 
 class Player(Scripted):
@@ -32,6 +34,7 @@ class Player(Scripted):
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
     plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
     palettes = param.Dict(default={}, doc="colours, see style.palettes")
+    scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")
     live = param.Boolean(doc="whether something is being computed that can be seen")
     asked = param.String(doc="what was asked for and is not on screen, in words")
     lead = param.String(doc="HTML: the question, and what is seen, in sentences")
@@ -60,29 +63,7 @@ class Player(Scripted):
     scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    SCRIPTS: ClassVar = (
-        "ask",
-        "sheet",
-        "scene",
-        "replay",
-        "look",
-        "layer",
-        "plots",
-        "buttons",
-        "live",
-        "pins",
-        "split",
-        "difference",
-        "predict",
-        "point",
-        "grab",
-        "opening",
-        "player",
-    )
-    _esm = (
-        f"const CHAIN_WIDTH = {CHAIN_WIDTH}, FULL_CHANGE = {FULL_CHANGE}, "
-        f"FULL_DEVIATION = {FULL_DEVIATION}\n" + joined(*SCRIPTS)
-    )
+    _esm = module("player")
     _stylesheets: ClassVar = [FOLDER / "player.css"]
 
     def __init__(self, **params):

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import Scripted, joined
+from .scripts import Scripted, module
 
 FOLLOWED = ("running", "fraction", "keeps")
 
@@ -22,7 +22,7 @@ class Progress(Scripted):
     words = param.String()
     keeps = param.Boolean()
 
-    _esm = joined("ask", "progress")
+    _esm = module("progress")
     _stylesheets: ClassVar = [
         """
         :host { display: block; width: 100%; }

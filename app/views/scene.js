@@ -1,7 +1,9 @@
 // The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
-const LEAST = 0.1 // px; thinner chains are not drawn
+import { PIXELS, Sheet } from "./sheet.js"
+
+export const LEAST = 0.1 // px; thinner chains are not drawn
 const FEW = 2500 // chains drawn one by one, with round ends; more are gathered in classes
 const FINE = 16 // colours; of more, every second serves where chains are gathered
 const GRAB = 6 // px from a chain that still mean it
@@ -9,7 +11,7 @@ const ZOOM = [0.02, 4] // least and largest part of the whole view
 const ARROW = 1.3 // of the largest force on a disk, in largest radii
 const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
-class Scene {
+export class Scene {
   constructor(onSelect) {
     this.root = document.createElement("div")
     this.root.className = "scene"
@@ -172,7 +174,7 @@ class Scene {
   drawChains(style) {
     this.style = style
     if (!this.size || this.stale) return this.stale && this.changed()
-    const { x0, y0, x1, y1, contact, i, j } = this.geometry
+    const { x0, y0, x1, y1, contact } = this.geometry
     const { chains, view, scale, width, bin } = this
     const least = LEAST / scale, order = this.order ??= []
     let drawn = 0, outside = 0, thin = 0

@@ -1,5 +1,19 @@
 // The page of a small scene: the scene and its S side by side, friction, and what is done with them.
 
+import { Arrows, tall } from "./arrows.js"
+import { ask } from "./ask.js"
+import { Bars } from "./bars.js"
+import { Body } from "./body.js"
+import { Builder } from "./builder.js"
+import { Going } from "./going.js"
+import { goneBanner } from "./gone.js"
+import { lesson, printed } from "./lesson.js"
+import { palette } from "./palette.js"
+import { Push } from "./push.js"
+import { counted, forceName, legend, pictured, sentence, special, stopping } from "./saying.js"
+import { Space } from "./space.js"
+import { TourCard } from "./tourcard.js"
+
 const MOST_MU = 1.5 // on the slider; larger ones can be typed
 const REST_MS = 150 // after which what only the server tells is asked for
 

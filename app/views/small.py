@@ -9,7 +9,7 @@ from granforce.packing import scenes as made
 from granforce.records import InputError, NotJammedError, UndecidedError
 
 from .. import scenes
-from .scripts import FOLDER, Scripted, joined, said
+from .scripts import FOLDER, Scripted, module, said
 
 # Title, text, and what the scene shows, of the steps of the tour before those of large packings.
 FIRST_STEPS = (
@@ -49,10 +49,7 @@ class Small(Scripted):
     first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
 
-    _esm = joined(
-        *("ask", "gone", "body", "easel", "palette", "arrows", "line", "shadow", "space"),
-        *("builder", "push", "going", "bars", "saying", "lesson", "tourcard", "small"),
-    )
+    _esm = module("small")
     _stylesheets: ClassVar = [FOLDER / "small.css"]
 
     def __init__(self, asked, task, all_steps, **params):
