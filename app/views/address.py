@@ -36,7 +36,6 @@ class Address(Scripted):
         if self._state.cell is not None:
             self.query = f"?{self._state.link()}"
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """The visitor went back or forward to another view."""
-        if isinstance(message, dict):
-            self._state.open(str(message.get("query", "")))
+        self._state.open(message["query"])

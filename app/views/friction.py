@@ -28,7 +28,7 @@ class FrictionSlider(Scripted):
         super().__init__(**params)
         self._on_typed = on_typed
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         if self._on_typed is not None:
-            self._on_typed(str(message.get("typed", "")))
+            self._on_typed(message["typed"])
             self._send_msg({"settled": True})

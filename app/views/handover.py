@@ -55,7 +55,7 @@ class Handover(Scripted):
         """No file comes for what was asked."""
         self._send_msg({"rest": True})
 
-    def _handle_msg(self, message):
-        key = message.get("key")
+    def _heard(self, message):
+        key = message["key"]
         if any(key in group for group in self.files.values()):
             self._on_ask(key)

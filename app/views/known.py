@@ -31,7 +31,7 @@ class Known(Scripted):
             task.param.watch(self._show, "running")
         self._show()
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         knowledge = self._state.knowledge
         match message:
             case {"release": int(contact)}:

@@ -29,8 +29,8 @@ class NumberField(Scripted):
         super().__init__(**params)
         self._on_wrong = on_wrong
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """Something was typed that is no whole number."""
-        if self._on_wrong is not None and isinstance(message, dict):
-            typed, within = str(message.get("typed", ""))[:30], f"{self.start} to {self.end}"
+        if self._on_wrong is not None:
+            typed, within = message["typed"][:30], f"{self.start} to {self.end}"
             self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed!r}")

@@ -6,7 +6,7 @@ import numpy as np
 import param
 
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
-from .scripts import FOLDER, Scripted, module, said
+from .scripts import FOLDER, Scripted, module
 
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
@@ -74,19 +74,18 @@ class Player(Scripted):
         """Send something of what is being computed, or of what was pulled."""
         self._send_msg(news)
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """Digits pressed anywhere on the page; what the browser has painted of a computation."""
-        message = said(message)
-        if self.on_digit is not None and isinstance(message.get("tab"), int):
-            self.on_digit(message["tab"])
-        if self.on_hand is not None and isinstance(message.get("hand"), dict):
-            self.on_hand(message["hand"])
-        if self.on_known is not None and isinstance(message.get("known"), dict):
-            self.on_known(message["known"])
-        if self.on_wide is not None and isinstance(message.get("wide"), bool):
-            self.on_wide(message["wide"])
-        if self.on_live is not None and isinstance(message.get("live"), dict):
-            self.on_live(message["live"])
+        hear = {
+            "tab": self.on_digit,
+            "hand": self.on_hand,
+            "known": self.on_known,
+            "wide": self.on_wide,
+            "live": self.on_live,
+        }
+        for name, part in message.items():
+            if hear[name] is not None:
+                hear[name](part)
 
 
 def frames(replay, room=0):

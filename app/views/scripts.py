@@ -5,6 +5,8 @@ from pathlib import Path
 
 from panel.custom import JSComponent
 
+from .messages import FROM_BROWSER, TO_BROWSER, listed
+
 FOLDER = Path(__file__).parent
 
 
@@ -48,18 +50,6 @@ def _bound(text):
     return IMPORT.sub(r"const { \1 } = $\2", text)
 
 
-def said(message):
-    """The message of a script, a dict; an empty one for what no script can have sent."""
-    return message if isinstance(message, dict) and _from_browser(message) else {}
-
-
-def _from_browser(part):
-    """Whether all whole numbers are such as browsers have: larger ones are no floats either."""
-    if isinstance(part, dict | list):
-        return all(map(_from_browser, part.values() if isinstance(part, dict) else part))
-    return not isinstance(part, int) or abs(part) <= 2**53
-
-
 class Scripted(JSComponent):
     """A component whose script the browser runs as it is written.
 
@@ -72,3 +62,14 @@ class Scripted(JSComponent):
         if not properties["dev"]:  # where scripts may change under the same name
             properties["bundle"] = type(self).__name__
         return properties
+
+    def _send_msg(self, data):
+        """Tell the script something that TO_BROWSER lists."""
+        if not listed(TO_BROWSER, type(self).__name__, data):
+            raise ValueError(f"no message of {type(self).__name__}: {', '.join(data)}")
+        super()._send_msg(data)
+
+    def _handle_msg(self, data):
+        """Hear what FROM_BROWSER lists: a page may have been altered, and send anything."""
+        if listed(FROM_BROWSER, type(self).__name__, data):
+            self._heard(data)

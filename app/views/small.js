@@ -343,7 +343,7 @@ export function render({ model, view }) {
       return say("This scene opens once the connection is back.")
     }
     tell("says", `Making “${event.target.selectedOptions[0].textContent}” …`)
-    ask(model, view, { scene: name, ...(chosenMu ? { mu } : {}) })
+    ask(model, view, chosenMu ? { scene: name, mu } : { scene: name })
   })
   part("range").addEventListener("input", (event) => chooseMu(Number(event.target.value)))
   part("typed").addEventListener("change", (event) => {

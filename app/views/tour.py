@@ -87,11 +87,10 @@ class Tour(Scripted):
         if self.step and not self._set_up:
             self._go(self.step)  # now that there is something to show
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """The visitor goes to a step, or closes the tour (0)."""
-        step = message.get("step") if isinstance(message, dict) else None
-        if isinstance(step, int) and 0 <= step <= len(STEPS):
-            self._go(step)
+        if 0 <= message["step"] <= len(STEPS):
+            self._go(message["step"])
 
     def _go(self, step):
         self.step = step

@@ -180,8 +180,8 @@ def test_pixels_and_places_are_each_others_inverse_and_zoom_keeps_the_place(run)
             {SCENE}
             const before = scene.toPlace(450, 200)
             scene.zoom(0.5, 450, 200)
-            return [scene.toPixel(scene.view.x, scene.view.y), scene.toPlace(...scene.toPixel(0.3, -0.7)),
-                before, scene.toPlace(450, 200), scene.view.half]
+            const place = scene.toPlace(...scene.toPixel(0.3, -0.7)), at = scene.view
+            return [scene.toPixel(at.x, at.y), place, before, scene.toPlace(450, 200), at.half]
         }}""",
         walk=PRESSED,
     )
