@@ -13,6 +13,7 @@ import { Plots } from "./plots.js"
 import { Predict } from "./predict.js"
 import { Replay } from "./replay.js"
 import { Scene } from "./scene.js"
+import { closeSidebar } from "./sidebar.js"
 import { Split } from "./split.js"
 
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
@@ -25,8 +26,6 @@ const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds th
 const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
-const ROOMY = 1200 // px; from there on the sidebar begins open
-const OVER_PAGE = ".MuiDrawer-modal" // the sidebar where it does
 
 class Player {
   constructor(model, page, tell) {
@@ -448,21 +447,4 @@ export function render({ model, view }) {
   openMoving(player)
   closeSidebar(page, view)
   return player.buttons.root
-}
-
-/** The sidebar begins open. Below ROOMY it is closed: it would take the room of the packing; on
- * a narrow page it lies over it and is unseen until it has heard that it is closed, which it does
- * not before it listens. */
-function closeSidebar(page, view) {
-  const data = [...page._all_models.values()].find(({ data }) => data?.sidebar_open !== undefined)?.data
-  const close = () => {
-    const over = view.root.shadow_el.querySelector(OVER_PAGE)
-    if (over || window.innerWidth < ROOMY) {
-      data.sidebar_open = true // as only a change is told
-      data.sidebar_open = false
-    }
-    if (over) setTimeout(close, 100)
-    else document.documentElement.style.setProperty("--sidebar", "visible")
-  }
-  if (data) close() // a page taken along has none
 }
