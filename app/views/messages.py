@@ -53,6 +53,16 @@ FROM_BROWSER = {
 
 NETWORK = {"normal": Array, "tangential": Array, "residual": float}
 NETWORKS = NETWORK | {"residual": Array}  # several, one after the other
+# The networks through which f_n of a contact can be pulled, and what stops it at both ends.
+RAIL = NETWORKS | {"contact": int, "lower": float, "upper": float, "values": Array}
+RAIL |= {"opened": Array, "sliding": Array}
+# A packing under compression: its box, disks, and contacts with their branch vectors.
+PICTURE = {"mu": float, "box": [float, ...], "tilt": float, "fraction": float, "unbalance": float}
+PICTURE |= {"x": Array, "radius": Array, "i": Array, "j": Array, "reach": Array}
+PICTURE |= {"normal": Array, "tangential": Array}
+# States of a walk under way, one after the other, and of each the numbers told beside it.
+STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
+STATES |= {"acceptance": Array, "eta1": Array, "eta2": Array, "eta3": Array}
 
 # {component: messages that its script is sent}; forces in ⟨f_n⟩, arrays flat.
 TO_BROWSER = {
@@ -68,14 +78,10 @@ TO_BROWSER = {
         {"held": NETWORK | {"pull": list}},
         {"rail": None},  # there is none
         {"rail": None, "fan": None},
-        {
-            "rail": NETWORKS
-            | {"contact": int, "lower": float, "upper": float}
-            | {"values": Array, "opened": Array, "sliding": Array}
-        },
+        {"rail": RAIL},
         {"fan": NETWORKS | {"x": Array, "y": Array}},
-        {"picture": dict, "number": int},  # of a packing under compression: see live._picture
-        {"states": dict, "number": int},  # of a walk under way: see live._batch
+        {"picture": PICTURE, "number": int},
+        {"states": STATES, "number": int},
         {"bounds": {"low": Array, "high": Array}, "number": int},
     ),
     "Small": (

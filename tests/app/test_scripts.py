@@ -27,3 +27,10 @@ def test_what_a_script_exports_another_one_imports():
     exported = {(script, name) for script, text in SCRIPTS.items() for name in EXPORT.findall(text)}
     assert imported <= exported
     assert {name for _, name in exported - imported} == ENTRIES
+
+
+def test_the_table_of_who_calls_whom_has_every_script():
+    text = (FOLDER.parent / "README.md").read_text()
+    rows = [row for row in text[text.index("## Scripts") :].splitlines() if row.startswith("|")]
+    told = set(re.findall(r"`(\w+)\.js`", "\n".join(rows)))
+    assert told == set(SCRIPTS)
