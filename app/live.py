@@ -108,7 +108,6 @@ def _picture(glimpse: Any) -> Message:
         "reach": glimpse.reach.astype(np.float32).ravel(),
         "normal": forces[:, 0] / mean,
         "tangential": forces[:, 1] / mean,
-        "step": glimpse.step,
         "fraction": glimpse.packing_fraction,
         "unbalance": glimpse.unbalance if np.isfinite(glimpse.unbalance) else -1.0,
     }

@@ -18,8 +18,8 @@ from .data import Cell, Library
 from .replays import Replay, evenly
 from .views import explanation, still
 from .views.packing import exact_intervals, full_extent, legend
-from .views.player import Player, frames
-from .views.scripts import FOLDER, joined
+from .views.player import SCALES, frames
+from .views.scripts import FOLDER, module
 from .views.style import palettes
 
 FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
@@ -45,9 +45,8 @@ p {{ max-width: 68ch; font-size: 14px; line-height: 1.5; }}
 This view on a server of granforce: <code>?{link}</code><br>{left_out}</footer>
 {script}
 <script type="module">
-const PLAYER_STYLE = {style}
-const GIVEN = {given}
 {code}
+begin({given}, {style})
 </script>
 </body></html>
 """
@@ -89,6 +88,7 @@ def html(
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
+        "scales": SCALES,
         "lead": explanation.first(replay.summary),
         "source": source,
         "frame": frame,
@@ -124,7 +124,7 @@ def html(
         else "",
         style=_script((FOLDER / "player.css").read_text()),
         given=_script({name: _plain(value) for name, value in given.items()}),
-        code="\n".join([Player._esm, joined("standalone")]),
+        code=module("standalone"),
     )
     return text.encode()
 

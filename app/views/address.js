@@ -1,6 +1,9 @@
 // The address follows the view, and the view follows Back and Forward; where the server is gone, see
 // gone.js.
 
+import { ask } from "./ask.js"
+import { goneBanner } from "./gone.js"
+
 const RETURN_MS = 20000 // in which a view that was gone back to appears
 
 export function render({ model, view }) {

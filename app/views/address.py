@@ -5,7 +5,7 @@ from typing import ClassVar
 import param
 
 from ..state import VIEW
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 # Nobody goes back to the frame before, to the view of a moment ago, or to the other theme.
 PASSING = ("frame", "dark", "zoom")
@@ -23,7 +23,7 @@ class Address(Scripted):
         default=list(PASSING), doc="what changes the address but is not gone back to"
     )
 
-    _esm = joined("ask", "gone", "address")
+    _esm = module("address")
     _stylesheets: ClassVar = [FOLDER / "address.css"]
 
     def __init__(self, state, **params):
@@ -36,7 +36,6 @@ class Address(Scripted):
         if self._state.cell is not None:
             self.query = f"?{self._state.link()}"
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """The visitor went back or forward to another view."""
-        if isinstance(message, dict):
-            self._state.open(str(message.get("query", "")))
+        self._state.open(message["query"])

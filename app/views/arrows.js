@@ -1,17 +1,22 @@
 // The small scene itself: disks, walls, the force on each disk at each contact as an arrow within its
 // cone, and, for a disk that is looked at, its forces put one after the other: they close.
 
+import { dot } from "./body.js"
+import { Easel } from "./easel.js"
+import { number } from "./saying.js"
+import { distance } from "./space.js"
+
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
 const NAMED = 3 // contacts up to which the forces on a single disk have their names beside them
 
 /** Whether a scene is so much higher than wide that it needs a picture like that. */
-function tall({ name, x, box }) {
+export function tall({ name, x, box }) {
   const extent = (k) => { const all = x.filter((_, n) => n % 2 === k); return Math.max(...all) - Math.min(...all) }
   return name !== "own" && !box[0] && extent(1) > 4 * extent(0) && extent(0) > 0
 }
 
-class Arrows {
+export class Arrows {
   constructor(root, told, ratio) {
     this.told = told // told(what, …): of a hand on it
     this.canvas = root
@@ -22,7 +27,7 @@ class Arrows {
       const box = root.getBoundingClientRect()
       return [event.clientX - box.left, event.clientY - box.top]
     }
-    root.addEventListener("pointermove", (event) => this.moved(...at(event), event))
+    root.addEventListener("pointermove", (event) => this.moved(...at(event)))
     root.addEventListener("pointerleave", () => { if (!this.held) { this.hover = null; told("hover", null) } })
     root.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
     for (const name of ["pointerup", "pointercancel"]) root.addEventListener(name, () => { this.held = null; told("release") })
@@ -366,7 +371,7 @@ class Arrows {
     event.preventDefault()
   }
 
-  moved(px, py, event) {
+  moved(px, py) {
     if (this.held?.taken) return this.told("carry", { at: this.back(px, py) })
     if (this.held) return this.pull(px, py)
     const found = this.find(px, py)

@@ -1,11 +1,11 @@
 /** Tell the server something. */
-function ask(model, view, message) {
+export function ask(model, view, message) {
   knownThere(view.model.document)
   model.send_msg(message)
 }
 
 /** Have nothing sent along with messages that the server knows anyway. */
-function knownThere(page) {
+export function knownThere(page) {
   if (!page || page.knownThere) return
   page.knownThere = true
   // Bokeh takes what came from the server for new until the page next tells the server something, and

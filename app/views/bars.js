@@ -1,9 +1,11 @@
 // The exact intervals of all normal forces in a small scene, and where each force is in its own. What
 // has not changed is not touched, and nothing that moves is laid out anew: a frame is to be cheap.
 
+import { forceName, number } from "./saying.js"
+
 const SEEN = 0.03 // part of the rail: how wide a bar is at least, to be seen beside the mark of the force
 
-class Bars {
+export class Bars {
   constructor(host) { this.host = host; this.rows = [] }
 
   /** ends: [least, largest] of each contact, known otherwise where S is not drawn whole. */

@@ -3,16 +3,16 @@
 
 const FAR = [1e4, 1e8] // where S seems to have no end it is cut so far outside, to find rays along which it goes on
 const SMALL = 1e-9
-const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
+export const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
 
-function dot(a, b) {
+export function dot(a, b) {
   let sum = 0
   for (let k = 0; k < a.length; k++) sum += a[k] * b[k]
   return sum
 }
 
 /** The solution of a small square system, null where its rows depend on each other. */
-function solve(rows, right) {
+export function solve(rows, right) {
   const n = right.length, M = rows.map((row, k) => [...row, right[k]])
   for (let c = 0; c < n; c++) {
     let p = c
@@ -28,7 +28,7 @@ function solve(rows, right) {
   return M.map((row, k) => row[n] / row[k])
 }
 
-class Body {
+export class Body {
   constructor(scene) {
     this.scene = scene
     this.h = scene.h ?? 0
@@ -36,7 +36,7 @@ class Body {
     const width = 2 * this.count
     this.axes = Array.from({ length: this.h }, (_, k) => scene.axes.slice(k * width, (k + 1) * width))
     this.load = Float64Array.from(scene.load)
-    this.u = new Array(this.h).fill(0)
+    this.u = Array(this.h).fill(0)
     this.bounded = true // above three dimensions until the server says otherwise
     this.reload()
   }

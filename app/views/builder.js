@@ -1,5 +1,8 @@
 // Build your own: disks and walls are put, moved and removed by hand; what comes near snaps into contact.
 
+import { solve } from "./body.js"
+import { distance } from "./space.js"
+
 const NEAR = 0.45 // of the largest radius, within which a disk is drawn into contact
 const MOST_DISKS = 30, MOST_WALLS = 12
 // One disk on the floor, by its weight or under a wall that presses.
@@ -16,7 +19,7 @@ const HOW = {
   pull: "Drag the tip of an arrow: all forces follow.",
 }
 
-class Builder {
+export class Builder {
   /** changed(text): of another scene, of the one to begin with if empty. */
   constructor(host, changed) {
     this.changed = changed

@@ -1,5 +1,7 @@
 // The player's buttons, sliders and numbers around the scene, and the keys that stand for them.
 
+import { LEAST } from "./scene.js"
+
 const ICONS = {
   restart: "M6 5h2v14H6zM20 5v14L9 12z",
   back: "M18 5v14L8 12z",
@@ -81,7 +83,7 @@ const CHECKS = `<summary>Check this network</summary>
     <span tabindex="0" data-term="distance">from the centre of the states <b class="distance"></b> ⟨fₙ⟩</span>
   </div>`
 
-class Buttons {
+export class Buttons {
   /** actions: by the buttons' names; scrub(position); tab(number), for the digits. */
   constructor(scene, actions) {
     this.root = document.createElement("div")

@@ -35,7 +35,7 @@ export function render({ model, view }) {
   /** What the columns are read from. */
   function now() {
     const on = player(), { replay, look } = on, { walk, mixed } = replay
-    const pairs = new Array(walk.contacts)
+    const pairs = Array(walk.contacts)
     for (let k = 0; k < walk.contact.length; k++) pairs[walk.contact[k]] ??= [walk.i[k], walk.j[k]]
     const { low, high } = look.exact ?? walk
     return { walk, mixed, pairs, low, high, known: new Set(on.pins.pins.contacts ?? []), exact: Boolean(look.exact) }

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 
 class Contacts(Scripted):
@@ -12,7 +12,7 @@ class Contacts(Scripted):
 
     dark = param.Boolean()
 
-    _esm = joined("contacts")
+    _esm = module("contacts")
     _stylesheets: ClassVar = [FOLDER / "contacts.css"]
 
     def __init__(self, state):

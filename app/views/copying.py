@@ -2,7 +2,7 @@
 
 import param
 
-from .scripts import Scripted
+from .scripts import Scripted, module
 
 
 class CopyButton(Scripted):
@@ -14,31 +14,7 @@ class CopyButton(Scripted):
     label = param.String()
     text = param.String()
 
-    _esm = """
-    export function render({ model }) {
-      const button = document.createElement("button")
-      button.type = "button"
-      const tell = (text) => { button.textContent = text }
-      // Browsers offer a clipboard to pages of this machine and of https only.
-      async function copy(text) {
-        if (navigator.clipboard) return navigator.clipboard.writeText(text)
-        const area = document.createElement("textarea")
-        area.value = text
-        document.body.append(area)
-        area.select()
-        document.execCommand("copy")
-        area.remove()
-      }
-      button.addEventListener("click", async () => {
-        await copy(model.text || window.location.href)
-        tell("copied ✓")
-        setTimeout(() => tell(model.label), 1500)
-      })
-      model.on("label", () => tell(model.label))
-      tell(model.label)
-      return button
-    }
-    """
+    _esm = module("copying")
     _stylesheets = (
         """
         :host { display: block; }

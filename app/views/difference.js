@@ -1,10 +1,12 @@
 // Spot the difference: the pinned network beside another one, both without colour. Where do they differ
 // most? A click, or N by keyboard, is an answer; what was found is ringed, and at the end colours tell all.
 
+import { CARRYING } from "./look.js"
+
 const TO_FIND = 5 // contacts, those whose fₙ differs most
 const RING = 0.8 // radius, in largest radii
 
-class Difference {
+export class Difference {
   constructor(player) {
     this.player = player
     this.on = false

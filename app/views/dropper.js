@@ -1,6 +1,8 @@
 // A place to drop files on, or to choose them by clicking. They are sent in pieces, which keeps each
 // message below the server's limit; the server keeps count of the bytes itself.
 
+import { ask } from "./ask.js"
+
 const PIECE = 4 * 1024 * 1024
 
 export function render({ model, view }) {

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 NAME_LENGTH = 120  # of a file's name, as shown in messages
 MOST_FILES = 16  # of one drop; a packing has two at most
@@ -19,7 +19,7 @@ class Dropper(Scripted):
     label = param.String()
     most = param.Integer(doc="bytes of all files of one drop together")
 
-    _esm = joined("ask", "dropper")
+    _esm = module("dropper")
     _stylesheets: ClassVar = [FOLDER / "dropper.css"]
 
     def __init__(self, on_files, on_refusal, **params):
@@ -28,17 +28,17 @@ class Dropper(Scripted):
         self._on_files, self._on_refusal = on_files, on_refusal
         self._files, self._size = {}, 0  # {name: content}; None once the drop was refused
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """One message of the page: a beginning, a piece of a file, or the end."""
         # A page may have been altered: the limits hold here, whatever it sends.
-        if not isinstance(message, dict) or message.get("begin"):
+        if "begin" in message:
             self._files, self._size = {}, 0
-        elif message.get("end"):
+        elif "end" in message:
             files, self._files = self._files, {}
             if files:
                 self._on_files([(name, bytes(content)) for name, content in files.items()])
         elif self._files is not None:
-            self._take(str(message.get("name"))[:NAME_LENGTH], message.get("data"))
+            self._take(message["name"][:NAME_LENGTH], message["data"])
 
     def _take(self, name, data):
         if not isinstance(data, (bytes, bytearray, memoryview)):

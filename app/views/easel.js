@@ -1,7 +1,7 @@
 // A canvas that is painted anew each frame. What stands still on it is painted once, on a canvas of its
 // own that is copied; nothing shines through, which halves what a browser without a graphics card does.
 
-class Easel {
+export class Easel {
   /** ratio: pixels of the canvas for one of the page. */
   constructor(canvas, ratio = window.devicePixelRatio || 1) {
     this.canvas = canvas

@@ -5,7 +5,7 @@ from typing import ClassVar
 import param
 
 from .hints import term
-from .scripts import Scripted, joined
+from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
 PULL = "; drag a line for your own"
@@ -111,7 +111,7 @@ class Foldout(Scripted):
     line = param.String()
     inside = param.String(doc="HTML; empty where there is nothing to say")
 
-    _esm = joined("foldout")
+    _esm = module("foldout")
     _stylesheets: ClassVar = [STYLE]
 
 

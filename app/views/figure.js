@@ -6,7 +6,7 @@ const COLUMN = 900 // units across the packing or a plot; so wide is its picture
 const SPACE = 24 // units between them
 
 /** The plots that are seen just now, from above, as SVG. */
-async function plotsSeen(page) {
+export async function plotsSeen(page) {
   const seen = []
   for (const fig of page._all_models.values()) {
     const view = fig.type === "Figure" && page.views_manager?.find_one(fig), box = view?.el?.getBoundingClientRect()
@@ -26,7 +26,7 @@ function inset(text, k) {
 }
 
 /** One SVG of them all: {text, height}, so many mm wide and high. */
-function composed(packing, plots, width, ground) {
+export function composed(packing, plots, width, ground) {
   const beside = plots.length > 0 && width >= SIDE_BY_SIDE_MM
   const wide = beside ? 2 * COLUMN + SPACE : COLUMN, down = [0, 0], parts = []
   for (const [k, text] of [packing, ...plots].entries()) {
@@ -43,7 +43,7 @@ function composed(packing, plots, width, ground) {
 }
 
 /** Print a figure alone, on a sheet of its own size: saved as PDF there, it stays lines and letters. */
-function printFigure({ text, height }, width) {
+export function printFigure({ text, height }, width) {
   const sheet = document.createElement("iframe")
   sheet.title = "The figure, to be printed"
   sheet.style.cssText = "position: fixed; width: 0; height: 0; border: 0"

@@ -5,7 +5,7 @@ from typing import ClassVar
 import param
 
 from ..data import LEAST_PLACE
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
 
@@ -20,7 +20,7 @@ class FrictionSlider(Scripted):
     most = param.Number(default=MOST_PLACE, constant=True)
     on_narrow = param.Boolean(doc="whether it is for narrow pages, else for all others")
 
-    _esm = joined("friction")
+    _esm = module("friction")
     _stylesheets: ClassVar = [FOLDER / "friction.css"]
 
     def __init__(self, on_typed=None, **params):
@@ -28,7 +28,7 @@ class FrictionSlider(Scripted):
         super().__init__(**params)
         self._on_typed = on_typed
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         if self._on_typed is not None:
-            self._on_typed(str(message.get("typed", "")))
+            self._on_typed(message["typed"])
             self._send_msg({"settled": True})

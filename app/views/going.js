@@ -3,7 +3,7 @@
 const LEG_MS = 450
 const PATH = 60 // corners of its path that are kept
 
-class Going {
+export class Going {
   /** button: it begins and ends a walk; moved(path): another point of it is on screen. */
   constructor(button, moved) { Object.assign(this, { button, moved, frame: null }) }
 

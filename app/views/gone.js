@@ -4,7 +4,7 @@
 const RETRY_MS = 1000 // how often a server that is gone is asked for
 
 /** The banner that says so; still: what goes on meanwhile. */
-function goneBanner(view, still) {
+export function goneBanner(view, still) {
   const banner = document.createElement("div")
   banner.className = "gone"
   banner.setAttribute("role", "alert")

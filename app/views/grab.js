@@ -2,17 +2,21 @@
 // networks that the server made; between two of them the straight line is shown, which is admissible
 // too. Let go, and it stays: the next pull starts there.
 
+import { CARRYING, plain } from "./look.js"
+import { PointHand } from "./point.js"
+
 const RAIL = 190 // px, the longest
 const EDGE = 14 // px between a rail and the edge of the picture
 const AT_END = 2e-3 // of a rail, within which the hand is at its end
 const FINDING = "Finding how far it can be pulled …"
+export const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const KNOWN = "This force is held: release it (press H) before it is pulled."
 const NUMBER_LINE = 14 // px, height of a line of numbers beside it
 const NUDGE = 1 / 40 // of a rail, by a key
 const REST = 600 // ms after the last key until the force is let go
 const LINGER = 1000 // ms for which its rail is seen after it was let go
 
-class Grab {
+export class Grab {
   /** tell(message): to the server. */
   constructor(player, tell) {
     this.player = player

@@ -1,5 +1,8 @@
 // Buttons that ask the server for a file and save what comes.
 
+import { ask } from "./ask.js"
+import { composed, plotsSeen, printFigure } from "./figure.js"
+
 const RATE = 6e6 // bits a second of a movie
 const LONGEST_MS = 60000 // of a movie
 const HELD_MS = 500 // for which a movie ends with the last network; a shorter one would have no picture

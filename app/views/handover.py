@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import Scripted, joined
+from .scripts import Scripted, module
 
 
 class Handover(Scripted):
@@ -15,7 +15,7 @@ class Handover(Scripted):
 
     files = param.Dict(default={}, doc="{heading: {key: words}}")
 
-    _esm = joined("ask", "figure", "handover")
+    _esm = module("handover")
     _stylesheets: ClassVar = [
         """
         :host { display: block; }
@@ -55,7 +55,7 @@ class Handover(Scripted):
         """No file comes for what was asked."""
         self._send_msg({"rest": True})
 
-    def _handle_msg(self, message):
-        key = message.get("key")
+    def _heard(self, message):
+        key = message["key"]
         if any(key in group for group in self.files.values()):
             self._on_ask(key)

@@ -7,7 +7,7 @@ import param
 
 from granforce.glossary import TERMS, title
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 # Words on the page that are not the glossary's own: what stands there → key of the glossary.
 LABELS = {
@@ -75,5 +75,5 @@ class Hints(Scripted):
     terms = param.Dict(default={key: [title(key), t.sentence] for key, t in TERMS.items()})
     labels = param.Dict(default=labels())
 
-    _esm = joined("hints")
+    _esm = module("hints")
     _stylesheets: ClassVar = [FOLDER / "hints.css"]

@@ -1,5 +1,7 @@
 // What is known, as chips; what it leaves open, in words; and which contact would be worth measuring.
 
+import { ask } from "./ask.js"
+
 export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "known"

@@ -6,7 +6,7 @@ import numpy as np
 import param
 
 from .hints import term
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
 ASK = "Click a line, then hold its force (Hold, or H): the other intervals can only shrink."
@@ -20,7 +20,7 @@ class Known(Scripted):
     ranked = param.List(doc="pairs (contact, words), the best to measure first")
     asking = param.Boolean(doc="whether the best to measure are being looked for")
 
-    _esm = joined("ask", "known")
+    _esm = module("known")
     _stylesheets: ClassVar = [FOLDER / "known.css"]
 
     def __init__(self, state, **params):
@@ -31,7 +31,7 @@ class Known(Scripted):
             task.param.watch(self._show, "running")
         self._show()
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         knowledge = self._state.knowledge
         match message:
             case {"release": int(contact)}:

@@ -5,7 +5,7 @@ const TRAIL = 40 // states that the trail in force space reaches back
 const DOT_REACH = 9 // px from a dot that still mean it
 const TOUCH_REACH = 22 // the same of a finger
 
-class Layer {
+export class Layer {
   /** A figure whose moving renderers have the tag "moves"; draw(context, scales) draws them. */
   constructor(fig, draw) {
     this.fig = fig
@@ -62,7 +62,7 @@ function linear(scale) {
   return (value) => zero + slope * value
 }
 
-const LAYERS = {
+export const LAYERS = {
   bars(context, { x, y }, plots) {
     const column = (name) => plots.find("bars").get_column(name)
     const rank = column("rank"), low = column("low"), high = column("high")
@@ -107,7 +107,7 @@ const LAYERS = {
     const held = replay.held && plots.projected(replay.mixed)
     if (replay.held && !held) return
     if (held) return spot(context, [x(held[0]), y(held[1])], plots)
-    const track = [...replay.track.slice(Math.max(0, Math.floor(replay.position) - TRAIL), Math.floor(replay.position) + 1)]
+    const track = replay.track.slice(Math.max(0, Math.floor(replay.position) - TRAIL), Math.floor(replay.position) + 1)
     const points = track.map((k) => [x(px[k]), y(py[k])])
     points.push([x(mix(px)), y(mix(py))])
     for (let k = 1; k < points.length; k++) {
@@ -140,7 +140,7 @@ function line(context, xs, ys, x, y, count, from = 0) {
 }
 
 /** What is dragged in a plot: hand.take(k, x, y), move(x, y), leave(), in the units of the plot. */
-class Handles {
+export class Handles {
   /** The points k of a source, in these columns, on the plot with the layer `name`. */
   constructor(plots, name, source, columns, hand) {
     Object.assign(this, { plots, name, source, columns, hand })

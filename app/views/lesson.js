@@ -13,7 +13,7 @@ const QUESTIONS = [
 ]
 
 /** The lesson as HTML; answers behind a click. */
-function lesson() {
+export function lesson() {
   const ends = (mu) => [Math.SQRT1_2 / (1 + mu), mu < 1 ? (Math.SQRT1_2 / (1 - mu)).toFixed(3) : "no end"]
   const rows = AT.map((mu) => `<tr><td>${mu}</td><td>${ends(mu)[0].toFixed(3)}</td><td>${ends(mu)[1]}</td></tr>`).join("")
   return `
@@ -37,7 +37,7 @@ function lesson() {
 }
 
 /** Have it printed alone, with the pictures of the disk and of S; open: with its answers. */
-function printed(pictures, open) {
+export function printed(pictures, open) {
   const sheet = document.createElement("iframe")
   sheet.title = "The lesson, to be printed"
   sheet.style.cssText = "position: fixed; width: 0; height: 0; border: 0"

@@ -1,9 +1,11 @@
 // S where it is a line: with what stops it at its ends, and below it the axis of a force.
 
+import { forceName, number } from "./saying.js"
+
 const TICKS = 70 // pixels between two numbers of an axis, at least
 
 /** The line, with what stops it at its ends. */
-function drawSegment(space) {
+export function drawSegment(space) {
   const { context: g, body, look, easel } = space
   const ends = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = ends[0][1]
   drawAxis(space, y0, Math.min(easel.high - 46, y0 + 80))
@@ -69,7 +71,7 @@ function drawAxis(space, y0, y) {
 }
 
 /** Which way a line is drawn: the force on its axis becomes larger to the right. */
-function signOf(body) { return body.h === 1 ? Math.sign(body.axes[0][axisForce(body, null)]) || 1 : 1 }
+export function signOf(body) { return body.h === 1 ? Math.sign(body.axes[0][axisForce(body, null)]) || 1 : 1 }
 
 /** Of a line, the force on its axis: that of this contact if it changes, else the one that changes most. */
 function axisForce(body, contact) {

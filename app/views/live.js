@@ -1,10 +1,12 @@
 // What is seen while it is computed: a packing under compression, then a walk that grows.
 
+import { CARRYING, plain } from "./look.js"
+
 const GLIDE = 250 // ms in which the view goes over from the moving packing to the finished one
 const STRIP = 1 // width of the strip around the box in which images are drawn, in largest radii
-const CATCH_UP = 0.6 // s that the player stays behind the newest state
+export const CATCH_UP = 0.6 // s that the player stays behind the newest state
 const WIDEST = 0.7 // of a chain in a moving packing, in largest radii: collisions carry most of the force
-const FORCES = ["normal", "tangential"]
+export const FORCES = ["normal", "tangential"]
 const TOLD = ["residual", "acceptance", "eta1", "eta2", "eta3"]
 
 /** A moving packing as the scene draws it, its periodic images included. */
@@ -42,10 +44,10 @@ function moving({ box, tilt, x, radius, i, j, reach }) {
 }
 
 /** Chains of a moving packing: width fₙ, colour mobilisation. */
-function flickering({ normal, tangential, radius, mu }, palettes) {
+function flickering({ normal, tangential, radius, mu }, palettes, scales) {
   const colours = mu > 0 ? palettes.mobilised : [palettes.neutral], last = colours.length - 1
   const unit = radius.reduce((most, r) => Math.max(most, r), 0)
-  const width = normal.map((value) => unit * Math.min(WIDEST, CHAIN_WIDTH * value))
+  const width = normal.map((value) => unit * Math.min(WIDEST, scales.width * value))
   const bin = Int16Array.from(normal, (value, c) => {
     const part = mu > 0 && value > CARRYING ? tangential[c] / (mu * value) : 0
     return Math.round(last * Math.max(0, Math.min(1, 0.5 + part / 2)))
@@ -54,7 +56,7 @@ function flickering({ normal, tangential, radius, mu }, palettes) {
 }
 
 /** A walk of one frame with room for those to come: `number` tells how many there are. */
-function roomy(walk) {
+export function roomy(walk) {
   const { room } = walk, whole = { ...walk, low: walk.low.slice(), high: walk.high.slice() }
   const wide = (values, count) => {
     const made = new Float32Array(count).fill(NaN)
@@ -69,7 +71,7 @@ function roomy(walk) {
 }
 
 /** Append states to a walk with room. */
-function extend(walk, states) {
+export function extend(walk, states) {
   const { contacts } = walk, from = walk.number.length, count = states.number.length
   if (from + count > walk.numbers.length) return
   for (const name of FORCES) walk[name].set(states[name], from * contacts)
@@ -83,7 +85,7 @@ function extend(walk, states) {
   }
 }
 
-class Live {
+export class Live {
   /** tell(message): to the server. */
   constructor(player, tell) {
     this.player = player
@@ -125,7 +127,7 @@ class Live {
     // As large as at first while it shrinks, larger where it tilts out of that.
     const half = Math.max(this.window[1] - this.window[0], right - left) / 2
     scene.view = { x: (left + right) / 2, y: (low + high) / 2, half }
-    scene.style = flickering(picture, plain(model.palettes))
+    scene.style = flickering(picture, plain(model.palettes), plain(model.scales))
     scene.resize()
     if (scene.size) scene.repaint()
     this.pictures++

@@ -1,15 +1,15 @@
 // How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
-// CHAIN_WIDTH, FULL_CHANGE and FULL_DEVIATION are those of geometry.py, see player.py.
 
-const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
+export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
 const THIN = 0.15 // of its width, a chain that a filter leaves out
 const DIM = 0.35 // chains under the marks of Fig. 5
 
-class Look {
+export class Look {
   constructor(model, walk) {
     this.model = model
     this.walk = walk
+    this.scales = plain(model.scales)
     this.only = null // 1 for each contact that a filter leaves, or null
     this.before = null // fₙ before the pull whose changes are coloured
     this.plain = false // whether colours would give something away, see difference.js
@@ -37,9 +37,9 @@ class Look {
     const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
     const colour = this.before ? "pulled" : model.colour
     // A model is slow to ask.
-    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? FULL_CHANGE }
+    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? this.scales.change }
     this.asked.load = full ?? this.mostLoad
-    const unit = CHAIN_WIDTH * (stretch ?? 1)
+    const unit = this.scales.width * (stretch ?? 1)
     for (let c = 0; c < style.width.length; c++) {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
@@ -75,7 +75,7 @@ class Look {
     const { colour, most } = this.asked
     if (colour === "mobilised") return 0.5 + (this.mobilised(normal[c], tangential[c]) ?? 0) / 2
     if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
-    if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * FULL_DEVIATION)
+    if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
     if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
     if (colour === "load") return this.loads ? this.loads[c] / this.asked.load : 0.5
     if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.asked.full)
@@ -165,7 +165,7 @@ class Look {
 }
 
 /** Takes what the server sent, a Map or a plain object, as a plain object. */
-function plain(given) {
+export function plain(given) {
   return given instanceof Map ? Object.fromEntries(given) : given
 }
 

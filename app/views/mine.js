@@ -1,5 +1,7 @@
 // What was computed here: a name to be typed, what it is, when, how large; to be opened or deleted.
 
+import { ask } from "./ask.js"
+
 export function render({ model, view }) {
   const root = document.createElement("details")
   root.innerHTML = `<summary>My computations</summary><p class="told"></p><table><tbody></tbody></table>`

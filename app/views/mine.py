@@ -8,7 +8,7 @@ from granforce.records import InputError
 
 from .. import mine, names
 from ..jobs import reading
-from .scripts import FOLDER, Scripted, joined, said
+from .scripts import FOLDER, Scripted, module
 
 
 class Mine(Scripted):
@@ -16,7 +16,7 @@ class Mine(Scripted):
 
     rows = param.List(doc="dicts, see mine.rows; and `here`, whether it is on screen")
 
-    _esm = joined("ask", "mine")
+    _esm = module("mine")
     _stylesheets: ClassVar = [FOLDER / "mine.css"]
 
     def __init__(self, state, **params):
@@ -33,10 +33,10 @@ class Mine(Scripted):
         on_screen = self._state.cell and self._state.cell.name
         self.rows = [row | {"here": row["entry"] == on_screen} for row in rows]
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """The visitor opens, names or deletes one of the rows."""
         state, known = self._state, {row["entry"] for row in self.rows}
-        match said(message):
+        match message:
             case {"open": str(entry)} if entry in known:
                 for cell in state.catalogue:
                     if cell.name == entry:

@@ -1,5 +1,7 @@
 // A field for a whole number: typed, or changed by arrow keys and the two buttons.
 
+import { ask } from "./ask.js"
+
 export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "number"

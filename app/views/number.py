@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 
 class NumberField(Scripted):
@@ -21,7 +21,7 @@ class NumberField(Scripted):
     step = param.Integer(default=1, doc="of the arrow keys and buttons")
     disabled = param.Boolean()
 
-    _esm = joined("ask", "number")
+    _esm = module("number")
     _stylesheets: ClassVar = [FOLDER / "number.css"]
 
     def __init__(self, on_wrong=None, **params):
@@ -29,8 +29,8 @@ class NumberField(Scripted):
         super().__init__(**params)
         self._on_wrong = on_wrong
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """Something was typed that is no whole number."""
-        if self._on_wrong is not None and isinstance(message, dict):
-            typed, within = str(message.get("typed", ""))[:30], f"{self.start} to {self.end}"
+        if self._on_wrong is not None:
+            typed, within = message["typed"][:30], f"{self.start} to {self.end}"
             self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed!r}")

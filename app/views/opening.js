@@ -4,7 +4,7 @@
 const SLOW = 0 // log2 of states per second
 const AGAIN_MS = 700 // rest at the end
 
-function openMoving(player) {
+export function openMoving(player) {
   const { model, buttons } = player
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) return
   if (model.frame || model.between || model.predict) return // a link that shows one moment

@@ -1,7 +1,7 @@
 // Colours of the small scenes: blue for forces, magenta for the hand, orange for what is at its limit.
 
 /** By what they are of, on dark paper or on white. */
-function palette(dark) {
+export function palette(dark) {
   return {
     ink: dark ? "#e6e9ee" : "#22272e", paper: dark ? "#121212" : "#ffffff", edge: dark ? "#7a8798" : "#8fa1b5",
     fill: dark ? "rgba(150,172,200,0.25)" : "rgba(139,160,187,0.3)", lit: dark ? "rgba(150,172,200,0.45)" : "rgba(139,160,187,0.55)",

@@ -1,10 +1,12 @@
 // Marks of what is known: a pin on each contact that is held, open where it has an error bar; and
 // numbers on those that would be worth measuring, the best first.
 
+import { plain } from "./look.js"
+
 const PIN = 17 // px, its height
 const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
 
-class Pins {
+export class Pins {
   constructor(model) { this.model = model }
 
   get pins() { return plain(this.model.pins ?? {}) }

@@ -1,19 +1,31 @@
 // Replays states in the page. The frames come once; per painted frame the chains are drawn anew and
 // the plots beside follow, without telling the server.
 
+import { ask, knownThere } from "./ask.js"
+import { Buttons } from "./buttons.js"
+import { Difference } from "./difference.js"
+import { Grab, UNCHOSEN } from "./grab.js"
+import { CATCH_UP, extend, Live, roomy } from "./live.js"
+import { Look, plain } from "./look.js"
+import { openMoving } from "./opening.js"
+import { Pins } from "./pins.js"
+import { Plots } from "./plots.js"
+import { Predict } from "./predict.js"
+import { Replay } from "./replay.js"
+import { Scene } from "./scene.js"
+import { closeSidebar } from "./sidebar.js"
+import { Split } from "./split.js"
+
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const SWING = 2.2 // s, for the displacement field to go to and fro
 const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
 const LONGEST_S = 6 // but no longer than this
 const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
-const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
 const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
 const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
-const ROOMY = 1200 // px; from there on the sidebar begins open
-const OVER_PAGE = ".MuiDrawer-modal" // the sidebar where it does
 
 class Player {
   constructor(model, page, tell) {
@@ -435,21 +447,4 @@ export function render({ model, view }) {
   openMoving(player)
   closeSidebar(page, view)
   return player.buttons.root
-}
-
-/** The sidebar begins open. Below ROOMY it is closed: it would take the room of the packing; on
- * a narrow page it lies over it and is unseen until it has heard that it is closed, which it does
- * not before it listens. */
-function closeSidebar(page, view) {
-  const data = [...page._all_models.values()].find(({ data }) => data?.sidebar_open !== undefined)?.data
-  const close = () => {
-    const over = view.root.shadow_el.querySelector(OVER_PAGE)
-    if (over || window.innerWidth < ROOMY) {
-      data.sidebar_open = true // as only a change is told
-      data.sidebar_open = false
-    }
-    if (over) setTimeout(close, 100)
-    else document.documentElement.style.setProperty("--sidebar", "visible")
-  }
-  if (data) close() // a page taken along has none
 }

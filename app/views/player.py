@@ -6,7 +6,9 @@ import numpy as np
 import param
 
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
-from .scripts import FOLDER, Scripted, joined, said
+from .scripts import FOLDER, Scripted, module
+
+SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
 
 class Player(Scripted):
@@ -32,6 +34,7 @@ class Player(Scripted):
     pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
     plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
     palettes = param.Dict(default={}, doc="colours, see style.palettes")
+    scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")
     live = param.Boolean(doc="whether something is being computed that can be seen")
     asked = param.String(doc="what was asked for and is not on screen, in words")
     lead = param.String(doc="HTML: the question, and what is seen, in sentences")
@@ -60,29 +63,7 @@ class Player(Scripted):
     scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    SCRIPTS: ClassVar = (
-        "ask",
-        "sheet",
-        "scene",
-        "replay",
-        "look",
-        "layer",
-        "plots",
-        "buttons",
-        "live",
-        "pins",
-        "split",
-        "difference",
-        "predict",
-        "point",
-        "grab",
-        "opening",
-        "player",
-    )
-    _esm = (
-        f"const CHAIN_WIDTH = {CHAIN_WIDTH}, FULL_CHANGE = {FULL_CHANGE}, "
-        f"FULL_DEVIATION = {FULL_DEVIATION}\n" + joined(*SCRIPTS)
-    )
+    _esm = module("player")
     _stylesheets: ClassVar = [FOLDER / "player.css"]
 
     def __init__(self, **params):
@@ -93,19 +74,18 @@ class Player(Scripted):
         """Send something of what is being computed, or of what was pulled."""
         self._send_msg(news)
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """Digits pressed anywhere on the page; what the browser has painted of a computation."""
-        message = said(message)
-        if self.on_digit is not None and isinstance(message.get("tab"), int):
-            self.on_digit(message["tab"])
-        if self.on_hand is not None and isinstance(message.get("hand"), dict):
-            self.on_hand(message["hand"])
-        if self.on_known is not None and isinstance(message.get("known"), dict):
-            self.on_known(message["known"])
-        if self.on_wide is not None and isinstance(message.get("wide"), bool):
-            self.on_wide(message["wide"])
-        if self.on_live is not None and isinstance(message.get("live"), dict):
-            self.on_live(message["live"])
+        hear = {
+            "tab": self.on_digit,
+            "hand": self.on_hand,
+            "known": self.on_known,
+            "wide": self.on_wide,
+            "live": self.on_live,
+        }
+        for name, part in message.items():
+            if hear[name] is not None:
+                hear[name](part)
 
 
 def frames(replay, room=0):

@@ -1,9 +1,11 @@
 // The plots beside, found in the page by name: a few numeric columns of them are rewritten in place,
 // without telling the server.
 
+import { Handles, Layer, LAYERS } from "./layer.js"
+
 const OFF_SCALE = 0.005 // of the bars, which may be longer than the axis
 
-class Plots {
+export class Plots {
   /** hands: what takes hold of the dots of the bars, and of the point in force space. */
   constructor(document, onData, { dots, point }) {
     this.document = document

@@ -2,7 +2,9 @@
 // network with it. The server sends networks at corners all around (a fan); the triangle between two
 // of them and the network that was taken is shown, and all of it is admissible, since S is convex.
 
-class PointHand {
+import { FORCES } from "./live.js"
+
+export class PointHand {
   constructor(hand) {
     this.hand = hand
     this.drop()

@@ -39,7 +39,7 @@ const ASKED = [
   },
 ]
 
-class Predict {
+export class Predict {
   constructor(player) {
     this.player = player
     this.step = 0 // the question that waits for an answer

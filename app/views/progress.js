@@ -1,5 +1,7 @@
 // How far a task is, with a button that cancels it; nothing is seen while it rests.
 
+import { ask } from "./ask.js"
+
 export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "task"

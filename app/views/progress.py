@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import Scripted, joined
+from .scripts import Scripted, module
 
 FOLLOWED = ("running", "fraction", "keeps")
 
@@ -22,7 +22,7 @@ class Progress(Scripted):
     words = param.String()
     keeps = param.Boolean()
 
-    _esm = joined("ask", "progress")
+    _esm = module("progress")
     _stylesheets: ClassVar = [
         """
         :host { display: block; width: 100%; }
@@ -71,10 +71,10 @@ class Progress(Scripted):
         """The task that is told of."""
         return next((task for task in self._tasks if task.running), self._tasks[0])
 
-    def _handle_msg(self, message):
-        if message.get("cancel"):
+    def _heard(self, message):
+        if "cancel" in message:
             self._told.dismiss()
-        if message.get("stop"):
+        if "stop" in message:
             self._told.stop()
 
     def _follow(self, *events):

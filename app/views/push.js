@@ -1,6 +1,9 @@
 // A push on a disk, by hand or by arrow keys, and how large it may become: the limit load.
 
-class Push {
+import { Body } from "./body.js"
+import { number } from "./saying.js"
+
+export class Push {
   constructor() { this.on = false; this.stop() }
 
   /** Nothing is pushed: no disk, and no load but the scene's. */

@@ -1,7 +1,7 @@
 // What is replayed: the frames of a walk, and how far the page has come among them.
 // Between two states the straight line is shown: S is convex, so every point of it is admissible too.
 
-class Replay {
+export class Replay {
   constructor(walk, between) {
     this.walk = walk
     this.mixed = { normal: new Float32Array(walk.contacts), tangential: new Float32Array(walk.contacts) }

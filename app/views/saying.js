@@ -1,17 +1,19 @@
 // What the page of a small scene says: what stops S at a side, what is counted, what is on screen, in a sentence.
 
-const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) < 10 ? 3 : 1))
+import { OPENS } from "./body.js"
+
+export const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) < 10 ? 3 : 1))
 const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
 const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
 
 /** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
-function forceName({ names }, index) {
+export function forceName({ names }, index) {
   const place = names[index >> 1]
   return `${index % 2 ? "tangential" : "normal"} force ${place.startsWith("disk") ? "on " : ""}${place}`
 }
 
 /** What happens at a side of S, in words: which contacts are about to slide or to open there. */
-function stopping({ scene }, side) {
+export function stopping({ scene }, side) {
   const kinds = new Map()
   for (const [contact, what] of side.stops) {
     const [, disk, place] = scene.names[contact].match(/^(disk \d+ )?(.*)$/)
@@ -29,7 +31,7 @@ function way(scene, contact, what) {
 }
 
 /** What is drawn of the disks, in this scene. */
-function legend({ scene, empty, load }) {
+export function legend({ scene, empty, load }) {
   if (empty && !scene.idle) return "orange: the motion in which they give way; grey: weight and other loads"
   const pulled = load.some((v, k) => k < 3 * scene.r.length && v), pressed = scene.pressing.length > 0
   const loads = [pulled ? "weight" : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
@@ -37,7 +39,7 @@ function legend({ scene, empty, load }) {
 }
 
 /** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
-function counted({ h, count, scene, empty, consistent, whole, corners }) {
+export function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
   const forces = plural(count, "contact") + " with a normal and a tangential force each"
   if (empty && !scene.idle) {
@@ -60,7 +62,7 @@ function equationsOf({ grains, r, pressing, box, equations }) {
 }
 
 /** What is special about a scene, besides its forces; empty for most. */
-function special({ scene }) {
+export function special({ scene }) {
   if (!scene.box[0]) return ""
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
@@ -69,7 +71,7 @@ function special({ scene }) {
 }
 
 /** What the picture of S is. */
-function pictured(body) {
+export function pictured(body) {
   const { h, whole, empty, corners, scene } = body, S = `S, all sets of forces that hold the ${scene.r.length > 1 ? "disks" : "disk"}:`
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
@@ -79,7 +81,7 @@ function pictured(body) {
 }
 
 /** The sentence over a scene. */
-function sentence(body, mu, now) {
+export function sentence(body, mu, now) {
   const { h, scene } = body, several = scene.r.length > 1
   if (scene.idle) return "Nothing presses on these disks yet: choose “Make a wall press”, then click a wall."
   if ([...scene.pressing].some((_, k) => !scene.j.includes(scene.r.length + k))) return "A wall presses on no disk, and nothing holds it: put a disk against it."

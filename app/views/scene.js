@@ -1,7 +1,10 @@
 // The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
-const LEAST = 0.1 // px; thinner chains are not drawn
+import { listen } from "./pointing.js"
+import { PIXELS, Sheet } from "./sheet.js"
+
+export const LEAST = 0.1 // px; thinner chains are not drawn
 const FEW = 2500 // chains drawn one by one, with round ends; more are gathered in classes
 const FINE = 16 // colours; of more, every second serves where chains are gathered
 const GRAB = 6 // px from a chain that still mean it
@@ -9,7 +12,7 @@ const ZOOM = [0.02, 4] // least and largest part of the whole view
 const ARROW = 1.3 // of the largest force on a disk, in largest radii
 const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
-class Scene {
+export class Scene {
   constructor(onSelect) {
     this.root = document.createElement("div")
     this.root.className = "scene"
@@ -32,7 +35,7 @@ class Scene {
     this.frozen = false // whether what is drawn moves by itself and cannot be pointed at
     this.offset = null
     this.mixed = null
-    this.listen()
+    listen(this)
   }
 
   // Geometry and view
@@ -172,7 +175,7 @@ class Scene {
   drawChains(style) {
     this.style = style
     if (!this.size || this.stale) return this.stale && this.changed()
-    const { x0, y0, x1, y1, contact, i, j } = this.geometry
+    const { x0, y0, x1, y1, contact } = this.geometry
     const { chains, view, scale, width, bin } = this
     const least = LEAST / scale, order = this.order ??= []
     let drawn = 0, outside = 0, thin = 0
@@ -353,48 +356,6 @@ class Scene {
   place(event) {
     const box = this.root.getBoundingClientRect()
     return [event.clientX - box.left, event.clientY - box.top]
-  }
-
-  listen() {
-    const { root } = this, fingers = new Map()
-    let moved = 0, taken = null
-    // By touch only the selected contact is taken: else the page scrolls under the finger.
-    root.addEventListener("touchstart", (event) => {
-      if (event.touches.length === 1 && this.takenAt(event.touches[0], true) !== null) event.preventDefault()
-    }, { passive: false })
-    root.addEventListener("wheel", (event) => {
-      event.preventDefault()
-      this.zoom(Math.exp(event.deltaY * 0.0015), ...this.place(event))
-    }, { passive: false })
-    root.addEventListener("dblclick", () => this.reset())
-    root.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return
-      fingers.set(event.pointerId, this.place(event))
-      root.setPointerCapture(event.pointerId)
-      moved = 0
-      taken = fingers.size > 1 ? null : this.takenAt(event, event.pointerType === "touch")
-    })
-    root.addEventListener("pointermove", (event) => {
-      const before = fingers.get(event.pointerId), now = this.place(event)
-      if (!before) return this.hover(...now)
-      const step = [now[0] - before[0], now[1] - before[1]]
-      const still = moved <= 3
-      moved += Math.hypot(...step)
-      fingers.set(event.pointerId, now)
-      if (moved <= 3) return
-      if (taken === null) return this.drag(fingers, event.pointerId, before, now)
-      if (still) this.hand.takeInScene(taken, ...before)
-      this.hand.moveInScene(...now)
-    })
-    const end = (event) => {
-      if (!fingers.delete(event.pointerId)) return
-      if (taken !== null && moved > 3) this.hand.leave()
-      taken = null
-      if (event.type === "pointerup" && moved <= 3) this.pick(...this.place(event))
-    }
-    root.addEventListener("pointerup", end)
-    root.addEventListener("pointercancel", end)
-    root.addEventListener("pointerleave", () => { this.tip.classList.remove("on"); this.point(-1) })
   }
 
   /** A disk is pointed at, or none (−1). */

@@ -7,7 +7,7 @@ import param
 from granforce.packing.scenes import SCENES
 
 from .. import scenes
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 
 class SceneList(Scripted):
@@ -17,7 +17,7 @@ class SceneList(Scripted):
     shown = param.String(default=scenes.MANY)
     usual = param.Number(doc="μ of the page as it opens, which is not taken along")
 
-    _esm = joined("scenelist")
+    _esm = module("scenelist")
     _stylesheets: ClassVar = [FOLDER / "scenelist.css"]
 
     def __init__(self, **params):

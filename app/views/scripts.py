@@ -1,27 +1,53 @@
 """The page's own components, and their scripts."""
 
+import re
 from pathlib import Path
 
 from panel.custom import JSComponent
 
+from .messages import FROM_BROWSER, TO_BROWSER, listed
+
 FOLDER = Path(__file__).parent
 
 
-def joined(*names):
-    """One module from these scripts: a component has no address to import others from."""
-    return "\n".join((FOLDER / f"{name}.js").read_text() for name in names)
+# What a script may say to be of one module with others, each a line of its own.
+IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+)\.js"$', re.M)
+EXPORT = re.compile(r"^export (?=(?:async )?(?:class|function|const) (\w+))", re.M)
 
 
-def said(message):
-    """The message of a script, a dict; an empty one for what no script can have sent."""
-    return message if isinstance(message, dict) and _from_browser(message) else {}
+def module(name):
+    """One ES module of a script and of all that it imports, as text.
+
+    A page that was saved has no server to import from, and a server that is asked for each script
+    is slower than one that sends them together: see README.md. Each script keeps its names to
+    itself: it becomes a function that returns what it exports, after those that it imports.
+    """
+    parts = {}
+    _gather(name, parts, ())
+    own = _bound(parts.pop(name))
+    return "\n".join([*(_inside(*part) for part in parts.items()), own])
 
 
-def _from_browser(part):
-    """Whether all whole numbers are such as browsers have: larger ones are no floats either."""
-    if isinstance(part, dict | list):
-        return all(map(_from_browser, part.values() if isinstance(part, dict) else part))
-    return not isinstance(part, int) or abs(part) <= 2**53
+def _gather(name, parts, way):
+    """Fill parts {name: text} in an order in which each comes after those that it imports."""
+    if name in way:
+        raise ValueError(f"scripts import each other: {' → '.join([*way, name])}")
+    if name in parts:
+        return
+    text = (FOLDER / f"{name}.js").read_text()
+    for _, other in IMPORT.findall(text):
+        _gather(other, parts, (*way, name))
+    parts[name] = text
+
+
+def _inside(name, text):
+    exported = ", ".join(EXPORT.findall(text))
+    plain = EXPORT.sub("", _bound(text))
+    return f"const ${name} = (() => {{\n{plain}\nreturn {{ {exported} }}\n}})()"
+
+
+def _bound(text):
+    return IMPORT.sub(r"const { \1 } = $\2", text)
 
 
 class Scripted(JSComponent):
@@ -36,3 +62,14 @@ class Scripted(JSComponent):
         if not properties["dev"]:  # where scripts may change under the same name
             properties["bundle"] = type(self).__name__
         return properties
+
+    def _send_msg(self, data):
+        """Tell the script something that TO_BROWSER lists."""
+        if not listed(TO_BROWSER, type(self).__name__, data):
+            raise ValueError(f"no message of {type(self).__name__}: {', '.join(data)}")
+        super()._send_msg(data)
+
+    def _handle_msg(self, data):
+        """Hear what FROM_BROWSER lists: a page may have been altered, and send anything."""
+        if listed(FROM_BROWSER, type(self).__name__, data):
+            self._heard(data)

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 
 
 class Select(Scripted):
@@ -17,5 +17,5 @@ class Select(Scripted):
     options: dict[str, str] = param.Dict(default={}, doc="{words: value}")
     value = param.String()
 
-    _esm = joined("select")
+    _esm = module("select")
     _stylesheets: ClassVar = [FOLDER / "select.css"]

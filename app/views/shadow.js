@@ -1,7 +1,9 @@
 // Shadows of S: on one axis, the exact interval of a force, and on two above three dimensions.
 
+import { dot } from "./body.js"
+
 /** The exact interval of a contact's f_n: the shadow of S on that axis. */
-function drawInterval(space, contact) {
+export function drawInterval(space, contact) {
   const { context: g, body, look } = space, slope = body.axes.map((axis) => axis[2 * contact])
   const size = Math.hypot(...slope)
   if (size < 1e-9) return
@@ -40,7 +42,7 @@ function drawInterval(space, contact) {
 }
 
 /** The shadow on the plane of two forces, with its exact outline. */
-function drawShadow(space) {
+export function drawShadow(space) {
   const { context: g, look } = space, { wide: w, high: h } = space.easel
   g.strokeStyle = look.edge
   g.lineWidth = 1

@@ -1,6 +1,6 @@
 // A canvas of sorts that keeps what is drawn on it as SVG: only what the scene asks of one.
 
-const PIXELS = 900 // of the picture's side
+export const PIXELS = 900 // of the picture's side
 const BELOW = 60 // pixels from the picture to the first line of its caption
 const LINE = 21 // pixels
 const MOST = 116 // letters of a line
@@ -8,7 +8,7 @@ const SCALE_LENGTH = 5 // of the scale, in largest radii
 
 const written = (value) => (typeof value === "number" ? Number(value.toPrecision(5)) : value)
 
-class Sheet {
+export class Sheet {
   constructor() {
     this.canvas = {}
     this.drawn = []

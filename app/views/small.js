@@ -1,47 +1,27 @@
 // The page of a small scene: the scene and its S side by side, friction, and what is done with them.
 
+import { Arrows, tall } from "./arrows.js"
+import { ask } from "./ask.js"
+import { Bars } from "./bars.js"
+import { Body } from "./body.js"
+import { Builder } from "./builder.js"
+import { desk } from "./desk.js"
+import { Going } from "./going.js"
+import { goneBanner } from "./gone.js"
+import { lesson, printed } from "./lesson.js"
+import { palette } from "./palette.js"
+import { Push } from "./push.js"
+import { counted, forceName, legend, pictured, sentence, special, stopping } from "./saying.js"
+import { Space } from "./space.js"
+import { TourCard } from "./tourcard.js"
+
 const MOST_MU = 1.5 // on the slider; larger ones can be typed
 const REST_MS = 150 // after which what only the server tells is asked for
 
 export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "desk"
-  root.innerHTML = `
-    <p class="whole">Disks at rest can often be held by many different sets of forces. S is the set of them all. More friction allows more of them.</p>
-    <div class="strip">
-      <label>Scene <select class="name" aria-label="Scene"></select></label>
-      <label class="mu">friction μ <input class="range" type="range" min="0" max="${MOST_MU}" step="0.005" aria-label="friction μ">
-        <input class="typed" inputmode="decimal" aria-label="μ"></label>
-      <span class="buttons">
-        <button type="button" class="play" title="Go at random through S, from one set of forces to the next">Random walk</button>
-        <button type="button" class="fill" title="Fill S with points, everywhere equally many">Random points</button>
-        <button type="button" class="undo" title="Take the last pull back (Z)" disabled>Undo</button>
-        <button type="button" class="push" title="Drag a disk, or use the arrow keys, to push it" aria-pressed="false">Test push</button>
-        <button type="button" class="save" title="This scene as a file for granforce: gf.load_packing">Download data</button>
-        <button type="button" class="tourist">Tour</button>
-      </span>
-    </div>
-    <p class="says" aria-live="polite"></p><button type="button" class="mend" hidden></button>
-    <div class="own" hidden></div>
-    <section class="card" role="dialog" aria-labelledby="small-title" hidden>
-      <div><h2 id="small-title" tabindex="-1"></h2><p></p></div>
-      <div class="row"><span class="of"></span><button type="button" class="earlier">Back</button>
-        <button type="button" class="next">Next</button><button type="button" class="close">Close</button></div>
-    </section>
-    <div class="board">
-    <div class="pair">
-      <figure><figcaption class="legend"></figcaption>
-        <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
-      <figure><figcaption class="what"></figcaption>
-        <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one set of forces. Arrow keys move the point"></canvas>
-        <div class="plane" hidden><label>across <select aria-label="force shown across"></select></label>
-          <label>up <select aria-label="force shown upwards"></select></label></div></figure>
-      <div class="sums"><p class="special"></p><p class="count"></p><div class="bars" role="list"></div></div>
-    </div>
-    <details class="lesson" hidden><summary>The groove: a lesson of one page, with three questions</summary>
-      <button type="button" class="print">Print</button> <button type="button" class="print answered">Print with answers</button>
-      <article></article></details>
-    </div>`
+  root.innerHTML = desk(MOST_MU)
   const parts = {}, told = {}
   const part = (name) => (parts[name] ??= root.querySelector(`.${name}`))
   const now = { contact: null, disk: null, side: null, contacts: new Set(), fall: null, enough: null, filled: false, path: [], undo: [] }
@@ -329,7 +309,7 @@ export function render({ model, view }) {
       return say("This scene opens once the connection is back.")
     }
     tell("says", `Making “${event.target.selectedOptions[0].textContent}” …`)
-    ask(model, view, { scene: name, ...(chosenMu ? { mu } : {}) })
+    ask(model, view, chosenMu ? { scene: name, mu } : { scene: name })
   })
   part("range").addEventListener("input", (event) => chooseMu(Number(event.target.value)))
   part("typed").addEventListener("change", (event) => {

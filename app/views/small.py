@@ -9,7 +9,7 @@ from granforce.packing import scenes as made
 from granforce.records import InputError, NotJammedError, UndecidedError
 
 from .. import scenes
-from .scripts import FOLDER, Scripted, joined, said
+from .scripts import FOLDER, Scripted, module
 
 # Title, text, and what the scene shows, of the steps of the tour before those of large packings.
 FIRST_STEPS = (
@@ -49,10 +49,7 @@ class Small(Scripted):
     first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
 
-    _esm = joined(
-        *("ask", "gone", "body", "easel", "palette", "arrows", "line", "shadow", "space"),
-        *("builder", "push", "going", "bars", "saying", "lesson", "tourcard", "small"),
-    )
+    _esm = module("small")
     _stylesheets: ClassVar = [FOLDER / "small.css"]
 
     def __init__(self, asked, task, all_steps, **params):
@@ -89,24 +86,24 @@ class Small(Scripted):
         if event.new:
             self._send_msg({"error": event.new})
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """Another scene, another μ, or the question how it falls."""
-        message = said(message)
         try:
-            if message.get("scene") in (*made.SCENES, scenes.OWN):
-                self._show(message["scene"], message.get("mu"))
-            if isinstance(message.get("query"), str):
-                asked = scenes.asked(message["query"])
-                self._show(asked.scene, asked.mu, asked.built)
-            if isinstance(message.get("built"), str):
-                self._show(scenes.OWN, message.get("mu"), message["built"][: scenes.LONGEST])
-            if isinstance(message.get("save"), dict):
-                self._save(**message["save"])
-            if isinstance(message.get("fall"), dict):
-                self._fall(**message["fall"])
-            if isinstance(message.get("measure"), dict):
-                self._measure(**message["measure"])
-        except (InputError, NotJammedError, UndecidedError, TypeError) as error:
+            match message:
+                case {"scene": name} if name in (*made.SCENES, scenes.OWN):
+                    self._show(name, message.get("mu"))
+                case {"query": query}:
+                    asked = scenes.asked(query)
+                    self._show(asked.scene, asked.mu, asked.built)
+                case {"built": built, "mu": mu}:
+                    self._show(scenes.OWN, mu, built[: scenes.LONGEST])
+                case {"save": of}:
+                    self._save(**of)
+                case {"fall": of}:
+                    self._fall(**of)
+                case {"measure": of}:
+                    self._measure(**of)
+        except (InputError, NotJammedError, UndecidedError) as error:
             self._send_msg({"error": str(error)})
 
     def _fall(self, mu, load):

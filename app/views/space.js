@@ -1,13 +1,18 @@
 // S of a small scene in its true shape: a segment, a polygon, or a body that turns in the hand, with
 // the network on screen as a point in it. With more dimensions, its shadow.
 
+import { dot, solve } from "./body.js"
+import { Easel } from "./easel.js"
+import { drawSegment, signOf } from "./line.js"
+import { drawInterval, drawShadow } from "./shadow.js"
+
 const TURN = 0.008 // radians a pixel
 // Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
 const BESIDE = [[46, 46], [95, 46], [140, 50], [30, 30], [60, 64]]
 const ON = 34 // pixels of an arrow where S goes on without an end
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
-class Space {
+export class Space {
   constructor(canvas, told, ratio) {
     this.told = told
     this.canvas = canvas
@@ -392,7 +397,7 @@ function within(points, px, py) {
   return inside
 }
 
-function distance([ax, ay], [bx, by], px, py) {
+export function distance([ax, ay], [bx, by], px, py) {
   const [dx, dy] = [bx - ax, by - ay], size = dx * dx + dy * dy || 1
   const s = Math.max(0, Math.min(1, ((px - ax) * dx + (py - ay) * dy) / size))
   return Math.hypot(px - ax - s * dx, py - ay - s * dy)

@@ -2,7 +2,11 @@
 // packing that is played along with it. The pinned state is drawn anew only where the view, the look
 // or the pinned state changes.
 
-class Split {
+import { Look, plain } from "./look.js"
+import { Replay } from "./replay.js"
+import { Scene } from "./scene.js"
+
+export class Split {
   constructor(player) {
     this.player = player
     const { scene, model } = player
@@ -53,7 +57,7 @@ class Split {
   }
 
   tell() {
-    const { captions, player, other } = this, { live, model, replay: { walk } } = player
+    const { captions, player, other } = this, { live, replay: { walk } } = player
     const frame = this.pinned, of = ({ mu }) => `μ = ${Number(mu.toPrecision(4))}`
     if (other) {
       captions[0].textContent = `${of(other.walk)}: ${other.place}`

@@ -1,5 +1,7 @@
 // The player without a server: the model is a plain object, its plots are those of this file.
 
+import { render } from "./player.js"
+
 function unpacked(value) {
   if (value === null || typeof value !== "object" || Array.isArray(value)) return value
   if (value.array) {
@@ -22,13 +24,14 @@ function standIn(given) {
   })
 }
 
-function begin() {
+/** given: the parameters; style: of the player. */
+export function begin(given, style) {
   const page = window.Bokeh?.documents[0]
-  if (!page?.get_model_by_name("bars")) { setTimeout(begin, 30); return }
-  const model = standIn(unpacked(GIVEN)), data = {}
+  if (!page?.get_model_by_name("bars")) { setTimeout(begin, 30, given, style); return }
+  const model = standIn(unpacked(given)), data = {}
   const view = { model: { document: page, data } }
   const shadow = document.getElementById("player").attachShadow({ mode: "open" })
-  shadow.append(Object.assign(document.createElement("style"), { textContent: PLAYER_STYLE }))
+  shadow.append(Object.assign(document.createElement("style"), { textContent: style }))
   shadow.append(render({ model, view }))
   data.player.scene.hand = null // nobody is there to make the networks that follow a hand
   data.player.select() // no button holds a force either
@@ -41,5 +44,3 @@ function begin() {
   // Their marks were drawn before there was a place for them.
   for (const { type, change } of page._all_models.values()) if (type === "Legend") setTimeout(() => change.emit(), 100)
 }
-
-begin()

@@ -27,10 +27,8 @@ class Stream:
             self._sent = self._painted = 0
             if self.state.live is not None:
                 self.state.live.rewind()
-        if isinstance(message.get("painted"), int):
-            self._painted = message["painted"]
-        if isinstance(message.get("seen"), bool):
-            self._awake = message["seen"]
+        self._painted = message.get("painted", self._painted)
+        self._awake = message.get("seen", self._awake)
 
     def _show(self, *events):
         self.player.asked = self.state.asked

@@ -1,5 +1,7 @@
 // The tour's card at the lower edge of the page that it speaks of, beside or below that.
 
+import { ask } from "./ask.js"
+
 const SEEN = "granforce.tour" // remembered in the browser
 const LOOK_MS = 100 // between two looks for what a step is about, which may still be on its way
 // Where each step points: other parts of the page than these come and go with their tab.

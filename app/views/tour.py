@@ -7,7 +7,7 @@ from urllib.parse import parse_qsl
 import numpy as np
 import param
 
-from .scripts import FOLDER, Scripted, joined
+from .scripts import FOLDER, Scripted, module
 from .small import FIRST_STEPS
 
 # Title and two sentences of each step, and the part of the page that it is about, see tour.js.
@@ -67,7 +67,7 @@ class Tour(Scripted):
     before = param.Integer(default=len(FIRST_STEPS), doc="steps of the tour on the page before")
     first = param.Boolean(doc="whether the page was opened without a view to show")
 
-    _esm = joined("ask", "tour")
+    _esm = module("tour")
     _stylesheets: ClassVar = [FOLDER / "tour.css"]
 
     def __init__(self, state, query="", **params):
@@ -87,11 +87,10 @@ class Tour(Scripted):
         if self.step and not self._set_up:
             self._go(self.step)  # now that there is something to show
 
-    def _handle_msg(self, message):
+    def _heard(self, message):
         """The visitor goes to a step, or closes the tour (0)."""
-        step = message.get("step") if isinstance(message, dict) else None
-        if isinstance(step, int) and 0 <= step <= len(STEPS):
-            self._go(step)
+        if 0 <= message["step"] <= len(STEPS):
+            self._go(message["step"])
 
     def _go(self, step):
         self.step = step

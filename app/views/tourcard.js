@@ -3,7 +3,7 @@
 const NARROW = "(max-width: 759.95px)" // where S lies below the scene
 const UNSEEN = "granforce.tour" // remembered in the browser: that the tour was seen
 
-class TourCard {
+export class TourCard {
   /** root: the page; shown(does): have it show what a step is about; onwards(): after the last step. */
   constructor(root, steps, all, shown, onwards) {
     Object.assign(this, { root, steps, all, shown, step: 0 })

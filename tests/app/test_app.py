@@ -2,7 +2,6 @@
 
 import asyncio
 import gc
-import re
 import shlex
 import shutil
 import sys
@@ -1081,14 +1080,6 @@ def test_a_walk_in_the_store_is_found_not_computed(library):
     job = Job(compute.states(library, chosen))
     assert job.wait(60) and job.error == "" and job.result.cell.mu == 1
     assert stored.store is library.shipped
-
-
-def test_scripts_of_one_component_name_nothing_twice():
-    """They make one module, where a second declaration is an error that leaves the page empty."""
-    from app.views.player import Player
-
-    declared = re.findall(r"^(?:const|let|class|(?:async )?function) (\w+)", Player._esm, re.M)
-    assert len(declared) > 50 and sorted(set(declared)) == sorted(declared)
 
 
 def test_states_of_older_packings_in_a_cache_are_not_offered(tmp_path):

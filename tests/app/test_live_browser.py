@@ -106,7 +106,6 @@ def test_a_tilting_packing_is_drawn_with_its_images(visit):
         "reach": (c.length[:, None] * c.normal).ravel().tolist(),
         "normal": packing.forces[:, 0].tolist(),
         "tangential": packing.forces[:, 1].tolist(),
-        "step": 1,
         "fraction": 0.8,
         "unbalance": 0.1,
         "mu": 1.0,

@@ -301,7 +301,7 @@ def test_more_than_allowed_is_not_collected(state):
     [
         ([{"name": f"{k}", "data": b""} for k in range(1000)], "16 files"),
         ([{"name": "a", "data": 7}, {"name": "b", "data": b"x,y,r"}], "no file"),
-        ([{"data": {"deep": [1]}}], "no file"),
+        ([{"name": "a", "data": {"deep": [1]}}], "no file"),
     ],
 )
 def test_a_drop_of_nothing_but_names_is_not_collected(state, pieces, word):

@@ -1,0 +1,342 @@
+"""Arithmetic of what the page draws, script by script: on a blank page, without a server."""
+
+import json
+
+import numpy as np
+import pytest
+from serving import CHROMIUM, FLAGS
+
+from app.views.scripts import FOLDER
+
+pytestmark = pytest.mark.browser
+ADDRESS = "http://scripts/"
+
+
+@pytest.fixture(scope="module")
+def blank():
+    """A page that imports scripts as the modules they are, and nothing else."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as context:
+        browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        page = browser.new_page()
+        page.route(f"{ADDRESS}**", _answer)
+        page.goto(ADDRESS)
+        yield page
+        browser.close()
+
+
+def _answer(route):
+    name = route.request.url.removeprefix(ADDRESS)
+    if name.endswith(".js"):
+        route.fulfill(path=FOLDER / name, content_type="text/javascript")
+    else:
+        route.fulfill(body="<!doctype html>", content_type="text/html")
+
+
+@pytest.fixture
+def run(blank):
+    """run(scripts, function, given): what a function of their exports and of given returns."""
+
+    def run(scripts, function, **given):
+        imports = ", ".join(f'import("./{name}.js")' for name in scripts.split())
+        return blank.evaluate(
+            f"""async (given) => {{
+                const parts = await Promise.all([{imports}])
+                return ({function})(Object.assign({{}}, ...parts), given)
+            }}""",
+            json.loads(json.dumps(given, default=np.ndarray.tolist)),
+        )
+
+    return run
+
+
+def test_every_script_is_a_module_by_itself(run):
+    """As they are written, not as they are joined: `module` makes no module of what is none."""
+    names = [path.stem for path in FOLDER.glob("*.js")]
+    assert len(run(" ".join(names), "(all) => Object.keys(all)")) > len(names) / 2
+
+
+# Two contacts, four frames, the first one the original.
+NORMAL = np.array([[1.0, 2.0], [0.5, 3.0], [2.0, 1.0], [1.5, 2.5]])
+TANGENTIAL = np.array([[0.1, -0.2], [0.0, 0.4], [-0.3, 0.1], [0.2, 0.2]])
+CENTRE = np.array([1.2, 2.1, 0.0, 0.1])
+WALK = {
+    "contacts": 2, "mu": 0.5, "states": 3, "number": [0, 1, 2, 3],
+    "normal": NORMAL.ravel(), "tangential": TANGENTIAL.ravel(),
+    "distance": np.linalg.norm(np.hstack([NORMAL, TANGENTIAL]) - CENTRE, axis=1),
+    "residual": [0.1, 0.2, 0.3, 0.4], "backbone": [7, 8],
+}  # fmt: skip
+
+
+def test_between_two_states_the_straight_line_is_shown(run):
+    """Forces, distance from the centre and range so far, at 1.3 of the track and back at 1."""
+    there, back = run(
+        "replay",
+        """({ Replay }, { walk }) => {
+            const replay = new Replay(walk, null)
+            return [3, 1.3, 1].map((to) => {
+                replay.go(to)
+                const { mixed, distance, residual, low, high, place } = replay
+                return {
+                    normal: [...mixed.normal], tangential: [...mixed.tangential],
+                    low: [...low], high: [...high], distance, residual, place,
+                }
+            }).slice(1)
+        }""",
+        walk=WALK,
+    )
+    normal, tangential = (0.7 * all[1] + 0.3 * all[2] for all in (NORMAL, TANGENTIAL))
+    away = np.linalg.norm(np.hstack([normal, tangential]) - CENTRE)
+    np.testing.assert_allclose(there["normal"], normal, rtol=1e-6)
+    np.testing.assert_allclose(there["tangential"], tangential, rtol=1e-6)
+    assert there["distance"] == pytest.approx(away, rel=1e-6)
+    assert (there["residual"], there["place"]) == (0.2, "1 of 3")
+    assert back["low"] == back["high"] == NORMAL[1].tolist()  # the original is no state
+    assert back["normal"] == NORMAL[1].tolist()
+
+
+def test_to_and_fro_between_two_states_has_a_track_of_two(run):
+    found = run(
+        "replay",
+        """({ Replay }, { walk }) => {
+            const replay = new Replay(walk, [0, 3])
+            replay.go(0.25)
+            const { frame, atEnd, place, mixed } = replay
+            return [frame, atEnd, place, [...mixed.normal]]
+        }""",
+        walk=WALK,
+    )
+    where = "25 % of the way from the original to state 3"
+    assert found == [0, False, where, (0.75 * NORMAL[0] + 0.25 * NORMAL[3]).tolist()]
+
+
+# A disk of radius 1/2 between two of radius 1, along x: contacts at −1/2 and 1/2.
+PRESSED = {
+    "contacts": 2, "mu": 0.5, "contact": [0, 1], "i": [0, 1], "j": [1, 2], "grain": [0, 1, 2],
+    "x0": [-1.5, 0.0], "y0": [0.0, 0.0], "x1": [0.0, 1.5], "y1": [0.0, 0.0],
+    "x": [-1.5, 0.0, 1.5], "y": [0.0, 0.0, 0.0], "r": [1.0, 0.5, 1.0], "radius": [1.0, 0.5, 1.0],
+    "kind": [0, 0, 0], "box": [-1, -1], "tilt": 0, "window": [-3, 3, -3, 3],
+    "normal": [2.0, 2.0], "tangential": [0.0, 0.0], "low": [1.0, 2.0], "high": [4.0, 2.5],
+}  # fmt: skip
+MODEL = {
+    "scales": {"width": 0.2, "change": 0.5, "deviation": 4.0}, "thickness": "normal",
+    "colour": "change", "reference": 0, "most": 3.0, "full": None, "stretch": 1.5,
+    "palettes": {"change": list(range(11)), "mobilised": list(range(11)), "neutral": "grey"},
+}  # fmt: skip
+TYPED = "Object.assign(walk, { normal: Float32Array.from(walk.normal) })"
+
+
+def test_width_and_colour_of_a_chain_say_its_force_and_its_change(run):
+    width, change, mobilised = run(
+        "look",
+        f"""({{ Look }}, {{ model, walk }}) => {{
+            const look = new Look(model, {TYPED})
+            const mixed = {{ normal: [2.25, 1e-9], tangential: [-1.125, 0] }}
+            const {{ width, bin }} = look.of(mixed), change = [...bin]
+            model.colour = "mobilised"
+            return [[...width], change, [...look.of(mixed).bin]]
+        }}""",
+        model=MODEL,
+        walk=PRESSED,
+    )
+    assert width == pytest.approx([0.2 * 1.5 * 2.25, 0.0])
+    assert change == [round(10 * 0.75), 0]  # a quarter of ⟨fₙ⟩ more; far less
+    assert mobilised == [0, 5]  # fₜ = −μ fₙ; nothing
+
+
+def test_stress_on_a_disk_is_that_of_its_contacts(run):
+    """Pressed by f along x: σ_xx = 2 f/(πr), σ_yy = 0; forces on both sides of a contact cancel."""
+    stress, left, middle = run(
+        "look",
+        f"""({{ Look }}, {{ model, walk, mixed }}) => {{
+            const look = new Look(model, {TYPED})
+            return [look.stressOn(1, mixed), look.forcesOn(0, mixed), look.forcesOn(1, mixed)]
+        }}""",
+        model=MODEL,
+        walk=PRESSED,
+        mixed={"normal": [2.0, 2.0], "tangential": [0.3, 0.3]},
+    )
+    half = 2.0 / (np.pi * 0.5)
+    assert stress["pressure"] == pytest.approx(half)
+    # n and F are symmetric but for fₜ, which turns the axes: σ_xy = 2 r fₜ/(2πr²) less its mirror.
+    assert stress["shear"] == pytest.approx(np.hypot(half, 0.3 / (np.pi * 0.5)))
+    assert [left[0]["fx"], left[0]["fy"]] == [-middle[0]["fx"], -middle[0]["fy"]]
+    assert [middle[0]["fx"], middle[1]["fx"]] == [2.0, -2.0]
+
+
+SCENE = """
+    const scene = new Scene(() => {})
+    scene.palette = { disks: [{}], edge: "grey" }
+    scene.size = 600
+    scene.ratio = 1
+    scene.show(walk)
+"""
+
+
+def test_pixels_and_places_are_each_others_inverse_and_zoom_keeps_the_place(run):
+    centre, place, before, after, half = run(
+        "scene",
+        f"""({{ Scene }}, {{ walk }}) => {{
+            {SCENE}
+            const before = scene.toPlace(450, 200)
+            scene.zoom(0.5, 450, 200)
+            const place = scene.toPlace(...scene.toPixel(0.3, -0.7)), at = scene.view
+            return [scene.toPixel(at.x, at.y), place, before, scene.toPlace(450, 200), at.half]
+        }}""",
+        walk=PRESSED,
+    )
+    assert centre == [300, 300]
+    assert place == pytest.approx([0.3, -0.7])
+    assert before == pytest.approx([1.5, 1.0])  # 100 px a unit, y upwards
+    assert after == pytest.approx(before)
+    assert half == 1.5
+
+
+def test_the_chain_under_the_pointer_is_the_nearest_and_none_at_a_centre(run):
+    on, beside, between, disk, outside = run(
+        "scene",
+        f"""({{ Scene }}, {{ walk }}) => {{
+            {SCENE}
+            const at = (find, x, y) => scene[find](...scene.toPixel(x, y))
+            return [at("linkAt", 0.7, 0.02), at("linkAt", -0.7, 0.5), at("linkAt", 0, 0.02),
+                at("diskAt", 0.1, 0.1), at("diskAt", 0, 2)]
+        }}""",
+        walk=PRESSED,
+    )
+    assert (on, beside, between, disk, outside) == (1, -1, -1, 1, -1)
+
+
+def test_chains_too_thin_or_out_of_sight_are_not_drawn(run):
+    whole, part = run(
+        "scene",
+        f"""({{ Scene }}, {{ walk }}) => {{
+            {SCENE}
+            scene.repaint() // there is a picture from now on
+            scene.drawChains({{ width: [0.2, 1e-4], bin: [0, 0], colours: ["red"], alpha: 1 }})
+            const whole = scene.counts
+            scene.view = {{ x: 2.5, y: 0, half: 0.5 }}
+            scene.drawChains({{ width: [0.2, 0.2], bin: [0, 0], colours: ["red"], alpha: 1 }})
+            return [whole, scene.counts]
+        }}""",
+        walk=PRESSED,
+    )
+    assert whole == {"segments": 2, "drawn": 1, "outside": 0, "thin": 1}
+    assert part == {"segments": 2, "drawn": 0, "outside": 2, "thin": 0}
+
+
+def test_the_path_in_force_space_ends_where_the_replay_is(run):
+    """On the straight line between two states, in pixels, behind the states that it came by."""
+    drawn = run(
+        "replay layer",
+        """({ Replay, LAYERS }, { walk }) => {
+            const replay = new Replay(walk, null), moved = []
+            replay.go(2.5)
+            const context = {
+                arc: (x, y) => moved.push([x, y]), moveTo: (...to) => moved.push(to),
+                lineTo: (...to) => moved.push(to),
+                beginPath() {}, fill() {}, stroke() {}, fillRect() {},
+            }
+            const column = { x: [0, 1, 3, 4], y: [0, 10, 20, 0] }
+            const plots = {
+                colours: {}, placed: { drawn: 0, count: 0 },
+                find: () => ({ get_column: (name) => column[name] }),
+            }
+            LAYERS.path(context, { x: (v) => 100 * v, y: (v) => -v }, plots, replay)
+            return moved
+        }""",
+        walk=WALK,
+    )
+    assert drawn[:2] == [[0, 0], [100, -10]]
+    assert drawn[-2:] == [[350, -10], [350, -10]]  # the line's end, and the point
+
+
+def test_a_dot_is_taken_within_its_reach_only(run):
+    found = run(
+        "layer",
+        """({ Handles }) => {
+            const column = { x: [0, 1], y: [0, 1] }
+            const plots = { find: () => ({ get_column: (name) => column[name] }) }
+            const handles = new Handles(plots, "bars", "bars", ["x", "y"], {})
+            handles.remove()
+            const scale = { compute: (v) => 100 * v }, frame = { x_scale: scale, y_scale: scale }
+            const element = { getBoundingClientRect: () => ({ left: 10, top: 20 }) }
+            const at = (x, y, pointerType) =>
+                handles.nearest({ clientX: x + 10, clientY: y + 20, pointerType }, element, frame)
+            return [at(95, 105, "mouse"), at(80, 100, "mouse"), at(80, 100, "touch")]
+        }""",
+    )
+    assert found == [1, -1, 1]
+
+
+# A rail of three networks of contact 0, whose normal force it is by.
+RAIL = {
+    "contact": 0, "lower": 1.0, "upper": 4.0, "values": [1.0, 2.0, 4.0],
+    "normal": [1.0, 3.0, 2.0, 2.0, 4.0, 0.0], "tangential": [0.0, 0.0, 0.5, 0.1, 1.0, 0.0],
+    "residual": [0.1, 0.3, 0.2], "opened": [0, 0, 0, 1], "sliding": [0, 1, 0, 0],
+}  # fmt: skip
+HAND = """
+    const source = {}, said = []
+    const player = {
+        scene: { size: 600 }, model: { scale: "mean" }, look: {}, replay: new Replay(walk, null),
+        buttons: { part: () => source }, tellHeld() {}, paint() {}, paintPlots() {},
+        plots: { projected: ({ normal }) => [...normal], move() {} },
+    }
+    player.replay.go(1)
+    const hand = new Grab(player, (message) => said.push(message))
+"""
+
+
+def test_a_force_in_the_hand_follows_its_rail_to_its_ends(run):
+    """By straight lines between the networks of the rail; at an end it says who holds it there."""
+    middle, end, holding, begun = run(
+        "replay grab",
+        f"""({{ Replay, Grab }}, {{ walk, rail }}) => {{
+            {HAND}
+            Object.assign(hand, {{ contact: 0, grip: [300, 300], point: [300, 300] }})
+            hand.place = () => 3
+            hand.ride(rail)
+            const shown = () => ({{
+                value: hand.value, normal: [...player.replay.held.normal],
+                tangential: [...player.replay.held.tangential],
+                residual: player.replay.held.residual, end: hand.end,
+            }})
+            const middle = shown(), begun = hand.valueAt(300)
+            hand.set(9)
+            return [middle, shown(), hand.holding, begun]
+        }}""",
+        walk=WALK,
+        rail=RAIL,
+    )
+    # Halfway from the second network to the third, with the larger of their residuals.
+    expected = {"value": 3, "normal": [3, 1], "tangential": [0.75, 0.05], "residual": 0.3, "end": 0}
+    tangential = middle.pop("tangential")
+    assert tangential == pytest.approx(expected.pop("tangential"))
+    assert middle == expected
+    assert (end["value"], end["normal"], end["end"]) == (4, [4, 0], 1)
+    assert holding == {"opened": [1], "sliding": []}  # contact 0 slid before
+    assert begun == pytest.approx(NORMAL[1, 0])  # where it was taken, it has the force it had
+
+
+@pytest.mark.parametrize(
+    "target, reached",
+    [([1.0, 0.5], [1.0, 0.5]), ([0.5, 3.0], [0.5, 2.0]), ([9.0, 9.0], [2.0, 2.0])],
+    ids=["inside", "beyond an edge", "beyond a corner"],
+)
+def test_the_point_in_force_space_stays_within_the_outline(run, target, reached):
+    """Here the two normal forces are the coordinates: the network must be the point itself."""
+    normal = run(
+        "replay grab",
+        f"""({{ Replay, Grab }}, {{ walk, fan, target }}) => {{
+            {HAND}
+            hand.spot.target = target
+            hand.spot.spread(fan)
+            return [...player.replay.held.normal]
+        }}""",
+        walk=WALK | {"normal": np.ones(8)},  # at (1, 1), inside
+        fan={
+            "x": [0, 2, 2, 0], "y": [0, 0, 2, 2], "normal": [0, 0, 2, 0, 2, 2, 0, 2],
+            "tangential": [0] * 8, "residual": [0, 0, 0, 0],
+        },
+        target=target,
+    )  # fmt: skip
+    assert normal == pytest.approx(reached, abs=1e-6)
