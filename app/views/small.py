@@ -50,7 +50,7 @@ class Small(Scripted):
     dark = param.Boolean()
 
     _esm = joined(
-        *("ask", "gone", "body", "easel", "palette", "arrows", "line", "shadow", "space"),
+        *("ask", "gone", "body", "easel", "palette", "arrows", "line", "shadow", "compass", "space"),
         *("builder", "push", "going", "bars", "saying", "lesson", "tourcard", "small"),
     )
     _stylesheets: ClassVar = [FOLDER / "small.css"]

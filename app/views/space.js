@@ -278,6 +278,9 @@ class Space {
       if (long > 14 || lit) this.besides(x + on * ux, y + on * uy, ux, uy, words, lit)
       this.labels.push({ side, a, b, reach: 14 })
     }
+    if (places.length < 3) return // a line among two dimensions
+    drawName(this, places, middle)
+    drawCompass(this, places)
   }
 
   /** Words outside a side at (x, y), u its normal: along it where they can be read so, else beside it. */
