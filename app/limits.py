@@ -35,7 +35,7 @@ class Limits(NamedTuple):
             least, most = RANGES.get(name) or (1, getattr(self, name))
             if not least <= value <= most:  # nor if it is NaN
                 raise InputError(
-                    f"{NAMES[name]} must lie between {least:g} and {most}, got {_short(value)}"
+                    f"{NAMES[name]} must lie between {least:g} and {most}, got {_told(value)}"
                 )
 
 
@@ -80,6 +80,11 @@ def _check_radii(text: Any) -> None:
             "radii must be named as uniform:LOW,HIGH or bidisperse:SMALL,LARGE,FRACTION, the "
             f"largest at most {SIZE_RATIO} times the smallest, got {_short(text)}"
         )
+
+
+def _told(number: float) -> str:
+    """A number as people write it: 1e+09 and not 1000000000.0."""
+    return f"{number:g}" if isinstance(number, float) else _short(number)
 
 
 def _short(value: Any) -> str:

@@ -103,15 +103,15 @@ def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
     """Titles of the two axes, in words."""
     if plane.components:
         return tuple(
-            f"{'fₙ' if component == 0 else 'fₜ'} of contact {replay.backbone[contact]} / ⟨fₙ⟩"
+            f"{'normal force fₙ' if component == 0 else 'tangential force fₜ'} of contact "
+            f"{replay.backbone[contact]}, in mean forces"
             for contact, component in plane.components
         )
     if plane.kind == STRESS:
-        return "(σₓₓ − σᵧᵧ) / 2P", "σₓᵧ / P"
-    most = ("networks differ most", "second most")
-    return tuple(
-        f"{words} ({part:.0%} of the variance) / ⟨fₙ⟩"
-        for words, part in zip(most, plane.share, strict=True)
+        return "pressed more across than up: (σₓₓ − σᵧᵧ) / 2P", "sheared: σₓᵧ / P"
+    return (
+        "direction in which networks differ most, in mean forces",
+        "direction in which they differ second most",
     )
 
 

@@ -162,6 +162,13 @@ def series(
     return ", ".join(words)
 
 
+def brief(selection: Selection, series: str) -> str:
+    """A series in the few words that are read over its picture; the whole of an import's."""
+    if selection.imported:
+        return series
+    return f"{selection.packing['n']} disks, {selection.states} states"
+
+
 def command(selection: Selection) -> str:
     """The command that makes the same states in a terminal."""
     words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]

@@ -17,7 +17,7 @@ from .known import Knowledge
 from .limits import LIMITS
 from .live import Arriving, Following
 from .replays import Replay
-from .selection import Selection, command, link, read_link
+from .selection import Selection, brief, command, link, read_link
 
 View = dict[str, Any]  # parameters of AppState by name
 
@@ -48,26 +48,26 @@ SORTS = {
 }
 # What single tabs can show.
 FIGURES = {
-    "eta": "η against μ",
-    "extent": "lengths ΔFₙ",
-    "correlation": "correlation",
-    "scatter": "ΔFₙ against fₙ",
-    "force": "forces fₙ",
+    "eta": "How does friction matter?",
+    "extent": "How far can single forces differ?",
+    "correlation": "Are strong contacts the less determined ones?",
+    "scatter": "Which contacts are least determined?",
+    "force": "How many forces are large?",
 }
 AXES = {"linear": "linear", "log": "logarithmic"}
 PUSHES = {
-    "one": "one contact",
-    "all": "failure load of every contact",
-    "store": "critical force against η2",
+    "one": "How hard can one contact be pushed?",
+    "all": "Which contacts bear most?",
+    "store": "Are undetermined packings weaker?",
 }
 PLANES = {
-    "principal": "principal axes",
-    "contact": "fₙ, fₜ of a contact",
-    "pair": "fₙ of two contacts",
-    "stress": "stresses",
+    "principal": "the plane in which networks differ most",
+    "contact": "both forces of one contact",
+    "pair": "the normal forces of two contacts",
+    "stress": "the stress that networks carry",
 }
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
-SCALES = {"mean": "fₙ / ⟨fₙ⟩", "own": "fₙ / original fₙ"}
+SCALES = {"mean": "mean force = 1", "own": "original force = 1"}
 
 
 class AppState(param.Parameterized):
@@ -383,7 +383,8 @@ class AppState(param.Parameterized):
         if cell is None:
             return ""
         shipped = cell.store is self.library.shipped
-        return f"μ = {cell.mu:g}, {cell.series} ({PRECOMPUTED if shipped else COMPUTED})"
+        told = brief(cell.selection, cell.series)
+        return f"μ = {cell.mu:g}, {told} ({PRECOMPUTED if shipped else COMPUTED})"
 
     def _is_grown(self, replay: Replay) -> bool:
         """Whether a Replay is what the walk on screen has grown into."""
@@ -424,7 +425,8 @@ class AppState(param.Parameterized):
     def grow(self, replay: Replay) -> None:
         """Put the Replay of a walk that begins on screen."""
         asked = self.live.selection
-        source = f"μ = {asked.mu:g}, {self.library.series(asked)} (as they are found)"
+        told = brief(asked, self.library.series(asked))
+        source = f"μ = {asked.mu:g}, {told} (as they are found)"
         self.param.update(
             growing=replay, fourfold=0, plane=None, moving=False, source=source, displacement=None,
             **UNSEEN,

@@ -1,10 +1,9 @@
 // The small scene itself: disks, walls, the force on each disk at each contact as an arrow within its
 // cone, and, for a disk that is looked at, its forces put one after the other: they close.
 
-import { dot } from "./body.js"
+import { distance, dot } from "./body.js"
 import { Easel } from "./easel.js"
 import { number } from "./saying.js"
-import { distance } from "./space.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it

@@ -5,6 +5,13 @@ const FAR = [1e4, 1e8] // where S seems to have no end it is cut so far outside,
 const SMALL = 1e-9
 export const OPENS = 0 // f_n = 0; 1 and −1: f_t = μ f_n and −μ f_n
 
+/** From the segment between two points to a third. */
+export function distance([ax, ay], [bx, by], px, py) {
+  const [dx, dy] = [bx - ax, by - ay], size = dx * dx + dy * dy || 1
+  const s = Math.max(0, Math.min(1, ((px - ax) * dx + (py - ay) * dy) / size))
+  return Math.hypot(px - ax - s * dx, py - ay - s * dy)
+}
+
 export function dot(a, b) {
   let sum = 0
   for (let k = 0; k < a.length; k++) sum += a[k] * b[k]

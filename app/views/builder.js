@@ -1,7 +1,6 @@
 // Build your own: disks and walls are put, moved and removed by hand; what comes near snaps into contact.
 
-import { solve } from "./body.js"
-import { distance } from "./space.js"
+import { distance, solve } from "./body.js"
 
 const NEAR = 0.45 // of the largest radius, within which a disk is drawn into contact
 const MOST_DISKS = 30, MOST_WALLS = 12

@@ -18,7 +18,7 @@ def caption(state):
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
             f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state, pulled)}.",
-            state.source,
+            f"μ = {state.cell.mu:g}, {state.cell.series}.",
             *known_words(state),
             f"granforce ?{state.link()}",
         ],

@@ -14,7 +14,7 @@ from ..state import COLOURS, WIDTHS
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
-from .parts import EXTRA
+from .parts import EXTRA, folded_away
 from .scenelist import SceneList
 from .select import Select
 
@@ -23,7 +23,6 @@ SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
 FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
 HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
 MADE, SCALES = "How it is made", "Scales of colour and width"
-FOLDED = {"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}}
 # What went wrong is told at the page's lower edge, whether the sidebar is open or closed.
 AT_EDGE = """
 :host { position: fixed; inset: auto 0 calc(var(--task, 0px) + var(--card, 0px)); z-index: 1400; }
@@ -144,15 +143,7 @@ class Controls:
             **WIDE,
         )
         scales = pn.Row(self.full, self.stretch, margin=(-10, -14), **WIDE)
-        return pmui.Accordion(
-            (MADE, inside),
-            (SCALES, scales),
-            active=[],
-            title_variant="subtitle2",
-            sx=FOLDED,
-            margin=(8, 10),
-            **WIDE,
-        )
+        return folded_away(MADE, inside, SCALES, scales)
 
     def _connect(self):
         state = self.state

@@ -5,11 +5,10 @@ import panel as pn
 from .captions import caption, stem
 from .handover import Handover
 from .number import NumberField
-from .parts import note
+from .parts import folded_away, note
 
-FILES = {
-    "Packing and plots as one figure": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}
-}
+TITLE = "Packing and plots as one figure"
+FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
 WIDTH_MM = 170  # of a page's two columns
 HELP = """
 As they are seen now, as lines and letters. From 120 mm on the plots are beside the packing.
@@ -28,9 +27,10 @@ def panel(state):
         name = f"{stem(state.cell.selection)}_figure.{kind}"
         buttons.hand_over_picture(name, caption(state), width.value)
 
-    buttons = Handover(asked, files=FILES, margin=(12, 10, -8, 10))
+    buttons = Handover(asked, files=FILES, margin=(4, 10, -8, 10))
     width = NumberField(
         refuse, label="Width, mm", value=WIDTH_MM, start=40, end=2000, step=5, width=150,
         margin=(0, 10, 4, 10),
     )  # fmt: skip
-    return pn.Column(buttons, width, note(HELP), sizing_mode="stretch_width")
+    inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")
+    return folded_away(TITLE, inside)

@@ -33,7 +33,7 @@ export function render({ model, view }) {
     root.replaceChildren()
     for (const [heading, files] of Object.entries(plain(model.files))) {
       const group = document.createElement("section")
-      group.append(Object.assign(document.createElement("h4"), { textContent: heading }))
+      if (heading) group.append(Object.assign(document.createElement("h4"), { textContent: heading }))
       for (const [key, words] of Object.entries(plain(files))) group.append(button(key, words))
       root.append(group)
     }

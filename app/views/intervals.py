@@ -25,8 +25,13 @@ ETAS = ("eta1", "eta2", "eta3")
 SMALL = {"width": 190, "margin": (6, 8, 2, 8)}
 
 
+LEAD = (
+    "<b>How far can each force go?</b> Each bar is one contact, from the smallest to the largest "
+    "normal force that it can have while every disk stays in balance. Drag a red dot, its force "
+    "now: all others follow."
+)
 HELP = f"""
-One bar for each contact. Pale: every force it can have in any network in balance
+Pale: every force that a contact can have in any network in balance
 ({term("exact", "possible")}); dark: what the states passed so far had; yellow: in the
 {term("original")}; dots: in the state on screen. Curves: η of the states passed so far (of η3,
 {term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
@@ -68,11 +73,12 @@ class View:
         wide = {"sizing_mode": "stretch_width", "margin": 0}
         choices = pn.FlexBox(self.sort, self.scale, sizing_mode="stretch_width")
         return pn.Column(
+            note(LEAD),
             choices,
-            Known(self.state),
             pn.pane.Bokeh(self.figure, **wide),
             self.exact,  # below, as the plot must not move when the button goes
             self.left_out,
+            Known(self.state),
             pn.pane.Bokeh(self.growth_figure, **wide),
             self.told,
             Contacts(self.state),
@@ -157,7 +163,7 @@ class View:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         self.figure.xaxis.axis_label = f"contacts, sorted by {SORTS[self.state.sort]}"
-        self.figure.yaxis.axis_label = SCALES[self.state.scale]
+        self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.state.scale]})"
 
     def _show_growth(self, replay):
         grows = self.state.growing is not None
@@ -204,7 +210,7 @@ class View:
             "intervals",
             None,
             "contacts",
-            "fₙ / ⟨fₙ⟩",
+            "normal force fₙ",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1, name="bars_range"),
             height=320,
@@ -274,14 +280,14 @@ class View:
         fig = figure(
             "eta_so_far",
             None,
-            "states",
-            "η",
+            "states shown so far",
+            "how undetermined, η",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1, name="growth_range"),
             height=210,
             tools="",
         )
-        labels = ("eta1", "η1"), ("eta2", "η2"), ("eta3", "0.15 η3")
+        labels = ("eta1", "spread η1"), ("eta2", "distance η2"), ("eta3", "0.15 × range η3")
         for (name, label), colour in zip(labels, SERIES, strict=True):
             line = fig.line(
                 "state", name, source=self.growth, line_width=2, color=colour, legend_label=label

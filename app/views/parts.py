@@ -7,6 +7,7 @@ from panel.io import document as panel_document
 from panel.io import unlocked
 from panel.reactive import Syncable
 
+from .select import Select
 from .style import plot
 
 NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
@@ -218,7 +219,37 @@ def choice(labels, value):
 
 def chosen(labels, state, name):
     """A `choice` of the state's parameter of this name."""
-    made = choice(labels, getattr(state, name))
-    made.param.watch(lambda event: state.param.update({name: event.new}), "value")
-    state.param.watch(lambda event: made.param.update(value=event.new), name)
-    return made
+    return _linked(choice(labels, getattr(state, name)), state, name)
+
+
+def question(label, labels, state, name):
+    """The same as a list under a label, for choices that are sentences."""
+    options = {words: key for key, words in labels.items()}
+    wide = {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
+    made = Select(label=label, options=options, value=getattr(state, name), **wide)
+    return _linked(made, state, name)
+
+
+def _linked(widget, state, name):
+    """A widget whose value is the state's parameter of this name."""
+    widget.param.watch(lambda event: state.param.update({name: event.new}), "value")
+    state.param.watch(lambda event: widget.param.update(value=event.new), name)
+    return widget
+
+
+def folded_away(*titled):
+    """Panels (title, panel, …) that are closed until they are opened."""
+    pairs = list(zip(titled[::2], titled[1::2], strict=True))
+    return pmui.Accordion(
+        *pairs,
+        active=[],
+        title_variant="subtitle2",
+        sx={"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}},
+        margin=(8, 10),
+        sizing_mode="stretch_width",
+    )
+
+
+def folded(text):
+    """HTML of what only those read who want to know more."""
+    return f"<details><summary>How was this computed?</summary>{text}</details>"

@@ -1,4 +1,4 @@
-"""Push the grains of a contact apart: limit load, critical force, and how the packing gives way."""
+"""Push the disks of a contact apart: limit load, critical force, and how the packing gives way."""
 
 import numpy as np
 import panel as pn
@@ -9,7 +9,7 @@ from .. import perturbations
 from ..state import PUSHES
 from . import studied
 from .hints import term
-from .parts import TabView, chosen, figure, note
+from .parts import PLAIN, TabView, figure, folded, note, question
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
@@ -19,16 +19,36 @@ TILE = (
     '<div style="font-size:15px;font-variant-numeric:tabular-nums">{}</div></div>'
 )
 EXPLAINED = {  # words on tiles → keys of the glossary
-    "fₙ": "fn",
-    "critical force": "critical_force",
+    "force before": "fn",
+    "gives way at": "critical_force",
     "limit load": "limit_load",
-    "α": "alpha",
 }
 TILES = '<div style="display:flex;flex-wrap:wrap;gap:6px">{}</div>'
-HINT = (
-    "Click a contact in the packing: two opposite forces will press its two disks apart. Why it "
-    "matters: indeterminacy shows in the failure load and in how far a push reaches."
+SKETCH = """<svg viewBox="0 0 300 92" width="300" height="92" role="img"
+ aria-label="two disks that touch, with an arrow on each, away from the other" fill="none"
+ stroke="currentColor" style="display:block;margin:6px 0 2px">
+ <g fill="rgba(139,160,187,0.35)" stroke="#8fa1b5" stroke-width="1.5">
+ <circle cx="112" cy="46" r="38"/><circle cx="188" cy="46" r="38"/></g>
+ <g stroke="{colour}" stroke-width="4" stroke-linecap="round">
+ <path d="M106 46H20M32 36L20 46L32 56M194 46H280M268 36L280 46L268 56"/></g>
+</svg>"""
+LEAD = (
+    "<b>Two growing forces press the two disks of a contact apart</b>, along the line through "
+    "their centres, until the packing gives way."
 )
+HINT = (
+    "Click any contact in the packing, or take the strongest one. Why it matters: "
+    "indeterminacy shows in the failure load and in how far a push reaches."
+)
+ISOSTATIC = (
+    "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
+    "needs (it is isostatic)."
+)
+EVERY = (
+    "<b>The failure load of a contact</b> (limit load): the largest pair of forces that may press "
+    "its two disks apart before no forces at all can hold the packing."
+)
+UNIT = "Forces are in units of the mean normal force ⟨fₙ⟩."
 
 
 class View(TabView):
@@ -38,15 +58,21 @@ class View(TabView):
 
     def __init__(self, state):
         super().__init__(state, "replay", "contact")
-        self.what = chosen(PUSHES, state, "pushing")
+        self.what = question("Question", PUSHES, state, "pushing")
         self.strongest = pmui.Button(
-            label="Take the strongest contact", variant="outlined", size="small", margin=(4, 8)
+            label="Take the strongest contact",
+            color="primary",
+            size="small",
+            margin=(4, 8),
+            sx=PLAIN,
         )
-        self.push = pmui.Button(label="Push", color="primary", size="small", margin=(4, 8))
+        self.push = pmui.Button(
+            label="Push", color="primary", size="small", margin=(4, 8), sx=PLAIN
+        )
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
         self.plots = pn.Column(sizing_mode="stretch_width")
-        self.told = note()
+        self.lead, self.told = note(), note()
         self.task = state.task(told=False)
         self.loads = self.pushed = self._shown = None
         self.chosen = ColumnDataSource({"x": [], "y": []})
@@ -63,7 +89,8 @@ class View(TabView):
         """Choices, buttons, numbers and plot."""
         wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
-            pn.FlexBox(self.what, **wide),
+            self.what,
+            self.lead,
             pn.FlexBox(self.push, self.strongest, self.animate, **wide),
             Progress(self.task),
             self.numbers,
@@ -82,13 +109,13 @@ class View(TabView):
             self.pushed = None
         one = what == "one"
         self.push.visible = (one and state.contact is not None) or what == "all"
-        self.push.label = "Push" if one else "Compute"
+        self.push.label = "Push" if one else "Compute for all contacts"
         self.strongest.visible = one and state.contact is None
         self.animate.visible = one and self.pushed is not None
         if state.replay is None:
             return
         if state.replay.summary["mu"] == 0:
-            self._say("At μ = 0 the packing is isostatic: the least force moves it.")
+            self._say("", lead=ISOSTATIC)
             self.push.visible = self.strongest.visible = False
             return
         {"one": self._one, "all": self._all, "store": self._store}[what]()
@@ -99,8 +126,8 @@ class View(TabView):
         contact, replay = self.pushed[1:]
         return contact == self.state.contact and replay is self.state.replay
 
-    def _say(self, text, plots=(), numbers=""):
-        self.told.object, self.numbers.object = text, numbers
+    def _say(self, text, plots=(), numbers="", lead=""):
+        self.lead.object, self.told.object, self.numbers.object = lead, text, numbers
         self.plots.objects = [
             pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0) for fig in plots
         ]
@@ -133,66 +160,57 @@ class View(TabView):
 
     def _one(self):
         state, replay = self.state, self.state.replay
+        drawn = LEAD + SKETCH.format(colour=DOT)
         if state.contact is None:
-            self._say(HINT)
+            self._say(HINT, lead=drawn)
             return
-        tiles = [
-            ("contact", f"{replay.backbone[state.contact]}"),
-            ("fₙ", f"{replay.normal[0, state.contact]:.3f} ⟨fₙ⟩"),
-        ]
+        tiles = [("force before", f"{replay.normal[0, state.contact]:.2f}")]
         if self.pushed is None:
-            known = self.loads is not None
-            if known:
-                tiles.append(("limit load", f"{self.loads.load[state.contact]:.3f} ⟨fₙ⟩"))
-            text = (
-                "Push: two opposite forces, along the line through the centres of the two disks, "
-                "grow until the disks find no balance any more."
-            )
-            self._say(text, numbers=_tiles(tiles))
+            if self.loads is not None:
+                tiles.append(("limit load", f"{self.loads.load[state.contact]:.2f}"))
+            where = f"Contact {replay.backbone[state.contact]}, marked in the packing. {UNIT}"
+            self._say(where, numbers=_tiles(tiles), lead=drawn)
             return
         pushed = self.pushed[0]
-        tiles += [
-            ("critical force", f"{pushed.low:.3f} ⟨fₙ⟩"),
-            ("limit load", f"{pushed.limit:.3f} ⟨fₙ⟩"),
-            ("opened", f"{pushed.opened}"),
-            ("slid", f"{pushed.slid}"),
-            ("kept", f"{pushed.kept}"),
-        ]
-        text = (
+        tiles += [("gives way at", f"{pushed.low:.2f}"), ("limit load", f"{pushed.limit:.2f}")]
+        lead = (
             f"<b>Pushed apart with about {pushed.low:.2g} times the mean force, the packing gives "
             f"way:</b> {pushed.opened} of its contacts open, {pushed.slid} slide, {pushed.kept} "
-            f"hold. The {term('critical_force', 'critical force')} lies between "
-            f"{pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩, never above the "
+            "hold. The disks set off as the packing shows."
+        )
+        text = (
+            f"The {term('critical_force', 'critical force')} of contact "
+            f"{replay.backbone[state.contact]}, with which the packing gives way, lies between "
+            f"{pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩; it is never above the "
             f"{term('limit_load', 'limit load')}, beyond which no network in balance exists. "
-            "Above it the disks set off: |u| is how far each moves first."
+            "|u| is how far a disk moves first, against the root mean square over all disks."
         )
         if np.isfinite(pushed.exponent):  # not in boxes too small for a fit
-            tiles.append(("α", f"{pushed.exponent:.2f}"))
             inner, outer = pushed.fit
             text += (
-                " <details><summary>How fast the motion decays</summary>"
-                f"The mean of |u| in shells goes like r<sup>−α</sup> with "
+                f" The mean of |u| in shells goes like {term('alpha', 'r<sup>−α</sup>')} with "
                 f"α = {pushed.exponent:.2f}, fitted from r = {inner:.1f} to {outer:.1f} largest "
                 "radii (shaded); other ranges give α "
-                f"from {pushed.spread[0]:.2f} to {pushed.spread[1]:.2f}.</details>"
+                f"from {pushed.spread[0]:.2f} to {pushed.spread[1]:.2f}."
             )
-        self._say(text, [self._decay(pushed)], _tiles(tiles))
+        self._say(UNIT + folded(text), [self._decay(pushed)], _tiles(tiles), lead)
 
     def _decay(self, pushed):
         """|u| of every grain against its distance from the contact, and its mean in shells."""
         fig = figure(
-            "displacement", None, "distance r from the contact", "|u| / rms", height=330,
-            x_axis_type="log", y_axis_type="log",
+            "displacement", "How far the push reaches",
+            "distance from the pushed contact, in largest radii",
+            "how far a disk moves (1: typical)", height=330, x_axis_type="log", y_axis_type="log",
         )  # fmt: skip
         seen = (pushed.size > 1e-4 * pushed.size.max()) & (pushed.distance > 0)
         fig.scatter(
             pushed.distance[seen], pushed.size[seen], size=4, color=DARK, alpha=0.5,
-            legend_label="disks",
+            legend_label="one dot, one disk",
         )  # fmt: skip
         known = np.isfinite(pushed.profile) & (pushed.profile > 0)
         fig.line(
             pushed.radius[known], pushed.profile[known], color=ORIGINAL, line_width=2.5,
-            legend_label="mean in shells",
+            legend_label="mean at this distance",
         )  # fmt: skip
         if np.isfinite(pushed.exponent):
             _fit(fig, pushed)
@@ -215,10 +233,13 @@ class View(TabView):
 
     def _all(self):
         if self.loads is None:
-            self._say("Compute: one linear program for each contact.")
+            self._say(folded("One linear program for each contact."), lead=EVERY)
             return
         replay, loads = self.state.replay, self.loads
-        fig = figure("limit_loads", None, "original fₙ / ⟨fₙ⟩", "limit load / ⟨fₙ⟩", height=380)
+        fig = figure(
+            "limit_loads", None, "its normal force fₙ in the original network, in mean forces",
+            "failure load of a contact, in mean forces", height=380,
+        )  # fmt: skip
         source = ColumnDataSource(
             {"x": replay.normal[0], "y": loads.load, "contact": replay.backbone}
         )
@@ -239,13 +260,16 @@ class View(TabView):
         )
         source.selected.on_change("indices", self._tapped)
         corner(fig, "exact: certified bounds")
-        spread = np.percentile(loads.load, [10, 50, 90])
-        self._say(
-            f"Limit loads of {len(loads.load)} contacts: median {spread[1]:.2f} ⟨fₙ⟩, nine in ten "
-            f"below {spread[2]:.2f}, certified to {loads.gap:.0e} ⟨fₙ⟩ in {loads.seconds:.1f} s. "
-            "A tap selects a contact.",
-            [fig],
+        median, most = np.percentile(loads.load, [50, 90])
+        lead = (
+            f"<b>Half of the contacts bear a push of {median:.2f} mean forces, one in ten more "
+            f"than {most:.2f}.</b> Each dot is one contact: click it to find it in the packing."
         )
+        text = (
+            f"{EVERY} One linear program for each of {len(loads.load)} contacts, certified to "
+            f"{loads.gap:.0e} ⟨fₙ⟩, in {loads.seconds:.1f} s."
+        )
+        self._say(folded(text), [fig], lead=lead)
 
     def _tapped(self, name, old, new):
         if new:
@@ -272,8 +296,8 @@ def over_store(library, cells, cell):
         job.begin("reading the stores")
         found = perturbations.over_store(library, cells, cell)
         job.begin("drawing")
-        drawn, text = studied.responses(found)
-        return text + studied.claims("store"), drawn
+        drawn, lead, text = studied.responses(found)
+        return folded(text) + studied.claims("store"), drawn, "", lead
 
     return work
 

@@ -1,9 +1,10 @@
-// Marks of what is known: a pin on each contact that is held, open where it has an error bar; and
-// numbers on those that would be worth measuring, the best first.
+// Marks of what is known: a pin on each contact that is held, open where it has an error bar;
+// numbers on those that would be worth measuring, the best first; and where a contact is pushed, arrows.
 
 import { plain } from "./look.js"
 
 const PIN = 17 // px, its height
+const ARROW_PX = 34 // beyond the edge of the disk that is pushed
 const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
 
 export class Pins {
@@ -16,6 +17,7 @@ export class Pins {
 
   draw(context, scene) {
     const { contacts = [], exact = [], ranked = [] } = this.pins
+    if (this.model.tab === "perturb" && scene.selected !== null) this.push(context, scene)
     if (!contacts.length && !ranked.length) return
     const held = new Map(), rank = new Map(), { geometry, ratio } = scene
     for (let k = 0; k < contacts.length; k++) held.set(contacts[k], exact[k])
@@ -28,6 +30,28 @@ export class Pins {
       const [xa, ya, xb, yb] = scene.ends(k), place = scene.toPixel((xa + xb) / 2, (ya + yb) / 2)
       if (held.has(c)) this.pin(context, scene.palette, place, held.get(c))
       else this.badge(context, scene.palette, place, rank.get(c))
+    }
+    context.restore()
+  }
+
+  /** The two forces that press the disks of the selected contact apart. */
+  push(context, scene) {
+    const { geometry, ratio, palette, scale } = scene
+    context.save()
+    context.setTransform(ratio, 0, 0, ratio, 0, 0)
+    context.lineCap = context.lineJoin = "round"
+    context.beginPath()
+    for (let k = 0; k < geometry.contact.length; k++) {
+      if (geometry.contact[k] !== scene.selected) continue
+      const [xa, ya, xb, yb] = scene.ends(k), a = scene.toPixel(xa, ya), b = scene.toPixel(xb, yb)
+      const far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, u = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
+      arrow(context, a, u.map((v) => -v), scale * geometry.radius[geometry.i[k]] + ARROW_PX)
+      arrow(context, b, u, scale * geometry.radius[geometry.j[k]] + ARROW_PX)
+    }
+    for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
+      context.lineWidth = width
+      context.strokeStyle = colour
+      context.stroke()
     }
     context.restore()
   }
@@ -79,5 +103,16 @@ export class Pins {
     context.textAlign = "center"
     context.textBaseline = "middle"
     context.fillText(number, x, y + 0.5)
+  }
+}
+
+/** Adds an arrow to the path, of this length from a point in the direction (ux, uy). */
+function arrow(context, [x, y], [ux, uy], long) {
+  const tip = [x + long * ux, y + long * uy], head = 12
+  context.moveTo(x, y)
+  context.lineTo(...tip)
+  for (const side of [1, -1]) {
+    context.moveTo(tip[0] - head * (ux - 0.7 * side * uy), tip[1] - head * (uy + 0.7 * side * ux))
+    context.lineTo(...tip)
   }
 }

@@ -13,7 +13,7 @@ from ..jobs import reading
 from ..state import PLANES
 from . import stresses
 from .hints import term
-from .parts import MOVES, TabView, chosen, figure, note, together
+from .parts import MOVES, TabView, figure, folded, note, question, together
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
 
@@ -31,22 +31,23 @@ COMING = "The states come as they are found; the first few tell how to look at t
 GROWS = "The states come as they are found; the exact outline of S follows."
 
 COMPUTED = (
-    "<details><summary>How was this computed?</summary>{found.programs} linear programs, one for "
-    "each direction, in {found.seconds:.1f} s: the outline is known to {found.gap:.1g} ⟨fₙ⟩. The "
-    "inner half is the outline shrunk to half its lengths about its middle.</details>"
+    " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
+    "it is known to {found.gap:.1g} ⟨fₙ⟩. The inner half is the outline shrunk to half its lengths "
+    "about its middle."
 )
 
 # No taller than the window leaves room for, where it has all of its width.
 WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 230px))"}
 
 LEAD = (
-    "<b>A shadow of all possible networks</b>{flattened}. Each dot is one network; the red one, "
-    '"now", is the one on screen: drag it, and the forces follow.'
+    "<b>Every network of forces that holds these disks lies in the shaded area</b>{flattened}. "
+    "Each dot is one network, and dots far apart differ much. The red dot is the network on "
+    "screen: drag it, and the forces in the packing follow."
 )
-HELP = f"""
-Shown is the shadow ({term("principal", "projection")}) that {term("s")} casts on a plane, not a
-section: the shaded {term("outline")} holds all of it.
-"""
+HELP = (
+    f"Shown is the shadow ({term('principal', 'projection')}) that {term('s')} casts on a plane, "
+    f"not a section: the shaded {term('outline')} holds all of it."
+)
 
 
 class View(TabView):
@@ -65,7 +66,7 @@ class View(TabView):
         self.figure = self._figure()
         if state.second is not None and state.axes == "principal":
             state.axes = "pair"
-        self.planes = chosen(PLANES, state, "axes")
+        self.planes = question("Shown", PLANES, state, "axes")
         self.task, self.placing = state.task(told=False), state.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
         self.others, self.other = state.task(), None  # who finds the other states; their Replay
@@ -82,12 +83,12 @@ class View(TabView):
         """Choice of the plane, plot, and what it says."""
         return pn.Column(
             self.lead,
-            pn.FlexBox(self.planes, self.also, sizing_mode="stretch_width"),
+            self.planes,
             pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0, styles=WHOLLY_SEEN),
             Progress(self.task),
-            Progress(self.others),
             self.told,
-            note(HELP),
+            self.also,
+            Progress(self.others),
             sizing_mode="stretch_width",
         )
 
@@ -284,8 +285,7 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         h, inner = replay.summary["dimension"], planes.inner_share(path, found.outer)
         words = (
-            f"Shaded: the exact outline of S in this plane. The {len(path)} states shown span "
-            f"{part[0]:.0%} of it across, {part[1]:.0%} upwards and {area:.1%} of its area; "
+            f"The {len(path)} dots span {part[0]:.0%} of the area across, {part[1]:.0%} upwards; "
             f"<b>{inner:.0%} of them lie in its inner half</b>"
         )
         if self.other is not None and len(self.beside.data["x"]):
@@ -298,7 +298,8 @@ class View(TabView):
                 f" That is no failure to explore: S is a body of {h} dimensions, and nearly all "
                 "volume of such a body casts its shadow near the middle."
             )
-        self.told.object = words + COMPUTED.format(found=found)
+        share = f" The dots fill {area:.1%} of its area{_variance(found.plane)}."
+        self.told.object = words + folded(HELP + share + COMPUTED.format(found=found))
 
     @property
     def other_kind(self):
@@ -331,7 +332,7 @@ class View(TabView):
         )
         fig.patch(
             "x", "y", source=self.outer, fill_color=PALE, fill_alpha=0.35, line_color=DARK,
-            line_width=1.6, legend_label="outline of S",
+            line_width=1.6, legend_label="possible",
         )  # fmt: skip
         fig.patch("x", "y", source=self.inner, fill_alpha=0, line_color=DARK, line_alpha=0.4)
         outlines = list(fig.renderers)
@@ -342,7 +343,13 @@ class View(TabView):
             legend_label="beside",
         )  # fmt: skip
         states = fig.scatter(
-            "x", "y", source=self.path, size=5, color=STATES, alpha=0.9, legend_label="states"
+            "x",
+            "y",
+            source=self.path,
+            size=5,
+            color=STATES,
+            alpha=0.9,
+            legend_label="networks found",
         )
         fig.scatter(
             "x", "y", source=self.original, marker="diamond", size=15, color=ORIGINAL,
@@ -365,8 +372,16 @@ class View(TabView):
 
 def _lead(free):
     """What the plane shows of a space with so many dimensions."""
-    flattened = f": {free} directions flattened to 2" if free > 2 else ""
+    flattened = f", {free} free numbers flattened to 2" if free > 2 else ""
     return LEAD.format(flattened=flattened)
+
+
+def _variance(plane):
+    """How much of the states' scatter goes along the axes, where that was asked of them."""
+    if not np.isfinite(plane.share).all():
+        return ""
+    across, up = plane.share
+    return f", and {across:.0%} of their variance goes across, {up:.0%} upwards"
 
 
 def _shown(state, cell):

@@ -1,7 +1,8 @@
 // S of a small scene in its true shape: a segment, a polygon, or a body that turns in the hand, with
 // the network on screen as a point in it. With more dimensions, its shadow.
 
-import { dot, solve } from "./body.js"
+import { distance, dot, solve } from "./body.js"
+import { drawCompass, drawName } from "./compass.js"
 import { Easel } from "./easel.js"
 import { drawSegment, signOf } from "./line.js"
 import { drawInterval, drawShadow } from "./shadow.js"
@@ -283,6 +284,9 @@ export class Space {
       if (long > 14 || lit) this.besides(x + on * ux, y + on * uy, ux, uy, words, lit)
       this.labels.push({ side, a, b, reach: 14 })
     }
+    if (places.length < 3) return // a line among two dimensions
+    drawName(this, places, middle)
+    drawCompass(this, places)
   }
 
   /** Words outside a side at (x, y), u its normal: along it where they can be read so, else beside it. */
@@ -395,10 +399,4 @@ function within(points, px, py) {
     if (y > py !== v > py && px < ((u - x) * (py - y)) / (v - y) + x) inside = !inside
   })
   return inside
-}
-
-export function distance([ax, ay], [bx, by], px, py) {
-  const [dx, dy] = [bx - ax, by - ay], size = dx * dx + dy * dy || 1
-  const s = Math.max(0, Math.min(1, ((px - ax) * dx + (py - ay) * dy) / size))
-  return Math.hypot(px - ax - s * dx, py - ay - s * dy)
 }

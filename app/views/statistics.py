@@ -10,11 +10,15 @@ from ..jobs import reading
 from ..state import AXES, FIGURES
 from . import studied
 from .packing import exact_intervals
-from .parts import TabView, chosen, figure, note
+from .parts import TabView, chosen, figure, folded, note, question
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
 LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
+EACH = (
+    "<b>Each dot is one contact:</b> the farther up, the less its force is determined; the farther "
+    "right, the stronger it is. Click a dot to find its contact in the packing."
+)
 
 
 class View(TabView):
@@ -24,7 +28,8 @@ class View(TabView):
 
     def __init__(self, state):
         super().__init__(state, "replay", "exact", "catalogue")
-        self.what, self.scale = chosen(FIGURES, state, "figure"), chosen(AXES, state, "axis")
+        self.what = question("Question", FIGURES, state, "figure")
+        self.scale = chosen(AXES, state, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.lead, self.told = note(), note()
         self.task = state.task(reading)
@@ -68,7 +73,8 @@ class View(TabView):
         if what in ("scatter", "force"):
             self.bar.visible = False
             draw = self._scatter if what == "scatter" else self._force
-            self.plots.objects = [_pane(draw(state.replay))]
+            fig, self.lead.object, self.told.object = draw(state.replay)
+            self.plots.objects = [_pane(fig)]
             return
         log = self.scale.value == "log"
         cells = distributions.alike(state.catalogue, state.cell) or [state.cell]
@@ -120,14 +126,20 @@ class View(TabView):
     # Of the states on screen
 
     def _scatter(self, replay):
-        """ΔF_n against the original f_n, one point a contact; a tap selects the contact."""
+        """ΔF_n against the original f_n, one point a contact: figure, lead and small print.
+
+        A tap selects the contact.
+        """
         original = replay.normal[0]
         seen = (replay.high - replay.low)[:, 0]
         exact = exact_intervals(self.state.exact, replay)
-        fig = figure("extent_against_force", None, "original fₙ / ⟨fₙ⟩", "ΔFₙ / ⟨fₙ⟩", height=380)
-        layers = [("of the states", seen, DARK, 4.5)]
+        fig = figure(
+            "extent_against_force", None, "normal force fₙ in the original network, in mean forces",
+            "length ΔFₙ of its interval, in mean forces", height=380,
+        )  # fmt: skip
+        layers = [("seen in the states", seen, DARK, 4.5)]
         if exact:
-            layers.insert(0, ("exact", exact["high"] - exact["low"], PALE, 6))
+            layers.insert(0, ("possible (exact)", exact["high"] - exact["low"], PALE, 6))
         for label, extent, colour, size in layers:
             source = ColumnDataSource(
                 {"x": original, "y": extent.astype(np.float32), "contact": replay.backbone}
@@ -146,11 +158,10 @@ class View(TabView):
         self._mark()
         legend_above(fig)
         corner(fig, "exact pale, seen dark" if exact else "seen by the states")
-        values = [f"of the states {replay.summary['correlation']:.2f}"]
+        values = [f"{replay.summary['correlation']:.2f} of what was seen"]
         if exact:
-            values.append(f"exact {self.state.exact['correlation'].item():.2f}")
-        self.told.object = f"Correlation of fₙ with ΔFₙ: {', '.join(values)}."
-        return fig
+            values.append(f"{self.state.exact['correlation'].item():.2f} of what is possible")
+        return fig, EACH, folded(f"Correlation of fₙ with ΔFₙ: {', '.join(values)}.")
 
     def _select(self, source, indices):
         if indices:
@@ -167,10 +178,11 @@ class View(TabView):
         self.chosen.data = {"x": x, "y": y}
 
     def _force(self, replay):
-        """P(f_n) of the original network and of all states shown."""
+        """P(f_n) of the original network and of all states shown: figure, lead and small print."""
         log = self.scale.value == "log"
         fig = figure(
-            "force_distribution", None, "fₙ / ⟨fₙ⟩", "P(fₙ)", height=380,
+            "force_distribution", None, "normal force fₙ, in mean forces",
+            "how often, P(fₙ)", height=380,
             y_axis_type="log" if log else "linear",
         )  # fmt: skip
         several = len(replay.normal) > 1
@@ -193,12 +205,17 @@ class View(TabView):
                 fig.scatter(middle, height, color=colour, size=5)
         legend_above(fig)
         corner(fig, "measured: of the states shown")
-        beyond = float(np.mean(replay.normal > LARGEST))
-        self.told.object = (
+        beyond, weak = np.mean(replay.normal > LARGEST), np.mean(replay.normal < 1)
+        lead = (
+            f"<b>{weak:.0%} of the forces are smaller than the mean force</b>, the largest "
+            f"{replay.normal.max():.1f} times as large. Yellow: the original network; pale: all "
+            "networks shown."
+        )
+        text = (
             f"{len(replay.normal) - 1} states of {replay.normal.shape[1]} contacts; "
             f"{beyond:.2%} of the forces lie beyond the axis."
         )
-        return fig
+        return fig, lead, folded(text)
 
 
 def _pane(fig):
@@ -213,9 +230,8 @@ def over_friction(library, cells, mu, what, log):
         rows = distributions.rows(cells)
         exact = distributions.exact_rows(library, cells)
         job.begin("drawing")
-        drawn, text = DRAWN[what](rows, exact, mu, log)
-        lead = studied.most_undetermined(rows) if what == "eta" else ""
-        return drawn, lead, text + studied.claims(what)
+        drawn, lead, text = DRAWN[what](rows, exact, mu, log)
+        return drawn, lead, folded(text) + studied.claims(what)
 
     return work
 

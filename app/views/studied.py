@@ -14,7 +14,11 @@ from .labels import labels
 from .parts import figure
 from .style import SERIES, corner, hover, legend_above
 
-MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
+MEASURES = (
+    ("eta1", "spread η1", 1.0),
+    ("eta2", "distance η2", 1.0),
+    ("eta3", "0.15 × range η3", 0.15),
+)
 # Parts of the study, and what they are called.
 SAMPLERS = {
     "walk": "random walk",
@@ -23,13 +27,14 @@ SAMPLERS = {
     "exact": "exact",
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
-OWN = "precomputed results"
+OWN = "on this page"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
-CLAIMS = """<table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
-says, and what the study found, with its 95 % interval</caption>{}</table>{}"""
+CLAIMS = """<details><summary>What the paper says, and what was found here</summary>
+<table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
+says, and what the study found, with its 95 % interval</caption>{}</table>{}</details>"""
 CLAIM = "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>"
 VERDICTS = {"reproduced": "✓", "differs": "≈", "not reproduced": "✗"}
 # Whose numbers a claim is judged by.
@@ -41,7 +46,7 @@ JUDGED = {
     "exact": "exact",
     "": "perturbed contacts",
 }
-RINGS = f"rings: {term('store', OWN)} made like those on screen"
+RINGS = f"open symbols: {term('store', 'precomputed results')} made like those on screen"
 STUDY = f"lines: means over the packings of {term('study', 'the study')}, bars their standard error"
 
 
@@ -77,14 +82,14 @@ def written(text):
 def indeterminacy(own, exact, log):
     """η against μ by the walk, 0.15 η3 by all samplers, and z: three figures."""
     kind = {"y_axis_type": "log" if log else "linear"}
-    etas = _over_mu("indeterminacy", "η", 310, **kind)
+    etas = _over_mu("indeterminacy", "how undetermined, η (0: not at all)", 310, **kind)
     for k, (name, label, factor) in enumerate(MEASURES):
         look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
         _line(etas, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
     for k, (name, _, factor) in enumerate(MEASURES):
         _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
-    corner(etas, "measured: of the random walk's states; open symbols: of this page")
-    seen = _over_mu("samplers", "0.15 η3", 270, **kind)
+    corner(etas, "measured: of the random walk's states")
+    seen = _over_mu("samplers", "0.15 × range η3", 270, title="Found in several ways", **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
         look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
         points = statistics.means(studied.rows(part), "eta3", factor=0.15)
@@ -92,7 +97,8 @@ def indeterminacy(own, exact, log):
     _own(seen, statistics.means(own, "eta3", factor=0.15), log, COLOURS[0], MARKERS[0])
     _own(seen, statistics.means(exact, "eta3", factor=0.15), log, COLOURS[3], MARKERS[3])
     corner(seen, "dashed exact, others measured")
-    z = _over_mu("coordination", "contacts per disk z", 220)
+    why = "Why it falls again: with more friction, packings have fewer contacts"
+    z = _over_mu("coordination", "contacts per disk z", 220, title=why)
     _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
     _own(z, statistics.means(own, "coordination"), False, COLOURS[0])
     corner(z, "measured: of the packings")
@@ -105,11 +111,11 @@ def indeterminacy(own, exact, log):
         "widens what each contact may carry, but a packing made with more of it has fewer contacts "
         "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ "
         "has its own packing. A tap on a point shows the states of that μ, or asks for them. The "
-        f"second figure: 0.15 η3 of the {term('walk', 'random walk')}, of the "
+        f"last figure: 0.15 η3 of the {term('walk', 'random walk')}, of the "
         f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')} to two unbalances, of states "
         f"{term('uniform')}, and {term('exact', 'exact')}."
     )
-    return [etas, seen, z], text
+    return [etas, z, seen], most_undetermined(own), text
 
 
 def most_undetermined(own):
@@ -122,15 +128,16 @@ def most_undetermined(own):
     where = " to ".join(f"{mu:g}" for mu in dict.fromkeys((peaks[0], peaks[-1])))
     many, few = (max(Counter(row["mu"] for row in part).values()) for part in (walks, own))
     return (
-        f"<b>How undetermined are the forces? Most at friction {where}.</b> Filled symbols are "
-        f"means over {many} packings at each friction, open ones over {few} on this page: "
-        "packings made alike differ."
+        f"<b>Forces are least determined at friction {where}.</b> Each point: by how much the "
+        "forces of a packing made with this friction can differ, as a part of the mean force. "
+        f"Filled: means over {many} packings; open: over {few} on this page, as packings made "
+        "alike differ. Grey: the friction on screen."
     )
 
 
 def correlations(own, exact):
     """corr(f_n, ΔF_n) against μ."""
-    fig = _over_mu("correlation", "corr(fₙ, ΔFₙ)", 380)
+    fig = _over_mu("correlation", "correlation of fₙ and ΔFₙ", 380)
     for k, part in enumerate(("walk", "uniform", "exact")):
         look = {"log": False, "colour": COLOURS[k], "marker": MARKERS[k]}
         points = statistics.means(studied.rows(part), "correlation")
@@ -145,7 +152,21 @@ def correlations(own, exact):
         f"{term('original', 'original')} fₙ with the extent {term('extent', 'ΔFₙ')}; {STUDY}; "
         f"{RINGS}."
     )
-    return [fig], text
+    return [fig], strong_and_undetermined(), text
+
+
+def strong_and_undetermined():
+    """Between which values the walk's correlation lies, in words; empty without a study."""
+    points = statistics.means(studied.rows("walk"), "correlation")
+    if not points:
+        return ""
+    values = [value for _, value, _ in points]
+    peak = max(points, key=lambda point: point[1])[0]
+    return (
+        f"<b>Over all frictions the correlation lies between {min(values):.2f} and "
+        f"{max(values):.2f}, largest at {peak:g}.</b> 1: the strongest contacts are the least "
+        "determined ones; 0: strength says nothing about it."
+    )
 
 
 def extents(groups, mu, log):
@@ -154,8 +175,9 @@ def extents(groups, mu, log):
     groups: {μ: extents} of the packings on the page.
     """
     fig = figure(
-        "extents", None, "ΔFₙ / ⟨fₙ⟩", "P(ΔFₙ)", height=400, y_axis_type="log" if log else "linear"
-    )
+        "extents", None, "length ΔFₙ of a contact's interval, in mean forces",
+        "how often, P(ΔFₙ)", height=400, y_axis_type="log" if log else "linear",
+    )  # fmt: skip
     table = studied.study()
     known = {} if table is None else table.extents("walk")
     curves = [(value, known[value], f"μ = {value:g}") for value in SHOWN if value in known]
@@ -164,15 +186,16 @@ def extents(groups, mu, log):
     largest = max((np.quantile(np.concatenate(g), 0.995) for _, g, _ in curves), default=1.0)
     edges = np.linspace(0, largest, 31)
     middle = (edges[1:] + edges[:-1]) / 2
+    tails = []
     for k, (_, group, label) in enumerate(curves):
         values = np.concatenate(group)
         height = statistics.density(values, edges)
         height = np.where(height > 0, height, np.nan) if log else height
         mine = label.endswith(OWN)
-        b = statistics.tail_exponent(values)
+        tails.append(f"{label}: b = {statistics.tail_exponent(values):.2f}")
         look = {
             "color": "#b5236b" if mine else COLOURS[k],
-            "legend_label": f"{label} (b = {b:.2f})",
+            "legend_label": label,
         }
         fig.line(middle, height, line_width=3 if mine else 1.6, **look)
         fig.scatter(middle, height, size=5, marker=MARKERS[k % 4], **look)
@@ -183,20 +206,28 @@ def extents(groups, mu, log):
         "How the extents ΔFₙ of the normal forces are distributed, in units of the mean force. b: "
         "beyond the median the tail falls like exp(−(λx)ᵇ); b = 1 is exponential, larger b falls "
         f"faster. Thin: ten packings of {term('study', 'the study')} each; thick: {OWN} made like "
-        "those on screen."
+        f"those on screen. {'; '.join(tails)}."
     )
-    return [fig], text
+    lead = "" if mu not in groups else (
+        f"<b>At friction {mu:g} one contact's force differs by "
+        f"{np.mean(np.concatenate(groups[mu])):.2f} mean forces on average</b> between the "
+        "networks seen. Each curve is one friction: how many contacts have how long an interval."
+    )  # fmt: skip
+    return [fig], lead, text
 
 
 def responses(own):
     """⟨F_crit⟩ and α against η2, joined in order of μ: the study, and on top own rows."""
     table = studied.study()
     study = [] if table is None else table.answers()
-    force = figure("critical_force", None, "η2", "force / ⟨fₙ⟩", height=300)
-    _against_eta2(force, study, {"critical_force": "critical force", "limit_load": "limit load"})
+    across = "how undetermined the forces are, η2"
+    force = figure("critical_force", None, across, "push, in mean forces", height=300)
+    lines = {"critical_force": "gives way at (critical force)", "limit_load": "limit load"}
+    _against_eta2(force, study, lines)
     for k, name in enumerate(("critical_force", "limit_load")):
         _own(force, _pairs(own, name), False, COLOURS[k], MARKERS[k])
-    alpha = figure("decay", None, "η2", "decay exponent α", height=280)
+    title = "How fast the motion fades with distance: |u| ~ r⁻ᵅ"
+    alpha = figure("decay", title, across, "decay exponent α", height=280)
     _against_eta2(alpha, study, {"decay_exponent": "α"})
     known = [row for row in own if np.isfinite(row["decay_exponent"])]
     _own(alpha, _pairs(known, "decay_exponent"), False, COLOURS[0], MARKERS[0])
@@ -213,7 +244,12 @@ def responses(own):
         f"{term('study', 'the study')} with 30 contacts each, bars standard errors; {RINGS} "
         f"({len(own)})."
     )
-    return [force, alpha], text
+    lead = (
+        "<b>How hard a contact can be pushed, critical force against η2:</b> each point is the "
+        "mean over packings of one friction μ, written beside it, and the line goes from the least "
+        "to the largest friction."
+    )
+    return [force, alpha], lead, text
 
 
 def _pairs(rows, name):
@@ -244,8 +280,8 @@ def _against_eta2(fig, rows, lines):
     )  # fmt: skip
 
 
-def _over_mu(name, label, height, **options):
-    fig = figure(name, None, "friction μ", label, height=height, x_axis_type="log", **options)
+def _over_mu(name, label, height, title=None, **options):
+    fig = figure(name, title, "friction μ", label, height=height, x_axis_type="log", **options)
     fig.xaxis.ticker = FixedTicker(ticks=DECADES)
     fig.xaxis.major_label_overrides = {mu: f"{mu:g}" for mu in DECADES}
     fig.xaxis.major_label_overrides |= {1e-5: "10⁻⁵", 1e-4: "10⁻⁴"}

@@ -1,4 +1,5 @@
-// The tour's card at the lower edge of the page that it speaks of, beside or below that.
+// The tour's card at the lower edge of the page that it speaks of, beside or below that; large beside
+// the packing while there is nothing else.
 
 import { ask } from "./ask.js"
 
@@ -45,6 +46,7 @@ export function render({ model, view }) {
     const { step } = model, steps = model.steps
     clear(step)
     card.hidden = !step
+    card.classList.toggle("alone", ALONE.includes(step))
     part(".begin").hidden = Boolean(step)
     if (step !== shown) { ring.hidden = true; pointed = null }
     if (!step) { shown = 0; return }
@@ -106,6 +108,7 @@ export function render({ model, view }) {
     const left = Math.max(box.left, 0), right = Math.min(box.right, window.innerWidth)
     const bottom = Math.min(box.bottom, window.innerHeight)
     ring.hidden = bottom <= top || right <= left
+    card.style.setProperty("--beside-it", `${right}px`)
     Object.assign(ring.style, {
       left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px`,
     })

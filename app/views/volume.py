@@ -4,6 +4,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from .. import compute
+from .parts import PLAIN
 from .summary import STYLE, TILE
 
 # Words, name in the dataset, form, and key of the glossary.
@@ -21,9 +22,10 @@ class Volume:
         self.state, self.found = state, None
         self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
         self.measure = pmui.Button(
-            label="Measure the volume of S",
-            variant="outlined",
+            label="How many networks are there? Measure the volume of S",
+            variant="text",
             color="default",
+            sx=PLAIN,
             size="small",
             margin=(4, 10),
         )

@@ -246,7 +246,7 @@ def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
     page = visit("?tab=statistics" if focused == "toggle" else "")
     clicked = {
         "tab": page.get_by_role("tab", name="Intervals"),
-        "toggle": page.get_by_role("button", name="forces fₙ", exact=True),
+        "toggle": page.get_by_role("button", name="logarithmic", exact=True),
         "switch": page.get_by_label("Strong and undetermined contacts"),
     }[focused]
     clicked.click()
@@ -326,7 +326,7 @@ def middles(page, count):
 
 def test_two_contacts_are_chosen_in_the_packing_and_both_are_marked(visit):
     page = visit("?tab=plane")
-    page.get_by_role("button", name="fₙ of two contacts").click()
+    page.get_by_role("combobox", name="Shown").select_option("pair")
     page.get_by_text("Now click a second contact").wait_for()
     handle = page.locator(".scene").element_handle()
     page.wait_for_function("e => e.scene.selected !== null", arg=handle)
@@ -341,8 +341,8 @@ def test_two_contacts_are_chosen_in_the_packing_and_both_are_marked(visit):
         """() => [...Bokeh.documents[0]._all_models.values()]
             .filter((m) => m.type === "LinearAxis").map((m) => m.axis_label)"""
     )
-    assert f"fₙ of contact {backbone[a]} / ⟨fₙ⟩" in axes
-    assert f"fₙ of contact {backbone[b]} / ⟨fₙ⟩" in axes
+    assert f"normal force fₙ of contact {backbone[a]}, in mean forces" in axes
+    assert f"normal force fₙ of contact {backbone[b]}, in mean forces" in axes
     searched(page, f"second={a}")
 
 
@@ -370,7 +370,7 @@ def test_legends_lie_where_no_curve_goes(visit, tab):
 
 def test_ticks_of_friction_stand_apart(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("How undetermined the forces are").wait_for()
+    page.get_by_text("Forces are least determined at friction").wait_for()
     page.wait_for_function(
         "() => [...Bokeh.documents[0]._all_models.values()]"
         ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
@@ -389,9 +389,9 @@ def test_ticks_of_friction_stand_apart(visit):
 def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, folder):
     page = visit("?tab=perturb&contact=5")
     page.get_by_role("button", name="Push", exact=True).click()
-    page.get_by_text("The critical force lies between").wait_for()
+    page.get_by_text("the packing gives way:").wait_for()
     page.get_by_role("tab", name="Statistics").click()
-    page.get_by_text("How undetermined the forces are").wait_for()
+    page.get_by_text("Forces are least determined at friction").wait_for()
     assert "already known" not in (folder / "log").read_text()
 
 
@@ -408,10 +408,10 @@ def test_the_report_goes_when_another_file_is_dropped(visit):
 
 def test_nothing_old_stands_under_a_new_statistic(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("How undetermined the forces are").wait_for()
-    page.get_by_role("button", name="correlation", exact=True).click()
-    page.get_by_text("How undetermined the forces are").wait_for(state="detached")
-    page.get_by_text("Whether strong contacts").wait_for()
+    page.get_by_text("Forces are least determined at friction").wait_for()
+    page.get_by_role("combobox", name="Question").select_option("correlation")
+    page.get_by_text("Forces are least determined at friction").wait_for(state="detached")
+    page.get_by_text("the correlation lies between").wait_for()
 
 
 # What is said must be so
@@ -432,7 +432,7 @@ def test_curves_of_the_shown_states_end_at_their_targets(visit):
 
 def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("How undetermined the forces are").wait_for()
+    page.get_by_text("Forces are least determined at friction").wait_for()
     assert page.get_by_role("cell", name="reproduced").count() >= 5
     most = page.evaluate(
         """() => Math.max(...[...Bokeh.documents[0]._all_models.values()]
