@@ -33,9 +33,9 @@ def test_small_packings_stand(block):
     assert not wrong and not undecided and done > 40  # packings of too few disks are refused
 
 
-@pytest.mark.parametrize("number", [118])
-def test_thin_spaces_stand(number):
-    """Where pivots of squares lose rows: a bounded S was called unbounded."""
+@pytest.mark.parametrize("number", [118, 276])
+def test_what_fell_stands(number):
+    """A bounded S was called unbounded; one bound without a certificate ended a ranking."""
     wrong, undecided, _ = judged([number])
     assert not wrong and not undecided
 

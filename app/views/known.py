@@ -93,7 +93,7 @@ def _ranks(best, number):
 
 def _worth(before, after, expected):
     """What knowing a contact would tell."""
-    if np.isnan(after):
+    if np.isnan(after) or np.isnan(before):
         return f"errors about {expected:.1%} smaller, by the states"
     return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"
 

@@ -20,8 +20,8 @@ class Informative(NamedTuple):
 
     contacts: Integers  # (k,) their numbers in the packing
     expected: Floats  # (k,) part by which the mean error of f_n falls, by covariance
-    before: float  # exact mean interval of f_n as it is, in ⟨f_n⟩; NaN where not computed
-    after: Floats  # (k,) the same once f_n of that contact is known; NaN where not computed
+    before: float  # exact mean interval of f_n as it is, in ⟨f_n⟩; NaN where not certified
+    after: Floats  # (k,) the same once f_n of that contact is known; NaN likewise, or not computed
 
     def _repr_html_(self) -> str:
         """The contacts as notebooks show them."""
@@ -92,10 +92,10 @@ def _expected(normal: Floats) -> Floats:
 
 
 def _mean_extent(ensemble: Ensemble, workers: int) -> float:
-    """Mean exact interval of f_n, in ⟨f_n⟩."""
+    """Mean exact interval of f_n, in ⟨f_n⟩; NaN where a bound has no certificate."""
     bounds = intervals(ensemble, workers=workers)
     cancelling.check("exact bounds")
     if not bounds.converged:
-        raise InputError(f"exact bounds not certified: largest gap {bounds.max_gap:.1e} ⟨f_n⟩")
+        return np.nan
     extent = measures.normal_extent(bounds.lower, bounds.upper)
     return float(extent.mean() / ensemble.force_scale)
