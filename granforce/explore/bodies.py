@@ -16,7 +16,8 @@ from scipy import sparse
 from scipy.spatial import HalfspaceIntersection
 
 from granforce import notebook
-from granforce.explore.walls import inner_point, null_space
+from granforce.explore.thin import null_space
+from granforce.explore.walls import inner_point
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import certificates
 from granforce.records import Floats, InputError, Integers, Packing

@@ -14,6 +14,7 @@ from scipy import linalg
 from granforce.numerics.wall_matrix import DEPENDENT
 from granforce.records import Floats, Integers
 from granforce.system import cancelling
+from granforce.tolerances import FLAT
 
 
 class ThinMatrix(NamedTuple):
@@ -41,13 +42,23 @@ class ThinMatrix(NamedTuple):
         return found
 
 
-def thin_matrix(balance: Floats, moving: Integers, levers: Floats, weight: Floats) -> ThinMatrix:
-    """The ThinMatrix of a balance (rows, w) of relative slacks; weight (2 N_c,): W on levers."""
-    left, values, right = cancelling.apart(np.linalg.svd, balance)
-    rank = int(np.sum(values > DEPENDENT * values.max(initial=0.0)))
-    null = right[rank:].T
+def thin_matrix(
+    balance: Floats, y: Floats, moving: Integers, levers: Floats, weight: Floats
+) -> ThinMatrix:
+    """The ThinMatrix at y (w,), of its balance (rows, w); weight (2 N_c,): W on levers.
+
+    Which rows follow from others is told before they are weighted by y: that may be 10⁻⁹.
+    """
+    free = null_space(balance, DEPENDENT)
+    null = cancelling.apart(np.linalg.qr, free / y[:, None])[0]
     along = levers @ null
     H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
     root = linalg.solve_triangular(np.linalg.cholesky(H), null.T, lower=True).T
-    inverse = (right[:rank].T / values[:rank]) @ left[:, :rank].T
+    inverse = cancelling.apart(np.linalg.pinv, balance * y, DEPENDENT)
     return ThinMatrix(moving, null, root, levers, inverse)
+
+
+def null_space(dense: Floats, least: float = FLAT) -> Floats:
+    """Orthonormal (n, h) of a matrix (rows, n), by singular values below a part of the largest."""
+    _, values, rows = cancelling.apart(np.linalg.svd, dense)
+    return rows[int(np.sum(values > least * values.max(initial=0.0))) :].T

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from granforce.explore.billiard import LANES
-from granforce.explore.thin import ThinMatrix, thin_matrix
+from granforce.explore.thin import ThinMatrix, null_space, thin_matrix
 from granforce.forces import knowledge
 from granforce.forces.contact_problem import (
     MOST_DENSE,
@@ -301,13 +301,14 @@ def _thin_metric(frame: _Frame, y: Floats) -> _ThinMetric:
         levers[2 * frame.contact[cones] + k, cones] = 0.5 * frame.normal[cones, k] * y[cones]
     if frame.ensemble.mu == 0:
         levers *= 2.0
-    balance = _balance_of_slacks(frame.ensemble, y, moving)
-    return _ThinMetric(frame, thin_matrix(balance, moving, levers[:, moving], frame.weight.ravel()))
+    weight = frame.weight.ravel()
+    balance = _balance(frame.ensemble, moving)
+    return _ThinMetric(frame, thin_matrix(balance, y[moving], moving, levers[:, moving], weight))
 
 
-def _balance_of_slacks(ensemble: Ensemble, y: Floats, moving: Integers) -> Floats:
-    """The balance (rows, w) of relative slacks."""
-    return ensemble.scaled_form[0].tocsc()[:, moving].toarray() * y[moving]
+def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
+    """The balance (rows, w) of what moves."""
+    return ensemble.scaled_form[0].tocsc()[:, moving].toarray()
 
 
 def _is_thin(frame: _Frame, y: Floats) -> bool:
@@ -323,11 +324,11 @@ def _is_thin(frame: _Frame, y: Floats) -> bool:
         return True
     g = np.random.default_rng(0).standard_normal((PROBES, at.matrix.contact.size))
     change = wall_matrix.moved(at.matrix, g, None, _POLISH)[:, : len(at.moving)]
-    balance = _balance_of_slacks(ensemble, y, at.moving)
-    if not np.abs(change @ balance.T).max(initial=0.0) <= BALANCED / 10:
+    balance = _balance(ensemble, at.moving)
+    if not np.abs(change @ (balance * y[at.moving]).T).max(initial=0.0) <= BALANCED / 10:
         return True
     h, _ = _shape(frame, _barrier(frame, y), np.where(frame.stiff < PINNED, 0.0, PINNED))
-    return h <= _THIN and h != null_space(A.toarray()[:, at.moving]).shape[1]
+    return h <= _THIN and h != null_space(balance).shape[1]
 
 
 def _centred(
@@ -396,13 +397,6 @@ def _walls(frame: _Frame, y: Floats, thin: ThinMatrix | None) -> Walls:
         units=units,
         thin=thin,
     )
-
-
-def null_space(dense: Floats) -> Floats:
-    """Orthonormal (n, h) of a matrix (rows, n), by singular values."""
-    _, values, rows = np.linalg.svd(dense)
-    rank = int(np.sum(values > FLAT * values.max(initial=0.0)))
-    return rows[rank:].T
 
 
 def _shape(frame: _Frame, curvature: Floats, stiff: Floats) -> tuple[int, float]:
