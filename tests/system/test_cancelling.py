@@ -91,8 +91,9 @@ def moving(S):
 
 def long_program(solver):
     n = 20_000
-    A = sparse.random(n, 2 * n, 6 / n, format="csc", rng=np.random.default_rng(1))
-    A = sparse.csc_matrix(A + sparse.eye(n, 2 * n))
+    rng = np.random.default_rng(1)
+    places = rng.integers(0, [[n], [2 * n]], (2, 12 * n))
+    A = sparse.csc_matrix((rng.random(12 * n), places), (n, 2 * n)) + sparse.eye(n, 2 * n)
     model = programs.standard_form(A, A @ np.ones(2 * n), solver=solver)
     programs.set_cost(model, 1 + np.random.default_rng(0).standard_normal(2 * n))
     programs.optimal(model)
