@@ -45,6 +45,14 @@ def rng():
 
 
 @pytest.fixture
+def away(tmp_path, monkeypatch):
+    """The folder of a test, which works in there, with a store of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    return tmp_path
+
+
+@pytest.fixture
 def nobody():
     """Rights of an ordinary user, for whom mode bits hold, also where the tests run as root."""
     if os.geteuid() != 0:
