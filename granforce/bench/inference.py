@@ -59,7 +59,8 @@ def _timed(
     solve: Callable[..., Floats | None], S: Ensemble, m: Floats, sigma: Floats, repeats: int
 ) -> tuple[float, Floats | None]:
     """The least seconds of some runs, after one that compiles, and the forces; None in time."""
-    taken, forces = [], None
+    taken: list[float] = []
+    forces: Floats | None = None
     for _ in range(repeats + 1):
         seconds, forces = timed(solve, S, m, sigma)
         taken.append(seconds)
