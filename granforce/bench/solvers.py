@@ -138,7 +138,7 @@ def contact_updates(
     for _ in range(2):  # kernels are compiled in the first
         for lane, start in enumerate(kicked(S, LANES, 0)):
             beside.begin(lane, start)
-        seconds, _ = timed(beside.ended)
+        seconds = timed(beside.ended)[0]
     ns = 1e9 * seconds / (beside.sweeps.sum() * len(S.index))
     told = f"{LANES} relaxations side by side"
     rows = [alone, {**alone, "ns_per_update": ns, "ratio": each / ns, "note": told}]
