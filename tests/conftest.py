@@ -15,10 +15,10 @@ from granforce.system.compiled import are_kept
 settings.register_profile("same", derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
-# What makes packings, and all else: each takes half of the time to compile.
+# What makes and pushes packings, and all else: each takes half of the time to compile.
 KERNELS = (
-    "warm_up(set())",
-    "import packings; warm_up(packing=packings.reference('n100_mu0.1_s11'))",
+    "warm_up({kinds.PERTURBATION})",
+    "warm_up(set(kinds.KINDS.values()) - {kinds.PERTURBATION}, reference('n100_mu0.1_s11'))",
 )
 
 
@@ -27,13 +27,13 @@ def pytest_configure(config):
     is_worker, count = hasattr(config, "workerinput"), config.getoption("numprocesses", 0)
     if is_worker or not count or config.option.collectonly or are_kept("flow.until_one_ends"):
         return
-    begin = "from granforce.study.scan import warm_up; "
-    paths = os.pathsep.join([str(config.rootpath), str(config.rootpath / "tests")])
+    begin = "from packings import reference\nfrom granforce.study.scan import kinds, warm_up\n"
+    paths = os.pathsep.join(str(config.rootpath / folder) for folder in (".", "tests"))
     both = [
         subprocess.Popen(
-            [sys.executable, "-c", begin + rest], env=os.environ | {"PYTHONPATH": paths}
+            [sys.executable, "-c", begin + half], env=os.environ | {"PYTHONPATH": paths}
         )
-        for rest in KERNELS
+        for half in KERNELS
     ]
     for process in both:
         process.wait()
@@ -42,6 +42,14 @@ def pytest_configure(config):
 @pytest.fixture
 def rng():
     return np.random.default_rng(20090501)
+
+
+@pytest.fixture
+def away(tmp_path, monkeypatch):
+    """The folder of a test, which works in there, with a store of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    return tmp_path
 
 
 @pytest.fixture

@@ -75,12 +75,10 @@ def commands(document):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(away):
     """A folder with the files that the commands name, and a store of its own."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
     for name in ("particles", "contacts"):
-        shutil.copy(f"{LAMMPS}.{name}.dump", tmp_path / f"{name}.dump")
+        shutil.copy(f"{LAMMPS}.{name}.dump", away / f"{name}.dump")
     packing = packed(30, 0.3)
     rows = np.column_stack([packing.x, packing.r])
     size = 30 / packing.box[0]  # the box that the command names
@@ -88,9 +86,9 @@ def folder(tmp_path, monkeypatch):
     pairs = np.column_stack([packing.contacts.i, packing.contacts.j])
     np.savetxt("contacts.csv", pairs, fmt="%d", delimiter=",", header="i,j", comments="")
     grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1)
-    frames.write(tmp_path, grains, rows)
-    (tmp_path / "data").mkdir()
-    return tmp_path
+    frames.write(away, grains, rows)
+    (away / "data").mkdir()
+    return away
 
 
 def test_the_readme_is_short_and_gives_the_commands_that_install():

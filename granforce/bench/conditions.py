@@ -3,17 +3,16 @@
 Both sides of each comparison get the same programs, and rows tell how far their answers are off.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from granforce.bench.exact import plain_loop
 from granforce.bench.inference import ERRORS, contact_program, piqp
-from granforce.bench.report import note
+from granforce.bench.report import note, timed
 from granforce.explore.intervals import intervals
 from granforce.explore.pull import pull
 from granforce.explore.uniform import sample_uniform
@@ -26,8 +25,6 @@ from granforce.records import Floats, Integers
 # Part of the contacts that are known, and how well; values of a pull, in parts of its interval.
 KNOWN_PART, KNOWN_WITHIN = 0.1, 0.1
 VALUES = np.linspace(0.05, 0.95, 8)
-
-T = TypeVar("T")
 
 
 def knowledge(
@@ -80,8 +77,8 @@ def _bounds(task: str, S: Ensemble, contacts: Integers) -> list[dict[str, Any]]:
     note(f"knowledge: {task}")
     intervals(S, contacts[:1])  # compiles
     S = replace(S)  # nothing is prepared
-    ours, found = _timed(intervals, S, contacts)
-    theirs, bounds = _timed(plain_loop, S, contacts)
+    ours, found = timed(intervals, S, contacts)
+    theirs, bounds = timed(plain_loop, S, contacts)
     # Between the value that is attained and the one that bounds it lies the optimum.
     beyond = np.abs([bounds[0] - found.lower, bounds[1] - found.upper]) / S.force_scale
     outside = np.maximum(beyond - np.moveaxis(found.gap, -1, 0), 0.0)
@@ -156,8 +153,8 @@ def _beside(
 ) -> list[dict[str, Any]]:
     """Rows of two ways to find the same networks, after one run that compiles."""
     ours()
-    taken, found = zip(*(_timed(ours) for _ in range(repeats)), strict=True)
-    taken_by, beside = zip(*(_timed(theirs) for _ in range(repeats)), strict=True)
+    taken, found = zip(*(timed(ours) for _ in range(repeats)), strict=True)
+    taken_by, beside = zip(*(timed(theirs) for _ in range(repeats)), strict=True)
     off = float(np.abs(found[0] - beside[0]).max() / S.force_scale)
     reached = np.array([squares(found[0]), squares(beside[0])])
     above = np.max(reached / reached.min(axis=0) - 1, axis=1)
@@ -173,9 +170,3 @@ def _beside(
 
 def _told(method: str, seconds: float, baseline: float) -> dict[str, Any]:
     return {"method": method, "seconds": seconds, "ratio": baseline / seconds}
-
-
-def _timed(action: Callable[..., T], *arguments: Any) -> tuple[float, T]:
-    begin = time.perf_counter()
-    result = action(*arguments)
-    return time.perf_counter() - begin, result

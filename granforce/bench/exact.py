@@ -1,7 +1,6 @@
 """Benchmark of the exact bounds against a plain loop over linear programs, and other tools."""
 
 import importlib.util
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
+from granforce.bench.report import timed
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import highs as programs
@@ -109,17 +109,13 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> dict[str,
 
 
 def _ours(system: Ensemble, data: Any, workers: int) -> dict[str, Any]:
-    begin = time.perf_counter()
-    found = intervals(system, workers=workers)
-    seconds = time.perf_counter() - begin
+    seconds, found = timed(intervals, system, workers=workers)
     error = _error(system, data, found.lower, found.upper)
     return {"seconds": seconds, "error": error, "gap": found.max_gap, "counts": found.counts}
 
 
 def _timed(method: Callable[..., Any], system: Ensemble, data: Any) -> dict[str, Any]:
-    begin = time.perf_counter()
-    lower, upper = method(system)
-    seconds = time.perf_counter() - begin
+    seconds, (lower, upper) = timed(method, system)
     return {"seconds": seconds, "error": _error(system, data, lower, upper)}
 
 

@@ -1,6 +1,5 @@
 """Inference: the likeliest network by the contact program, by PIQP and by HiGHS, in one run."""
 
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -8,7 +7,7 @@ import highspy
 import numpy as np
 from scipy import sparse
 
-from granforce.bench.report import note
+from granforce.bench.report import note, timed
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.likeliest import checked, fitted
@@ -60,11 +59,11 @@ def _timed(
     solve: Callable[..., Floats | None], S: Ensemble, m: Floats, sigma: Floats, repeats: int
 ) -> tuple[float, Floats | None]:
     """The least seconds of some runs, after one that compiles, and the forces; None in time."""
-    taken, forces = [], None
+    taken: list[float] = []
+    forces: Floats | None = None
     for _ in range(repeats + 1):
-        begin = time.perf_counter()
-        forces = solve(S, m, sigma)
-        taken.append(time.perf_counter() - begin)
+        seconds, forces = timed(solve, S, m, sigma)
+        taken.append(seconds)
         if taken[-1] > 5.0:
             break
     note(f"{solve.__name__}: {min(taken):.3g} s")

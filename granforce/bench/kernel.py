@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import exponent, note
+from granforce.bench.report import exponent, note, timed
 from granforce.bench.solvers import FRICTIONS, kicked, tile
 from granforce.explore.intervals import intervals, limit_loads
 from granforce.forces.contact_problem import make_problem
@@ -28,7 +28,6 @@ _PRODUCT = 54
 # Dense matrices multiplied on one core: the most that double precision gets here.
 _DENSE = """
 import time
-from collections.abc import Callable
 import numpy as np
 a = np.random.default_rng(0).random((1200, 1200))
 best = 1e9
@@ -82,9 +81,8 @@ def _factorisation(problem: Problem, lanes: Any) -> float:
         # Any positive definite matrix: its numbers do not change the work.
         work.factors.lower[:] = 0.0
         work.factors.lower[cholesky.diagonals(problem.network).ravel()] = 1.0
-        begin = time.perf_counter()
-        cholesky.factor(problem.network, work.least, work.factors, work.stop, lanes)
-        best = min(best, time.perf_counter() - begin)
+        arguments = problem.network, work.least, work.factors, work.stop, lanes
+        best = min(best, timed(cholesky.factor, *arguments)[0])
     return best
 
 
@@ -115,9 +113,9 @@ def starts(
             given = kicked(S, 2 * LANES, turn)
             found = {}
             for name, way in ways.items():
-                begin = time.perf_counter()
-                found[name] = np.stack([one.forces for one in way(given)])
-                spent[name].append((time.perf_counter() - begin) / len(given))
+                seconds, reached = timed(way, given)
+                found[name] = np.stack([one.forces for one in reached])
+                spent[name].append(seconds / len(given))
             worst = max(worst, *(np.abs(one - found["PIQP"]).max() for one in found.values()))
         piqp = np.median(spent["PIQP"][1:])
         for name in ways:
@@ -157,9 +155,7 @@ def pushes(
         seconds, found = {}, {}
         for name, way in ways.items():
             way(some[:3], loads[:3])  # compiles
-            begin = time.process_time()
-            found[name] = way(some, loads)
-            seconds[name] = time.process_time() - begin
+            seconds[name], found[name] = timed(way, some, loads, clock=time.process_time)
         alone, beside = ([one.low for one in each] for each in found.values())
         for name in ways:
             systems = sum(one.counts["linear_systems"] for one in found[name])
@@ -180,15 +176,12 @@ def growth(
     for k in tiles or ((1, 2, 4) if quick else (1, 2, 4, 8, 16)):
         note(f"growth: N = {n * k * k}")
         S = ensemble(tile(base, k), prune=False)
-        begin = time.perf_counter()
-        make_problem(S)
-        row = {"n": n * k * k, "setup": time.perf_counter() - begin}
+        row = {"n": n * k * k, "setup": timed(make_problem, S)[0]}
         start = kicked(S, 1, 0)[0]
         nearest(S, start, max_iterations=1)
         row["relaxation"] = nearest(S, start).seconds
-        begin = time.perf_counter()
-        found = intervals(S, S.index[:LANES])
-        row["bound"] = (time.perf_counter() - begin) / found.counts["programs"]
+        seconds, found = timed(intervals, S, S.index[:LANES])
+        row["bound"] = seconds / found.counts["programs"]
         row["max_gap"] = found.max_gap
         row["peak_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
         rows.append(row)

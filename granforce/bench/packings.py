@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from granforce import measures
-from granforce.bench.report import exponent, note
+from granforce.bench.report import exponent, note, timed
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
 from granforce.forces.ensemble import ensemble
@@ -114,12 +114,10 @@ def _keys(kept: Sequence[dict[str, float]]) -> Iterable[str]:
 
 
 def _extent(n: int, mu: float, seed: int, options: dict[str, Any]) -> dict[str, float]:
-    begin = time.process_time()
     try:
-        packing = pack(n, mu, seed, **options)
+        seconds, packing = timed(pack, n, mu, seed, clock=time.process_time, **options)
     except NotJammedError:
         return {}
-    seconds = time.process_time() - begin
     S = ensemble(packing)
     bounds = intervals(S)
     return {
@@ -154,12 +152,10 @@ def _row(n: int, mu: float, seeds: int, **options: Any) -> dict[str, Any]:
 
 
 def _packed(n: int, mu: float, seed: int, **options: Any) -> dict[str, Any]:
-    begin = time.perf_counter()
     try:
-        packing = pack(n, mu, seed, **options)
+        seconds, packing = timed(pack, n, mu, seed, **options)
     except NotJammedError:
         return {}
-    seconds = time.perf_counter() - begin
     S = ensemble(packing)
     return {
         "seconds": seconds,

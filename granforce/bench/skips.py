@@ -1,13 +1,12 @@
 """What leaving out the unnecessary is worth: each skip switched off, on the same packing."""
 
 import tempfile
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import note
+from granforce.bench.report import note, timed
 from granforce.bench.solvers import kicked
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import Ensemble, ensemble
@@ -46,12 +45,7 @@ def _row(what: str, count: int, seconds: float, without: float) -> dict[str, Any
 def _seconds(action: Callable[[], object], repeats: int = 5) -> float:
     """Median run time of an action, done once before."""
     action()
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - begin)
-    return float(np.median(times))
+    return float(np.median([timed(action)[0] for _ in range(repeats)]))
 
 
 def _rattlers(packing: Packing, S: Ensemble) -> dict[str, Any]:
@@ -92,9 +86,9 @@ def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:
     try:
         for moved in (usual, 0.0):
             compaction.MOVED = moved
-            begin = time.perf_counter()
-            rebuilds.append(pack(n, mu, 1).info["list_rebuilds"])
-            seconds.append(time.perf_counter() - begin)
+            spent, packing = timed(pack, n, mu, 1)
+            rebuilds.append(packing.info["list_rebuilds"])
+            seconds.append(spent)
     finally:
         compaction.MOVED = usual
     return _row("new neighbour lists, one compaction", rebuilds[1] - rebuilds[0], *seconds)
@@ -112,8 +106,6 @@ def _cells(n: int, mu: float) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(folder)
         named = kinds.WALK.parameters(kinds.PACKING.parameters(n, mu, 1), 50)
-        begin = time.perf_counter()
-        study.get(store, kinds.WALK, named)
-        every = time.perf_counter() - begin
+        every, _ = timed(study.get, store, kinds.WALK, named)
         few = _seconds(lambda: study.get(store, kinds.WALK, named))
     return _row("a finished cell (packing, 50 states)", 1, few, every)

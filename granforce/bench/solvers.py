@@ -1,12 +1,11 @@
 """Relaxation solvers side by side: same starts, time and what was reached, and how it scales."""
 
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import exponent, note
+from granforce.bench.report import exponent, note, timed
 from granforce.bench.siconos import ABSENT, TOLERANCES, against_siconos
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.gauss_seidel import SideBySide, gauss_seidel
@@ -139,9 +138,7 @@ def contact_updates(
     for _ in range(2):  # kernels are compiled in the first
         for lane, start in enumerate(kicked(S, LANES, 0)):
             beside.begin(lane, start)
-        begin = time.perf_counter()
-        beside.ended()
-        seconds = time.perf_counter() - begin
+        seconds = timed(beside.ended)[0]
     ns = 1e9 * seconds / (beside.sweeps.sum() * len(S.index))
     told = f"{LANES} relaxations side by side"
     rows = [alone, {**alone, "ns_per_update": ns, "ratio": each / ns, "note": told}]
@@ -218,9 +215,7 @@ def scaling(
             if name in tired:
                 continue
             note(f"scaling: N = {n * k * k}, {name}")
-            begin = time.perf_counter()
-            solver(S, starts[0], **{**options, "max_iterations": 1})
-            setup = time.perf_counter() - begin
+            setup, _ = timed(solver, S, starts[0], **{**options, "max_iterations": 1})
             run = [solver(S, starts[0], **options)]
             if run[0].seconds > patience:
                 tired.add(name)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from granforce import measures
-from granforce.bench.report import note
+from granforce.bench.report import note, timed
 from granforce.explore.intervals import intervals as exact_intervals
 from granforce.explore.random_walk import walk
 from granforce.forces.ensemble import Ensemble, ensemble
@@ -130,15 +130,11 @@ def batches(
     for mu in frictions:
         note(f"batches: N = {n}, μ = {mu:g}")
         S = ensemble(pack(n, mu, 1))
-        begin = time.perf_counter()
-        walk(S, 1, 0)
-        setup = time.perf_counter() - begin
+        setup, _ = timed(walk, S, 1, 0)
         seconds: dict[Any, list[Any]] = {1: [], 2: []}
         for _ in range(3):
             for workers, times in seconds.items():
-                begin = time.perf_counter()
-                walk(S, states, 0, chains=2, workers=workers)
-                times.append(time.perf_counter() - begin)
+                times.append(timed(walk, S, states, 0, chains=2, workers=workers)[0])
         one, two = (states / np.median(times) for times in seconds.values())
         row = {"n": n, "mu": mu, "states": states, "setup": setup, "per_second": one}
         ceiling = _ceiling(S, states)
@@ -157,9 +153,7 @@ def _speed(packing: Packing, states: int) -> float:
     """States per second of one chain in this process."""
     S = ensemble(packing)
     walk(S, 2, 0)
-    begin = time.perf_counter()
-    walk(S, states, 0)
-    return states / (time.perf_counter() - begin)
+    return states / timed(walk, S, states, 0)[0]
 
 
 def intervals(
@@ -180,9 +174,7 @@ def intervals(
     for mu in frictions:
         S = ensemble(pack(n, mu, 1))
         note(f"intervals: N = {n}, μ = {mu:g}, exact")
-        begin = time.perf_counter()
-        exact = exact_intervals(S, workers=2)
-        seconds = time.perf_counter() - begin
+        seconds, exact = timed(exact_intervals, S, workers=2)
         row = {"n": n, "mu": mu}
         eta3, extent = _extents(S, exact.lower, exact.upper)
         told = {"eta3": eta3, "mean_extent": extent, "eta3_part": 1.0, "extent_part": 1.0}

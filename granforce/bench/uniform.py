@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
-from granforce.bench.report import exponent, note
+from granforce.bench.report import exponent, note, timed
 from granforce.bench.solvers import tile
 from granforce.explore.billiard import all_rows, make_rows, some_rows
 from granforce.explore.mixing import Mixing, mixing
@@ -61,10 +61,7 @@ def uniform(
     for mu in frictions:
         S = ensemble(pack(n, mu, seed))
         walls(S)  # the first time it is compiled
-        begin = time.process_time()
-        made = walls(S)
-        kept = all_rows(made)
-        setup = time.process_time() - begin
+        setup, (made, kept) = timed(_set_up, S, clock=time.process_time)
         runs = [_ours(S, made, kept, method, seed) for method in METHODS]
         runs += _hopsy(S, made, kept, rounded)
         for run in runs:
@@ -134,12 +131,9 @@ def uniform_growth(
     for k in tiles:
         note(f"uniform: N = {n * k * k}")
         S = ensemble(tile(base, k), prune=False)
-        begin = time.process_time()
-        made = walls(S)
-        all_rows(made)
-        setup = time.process_time() - begin
-        begin = time.process_time()
-        sample = sample_uniform(S, effective, seed=seed, effective=effective)
+        setup, (made, _) = timed(_set_up, S, clock=time.process_time)
+        wanted: dict[str, Any] = {"seed": seed, "effective": effective}
+        seconds, sample = timed(sample_uniform, S, effective, clock=time.process_time, **wanted)
         row: dict[str, Any] = {
             "n": n * k * k,
             "h": made.dimension,
@@ -147,22 +141,24 @@ def uniform_growth(
             "states": len(sample.flat),
         }
         row |= {"effective": sample.effective, "reached": sample.reached}
-        row |= {"seconds": time.process_time() - begin, "peak_MB": _peak(), "setup_seconds": setup}
+        row |= {"seconds": seconds, "peak_MB": _peak(), "setup_seconds": setup}
         if made.count <= MOST_DENSE_WALLS:
             row["null_space_ratio"] = _null_space(S, made) / setup
         worth = sample.effective / len(sample.flat)
         for place, part in ROOMS.items():
-            cost = {
-                "n": n * k * k,
-                "rows": place,
-                "seconds_per_state": _going_on(sample, part) / worth,
-            }
+            each = _going_on(sample, part) / worth
+            cost = {"n": n * k * k, "rows": place, "seconds_per_state": each}
             rows.append(cost | row if part == 1.0 else cost)
     fits = {
         place: exponent([(r["n"], r["seconds_per_state"]) for r in rows if r["rows"] == place])
         for place in ROOMS
     }
     return rows + [{"n": "fit", "rows": place, "exponent": fit} for place, fit in fits.items()]
+
+
+def _set_up(S: Ensemble) -> tuple[Any, Any]:
+    made = walls(S)
+    return made, all_rows(made)
 
 
 def _peak() -> float:
@@ -185,9 +181,7 @@ def _going_on(sample: Any, part: float) -> Any:
 def _null_space(S: Ensemble, made: Any) -> float:
     """Seconds of processor time of the QR that gives the same K by a dense null space."""
     weighted = S.scaled_form[0].tocsc()[:, made.moving].toarray() * made.centre[made.moving]
-    begin = time.process_time()
-    linalg.qr(weighted.T, pivoting=True)
-    return time.process_time() - begin
+    return timed(linalg.qr, weighted.T, pivoting=True, clock=time.process_time)[0]
 
 
 def _two_cores(made: Any, kept: Any, seed: int) -> float:
@@ -210,16 +204,7 @@ def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
     try:
         import hopsy
     except ImportError:
-        return [
-            _Run(
-                method="hopsy",
-                states=None,
-                mixing=None,
-                seconds=0.0,
-                setup=0.0,
-                note="not installed",
-            )
-        ]
+        return [_Run("hopsy", None, None, seconds=0.0, setup=0.0, note="not installed")]
     h, count = made.dimension, len(made.moving)
     sides = -np.linalg.eigh(kept.values[:count, :count])[1][:, count - h :]
     begin = time.process_time()
@@ -236,9 +221,8 @@ def _hopsy(S: Ensemble, made: Any, kept: Any, rounded: int) -> list[_Run]:
         chains = [hopsy.MarkovChain(problem, proposal, starting_point=start) for _ in range(4)]
         streams = [hopsy.RandomNumberGenerator(1, k) for k in range(4)]
         thinning = h * max(8, h // 6)
-        begin = time.process_time()
-        _, places = hopsy.sample(chains, streams, HOPSY_STATES // 4, thinning=thinning)
-        seconds = time.process_time() - begin
+        sample = partial(hopsy.sample, chains, streams, HOPSY_STATES // 4, thinning=thinning)
+        seconds, (_, places) = timed(sample, clock=time.process_time)
         slacks = np.ones((*places.shape[:2], made.count))
         slacks[..., :count] -= places @ sides.T
         states = forces_of(S, made, slacks)[:, places.shape[1] // 10 :]  # warm-up

@@ -8,6 +8,8 @@ from typing import NoReturn, TypeAlias
 
 LONGEST = 600  # characters of a message
 EXAMPLE = argparse.RawDescriptionHelpFormatter
+# Commands whose names are taken in Python, or by a room: their functions end in an underscore.
+_TAKEN = ("import", "study")
 # What subcommands are added to.
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
@@ -28,8 +30,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def subcommand(
-    commands: Commands, name: str, run: str, summary: str, example: str, *, reports: bool = True
+    commands: Commands, name: str, summary: str, example: str, *, reports: bool = True
 ) -> argparse.ArgumentParser:
+    """A command, which the function of its name in `granforce.cli.commands` runs."""
     command = commands.add_parser(
         name,
         help=summary,
@@ -38,7 +41,8 @@ def subcommand(
         formatter_class=EXAMPLE,
         allow_abbrev=False,
     )
-    command.set_defaults(run=run)
+    own = name.replace("-", "_")
+    command.set_defaults(run=f"{own}_" if name in _TAKEN else own)
     if reports:
         command.add_argument("--json", action="store_true", help="print the report as JSON")
     return command

@@ -85,22 +85,7 @@ def make_parser() -> argparse.ArgumentParser:
         formatter_class=EXAMPLE,
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    words.add_pack(commands)
-    words.add_walk(commands)
-    words.add_uniform(commands)
-    words.add_volume(commands)
-    words.add_infer(commands)
-    words.add_measure(commands)
-    words.add_scan(commands)
+    for add in words.COMMANDS:
+        add(commands)
     commands.choices["sweep"] = commands.choices["scan"]  # its name before
-    words.add_intervals(commands)
-    words.add_limit_loads(commands)
-    words.add_stress(commands)
-    words.add_perturb(commands)
-    words.add_study(commands)
-    words.add_app(commands)
-    words.add_docs(commands)
-    words.add_import(commands)
-    words.add_bench(commands)
-    words.add_cache(commands)
     return parser

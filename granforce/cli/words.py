@@ -23,7 +23,6 @@ def add_pack(commands: Commands) -> None:
     command = subcommand(
         commands,
         "pack",
-        "pack",
         "make a jammed packing, or find it in the store",
         "granforce pack -n 400 --mu 0.1 --seed 1 --out packing.npz\n"
         "  granforce pack --scene groove --mu 0.5",
@@ -44,7 +43,6 @@ def add_walk(commands: Commands) -> None:
     command = subcommand(
         commands,
         "walk",
-        "walk",
         "walk at random through the force networks of a packing",
         "granforce walk -n 400 --mu 0.1 --seed 1 --states 1000",
     )
@@ -54,7 +52,6 @@ def add_walk(commands: Commands) -> None:
 def add_uniform(commands: Commands) -> None:
     command = subcommand(
         commands,
-        "uniform",
         "uniform",
         "draw force networks of a packing uniformly, and tell how well that went",
         "granforce uniform -n 400 --mu 0.1 --seed 1 --states 1000 --effective 500",
@@ -77,7 +74,6 @@ def add_volume(commands: Commands) -> None:
     command = subcommand(
         commands,
         "volume",
-        "volume",
         "measure the volume of all force networks of a packing, with its standard error",
         "granforce volume -n 400 --mu 0.1 --seed 1 --accuracy 0.1",
     )
@@ -99,7 +95,6 @@ def add_volume(commands: Commands) -> None:
 def add_infer(commands: Commands) -> None:
     command = subcommand(
         commands,
-        "infer",
         "infer",
         "find the admissible network that measured forces speak for, with error bars",
         "granforce infer --packing frame.npz --measured frame.csv --unmeasured 1\n"
@@ -158,7 +153,6 @@ def add_measure(commands: Commands) -> None:
     command = subcommand(
         commands,
         "measure",
-        "measure",
         "measure the indeterminacy of a walk, contact by contact if wanted",
         "granforce measure -n 400 --mu 0.1 --seed 1 --states 1000 --contacts contacts.csv",
     )
@@ -171,7 +165,6 @@ def add_measure(commands: Commands) -> None:
 def add_scan(commands: Commands) -> None:
     command = subcommand(
         commands,
-        "scan",
         "scan",
         "packings and walks for many μ and seeds, over processes, resumable",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
@@ -191,7 +184,6 @@ def add_study(commands: Commands) -> None:
     command = subcommand(
         commands,
         "study",
-        "study_",
         "compute the paper's study, draw its figures and judge its claims, resumable",
         "granforce study --out study\n  granforce study --quick --out quick",
     )
@@ -252,7 +244,6 @@ def add_intervals(commands: Commands) -> None:
     command = subcommand(
         commands,
         "intervals",
-        "intervals",
         "compute the exact interval of every contact force",
         "granforce intervals -n 400 --mu 0.1 --seed 1 --csv bounds.csv",
     )
@@ -263,7 +254,6 @@ def add_limit_loads(commands: Commands) -> None:
     command = subcommand(
         commands,
         "limit-loads",
-        "limit_loads",
         "compute the largest force pair each contact can be pushed apart with",
         "granforce limit-loads -n 400 --mu 0.1 --seed 1 --contacts 0,5,17",
     )
@@ -273,7 +263,6 @@ def add_limit_loads(commands: Commands) -> None:
 def add_stress(commands: Commands) -> None:
     command = subcommand(
         commands,
-        "stress",
         "stress",
         "compute which stresses the contacts can carry at their pressure, and the largest shear",
         "granforce stress -n 400 --mu 0.1 --seed 1 --csv outline.csv",
@@ -291,7 +280,6 @@ def add_stress(commands: Commands) -> None:
 def add_perturb(commands: Commands) -> None:
     command = subcommand(
         commands,
-        "perturb",
         "perturb",
         "push the grains of single contacts apart until they set off: critical force and motion",
         "granforce perturb -n 400 --mu 0.1 --seed 1 --random 50",
@@ -317,7 +305,6 @@ def add_app(commands: Commands) -> None:
     command = subcommand(
         commands,
         "app",
-        "app",
         "open the page that shows packings and their force networks live, in a browser",
         "granforce app\n  granforce app --port 8080 --no-show",
         reports=False,
@@ -341,7 +328,6 @@ def add_docs(commands: Commands) -> None:
     command = subcommand(
         commands,
         "docs",
-        "docs",
         "open the reference of all public names, with examples and sources, in a browser",
         "granforce docs\n  granforce docs --out reference.html",
         reports=False,
@@ -353,7 +339,6 @@ def add_import(commands: Commands) -> None:
     command = subcommand(
         commands,
         "import",
-        "import_",
         "read a packing from elsewhere, check it and keep it",
         "granforce import lammps particles.dump contacts.dump --mu 0.3 --out packing.npz\n"
         "  granforce import table grains.csv contacts.csv --box 30 30 --mu 0.3 --out packing.npz\n"
@@ -395,7 +380,6 @@ def add_bench(commands: Commands) -> None:
     command = subcommand(
         commands,
         "bench",
-        "bench",
         "measure run time against error of every solver on this machine",
         "granforce bench --quick --out bench",
     )
@@ -407,10 +391,26 @@ def add_cache(commands: Commands) -> None:
     command = subcommand(
         commands,
         "cache",
-        "cache",
         "list, size, clear or verify the store",
         "granforce cache verify --cache scan.zarr",
     )
     command.add_argument("action", choices=["list", "size", "clear", "verify"])
     command.add_argument("--kind", help="only entries of this kind (packing, walk, …)")
     add_store(command)
+
+
+# In the order of the help.
+COMMANDS = (
+    *(add_pack, add_walk, add_uniform, add_volume, add_infer, add_measure, add_scan, add_intervals),
+    *(
+        add_limit_loads,
+        add_stress,
+        add_perturb,
+        add_study,
+        add_app,
+        add_docs,
+        add_import,
+        add_bench,
+    ),
+    add_cache,
+)

@@ -38,9 +38,7 @@ class Side(NamedTuple):
     """A side of S: an end (h = 1), an edge of the polygon (2) or a face of the body (3)."""
 
     corners: Integers  # (k,) positions in Body.corners; at h = 3 in order around the face
-    stops: tuple[
-        tuple[int, int], ...
-    ]  # ((contact, OPENS, SLIDES or SLIDES_BACK), …), contact by its number in packing
+    stops: tuple[tuple[int, int], ...]  # (number in the packing, OPENS, SLIDES or SLIDES_BACK)
     normal: Floats  # (h,) unit vector out of S
 
 

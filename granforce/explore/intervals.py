@@ -41,9 +41,7 @@ class Intervals(NamedTuple):
     backbone: Mask  # (k,) bool, largest f_n > 0
     max_gap: float  # largest gap among the bounds that were reached
     converged: bool  # every bound was reached with a gap ≤ INTERVAL_GAP
-    counts: dict[
-        str, int
-    ]  # programs solved, skipped (by reason), solved again by HiGHS; iterations
+    counts: dict[str, int]  # programs solved, skipped by reason, solved again by HiGHS; iterations
 
     def _repr_html_(self) -> str:
         """The bounds as notebooks show them."""

@@ -47,9 +47,7 @@ class Walk(NamedTuple):
     violation: Floats  # (S,) in ⟨f_n⟩, by Ensemble.violation
     sweeps: Integers  # (S,) solver iterations spent since the state before, failures included
     attempts: Integers  # (S,) perturbations tried since the state before
-    counts: dict[
-        str, int
-    ]  # accepted, rejected (no equilibrium), unconverged, skipped (S is one point)
+    counts: dict[str, int]  # accepted, rejected (no equilibrium), unconverged, skipped (a point)
 
     @property
     def acceptance(self) -> float:

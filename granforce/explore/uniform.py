@@ -76,9 +76,7 @@ class UniformSample(NamedTuple):
     violation: Floats  # (chains, k) in ⟨f_n⟩, by Ensemble.violation
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
     reached: bool  # complete, all in S, R̂ ≤ MIXED, worth as many independent states as wanted
-    counts: dict[
-        str, Any
-    ]  # turns, refused paths, dropped states, held coordinates, skipped (h = 0)
+    counts: dict[str, Any]  # turns, refused paths, dropped states, held coordinates, skipped states
     setup_seconds: float  # wall time of the walls and of the rows of K that are kept
     sampling_seconds: float  # wall time of the steps, those dropped included
     diagnosis_seconds: float  # wall time of the diagnostics

@@ -72,7 +72,7 @@ def main(arguments: argparse.Namespace) -> int:
     with written(folder / "claims.json") as file:
         file.write(json_text(told, ascii_only=False).encode())
     documents.renew(renewed, reduced, told["claims"])
-    report(told, arguments.json)
+    print_claims(told, arguments.json)
     return 1 if failed else 0
 
 
@@ -172,7 +172,7 @@ def compute(
     return failed
 
 
-def report(told: dict[str, Any], as_json: bool) -> None:
+def print_claims(told: dict[str, Any], as_json: bool) -> None:
     """Claims with their verdicts, and findings, on stdout."""
     if as_json:
         print(json_text(told))

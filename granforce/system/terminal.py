@@ -17,7 +17,7 @@ def print_list(rows: Sequence[Mapping[str, Any]], names: Sequence[str], as_json:
         table(rows, names, {})
 
 
-def report(lines: Mapping[str, Any], as_json: bool) -> None:
+def print_report(lines: Mapping[str, Any], as_json: bool) -> None:
     """A report on stdout: names and numbers in two columns, sentences line by line, or JSON."""
     if as_json:
         print(json_text(lines))

@@ -22,9 +22,8 @@ SMALL = ["-n", "20", "--mu", "0.3", "--relax", "nearest", "--states", "5"]
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
+def run(away, capsys):
     """Run a command on a store of this test alone; returns exit code, stdout, stderr."""
-    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
 
     def call(*words):
         try:

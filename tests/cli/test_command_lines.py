@@ -16,12 +16,10 @@ LINES = command_lines.lines()
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(away):
     """A folder to work in, with files of every kind, and a store of its own."""
-    command_lines.prepare(tmp_path, PACKING)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
-    return tmp_path
+    command_lines.prepare(away, PACKING)
+    return away
 
 
 def called(words):

@@ -11,12 +11,10 @@ from granforce.packing.importers import load_packing
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+def folder(away):
     grains, rows, _ = frames.frame(60, missing=0.1, noise=0.1, seed=2)
-    frames.write(tmp_path, grains, rows)
-    return tmp_path
+    frames.write(away, grains, rows)
+    return away
 
 
 def told(words, capsys):

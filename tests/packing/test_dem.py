@@ -135,12 +135,11 @@ def test_what_is_wrong_is_told(read, files, words):
         read(*given(*files), MU)
 
 
-def test_by_the_command_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_by_the_command_line(away, capsys):
     width = str(packed(N, MU).box[0])
     for name, made in (("yade", yade()), ("mercury", mercury())):
         for k, content in enumerate(made):
-            (tmp_path / f"{name}{k}").write_bytes(content)
+            (away / f"{name}{k}").write_bytes(content)
         words = ["import", name, f"{name}0", f"{name}1", "--mu", "0.3", "--box", width, width]
         assert main([*words, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["contacts"] == len(vectors()[2])

@@ -37,7 +37,7 @@ def test_a_failed_cell_leaves_the_others(tmp_path):
     # Three disks do not always jam: whatever happens to them, the other cell is there.
     hopeless = cell()
     hopeless["packing"] = {**hopeless["packing"], "radii": [1.0] * 3}
-    rows, failed = scan.scan(tmp_path / "s", [hopeless, cell()], workers=2)
+    rows, failed = scan.scan(tmp_path / "s", [hopeless, cell()], workers=1)
     assert len(rows) == 1
     assert "radii" in failed[0][1]
 
@@ -177,10 +177,12 @@ def assert_same(one, two):
         assert a.identical(b.assign_attrs(created=a.attrs["created"], checksum=a.attrs["checksum"]))
 
 
-def test_cells_of_every_kind_are_counted_and_kept(tmp_path):
-    seen, done = [], []
+@pytest.fixture(scope="module")
+def by_processes(tmp_path_factory):
+    """The store of small cells of several kinds by two processes, and what was told meanwhile."""
+    path, seen, done = tmp_path_factory.mktemp("scan") / "s", [], []
     failed = scan.run(
-        tmp_path / "s",
+        path,
         small_cells(),
         workers=2,
         dtypes={"states": "float32"},
@@ -188,31 +190,35 @@ def test_cells_of_every_kind_are_counted_and_kept(tmp_path):
         on_done=lambda k, cached: done.append((k, cached)),
     )
     assert not failed
+    return path, seen, done
+
+
+def test_cells_of_every_kind_are_counted_and_kept(by_processes):
+    path, seen, done = by_processes
     assert sorted(done) == [(k, False) for k in range(6)]
     assert seen[-1] == (6, 6)
     assert seen == sorted(seen)
-    store = open_store(tmp_path / "s")
+    store = open_store(path)
     for one in small_cells():
         assert load(store, *one) is not None
     assert load(store, *small_cells()[0])["states"].dtype == "float32"
     assert load(store, *small_cells()[2])["limit_load"].dtype == "float64"
 
 
-def test_dask_workers_give_the_same_as_processes(tmp_path, cluster):
-    cells = small_cells()
-    assert not scan.run(tmp_path / "one", cells, workers=2)
-    done = []
+def test_dask_workers_give_the_same_as_processes(tmp_path, by_processes, cluster):
+    cells, done = small_cells(), []
     failed = scan.run(
         tmp_path / "two",
         [*cells, Cell(kinds.WALK, {**cells[0].parameters, "packing": {"imported": "0"}})],
         scheduler=cluster.scheduler_address,
+        dtypes={"states": "float32"},
         on_done=lambda k, cached: done.append(cached),
     )
     assert [text for _, text in failed] == [
         "the imported packing is not in this store: import it again"
     ]
     assert done == [False] * 6
-    assert_same(tmp_path / "one", tmp_path / "two")
+    assert_same(by_processes[0], tmp_path / "two")
 
 
 def kill_one(processes):

@@ -29,6 +29,7 @@ def folder_of(tmp_path, numbers=(1, 2, 3), **options):
 
 
 OPTIONS = {"mu": 0.3, "states": 16, "reach": 0.1}
+BROKEN = "Step-0002_Adjacency.txt"
 
 
 def test_frames_are_inferred_and_found_again(tmp_path):
@@ -50,43 +51,45 @@ def test_frames_are_inferred_and_found_again(tmp_path):
     assert xr.testing.assert_identical(dataset, again) is None and not seen
 
 
-def test_dask_workers_give_the_same_as_processes(tmp_path, cluster):
+@pytest.fixture(scope="module")
+def refused(tmp_path_factory):
+    """A folder of three frames, the second of which is refused; what two processes made of it."""
+    folder = folder_of(tmp_path_factory.mktemp("frames"))
+    (folder / BROKEN).write_text("2,900,901,0,1\n2,903,904,0,1\n")
+    frames = series.frames_of(folder)
+    return folder, *series.infer_series(folder / "store", frames, workers=2, **OPTIONS)
+
+
+def test_dask_workers_give_the_same_as_processes(tmp_path, refused, cluster):
     """The second frame is refused, by a worker in the same words as here."""
-    frames = series.frames_of(folder_of(tmp_path))
-    (tmp_path / "Step-0002_Adjacency.txt").write_text("2,900,901,0,1\n2,903,904,0,1\n")
-    (one, lost), (two, missed) = (
-        series.infer_series(tmp_path / name, frames, **chosen, **OPTIONS)
-        for name, chosen in (
-            ("one", {"workers": 2}),
-            ("two", {"scheduler": cluster.scheduler_address}),
-        )
-    )
-    assert xr.testing.assert_identical(one, two) is None and one.sizes["frame"] == 2
-    assert lost == missed and len(lost) == 1
-
-
-def test_a_frame_that_is_refused_costs_only_itself(tmp_path):
-    folder = folder_of(tmp_path)
-    (tmp_path / "Step-0002_Adjacency.txt").write_text("2,900,901,0,1\n2,903,904,0,1\n")
-    dataset, failed = series.infer_series(
-        tmp_path / "store", series.frames_of(folder), workers=1, **OPTIONS
-    )
-    assert dataset["frame"].values.tolist() == [1, 3]
-    ((frame, message),) = failed
-    assert frame.number == 2 and "join neighbours" in message
-    # Mended, it is read anew; the others are found.
-    synthetic_frame(packed(40, 0.3), noise=0.1, number=2, seed=2, walls=False).write(
-        tmp_path / "Step-0002_centers.txt", tmp_path / "Step-0002_Adjacency.txt"
-    )
-    seen = []
-    dataset, failed = series.infer_series(
-        tmp_path / "store",
-        series.frames_of(folder),
-        workers=1,
-        progress=lambda *p: seen.append(p),
+    folder, dataset, failed = refused
+    two, missed = series.infer_series(
+        *(tmp_path / "two", series.frames_of(folder)),
+        scheduler=cluster.scheduler_address,
         **OPTIONS,
     )
-    assert not failed and seen[-1] == (1, 1)
+    assert xr.testing.assert_identical(dataset, two) is None and two.sizes["frame"] == 2
+    assert failed == missed and len(failed) == 1
+
+
+def test_a_frame_that_is_refused_costs_only_itself(refused):
+    folder, dataset, ((frame, message),) = refused
+    assert dataset["frame"].values.tolist() == [1, 3]
+    assert frame.number == 2 and "join neighbours" in message
+    # Mended, it is read anew; the others are found.
+    broken = (folder / BROKEN).read_text()
+    try:
+        folder_of(folder, (2,))
+        seen = []
+        _, failed = series.infer_series(
+            *(folder / "store", series.frames_of(folder)),
+            workers=1,
+            progress=lambda *p: seen.append(p),
+            **OPTIONS,
+        )
+        assert not failed and seen[-1] == (1, 1)
+    finally:
+        (folder / BROKEN).write_text(broken)
 
 
 def test_all_frames_of_one_pair_of_files(tmp_path):
@@ -110,25 +113,23 @@ def test_folders_without_frames_are_told(tmp_path):
         series.frames_of(tmp_path)
 
 
-def test_by_the_command_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
-    (tmp_path / "lab").mkdir()
-    folder_of(tmp_path / "lab", (1, 2))
+def test_by_the_command_line(away, capsys):
+    (away / "lab").mkdir()
+    folder_of(away / "lab", (1, 2))
     words = "infer lab --frames all --mu 0.3 --reach 0.1 --states 16 --out series.zarr --json"
     assert main(words.split()) == 0
     rows = json.loads(capsys.readouterr().out)
     assert [row["frame"] for row in rows] == [1, 2] and rows[0]["grains"] == 40
-    written = xr.open_zarr(tmp_path / "series.zarr", consolidated=False)
+    written = xr.open_zarr(away / "series.zarr", consolidated=False)
     assert written.sizes["frame"] == 2 and "inferred" in written
     assert main([*words.split()[:-1], "--frames", "2"]) == 0
-    assert xr.open_zarr(tmp_path / "series.zarr", consolidated=False).sizes["frame"] == 1
+    assert xr.open_zarr(away / "series.zarr", consolidated=False).sizes["frame"] == 1
     capsys.readouterr()
     for wrong in ("--frames 7", "--frames x", "--out lab", "--measured x.csv"):
         assert main([*words.split(), *wrong.split()]) == 2, wrong
         assert capsys.readouterr().err.count("\n") == 1
     assert main(["infer", "--mu", "0.3"]) == 2
-    assert len(list(open_store(tmp_path / "cache").find("frame"))) == 2
+    assert len(list(open_store(away / "cache").find("frame"))) == 2
 
 
 def test_names_of_files_of_positions_and_adjacency(tmp_path):

@@ -102,18 +102,17 @@ def test_what_fails_leaves_the_old_file(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["none/x", "folder", "file/x", "loop", "x" * 300, "a\0b", ""])
-def test_what_cannot_be_written_is_one_line(tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "file").write_text("older")
-    (tmp_path / "loop").symlink_to("loop")
-    before = sorted(tmp_path.iterdir())
+def test_what_cannot_be_written_is_one_line(away, name):
+    (away / "folder").mkdir()
+    (away / "file").write_text("older")
+    (away / "loop").symlink_to("loop")
+    before = sorted(away.iterdir())
     for refused in (write, check_file):
         with pytest.raises(InputError) as told:
             refused(name)
         assert "\n" not in str(told.value)
-    assert sorted(tmp_path.iterdir()) == before
-    assert (tmp_path / "file").read_text() == "older"
+    assert sorted(away.iterdir()) == before
+    assert (away / "file").read_text() == "older"
 
 
 def test_a_disk_that_is_full_is_one_line():

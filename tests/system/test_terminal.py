@@ -4,7 +4,7 @@ import json
 import math
 import re
 
-from granforce.system.terminal import Bar, one_line, print_list, report
+from granforce.system.terminal import Bar, one_line, print_list, print_report
 
 
 def shown(capsys):
@@ -59,7 +59,9 @@ def strict(text):
 
 
 def test_what_is_not_a_number_is_null_in_json(capsys):
-    report({"eta": math.nan, "deciles": [1.0, math.inf], "fit": (-math.inf, {"x": math.nan})}, True)
+    print_report(
+        {"eta": math.nan, "deciles": [1.0, math.inf], "fit": (-math.inf, {"x": math.nan})}, True
+    )
     told = strict(capsys.readouterr().out)
     assert told == {"eta": None, "deciles": [1.0, None], "fit": [None, {"x": None}]}
     print_list([{"gap": math.nan}], ("gap",), True)
@@ -67,7 +69,7 @@ def test_what_is_not_a_number_is_null_in_json(capsys):
 
 
 def test_sentences_stand_line_by_line(capsys):
-    report({"left_open": [1, 2], "findings": ["2 grains: a, b", "3 contacts: c"]}, False)
+    print_report({"left_open": [1, 2], "findings": ["2 grains: a, b", "3 contacts: c"]}, False)
     assert capsys.readouterr().out.splitlines() == [
         "left open  1 2",
         "findings   2 grains: a, b",

@@ -10,7 +10,7 @@ from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
 from granforce.study.keys import Parameters
 from granforce.study.store import Store
-from granforce.system.terminal import report
+from granforce.system.terminal import print_report
 
 
 def perturb(arguments: argparse.Namespace) -> None:
@@ -53,7 +53,7 @@ def perturb(arguments: argparse.Namespace) -> None:
         names += ("opened", "slid", "kept", *COUNTS)
         columns = {"contact": dataset["backbone"].values}
         write_csv(arguments.csv, columns | {name: dataset[name].values for name in names})
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
 
 
 def _exact(arguments: argparse.Namespace) -> tuple[Store, Parameters]:
@@ -100,7 +100,7 @@ def intervals(arguments: argparse.Namespace) -> None:
             columns |= {f"f_n_{name}": dataset[side].values[:, 0]}
             columns |= {f"f_t_{name}": dataset[side].values[:, 1]}
         write_csv(arguments.csv, columns | {"cluster": cluster})
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
 
 
 def limit_loads(arguments: argparse.Namespace) -> None:
@@ -121,7 +121,7 @@ def limit_loads(arguments: argparse.Namespace) -> None:
     if arguments.csv is not None:
         names = {"contact": "backbone", "limit_load": "limit_load"}
         write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
 
 
 def stress(arguments: argparse.Namespace) -> None:
@@ -151,4 +151,4 @@ def stress(arguments: argparse.Namespace) -> None:
     if arguments.csv is not None:
         names = {"angle": "stress_angle", "largest": "stress_support"}
         write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)

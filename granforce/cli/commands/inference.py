@@ -12,7 +12,7 @@ from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.keys import Parameters
-from granforce.system.terminal import Bar, report
+from granforce.system.terminal import Bar, print_report
 from granforce.tolerances import CARRYING
 
 INFERENCE_LINES = (
@@ -89,5 +89,5 @@ def infer(arguments: argparse.Namespace) -> int | None:
             columns |= {f"error_{part}": error[:, k]}
     if arguments.csv is not None:
         write_csv(arguments.csv, columns)
-    report(lines | {"seconds": dataset["seconds"].item(), "cached": cached}, arguments.json)
+    print_report(lines | {"seconds": dataset["seconds"].item(), "cached": cached}, arguments.json)
     return None

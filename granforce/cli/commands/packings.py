@@ -15,7 +15,7 @@ from granforce.cli.asked import (
 from granforce.packing import importers, scenes
 from granforce.records import InputError, whole
 from granforce.study.store import open_store
-from granforce.system.terminal import report
+from granforce.system.terminal import print_report
 
 
 def pack(arguments: argparse.Namespace) -> None:
@@ -32,7 +32,7 @@ def pack(arguments: argparse.Namespace) -> None:
     told = "steps", "sweeps_done", "unfinished_steps", "largest_contact_gap", "least_other_gap"
     work = {name: packing.info[name] for name in told}
     lines = {**importers.report(packing), **work, "cached": cached}
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
 
 
 def _scene(arguments: argparse.Namespace) -> None:
@@ -40,7 +40,7 @@ def _scene(arguments: argparse.Namespace) -> None:
     packing = scenes.scene(arguments.scene, arguments.mu)
     if arguments.out is not None:
         importers.save_packing(packing, arguments.out)
-    report({"scene": arguments.scene, **importers.report(packing)}, arguments.json)
+    print_report({"scene": arguments.scene, **importers.report(packing)}, arguments.json)
 
 
 def import_(arguments: argparse.Namespace) -> None:
@@ -75,7 +75,7 @@ def import_(arguments: argparse.Namespace) -> None:
     }
     if arguments.out is not None:
         importers.save_packing(packing, arguments.out)
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
 
 
 def _import_pegs(arguments: argparse.Namespace) -> None:
@@ -94,7 +94,7 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
         columns = {"contact": np.arange(len(found.measured))}
         columns |= dict(zip(importers.measurements.COLUMNS, values, strict=True))
         write_csv(arguments.measured, columns)
-    report(found.report, arguments.json)
+    print_report(found.report, arguments.json)
 
 
 def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import platformdirs
 from granforce.records import InputError, whole
 from granforce.study.store import open_store
 from granforce.system.files import make_folder, written
-from granforce.system.terminal import print_list, report
+from granforce.system.terminal import print_list, print_report
 
 
 def study_(arguments: argparse.Namespace) -> int:
@@ -95,11 +95,13 @@ def cache(arguments: argparse.Namespace) -> int:
     store = open_store(arguments.cache)
     if arguments.action == "clear":
         lines = {"removed": store.clear(arguments.kind), "temporaries": store.clean()}
-        report(lines, arguments.json)
+        print_report(lines, arguments.json)
     elif arguments.action == "size":
         entries = store.find(arguments.kind)
         size = sum(entry.bytes for entry in entries)
-        report({"path": str(store.path), "entries": len(entries), "bytes": size}, arguments.json)
+        print_report(
+            {"path": str(store.path), "entries": len(entries), "bytes": size}, arguments.json
+        )
     elif arguments.action == "verify":
         verdicts = [
             v._asdict()

@@ -21,7 +21,7 @@ from granforce.study import scan as scans
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
 from granforce.system.memory import check_memory
-from granforce.system.terminal import Bar, report, table
+from granforce.system.terminal import Bar, print_report, table
 
 
 def walk(arguments: argparse.Namespace) -> None:
@@ -36,7 +36,7 @@ def walk(arguments: argparse.Namespace) -> None:
         "seconds": dataset["seconds"].item(),
         "cached": cached,
     }
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
 
 
 UNIFORM_LINES = (
@@ -78,7 +78,7 @@ def uniform(arguments: argparse.Namespace) -> int:
         "seconds": dataset["seconds"].item(),
         "cached": cached,
     }
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
     return 1 if arguments.effective is not None and not reached else 0
 
 
@@ -108,7 +108,7 @@ def volume(arguments: argparse.Namespace) -> int:
         "seconds": dataset["seconds"].item(),
         "cached": cached,
     }
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
     return 0 if reached else 1
 
 
@@ -136,7 +136,7 @@ def measure(arguments: argparse.Namespace) -> None:
         for name, source in (("f_n", "original"), ("f_n_min", "low"), ("f_n_max", "high")):
             columns[name] = dataset[source].values[:, 0]
         write_csv(arguments.contacts, columns)
-    report(lines, arguments.json)
+    print_report(lines, arguments.json)
 
 
 def scan(arguments: argparse.Namespace) -> int:
@@ -177,7 +177,7 @@ def _report_scan(rows: Rows, failed: Sequence[tuple[Parameters, str]], as_json: 
     summary = {"cells": len(rows) + len(failed), "found": found, "failed": len(failed)}
     if as_json:
         errors = [{"cell": cell, "error": message} for cell, message in failed]
-        report({"rows": rows, "errors": errors, **summary}, as_json)
+        print_report({"rows": rows, "errors": errors, **summary}, as_json)
         return
     heads = {"packing_fraction": "φ", "coordination": "z", "dimension": "h", "mu": "μ"}
     heads |= {"eta1": "η1", "eta2": "η2", "eta3": "η3"}

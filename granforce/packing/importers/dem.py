@@ -95,9 +95,7 @@ def read_mercury(
     inner = np.flatnonzero((first >= 0) & (second >= 0))
     if not len(inner):
         raise InputError(f"{links.name}: no contact between two particles at time {time:g}")
-    links = links._replace(
-        rows=[links.rows[k] for k in inner], lines=[links.lines[k] for k in inner]
-    )
+    links = links.some(inner)
     ids = {row: row for row in range(len(grains.rows))}
     i, j = links.lookup("i", ids), links.lookup("j", ids)
     x = np.column_stack([grains.numbers(axis) for axis in plane])
@@ -113,9 +111,8 @@ def read_mercury(
         if tuple(sorted(pair)) not in once:
             once.add(tuple(sorted(pair)))
             keep.append(k)
-    links = links._replace(rows=[links.rows[k] for k in keep], lines=[links.lines[k] for k in keep])
     return _packing(
-        *(grains, plane, links, i[keep], j[keep], force[keep]),
+        *(grains, plane, links.some(keep), i[keep], j[keep], force[keep]),
         *(friction(mu), box, most_grains, "mercury"),
     )
 
@@ -244,5 +241,4 @@ def _mercury_contacts(source: Source, time: float) -> Table:
         raise InputError(
             f"{name}: no contacts at time {time:g}; they are of {times.min():g} … {times.max():g}"
         )
-    here = np.flatnonzero(times == nearest)
-    return table._replace(rows=[table.rows[k] for k in here], lines=[table.lines[k] for k in here])
+    return table.some(np.flatnonzero(times == nearest))

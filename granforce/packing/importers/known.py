@@ -44,7 +44,4 @@ def read_known(source: Source) -> Known:
 def _numbers(table: Table, column: str) -> tuple[list[int], Floats]:
     """Rows with an entry in a column, and their numbers."""
     given = [row for row, text in enumerate(table.fields(column)) if text]
-    part = table._replace(
-        rows=[table.rows[row] for row in given], lines=[table.lines[row] for row in given]
-    )
-    return given, part.numbers(column)
+    return given, table.some(given).numbers(column)

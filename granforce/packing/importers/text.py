@@ -1,10 +1,12 @@
 """Text from a path or an open file, and tables of it whose errors name file and line."""
 
+from __future__ import annotations
+
 import csv
 import math
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import IO, Any, NamedTuple
 
 import numpy as np
@@ -28,6 +30,13 @@ class Table(NamedTuple):
     def place(self, row: int) -> str:
         """'file, line n' of a row."""
         return f"{self.name}, line {self.lines[row]}"
+
+    def some(self, rows: Iterable[int]) -> Table:
+        """Some of the rows, in this order."""
+        chosen = list(rows)
+        return self._replace(
+            rows=[self.rows[k] for k in chosen], lines=[self.lines[k] for k in chosen]
+        )
 
     def require(self, *columns: str) -> None:
         """InputError unless all these columns are there."""
