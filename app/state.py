@@ -1,6 +1,6 @@
 """What the page is showing and doing, as parameters: no widgets, no plots."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -9,17 +9,16 @@ import param
 
 from granforce.records import InputError
 
-from . import compute, grabs, known, perturbations
+from . import compute, known, perturbations
 from .beside import Beside
 from .data import Cell, Library, Shown, best_cell, nearest_cell
 from .jobs import Job, Pool, Task, computing, reading
 from .known import Knowledge
 from .limits import LIMITS
+from .links import OF_A_REPLAY, UNSEEN, VIEW, View, fitting, read_view, spelled
 from .live import Arriving, Following
 from .replays import Replay
 from .selection import Selection, brief, command, link, read_link
-
-View = dict[str, Any]  # parameters of AppState by name
 
 # What colour, width and order can show: word in links → words on screen.
 COLOURS = {
@@ -66,6 +65,7 @@ PLANES = {
     "pair": "the normal forces of two contacts",
     "stress": "the stress that networks carry",
 }
+EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 SCALES = {"mean": "mean force = 1", "own": "original force = 1"}
 
@@ -221,7 +221,7 @@ class AppState(param.Parameterized):
         except InputError as error:
             wanted, view = None, {}
             self.message = str(error)
-        self._look_up(wanted, self._as_new() | read_view(view))
+        self._look_up(wanted, self._as_new() | read_view(view, type(self).param))
 
     def _as_new(self) -> View:
         """What a new page shows, but for the theme: what a link does not name."""
@@ -374,7 +374,7 @@ class AppState(param.Parameterized):
             displacement=None,
             loads=self.loads if self.replay is replay else None,
             plane=self.plane if self.replay is replay else None,
-            **fresh | _fitting(view or {}, replay),
+            **fresh | fitting(view or {}, replay),
         )
 
     def _source(self, cell: Cell | None = None) -> str:
@@ -508,102 +508,9 @@ class AppState(param.Parameterized):
             # Between the choice of another μ and its states, what is beside is still on screen.
             alone = name == "beside" and value == self.selection.mu
             if value != self.param[name].default and not alone:
-                view[name] = SPELLED.get(name, _spelled)(value)
+                view[name] = spelled(name, value)
         return link(self.selection, view)
 
 
 def _read(library: Library, cell: Cell, job: Job) -> Shown:
     return library.shown(cell)
-
-
-# Parameters that a link holds where they are not as in a new page, and how they are read.
-def _pair(text: str) -> tuple[int, int]:
-    a, b = (int(part) for part in text.split("-"))
-    return a, b
-
-
-def _place(text: str) -> tuple[float, ...]:
-    place = tuple(float(part) for part in text.split(":"))
-    if not all(abs(value) < 1e6 for value in place) or not place[-1] > 0:
-        raise ValueError("no place that can be seen")
-    return place
-
-
-def _tab(text: str) -> str:
-    return {"projection": "plane"}.get(text, text)  # as older links call it
-
-
-def _flag(text: str) -> bool:
-    return {"0": False, "1": True}[text]
-
-
-VIEW: dict[str, Callable[[str], Any]] = {
-    "tab": _tab,
-    "contact": int,
-    "second": int,
-    "frame": int,
-    "reference": int,
-    "between": _pair,
-    "zoom": _place,
-    "split": _flag,
-    "beside": float,
-    "predict": int,
-    "pulls": grabs.read,
-    "known": known.read,
-    "colour": str,
-    "thickness": str,
-    "full": float,
-    "stretch": float,
-    "overlay": _flag,
-    "sort": str,
-    "scale": str,
-    "figure": str,
-    "axis": str,
-    "pushing": str,
-    "axes": str,
-    "dark": _flag,
-}
-SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": grabs.spelled, "known": known.spelled}
-SPELLED["zoom"] = lambda place: ":".join(f"{value:g}" for value in place)
-EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
-UNSEEN: View = {"contact": None, "second": None, "frame": 0, "reference": 0, "between": None}
-UNSEEN |= {"pulls": [], "known": []}
-OF_A_REPLAY = tuple(UNSEEN)
-
-
-def _spelled(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return "-".join(str(part) for part in value)
-    return int(value) if isinstance(value, bool) else value
-
-
-def read_view(given: Mapping[str, str]) -> View:
-    """Parameters of AppState from a link's texts; what makes no sense is left out."""
-    view = {}
-    for name, cast in VIEW.items():
-        try:
-            value = cast(given[name])
-            AppState.param[name]._validate(value)
-        except (KeyError, ValueError):
-            continue
-        view[name] = value
-    return view
-
-
-def _fitting(view: View, replay: Replay) -> View:
-    """Of these rows and contacts those that a Replay has."""
-    frames, contacts = replay.normal.shape
-    sizes = dict.fromkeys(OF_A_REPLAY, frames)
-    sizes |= dict.fromkeys(("contact", "second", "pulls", "known"), contacts)
-
-    def fits(name: str) -> bool:
-        if view[name] is None:
-            return True
-        values = view[name] if name == "between" else (view[name],)
-        if name == "pulls":
-            values = list(grabs.contacts(view[name]))
-        if name == "known":
-            values = [one.contact for one in view[name]]
-        return all(0 <= value < sizes[name] for value in values)
-
-    return {name: view[name] for name in OF_A_REPLAY if name in view and fits(name)}

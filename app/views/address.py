@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import param
 
-from ..state import VIEW
+from ..links import VIEW
 from .scripts import FOLDER, Scripted, module
 
 # Nobody goes back to the frame before, to the view of a moment ago, or to the other theme.

@@ -6,7 +6,7 @@ from .. import exports, movies, planes, standalone
 from ..compute import found_or_made
 from ..data import SOURCES
 from ..jobs import reading
-from ..state import VIEW
+from ..links import VIEW
 from .captions import caption, known_words, stem
 from .handover import Handover
 from .packing import exact_intervals, full_extent, gone, measured, pins

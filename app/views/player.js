@@ -15,10 +15,10 @@ import { Replay } from "./replay.js"
 import { Scene } from "./scene.js"
 import { closeSidebar } from "./sidebar.js"
 import { Split } from "./split.js"
+import { Sway } from "./sway.js"
 
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
-const SWING = 2.2 // s, for the displacement field to go to and fro
 const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
 const LONGEST_S = 6 // but no longer than this
 const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
@@ -61,6 +61,7 @@ class Player {
     this.difference = new Difference(this)
     this.predict = new Predict(this)
     this.split = new Split(this)
+    this.sway = new Sway(this.scene)
     this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
     this.scene.describe = {
       contact: (k) => this.look.contact(k, this.replay),
@@ -361,25 +362,6 @@ class Player {
     this.play(true)
   }
 
-  // A displacement field goes to and fro; the largest displacement is half a largest radius.
-
-  displace() {
-    const { scene } = this, field = this.model.displacement, was = scene.offset
-    let most = 0
-    for (let g = 0; g < (field?.length ?? 0); g += 2) most = Math.max(most, Math.hypot(field[g], field[g + 1]))
-    scene.offset = most > 0 ? { field, most: 0.5 / most, amplitude: 0 } : null
-    if (scene.offset && !was) requestAnimationFrame((now) => this.swing(now))
-    if (!scene.offset && this.replay) scene.changed()
-  }
-
-  swing(now) {
-    const { scene } = this
-    if (!scene.offset || !scene.root.isConnected) return
-    scene.offset.amplitude = scene.offset.most * Math.sin((2 * Math.PI * now) / (1000 * SWING))
-    scene.repaint()
-    requestAnimationFrame((next) => this.swing(next))
-  }
-
   // What the server tells
 
   /** What is done when a parameter of the model has changed. */
@@ -393,7 +375,7 @@ class Player {
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
       busy: () => buttons.root.classList.toggle("busy", model.busy),
       walk: () => this.load(),
-      displacement: () => this.displace(),
+      displacement: () => this.sway.take(model.displacement),
       twin: () => this.split.take(),
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
       plane: () => { this.plots.plane = plain(model.plane); this.again() },

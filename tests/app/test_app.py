@@ -237,10 +237,11 @@ def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
 
 
 def test_older_links_to_a_renamed_tab_open_it():
+    from app.links import read_view
     from app.page import TABS
-    from app.state import read_view
+    from app.state import AppState
 
-    (tab,) = read_view({"tab": "projection"}).values()
+    (tab,) = read_view({"tab": "projection"}, AppState.param).values()
     assert TABS[tab] == "Force space"
 
 

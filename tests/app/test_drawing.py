@@ -224,6 +224,31 @@ def test_chains_too_thin_or_out_of_sight_are_not_drawn(run):
     assert part == {"segments": 2, "drawn": 0, "outside": 2, "thin": 0}
 
 
+def test_a_displacement_goes_to_and_fro_by_half_a_largest_radius(run):
+    """The disk that moves most, at the turning point a quarter of the swing after its middle."""
+    ahead, back, rests = run(
+        "scene sway",
+        f"""({{ Scene, Sway }}, {{ walk, field }}) => {{
+            {SCENE}
+            document.body.append(scene.root)
+            const sway = new Sway(scene)
+            const shifts = () => [0, 1, 2].map((k) => [scene.shift(k, 0), scene.shift(k, 1)])
+            sway.take(field)
+            sway.swing(550)
+            const ahead = shifts()
+            sway.swing(1650)
+            const back = shifts()
+            sway.take(null)
+            return [ahead, back, shifts()]
+        }}""",
+        walk=PRESSED,
+        field=[0.0, 0.0, 0.3, 0.4, 0.0, -0.25],
+    )
+    np.testing.assert_allclose(ahead, [[0, 0], [0.3, 0.4], [0, -0.25]], atol=1e-12)
+    np.testing.assert_allclose(back, -np.array(ahead), atol=1e-12)
+    assert rests == [[0, 0]] * 3
+
+
 def test_the_path_in_force_space_ends_where_the_replay_is(run):
     """On the straight line between two states, in pixels, behind the states that it came by."""
     drawn = run(

@@ -7,6 +7,7 @@ from app import grabs, planes
 from app.grabs import Hand
 from app.jobs import reading
 from app.state import AppState
+from app.views.messages import FROM_BROWSER, TO_BROWSER, listed
 
 
 class Page:
@@ -14,10 +15,15 @@ class Page:
 
     def __init__(self, state, wait_for):
         self.state, self.told, self._wait = state, [], lambda: wait_for(state)
-        self.hand = Hand(state, state.task(reading), self.told.append)
+        self.hand = Hand(state, state.task(reading), self._tell)
         self._wait()
 
+    def _tell(self, message):
+        assert listed(TO_BROWSER, "Player", message), message
+        self.told.append(message)
+
     def hear(self, **message):
+        assert listed(FROM_BROWSER, "Player", {"hand": message}), message
         self.hand.heard(message)
         self._wait()
         return self.told[-1] if self.told else None

@@ -13,6 +13,7 @@ from app.state import AppState
 from app.views import plane
 from app.views.controls import Controls
 from app.views.intervals import View
+from app.views.messages import TO_BROWSER, listed
 from app.views.packing import PackingView
 from app.views.stream import Stream
 
@@ -28,6 +29,7 @@ class Browser:
         self.player._handle_msg({"live": {"anew": True, "seen": awake}})
 
     def _take(self, news):
+        assert listed(TO_BROWSER, "Player", news), sorted(news)
         self.got.append(news)
         if self.awake:
             self.player._handle_msg({"live": {"painted": news["number"]}})

@@ -485,6 +485,7 @@ def test_parameters_name_what_is_on_screen(state):
 
 def test_every_button_hands_a_file_over(state):
     from app.views.export import View
+    from app.views.messages import TO_BROWSER, listed
 
     view = View(opened(state))
     keys = [key for group in view.buttons.files.values() for key in group]
@@ -493,6 +494,7 @@ def test_every_button_hands_a_file_over(state):
         view.buttons._send_msg = handed.append
         view.buttons._handle_msg({"key": key})
         settled(state)
+        assert all(listed(TO_BROWSER, "Handover", given) for given in handed), key
         (file,) = (given for given in handed if "name" in given)
         assert "/" not in file["name"], key
         drawn = key in ("svg", "png", "webm")  # by the browser

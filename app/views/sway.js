@@ -1,0 +1,25 @@
+// A displacement field of the disks goes to and fro; the largest displacement is half a largest radius.
+
+const SWING = 2.2 // s, to and fro
+
+export class Sway {
+  constructor(scene) { this.scene = scene }
+
+  /** field: flat (2 N,) displacements, or null where nothing moves any more. */
+  take(field) {
+    const { scene } = this, was = scene.offset
+    let most = 0
+    for (let g = 0; g < (field?.length ?? 0); g += 2) most = Math.max(most, Math.hypot(field[g], field[g + 1]))
+    scene.offset = most > 0 ? { field, most: 0.5 / most, amplitude: 0 } : null
+    if (scene.offset && !was) requestAnimationFrame((now) => this.swing(now))
+    if (!scene.offset && scene.geometry) scene.changed()
+  }
+
+  swing(now) {
+    const { scene } = this
+    if (!scene.offset || !scene.root.isConnected) return
+    scene.offset.amplitude = scene.offset.most * Math.sin((2 * Math.PI * now) / (1000 * SWING))
+    scene.repaint()
+    requestAnimationFrame((next) => this.swing(next))
+  }
+}
