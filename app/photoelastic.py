@@ -233,9 +233,7 @@ NAMED = 12  # disks that are named
 def _left(report: dict[str, Any]) -> str:
     names = report["left_open"]
     if not names:
-        return (
-            "With them every inner disk is balanced: apart from the walls nothing was left open."
-        )
+        return "With them every inner disk is balanced: apart from the walls nothing was left open."
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (
         f"With them {len(names)} inner disks still cannot be balanced, by "

@@ -130,7 +130,7 @@ def left_out(summary):
 
 def tiles(state, volume):
     """The numbers of the replay on screen, its Volume, and what they stand on, to be opened."""
-    folded = Foldout(line="Check", sizing_mode="stretch_width", margin=(2, 12))
+    folded = Foldout(line="Check", margin=(2, 12), styles={"flex": "1 0 90px"})
 
     def tell(*events):
         folded.inside = "" if state.replay is None else checks(state.replay.summary)
@@ -138,7 +138,7 @@ def tiles(state, volume):
     state.param.watch(tell, "replay")
     tell()
     shown = of_replay(state, numbers, STYLE, margin=(0, 10))
-    last = pn.Row(folded, volume.measure, sizing_mode="stretch_width")
+    last = pn.FlexBox(folded, volume.measure, sizing_mode="stretch_width")
     return pn.Column(shown, volume.tiles, last, sizing_mode="stretch_width")
 
 
