@@ -27,7 +27,7 @@ STYLE = """
 TILES = (
     ("free numbers h", "dimension", "d", "h", "forces less equations"),
     ("spread η1", "eta1", ".4f", "eta1", "of one force"),
-    ("distance η2", "eta2", ".4f", "eta2", "between two networks"),
+    ("distance η2", "eta2", ".4f", "eta2", "of two networks"),
     ("range η3", "eta3", ".4f", "eta3", "largest − least force"),
 )
 # The same of what only those look at who check.
