@@ -46,6 +46,7 @@ class Recorder:
 
     def stop(self):
         """No more pictures."""
+        self._wire.remove_listener("Page.screencastFrame", self._take)
         self._wire.send("Page.stopScreencast")
 
     def _take(self, told):
