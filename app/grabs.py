@@ -144,11 +144,11 @@ class Hand:
         def work(job: Job) -> tuple[Any, ...]:
             puller = _puller(library, cell, known.rows(replay, told))
             held, refusal = _networks(library, cell, replay, puller, told, made, pulls, first)
-            ready = None
+            ready: Iterator[Message] = iter(())
             if grabbed is not None and not refusal:
                 last = held[-1][1] if held else first
                 ready = _to_pull(puller, replay, last, grabbed)
-            return base, held, ready, refusal
+            return base, held, next(ready, None), ready, refusal
 
         if pulls or grabbed is not None:
             self._task.start(work, self._done)
@@ -158,7 +158,7 @@ class Hand:
             self._tell({"held": None})
 
     def _done(self, found: tuple[Any, ...]) -> None:
-        base, made, ready, refusal = found
+        base, made, ready, more, refusal = found
         self._made, self._base = made, base
         self.state.held = made[-1][1] if made else None
         if refusal:
@@ -167,6 +167,8 @@ class Hand:
             return
         if ready is not None:
             self._tell(ready)
+            if not ready.get("rail", {"whole": True})["whole"]:
+                self._task.start(lambda job: next(more), self._tell)
         elif made:
             self._show(made)
 
@@ -234,13 +236,16 @@ def _pulled(
     return Held(found[0] / scale, found[1])
 
 
-def _to_pull(puller: Puller, replay: Replay, last: Held, grabbed: int | planes.Plane) -> Message:
-    """What the page needs to pull a contact, or the point in a Plane."""
+def _to_pull(
+    puller: Puller, replay: Replay, last: Held, grabbed: int | planes.Plane
+) -> Iterator[Message]:
+    """What the page needs to pull a contact, or the point in a Plane: a part may come first."""
     scale = replay.force_scale
     if isinstance(grabbed, planes.Plane):
-        return {"fan": _fan(puller.fan(grabbed.axes), grabbed, scale)}
-    rail = puller.rail(int(replay.backbone[grabbed]), last.forces * scale)
-    return {"rail": {"contact": grabbed} | _rail(rail, scale)}
+        yield {"fan": _fan(puller.fan(grabbed.axes), grabbed, scale)}
+        return
+    for rail in puller.rails(int(replay.backbone[grabbed]), last.forces * scale):
+        yield {"rail": {"contact": grabbed} | _rail(rail, scale)}
 
 
 def _spelled(held: Held) -> Message:
@@ -268,6 +273,7 @@ def _rail(rail: Any, scale: float) -> Message:
     return {
         "lower": rail.lower / scale,
         "upper": rail.upper / scale,
+        "whole": rail.whole,
         "values": (rail.values / scale).astype(np.float64),
         "normal": (rail.states[..., 0] / scale).astype(np.float32).ravel(),
         "tangential": (rail.states[..., 1] / scale).astype(np.float32).ravel(),

@@ -4,8 +4,9 @@ import io
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 from granforce.records import Cancel, Cancelled, Floats, Progress
 
@@ -22,6 +23,9 @@ FRAME_MS = 80
 MOST_BYTES = 5e6
 FEWER = (1.0, 0.7, 0.5, 0.35)  # parts of SIDE that are tried until it is small enough
 TONES = 64  # colours of the whole movie
+BELOW = 0.13  # height of what is written below the packing, in its sides
+ENDS = "low", "high"  # words beside the scale of colours
+LETTERS = 0.026  # the same of its letters
 
 
 def gif(
@@ -34,7 +38,8 @@ def gif(
 ) -> bytes:
     """GIF (bytes, at most MOST_BYTES) of the states, or to and fro between two of them.
 
-    look: see `shades`. progress(done, total); cancelled() ends it with Cancelled.
+    look: see `shades`, with ink, bar and lines of `captions.caption`. progress(done, total);
+    cancelled() ends it with Cancelled.
     """
     for part in FEWER:
         images = _drawn(replay, look, int(SIDE * part), between, progress, cancelled)
@@ -68,16 +73,56 @@ def _drawn(
         image = ground.copy()
         _chains(ImageDraw.Draw(image), replay, look, normal, tangential, fine)
         small = image.resize((side, side), Image.Resampling.LANCZOS)
-        # One palette for all frames, or colours would flicker.
-        tones = images[0] if images else None
-        images.append(
-            small.quantize(TONES, dither=Image.Dither.NONE)
-            if tones is None
-            else small.quantize(palette=tones, dither=Image.Dither.NONE)
-        )
+        small = _captioned(small, look, _place_in(replay, (a, b, part), between))
+        # One palette for all frames, or colours would flicker: of the first and all that may come.
+        if k == 0:
+            tones = _with_all_colours(small, look).quantize(TONES, dither=Image.Dither.NONE)
+        images.append(small.quantize(palette=tones, dither=Image.Dither.NONE))
         if progress is not None:
             progress(k + 1, FRAMES)
     return images
+
+
+def _with_all_colours(image: Image.Image, look: Look) -> Image.Image:
+    """The picture, a quarter of it under all colours that chains can have."""
+    shown, colours = image.copy(), look["colours"]
+    part = image.width / len(colours)
+    for k, colour in enumerate(colours):
+        box = (k * part, 0, (k + 1) * part, image.height / 4)
+        ImageDraw.Draw(shown).rectangle(box, fill=colour)
+    return shown
+
+
+def _place_in(replay: Replay, moment: Moment, between: tuple[int, int] | None) -> str:
+    """Which network a frame shows, in words."""
+    (a, b, part), states = moment, replay.summary["states"]
+
+    def called(k: int) -> str:
+        return f"network {replay.number[k]} of {states}" if replay.number[k] else "original network"
+
+    if between is not None:
+        return f"{part:.0%} of the way from {called(a)} to {called(b)}"
+    return called(a if part < 0.5 else b)
+
+
+def _captioned(image: Image.Image, look: Look, place: str) -> Image.Image:
+    """The picture with its scale of colours, what it shows and where it comes from below it."""
+    side, colours, (low, high) = image.width, look["colours"], (look["bar"][k] for k in ENDS)
+    whole = Image.new("RGB", (side, round(side * (1 + BELOW))), look["ground"])
+    whole.paste(image, (0, 0))
+    draw, gap = ImageDraw.Draw(whole), round(0.01 * side)
+    path = f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf"
+    font = ImageFont.truetype(path, max(9, round(LETTERS * side)))
+    row = (whole.height - side) / 3
+    for k, words in enumerate([f"{place}. {look['lines'][0]}", look["lines"][1]]):
+        draw.text((gap, side + row * k + gap), words, fill=look["ink"], font=font)
+    x, y = gap + draw.textlength(low, font) + gap, side + 2 * row + gap
+    draw.text((gap, y), low, fill=look["ink"], font=font)
+    for k, colour in enumerate(colours):
+        part = 0.2 * side / len(colours)
+        draw.rectangle((x + k * part, y, x + (k + 1) * part, y + 0.6 * row), fill=colour)
+    draw.text((x + 0.2 * side + gap, y), high, fill=look["ink"], font=font)
+    return whole
 
 
 def _moments(count: int, between: tuple[int, int] | None) -> list[Moment]:

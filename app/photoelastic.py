@@ -83,7 +83,7 @@ def infer(
 
     def work(job: Job) -> Frame:
         LIMITS.check(mu=mu)
-        job.begin("looking for forces that balance the grains, near the measured ones")
+        job.begin("looking for forces that balance the disks, near the measured ones")
         roles = next(roles for roles in ROLES if roles[0] in files)
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
         found = read_pegs(
@@ -178,7 +178,7 @@ def account(report: dict[str, Any]) -> Iterator[str]:
     if "names" in report:
         yield f"Beware: {report['names']}."
     yield (
-        f"Listed are {count('contacts_listed')} contacts of {count('grains')} grains. "
+        f"Listed are {count('contacts_listed')} contacts of {count('grains')} disks. "
         f"{_walls(report)}"
     )
     mended = [f"{words} ({report[kind]})" for kind, (words, _, spoils) in KINDS.items()
@@ -190,12 +190,12 @@ def account(report: dict[str, Any]) -> Iterator[str]:
             yield f"{report[key]} {words}"
     if report["unbalance_saved_if_tangential_forces_were_reversed"] > REVERSED:
         yield (
-            "If all tangential forces had the other sign, grains would be nearer to balance: "
+            "If all tangential forces had the other sign, disks would be nearer to balance: "
             "programs differ there, try the switch."
         )
     yield (
         f"On the listed contacts alone, no admissible forces balance "
-        f"{count('unbalanced_on_listed_contacts')} of the inner grains. {count('candidates')} "
+        f"{count('unbalanced_on_listed_contacts')} of the inner disks. {count('candidates')} "
         "pairs that are about as near joined as contacts that were not measured."
     )
     yield _left(report)
@@ -210,7 +210,7 @@ def account(report: dict[str, Any]) -> Iterator[str]:
 
 
 def _walls(report: dict[str, Any]) -> str:
-    at = f"{report['grains_at_walls']} grains are at walls"
+    at = f"{report['grains_at_walls']} disks are at walls"
     if report["walls"] == "open":
         return (
             f"{at}: what a wall does to them was not measured, so their balance is not asked for."
@@ -227,18 +227,16 @@ DOUBTS = (
     ("beyond_friction", "measured tangential forces are larger than friction allows at this μ."),
 )  # fmt: skip
 REVERSED = 0.05  # part of the unbalance, from which on the sign of f_t is doubted
-NAMED = 12  # grains that are named
+NAMED = 12  # disks that are named
 
 
 def _left(report: dict[str, Any]) -> str:
     names = report["left_open"]
     if not names:
-        return (
-            "With them every inner grain is balanced: apart from the walls nothing was left open."
-        )
+        return "With them every inner disk is balanced: apart from the walls nothing was left open."
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (
-        f"With them {len(names)} inner grains still cannot be balanced, by "
+        f"With them {len(names)} inner disks still cannot be balanced, by "
         f"{report['unbalance']:.2g} ⟨fₙ⟩ in sum: their balance was left open "
-        f"(grains {', '.join(map(str, names[:NAMED]))}{more})."
+        f"(disks {', '.join(map(str, names[:NAMED]))}{more})."
     )

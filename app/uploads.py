@@ -29,9 +29,9 @@ WORDS = {
     "npz": "packing",
     "particles": "dump of the particles",
     "contacts": "dump of the contacts",
-    "grains": "table of grains",
+    "grains": "table of disks",
     "joined": "table of contacts",
-    "positions": "positions of the grains",
+    "positions": "positions of the disks",
     "adjacency": "adjacency list with the forces",
     "solved": "frame solved by PeGS 2",
 }
@@ -73,7 +73,7 @@ def role(name: str, content: bytes) -> str:
         return measured
     raise InputError(
         f"{name}: neither an NPZ of granforce, nor a LAMMPS dump, nor a table with columns x, y, r "
-        "(grains) or i, j (contacts), nor a photoelastic list of positions or of forces"
+        "(disks) or i, j (contacts), nor a photoelastic list of positions or of forces"
     )
 
 
@@ -209,7 +209,7 @@ def told(report: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 _ROWS = (
-    ("grains", "grains", ",d", ""),
+    ("disks", "grains", ",d", ""),
     ("rattlers", "rattlers", ",d", ""),
     ("contacts listed", "contacts", ",d", ""),
     ("contacts that can carry", "backbone_contacts", ",d", ""),

@@ -18,11 +18,16 @@ def caption(state):
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
             f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state, pulled)}.",
-            f"μ = {state.cell.mu:g}, {state.cell.series}.",
+            origin(state.cell),
             *known_words(state),
             f"granforce ?{state.link()}",
         ],
     }
+
+
+def origin(cell):
+    """Where states come from, in all words that it takes to make them again."""
+    return f"μ = {cell.mu:g}, {cell.series}"
 
 
 def known_words(state):

@@ -104,7 +104,7 @@ def _along(frame, force, width, chosen):
 def _draw_grains(fig, frame):
     x, y = frame.x.T
     kinds = (
-        ("grains", ~(frame.at_wall | frame.left_open), EDGE, 0.18),
+        ("disks", ~(frame.at_wall | frame.left_open), EDGE, 0.18),
         ("at a wall", frame.at_wall, EDGE, 0.5),
         ("left open", frame.left_open, SERIES[1], 0.9),
     )

@@ -7,7 +7,7 @@ from ..compute import found_or_made
 from ..data import SOURCES
 from ..jobs import reading
 from ..links import VIEW
-from .captions import caption, known_words, stem
+from .captions import caption, known_words, origin, stem
 from .handover import Handover
 from .packing import exact_intervals, full_extent, gone, measured, pins
 from .parts import note
@@ -30,7 +30,7 @@ HELP = """
 Pictures have a colour bar, a scale and a caption. Movies play from the first state to the last, or
 to and fro between two: WebM is recorded here at the player's speed, GIF is drawn for slides, at
 most 5 MB. The page as one file plays without a server and without a network.
-Contacts: one row each with grains, original and present forces, the range over the states and,
+Contacts: one row each with disks, original and present forces, the range over the states and,
 where known, exact bounds; the file's first lines explain the columns. States: the packing, and
 <b>all</b> states with their measures, units and parameters; where only some were kept, all are
 computed again. Every plot is saved as PNG or SVG by the buttons above it. The address of the page
@@ -90,8 +90,9 @@ class View:
         loads, given, known = state.loads, gone(state, replay), pins(state)
         seen = measured(state, replay)
         view = {name: getattr(state, name) for name in VIEW}
-        source = " ".join([state.source, *known_words(state)])
+        source = " ".join([origin(cell), *known_words(state)])
         told = {"link": state.link(), "command": state.command, "source": source}
+        legend = {name: caption(state)[name] for name in ("ink", "bar", "lines")}
 
         def work(job):
             if key in ("netcdf", "zarr"):
@@ -111,7 +112,7 @@ class View:
                     most=most, **{name: view[name] for name in names},
                 )  # fmt: skip
                 content = movies.gif(
-                    replay, look, between=view["between"], progress=job.tell,
+                    replay, look | legend, between=view["between"], progress=job.tell,
                     cancelled=job.cancelled,
                 )  # fmt: skip
                 return exports.File(f"{stem}.gif", "image/gif", content)
@@ -143,7 +144,7 @@ class View:
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
         frame = min(state.frame, len(replay.normal) - 1)
-        source, held = state.source, state.held
+        source, held = origin(cell), state.held
         link, view = state.link(), {name: getattr(state, name) for name in VIEW}
 
         def work(job):

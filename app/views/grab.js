@@ -163,13 +163,19 @@ export class Grab {
   ride(rail) {
     if (!rail) { this.contact = null; this.unsay(); this.player.plots.move(false); return this.player.again() }
     if (rail.contact !== this.contact) return
-    const { mixed } = this.replay
+    const { mixed } = this.replay, more = this.rail !== null // the ends, of a rail that was there in part
     this.rail = rail
+    if (more) return this.arrived()
     this.begun = mixed.normal[this.contact]
     this.remember()
     this.slid = mixed.tangential.map((t, c) => Math.abs(t) >= 0.999 * this.replay.walk.mu * mixed.normal[c])
+    this.arrived()
+  }
+
+  /** The hand goes on along a rail that has come; one that let go before stays where it was going. */
+  arrived() {
     this.move()
-    if (this.flung) this.leave()
+    if (this.flung && this.rail.whole) this.leave()
   }
 
   /** Changes are coloured against the network on screen. */

@@ -55,7 +55,7 @@ NETWORK = {"normal": Array, "tangential": Array, "residual": float}
 NETWORKS = NETWORK | {"residual": Array}  # several, one after the other
 # The networks through which f_n of a contact can be pulled, and what stops it at both ends.
 RAIL = NETWORKS | {"contact": int, "lower": float, "upper": float, "values": Array}
-RAIL |= {"opened": Array, "sliding": Array}
+RAIL |= {"opened": Array, "sliding": Array, "whole": bool}
 # A packing under compression: its box, disks, and contacts with their branch vectors.
 PICTURE = {"mu": float, "box": [float, ...], "tilt": float, "fraction": float, "unbalance": float}
 PICTURE |= {"x": Array, "radius": Array, "i": Array, "j": Array, "reach": Array}

@@ -134,7 +134,7 @@ class Frames:
 
 OPENED = """
 As a packing the frame is the packing of this page: its inferred forces, and what walls do in them
-to the grains held fixed. Then intervals, pulls and outlines tell what else balance would allow.
+to the disks held fixed. Then intervals, pulls and outlines tell what else balance would allow.
 """
 
 

@@ -349,7 +349,7 @@ class View(TabView):
             size=5,
             color=STATES,
             alpha=0.9,
-            legend_label="networks found",
+            legend_label="found",
         )
         fig.scatter(
             "x", "y", source=self.original, marker="diamond", size=15, color=ORIGINAL,

@@ -244,10 +244,11 @@ def responses(own):
         f"{term('study', 'the study')} with 30 contacts each, bars standard errors; {RINGS} "
         f"({len(own)})."
     )
-    lead = (
-        "<b>How hard a contact can be pushed, critical force against η2:</b> each point is the "
-        "mean over packings of one friction μ, written beside it, and the line goes from the least "
-        "to the largest friction."
+    most = max(statistics.means(study, "critical_force"), key=lambda at: at[1], default=None)
+    lead = "" if most is None else f"<b>The hardest pushes are borne at friction {most[0]:g}.</b> "
+    lead += (
+        "Critical force against η2: each point is the mean over packings of one friction μ, "
+        "written beside it, and the line goes from the least to the largest friction."
     )
     return [force, alpha], lead, text
 

@@ -27,7 +27,7 @@ STYLE = """
 TILES = (
     ("free numbers h", "dimension", "d", "h", "forces less equations"),
     ("spread η1", "eta1", ".4f", "eta1", "of one force"),
-    ("distance η2", "eta2", ".4f", "eta2", "between two networks"),
+    ("distance η2", "eta2", ".4f", "eta2", "of two networks"),
     ("range η3", "eta3", ".4f", "eta3", "largest − least force"),
 )
 # The same of what only those look at who check.
@@ -130,7 +130,7 @@ def left_out(summary):
 
 def tiles(state, volume):
     """The numbers of the replay on screen, its Volume, and what they stand on, to be opened."""
-    folded = Foldout(line="Check", sizing_mode="stretch_width", margin=(2, 12))
+    folded = Foldout(line="Check", margin=(2, 12), styles={"flex": "1 0 90px"})
 
     def tell(*events):
         folded.inside = "" if state.replay is None else checks(state.replay.summary)
@@ -138,7 +138,7 @@ def tiles(state, volume):
     state.param.watch(tell, "replay")
     tell()
     shown = of_replay(state, numbers, STYLE, margin=(0, 10))
-    last = pn.Row(folded, volume.measure, sizing_mode="stretch_width")
+    last = pn.FlexBox(folded, volume.measure, sizing_mode="stretch_width")
     return pn.Column(shown, volume.tiles, last, sizing_mode="stretch_width")
 
 

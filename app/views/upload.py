@@ -21,7 +21,7 @@ STATES = 200  # of the walk that is made at once
 HELP = """
 <b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
 <b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
-contacts; <b>tables</b> (CSV): grains with columns x, y, r, and, if there are any, contacts with
+contacts; <b>tables</b> (CSV): disks with columns x, y, r, and, if there are any, contacts with
 columns i, j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
 y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code>
 of PeGS 2, for which the nearest forces in balance are found. The files are read in memory; only a

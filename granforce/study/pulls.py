@@ -3,13 +3,14 @@
 Nothing is kept in a store: a rail or a fan takes some tenths of a second at 400 disks.
 """
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from granforce.explore.outline import extremes
-from granforce.explore.pull import pull, reach
+from granforce.explore.pull import Pull, Reach, pull, reach
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.records import Floats, InputError, Mask, Packing
@@ -20,6 +21,7 @@ STOPS = 17  # networks along a rail
 # width) that each is found at once.
 MANY, FEW_STOPS, INWARD = 5000, 5, 1e-4
 RIBS = 48  # directions of a fan
+WORKERS = 2  # threads, while somebody waits with a force in hand
 
 
 class Rail(NamedTuple):
@@ -32,6 +34,7 @@ class Rail(NamedTuple):
     residual: Floats  # (k,) in ⟨f_n⟩
     opened: Mask  # (2, N_c) bool, contacts without force at the lower and the upper end
     sliding: Mask  # (2, N_c) bool, contacts at the limit of friction there
+    whole: bool = True  # False where values near the ends are still to come
 
 
 class Fan(NamedTuple):
@@ -50,11 +53,16 @@ class Puller:
         self._S = ensemble(packing, mu, **conditions.of(conditions.conditions(known=known)))
 
     def rail(self, contact: int, state: Floats) -> Rail:
-        """The Rail of a contact (its number in the packing) for the network `state` (N_c, 2).
+        """The whole Rail of a contact (its number in the packing) for the network `state` (N_c, 2).
 
         Raises what `pull` and `reach` raise.
         """
-        ends = reach(self._S, contact)
+        *_, whole = self.rails(contact, state)
+        return whole
+
+    def rails(self, contact: int, state: Floats) -> Iterator[Rail]:
+        """The same; of many contacts first a part of it, without the ends, which take longest."""
+        ends = reach(self._S, contact, workers=WORKERS)
         (position,) = self._S.positions([contact])
         many = len(self._S.index) > MANY
         inward = (ends.upper - ends.lower) * (INWARD if many else 0.0)
@@ -62,16 +70,15 @@ class Puller:
         # The network itself is among them, so that nothing jumps when it is taken in hand.
         stops = np.linspace(low, high, FEW_STOPS if many else STOPS)
         values = np.union1d(stops, np.clip(state[position, 0], low, high))
-        found = pull(self._S, contact, values, state)
-        return Rail(
-            lower=ends.lower,
-            upper=ends.upper,
-            values=found.values,
-            states=found.states,
-            residual=found.residual,
-            opened=ends.opened,
-            sliding=ends.sliding != 0,
-        )
+        inner = (values > low) & (values < high)
+        parts: list[Pull] = []
+        some = values[inner] if many and inner.any() else values
+        if len(some) < len(values):
+            parts.append(pull(self._S, contact, some, state, workers=WORKERS))
+            yield _rail(ends, parts, whole=False)
+            some = values[~inner]
+        parts.append(pull(self._S, contact, some, state, workers=WORKERS))
+        yield _rail(ends, parts)
 
     def at(self, contact: int, value: float, state: Floats) -> tuple[Floats, float]:
         """The network (N_c, 2) nearest to `state` with f_n = value on a contact, and its residual.
@@ -115,6 +122,22 @@ class Puller:
         after = (k + 1) % len(fan.points)
         forces = (1 - a - b) * state + a * fan.states[k] + b * fan.states[after]
         return forces, float(self._S.residual(forces[None])[0])
+
+
+def _rail(ends: Reach, parts: list[Pull], whole: bool = True) -> Rail:
+    """The Rail of what was pulled to values between two ends."""
+    values = np.concatenate([part.values for part in parts])
+    order = np.argsort(values)
+    return Rail(
+        lower=ends.lower,
+        upper=ends.upper,
+        values=values[order],
+        states=np.concatenate([part.states for part in parts])[order],
+        residual=np.concatenate([part.residual for part in parts])[order],
+        opened=ends.opened,
+        sliding=ends.sliding != 0,
+        whole=whole,
+    )
 
 
 def _inside(corners: Floats, point: Floats) -> Floats:

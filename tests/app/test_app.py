@@ -630,6 +630,8 @@ def test_limits_are_read_and_wrong_ones_refused():
     for text in wrong:
         with pytest.raises(InputError, match="GRANFORCE_LIMITS"):
             read_limits(text)
+    with pytest.raises(InputError, match=r"between 0 and 1000, got 1e\+09$"):  # no row of zeros
+        Limits().check(mu=1e9)
     with pytest.raises(InputError, match="N must lie between 1 and 500"):
         Limits(n=500).check(n=501)
 

@@ -8,6 +8,7 @@ from app.grabs import Hand
 from app.jobs import reading
 from app.state import AppState
 from app.views.messages import FROM_BROWSER, TO_BROWSER, listed
+from granforce.study import pulls
 
 
 class Page:
@@ -45,6 +46,13 @@ def test_a_contact_that_is_taken_is_selected_and_gets_a_rail(page, state):
     here = np.abs(rail["values"] - state.replay.normal[0, 4]).argmin()
     np.testing.assert_allclose(normal[here], state.replay.normal[0], atol=1e-5)
     assert rail["residual"].max() < 1e-9 and len(rail["opened"]) == 2 * contacts
+
+
+def test_of_many_contacts_a_part_of_the_rail_comes_first(page, state, monkeypatch):
+    monkeypatch.setattr(pulls, "MANY", 1)
+    page.hear(grab=4)
+    part, rail = (message["rail"] for message in page.told if "rail" in message)
+    assert not part["whole"] and rail["whole"] and set(part["values"]) < set(rail["values"])
 
 
 def middle(rail):

@@ -10,14 +10,16 @@ import xarray as xr
 import zarr
 from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
+from PIL import Image
 from small_store import KEPT, STATES
 
 import granforce as gf
-from app import distributions, exports, perturbations, planes, studied, uploads
+from app import distributions, exports, movies, perturbations, planes, studied, uploads
 from app.views import labels
 from app.views import plane as plane_view
 from app.views import studied as drawn_study
 from app.views.controls import Controls
+from app.views.style import palettes
 from granforce import measures
 from granforce.records import InputError
 from granforce.study import cells as study
@@ -428,6 +430,21 @@ def test_a_tap_on_a_mu_shows_its_states(state):
 
 
 # Export
+
+
+def test_a_movie_keeps_the_colours_that_its_first_network_has_not(state, monkeypatch):
+    replay = opened(state).replay
+    monkeypatch.setattr(movies, "FRAMES", 4)
+    view = {"colour": "change", "thickness": "normal", "reference": 0, "dark": False}
+    look = movies.shades(replay, {}, palettes(False), most=1.0, full=1e-3, **view)
+    told = {"ink": "#000000", "bar": {"low": "less", "high": "more"}, "lines": ["width", "from"]}
+    with Image.open(io.BytesIO(movies.gif(replay, look | told))) as movie:
+        side, warm = movie.width, []
+        for k in range(movie.n_frames):
+            movie.seek(k)
+            pixels = np.asarray(movie.convert("RGB"), dtype=int)[:side]
+            warm.append((pixels[..., 0] - pixels[..., 2]).max())
+    assert warm[0] < 30 and max(warm) > 120  # orange, of what carries more
 
 
 def test_the_table_of_contacts_holds_what_is_on_screen(state):

@@ -52,7 +52,7 @@ def test_exact_measurements_are_taken_as_they_are(state):
     player, *body = view.frame
     account, _, _, _, _, _, compared, stress, save = body
     assert not player.visible and "σₓₓ" in stress.object and save.files
-    for words in ("60 grains", "at walls", "every inner grain is balanced", "not measured"):
+    for words in ("60 disks", "at walls", "every inner disk is balanced", "not measured"):
         assert words in account.object
     for part in "nt":
         source = compared.object.select_one({"name": f"photoelastic_{part}"})

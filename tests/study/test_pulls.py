@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from packings import packed
 
+from granforce.explore import pull
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import ensemble
 from granforce.records import InputError
@@ -46,6 +47,19 @@ def test_rails_of_many_contacts_have_fewer_stops_and_the_same_bounds(S, puller, 
     halfway = (rail.states[1:] + rail.states[:-1]) / 2
     for states in (rail.states, halfway):
         assert S.residual(states).max() <= BALANCED and S.violation(states).max() <= ADMISSIBLE
+
+
+def test_a_part_of_a_rail_comes_first_and_threads_change_nothing(S, puller, monkeypatch):
+    contact = int(S.index[7])
+    monkeypatch.setattr(pulls, "MANY", 1)
+    beside = puller.rail(contact, S.original)
+    monkeypatch.setattr(pull, "_ALONE", 1)  # each value by itself, on threads
+    part, rail = puller.rails(contact, S.original)
+    assert not part.whole and rail.whole and (part.lower, part.upper) == (rail.lower, rail.upper)
+    kept = np.isin(rail.values, part.values)
+    assert kept.tolist() == [False, *[True] * len(part.values), False]
+    np.testing.assert_array_equal(part.states, rail.states[kept])
+    np.testing.assert_array_equal(rail.states, beside.states)
 
 
 def test_the_network_itself_is_on_its_rail(S, puller):
