@@ -111,10 +111,14 @@ def exact(library: Library, shown: Shown) -> Work:
     def work(job: Job) -> Shown:
         replay = shown.replay
         bounding = live.shared(live.Bounding, params)
-        dataset = found_or_made(
-            library, job, "exact intervals, the widest first", kinds.INTERVALS, params,
-            begun=bounding.restart, watch=bounding.add, widths=replay.high[:, 0] - replay.low[:, 0],
-        )  # fmt: skip
+        try:
+            dataset = found_or_made(
+                library, job, "exact intervals, the widest first", kinds.INTERVALS, params,
+                begun=bounding.restart, watch=bounding.add,
+                widths=replay.high[:, 0] - replay.low[:, 0],
+            )  # fmt: skip
+        finally:
+            bounding.forget()
         found = Shown(shown.cell, shown.replay, dataset)
         library.keep_in_memory(found)
         return found

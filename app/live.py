@@ -148,6 +148,10 @@ class Bounding:
 
     def __init__(self) -> None:
         self.version = 0  # how often something has changed
+        self.forget()
+
+    def forget(self) -> None:
+        """Keep nothing: whoever looks from now on is shown what is found by the next run."""
         self.low = self.high = np.zeros(0, np.float32)
 
     def restart(self, S: Any) -> None:

@@ -558,7 +558,7 @@ def test_states_computed_while_the_page_is_on_its_way_are_shown(chromium, addres
 
 def test_another_stored_mu_is_shown_by_a_key(page):
     page.locator(".friction input[type=range]").press("ArrowRight")
-    page.get_by_text("μ = 1, N = 30").wait_for()
+    page.get_by_text("μ = 1, 30 disks").wait_for()
     page.wait_for_function(
         "e => e.scene.geometry.mu === 1", arg=page.locator(".scene").element_handle()
     )
@@ -568,7 +568,7 @@ def test_mu_typed_is_computed_and_shown_with_exact_intervals(page):
     typed = page.locator("input.typed")
     typed.fill("0.4")
     typed.press("Enter")
-    page.get_by_text("μ = 0.4, N = 30").wait_for(timeout=60_000)
+    page.get_by_text("μ = 0.4, 30 disks").wait_for(timeout=60_000)
     page.wait_for_function(  # they follow by themselves
         f"() => {MODEL}('bars').get_column('exact_high').every(Number.isFinite)", timeout=60_000
     )
