@@ -9,7 +9,6 @@ slacks 1 + w and a weight W on them, K = N H⁻¹ Nᵀ.
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from granforce.numerics.wall_matrix import DEPENDENT
 from granforce.records import Floats, Integers
@@ -53,7 +52,7 @@ def thin_matrix(
     null = cancelling.apart(np.linalg.qr, free / y[:, None])[0]
     along = levers @ null
     H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
-    root = linalg.solve_triangular(np.linalg.cholesky(H), null.T, lower=True).T
+    root = np.linalg.solve(np.linalg.cholesky(H), null.T).T
     inverse = cancelling.apart(np.linalg.pinv, balance * y, DEPENDENT)
     return ThinMatrix(moving, null, root, levers, inverse)
 
