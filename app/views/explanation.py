@@ -30,8 +30,10 @@ def first(summary, more=""):
     """What does not move, what is free, and what playing shows; more: what else can be done."""
     n, mu, free = summary["n"], summary["mu"], summary["dimension"]
     forces = (2 if mu > 0 else 1) * summary["contacts"]
+    loose = summary.get("rattlers", 0)
     still = f"<b>These {n} disks never move.</b> "
-    given = f"Balance gives {forces - free} equations for {forces} contact forces: "
+    those = f"The {n - loose} of them that carry (pale ones are loose)" if loose else "They"
+    given = f"{those} give {forces - free} equations of balance for {forces} contact forces: "
     if free == 0:
         question = "Same disks, same pressure: here the forces are fixed."
         told = f"none is left free, and there is just one {term('network', 'force network')}."

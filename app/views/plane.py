@@ -41,8 +41,8 @@ WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 230px))"}
 
 LEAD = (
     "<b>Every network of forces that holds these disks lies in the shaded area</b>{flattened}. "
-    "Each dot is one network, and dots far apart differ much. The red dot is the network on "
-    "screen: drag it, and the forces in the packing follow."
+    "Each dot is one network found at random. The red dot is the one on screen: drag it, and the "
+    "forces in the packing follow."
 )
 HELP = (
     f"Shown is the shadow ({term('principal', 'projection')}) that {term('s')} casts on a plane, "
@@ -372,7 +372,9 @@ class View(TabView):
 
 def _lead(free):
     """What the plane shows of a space with so many dimensions."""
-    flattened = f", {free} free numbers flattened to 2" if free > 2 else ""
+    flattened = (
+        f", of which this is a shadow: of {free} dimensions two are seen" if free > 2 else ""
+    )
     return LEAD.format(flattened=flattened)
 
 

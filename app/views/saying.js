@@ -77,7 +77,7 @@ export function pictured(body) {
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
   return h > 3 ? `one shadow of S, which has ${h} dimensions; its outline is exact`
-    : `${S} ${["", "a line", "a polygon; far apart are very different forces", "a body; drag beside the point to turn it"][h]}`
+    : `${S} ${["", "a line", "a polygon; points far apart are very different sets of forces", "a body; drag beside the point to turn it"][h]}`
 }
 
 /** The sentence over a scene. */

@@ -130,8 +130,8 @@ def most_undetermined(own):
     return (
         f"<b>Forces are least determined at friction {where}.</b> Each point: by how much the "
         "forces of a packing made with this friction can differ, as a part of the mean force. "
-        f"Filled: means over {many} packings; open: over {few} on this page, as packings made "
-        "alike differ. Grey: the friction on screen."
+        f"Filled: means over {many} packings; open: over {few} computed on this page "
+        "(packings made in the same way differ). Grey: the friction on screen."
     )
 
 

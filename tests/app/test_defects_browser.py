@@ -445,7 +445,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
 @pytest.mark.parametrize(
     "tab, words",
     [
-        ("intervals", ("possible: exact; seen: so far",)),
+        ("intervals", ("pale: possible, exact; dark: seen so far",)),
         ("plane", ("exact outline; sampled states",)),
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],
