@@ -12,7 +12,7 @@ from scipy import sparse
 
 from granforce.bench.exact import plain_loop
 from granforce.bench.inference import ERRORS, contact_program, piqp
-from granforce.bench.report import note, timed
+from granforce.bench.report import note
 from granforce.explore.intervals import intervals
 from granforce.explore.pull import pull
 from granforce.explore.uniform import sample_uniform
@@ -21,6 +21,7 @@ from granforce.forces.knowledge import Known
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack
 from granforce.records import Floats, Integers
+from granforce.system.clock import timed
 
 # Part of the contacts that are known, and how well; values of a pull, in parts of its interval.
 KNOWN_PART, KNOWN_WITHIN = 0.1, 0.1

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
-from granforce.bench.report import timed
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing
 from granforce.records import Floats
+from granforce.system.clock import timed
 
 
 def read_reference(path: str | Path) -> tuple[Ensemble, Any]:

@@ -7,13 +7,14 @@ import highspy
 import numpy as np
 from scipy import sparse
 
-from granforce.bench.report import note, timed
+from granforce.bench.report import note
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.likeliest import checked, fitted
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack
 from granforce.records import Floats
+from granforce.system.clock import timed
 
 # Errors of f_n and f_t in ⟨f_n⟩, and seconds after which HiGHS is not waited for.
 ERRORS, PATIENCE = (0.2, 0.1), 120.0

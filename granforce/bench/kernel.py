@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import exponent, note, timed
+from granforce.bench.report import exponent, note
 from granforce.bench.solvers import FRICTIONS, kicked, tile
 from granforce.explore.intervals import intervals, limit_loads
 from granforce.forces.contact_problem import make_problem
@@ -22,6 +22,7 @@ from granforce.numerics.contact_program import Problem
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_force, critical_forces
+from granforce.system.clock import timed
 
 # Operations of one product of two 3×3 blocks that is taken from a third.
 _PRODUCT = 54

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from granforce import measures
-from granforce.bench.report import exponent, note, timed
+from granforce.bench.report import exponent, note
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
 from granforce.forces.ensemble import ensemble
 from granforce.packing.compaction import pack
 from granforce.records import NotJammedError
+from granforce.system.clock import timed
 
 FRICTIONS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 

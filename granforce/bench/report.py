@@ -3,32 +3,16 @@
 import os
 import platform
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from granforce.records import Rows
 
 LIBRARIES = ("granforce", "numpy", "scipy", "numba", "highspy", "piqp", "siconos")
-
-
-T = TypeVar("T")
-
-
-def timed(
-    action: Callable[..., T],
-    *arguments: Any,
-    clock: Callable[[], float] = time.perf_counter,
-    **options: Any,
-) -> tuple[float, T]:
-    """Seconds that action(…) takes, by a clock, and what it returns."""
-    begin = clock()
-    found = action(*arguments, **options)
-    return clock() - begin, found
 
 
 def note(message: str) -> None:

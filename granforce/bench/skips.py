@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import note, timed
+from granforce.bench.report import note
 from granforce.bench.solvers import kicked
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import Ensemble, ensemble
@@ -18,6 +18,7 @@ from granforce.records import Packing
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
+from granforce.system.clock import timed
 
 
 def skips(quick: bool = True, *, n: int | None = None, mu: float = 0.1) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.bench.report import exponent, note, timed
+from granforce.bench.report import exponent, note
 from granforce.bench.siconos import ABSENT, TOLERANCES, against_siconos
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.gauss_seidel import SideBySide, gauss_seidel
@@ -14,6 +14,7 @@ from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
 from granforce.records import Floats, Packing, Relaxation, Rows, make_contacts, make_packing
+from granforce.system.clock import timed
 
 BASELINE = "Gauss–Seidel alone"
 # Residual (in ⟨f_n⟩) all solvers are asked for.

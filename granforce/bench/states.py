@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from granforce import measures
-from granforce.bench.report import note, timed
+from granforce.bench.report import note
 from granforce.explore.intervals import intervals as exact_intervals
 from granforce.explore.random_walk import walk
 from granforce.forces.ensemble import Ensemble, ensemble
@@ -21,6 +21,7 @@ from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.packing.compaction import pack
 from granforce.records import Floats, NotJammedError, Packing
+from granforce.system.clock import timed
 from granforce.tolerances import EQUILIBRIUM
 
 WALKS: dict[str, dict[str, Any]] = {

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg
 
-from granforce.bench.report import exponent, note, timed
+from granforce.bench.report import exponent, note
 from granforce.bench.solvers import tile
 from granforce.explore.billiard import all_rows, make_rows, some_rows
 from granforce.explore.mixing import Mixing, mixing
@@ -23,6 +23,7 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
 from granforce.records import Floats
+from granforce.system.clock import timed
 
 # Dimension up to which hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79, is waited
 # for. Beyond it hopsy gets our rounding only.

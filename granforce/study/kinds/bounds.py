@@ -20,15 +20,10 @@ from granforce.study.bounds import (
 )
 from granforce.study.cells import Kind
 from granforce.study.keys import Parameters
-from granforce.study.kinds.packings import (
-    check_complete,
-    chosen_contacts,
-    cones_of,
-    ensemble_of,
-    timed,
-)
+from granforce.study.kinds.packings import check_complete, chosen_contacts, cones_of, ensemble_of
 from granforce.study.store import Store
 from granforce.system import cancelling
+from granforce.system.clock import timed
 
 
 def _exact_parameters(
@@ -71,7 +66,7 @@ def _intervals(
     if begun:
         begun(S)
     options |= {"workers": workers, "progress": progress}
-    bounds, seconds = timed(intervals, S, parameters["contacts"], **options)
+    seconds, bounds = timed(intervals, S, parameters["contacts"], **options)
     check_complete(bounds, "exact bounds")
     return intervals_dataset(S, bounds, seconds=seconds)
 
@@ -82,7 +77,7 @@ def _limit_loads(
     """Dataset of the limit loads of contacts."""
     S = ensemble_of(store, parameters)
     options: dict[str, Any] = {"workers": workers, "progress": progress}
-    loads, seconds = timed(limit_load_bounds, S, parameters["contacts"], **options)
+    seconds, loads = timed(limit_load_bounds, S, parameters["contacts"], **options)
     check_complete(loads, "limit loads")
     return limit_loads_dataset(S, loads, seconds=seconds)
 
@@ -139,7 +134,7 @@ def _outline(
     S = ensemble_of(store, parameters)
     plane = _component_axes(S, parameters["components"]) if axes is None else axes
     options = {"tolerance": parameters["tolerance"], "workers": workers, "progress": progress}
-    found, seconds = timed(outline, S, plane, **options)
+    seconds, found = timed(outline, S, plane, **options)
     cancelling.check("outline")
     if not found.converged:
         raise InputError(f"outline not closed: a gap of {found.gap:.1e} ⟨f_n⟩ is left")
@@ -172,7 +167,7 @@ def _stress(
     """Dataset of the outline of stresses."""
     S = ensemble_of(store, parameters)
     options: dict[str, Any] = {"workers": workers, "progress": progress}
-    found, seconds = timed(stress_outline, S, parameters["angles"], **options)
+    seconds, found = timed(stress_outline, S, parameters["angles"], **options)
     cancelling.check("outline of stresses")
     if not found.converged:
         raise InputError("the outline of stresses did not close")

@@ -1,9 +1,8 @@
 """Packings that are kept, and the ensembles of their forces: what names them in a store."""
 
 import hashlib
-import time
 from collections.abc import Callable, Iterable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,8 +23,6 @@ from granforce.system.memory import check_memory
 # Memory that a packing needs at the least for each disk: the lists of pairs, and one factor of its
 # balance.
 DISK_BYTES = 2000
-
-Found = TypeVar("Found")
 
 
 def _packing_parameters(
@@ -135,13 +132,6 @@ def chosen_contacts(contacts: Iterable[int] | None) -> list[int] | None:
     if not chosen:
         raise InputError("name at least one contact, or leave the contacts out for all")
     return chosen
-
-
-def timed(compute: Callable[..., Found], *asked: Any, **options: Any) -> tuple[Found, float]:
-    """What compute(…) finds, and the wall time that it takes."""
-    begin = time.perf_counter()
-    found = compute(*asked, **options)
-    return found, time.perf_counter() - begin
 
 
 def check_complete(result: Any, what: str) -> None:

@@ -23,10 +23,11 @@ from granforce.records import InputError, Progress, positive, random_seed, whole
 from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load
 from granforce.study.keys import Parameters
-from granforce.study.kinds.packings import cones_of, ensemble_of, hash_of, timed
+from granforce.study.kinds.packings import cones_of, ensemble_of, hash_of
 from granforce.study.samples import inference_dataset, uniform_dataset, walk_dataset, walk_of
 from granforce.study.store import Store
 from granforce.system import cancelling
+from granforce.system.clock import timed
 from granforce.system.memory import check_memory
 from granforce.tolerances import EQUILIBRIUM
 
@@ -128,7 +129,7 @@ def _walk(
     options["skip"] = parameters.get("skip", True)
     if begun is not None:
         begun(S)
-    done, seconds = timed(
+    seconds, done = timed(
         walk,
         S,
         parameters["states"],
@@ -204,7 +205,7 @@ def _uniform(
     A sample that did not reach the wanted effective size is kept too, and says so in `reached`.
     """
     S = ensemble_of(store, parameters)
-    drawn, seconds = timed(
+    seconds, drawn = timed(
         sample_uniform,
         S,
         parameters["states"],
@@ -338,7 +339,7 @@ def _informative(
     S = ensemble_of(store, parameters)
     options = {name: parameters[name] for name in ("k", "check", "states", "seed")}
     options |= {"workers": workers, "watch": watch, "progress": progress}
-    found, seconds = timed(informative, S, **options)
+    seconds, found = timed(informative, S, **options)
     cancelling.check("which measurement next")
     return informative_dataset(S, found, seconds=seconds)
 

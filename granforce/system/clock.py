@@ -1,0 +1,19 @@
+"""What something takes, beside what it gives."""
+
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def timed(
+    action: Callable[..., T],
+    *arguments: Any,
+    clock: Callable[[], float] = time.perf_counter,
+    **options: Any,
+) -> tuple[float, T]:
+    """Seconds that action(…) takes, by a clock, and what it returns."""
+    begin = clock()
+    found = action(*arguments, **options)
+    return clock() - begin, found
