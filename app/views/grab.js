@@ -2,7 +2,8 @@
 // networks that the server made; between two of them the straight line is shown, which is admissible
 // too. Let go, and it stays: the next pull starts there.
 
-import { CARRYING, plain } from "./look.js"
+import { CARRYING } from "./look.js"
+import { plain } from "./plain.js"
 import { PointHand } from "./point.js"
 
 const RAIL = 190 // px, the longest

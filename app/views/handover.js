@@ -2,6 +2,7 @@
 
 import { ask } from "./ask.js"
 import { composed, plotsSeen, printFigure } from "./figure.js"
+import { plain } from "./plain.js"
 
 const RATE = 6e6 // bits a second of a movie
 const LONGEST_MS = 60000 // of a movie
@@ -12,7 +13,6 @@ const SCALE = 2 // pixels of a PNG per pixel of its SVG
 
 export function render({ model, view }) {
   const root = document.createElement("div")
-  const plain = (given) => (given instanceof Map ? Object.fromEntries(given) : given)
 
   const deep = (given) => (given instanceof Map || given?.constructor === Object
     ? Object.fromEntries(Object.entries(plain(given)).map(([name, part]) => [name, deep(part)])) : given)

@@ -1,13 +1,14 @@
 // The glossary where its words stand. Marked are elements with data-term; of widgets the words of
 // their label and of the option chosen are looked up.
 
+import { plain } from "./plain.js"
+
 const WAIT_MS = 250 // before a hint opens under a resting pointer
 const WIDGETS = "[role=tab], button, .number, .friction, " +
   ".choice, .MuiFormControl-root, .MuiFormControlLabel-root"
 const DEEP = 14 // levels above the pointer that may hold the word
 
 export function render({ model }) {
-  const plain = (given) => (given instanceof Map ? Object.fromEntries(given) : given)
   const terms = plain(model.terms), labels = plain(model.labels)
   const tip = document.createElement("div")
   tip.className = "hint"

@@ -1,6 +1,7 @@
 // What is seen while it is computed: a packing under compression, then a walk that grows.
 
-import { CARRYING, plain } from "./look.js"
+import { CARRYING } from "./look.js"
+import { plain } from "./plain.js"
 
 const GLIDE = 250 // ms in which the view goes over from the moving packing to the finished one
 const STRIP = 1 // width of the strip around the box in which images are drawn, in largest radii

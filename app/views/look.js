@@ -1,5 +1,7 @@
 // How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
 
+import { plain } from "./plain.js"
+
 export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
 const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
 const THIN = 0.15 // of its width, a chain that a filter leaves out
@@ -162,11 +164,6 @@ export class Look {
     }
     return virial / (2 * Math.PI * radius.reduce((sum, r) => sum + r * r, 0))
   }
-}
-
-/** Takes what the server sent, a Map or a plain object, as a plain object. */
-export function plain(given) {
-  return given instanceof Map ? Object.fromEntries(given) : given
 }
 
 /** Which of the values are among the largest, MARKED of them: 1 or 0 each. */

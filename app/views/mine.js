@@ -1,12 +1,12 @@
 // What was computed here: a name to be typed, what it is, when, how large; to be opened or deleted.
 
 import { ask } from "./ask.js"
+import { plain } from "./plain.js"
 
 export function render({ model, view }) {
   const root = document.createElement("details")
   root.innerHTML = `<summary>My computations</summary><p class="told"></p><table><tbody></tbody></table>`
   const told = root.querySelector(".told"), body = root.querySelector("tbody")
-  const plain = (given) => (given instanceof Map ? Object.fromEntries(given) : given)
   const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
 
   function button(words, act) {

@@ -1,7 +1,7 @@
 // Marks of what is known: a pin on each contact that is held, open where it has an error bar;
 // numbers on those that would be worth measuring, the best first; and where a contact is pushed, arrows.
 
-import { plain } from "./look.js"
+import { plain } from "./plain.js"
 
 const PIN = 17 // px, its height
 const ARROW_PX = 34 // beyond the edge of the disk that is pushed

@@ -2,7 +2,8 @@
 // packing that is played along with it. The pinned state is drawn anew only where the view, the look
 // or the pinned state changes.
 
-import { Look, plain } from "./look.js"
+import { Look } from "./look.js"
+import { plain } from "./plain.js"
 import { Replay } from "./replay.js"
 import { Scene } from "./scene.js"
 
