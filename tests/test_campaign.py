@@ -33,9 +33,9 @@ def test_small_packings_stand(block):
     assert not wrong and not undecided and done > 40  # packings of too few disks are refused
 
 
-@pytest.mark.parametrize("number", [118, 276])
+@pytest.mark.parametrize("number", [100, 118, 276])
 def test_what_fell_stands(number):
-    """A bounded S was called unbounded; one bound without a certificate ended a ranking."""
+    """Unbalanced states; a bounded S called unbounded; a ranking ended by one open bound."""
     wrong, undecided, _ = judged([number])
     assert not wrong and not undecided
 

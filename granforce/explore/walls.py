@@ -105,15 +105,20 @@ def walls(
     else:
         held = (y == 0) | is_a_point(ensemble)
     frame = _frame(ensemble, y, held, weight, measured)
-    if not _is_thin(frame, y):
-        return _walls(frame, _centred(frame, y, _metric), None)
-    y = _centred(frame, y, _thin_metric)
-    if not np.all(y >= 0):
+    centre, thin = _centred(frame, y, _metric), None
+    # Where rows are lost, no centre may be found, or a wrong one.
+    if _is_thin(frame, y if centre is None else centre):
+        centre = _centred(frame, y, _thin_metric)
+        if centre is not None:
+            thin = _thin_metric(frame, centre).matrix
+    if centre is None:
+        raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
+    if not np.all(centre >= 0):
         raise UndecidedError(
             "these conditions leave so little room to the forces that rounding hides it: take a "
             "larger friction coefficient, or prescribe less"
         )
-    return _walls(frame, y, _thin_metric(frame, y).matrix)
+    return _walls(frame, centre, thin)
 
 
 def inner_point(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Mask]:
@@ -315,8 +320,10 @@ def _is_thin(frame: _Frame, y: Floats) -> bool:
     """Whether the sparse factor lost rows of the balance at y, as dense matrices tell."""
     ensemble = frame.ensemble
     A, b, _ = ensemble.scaled_form
+    if A.shape[0] > MOST_DENSE:
+        return False
     at = _metric(frame, y)
-    if A.shape[0] > MOST_DENSE or not len(at.moving):
+    if not len(at.moving):
         return False
     for _ in range(_POLISH):
         y = at.balanced(y)
@@ -333,8 +340,11 @@ def _is_thin(frame: _Frame, y: Floats) -> bool:
 
 def _centred(
     frame: _Frame, y: Floats, metric: Callable[[_Frame, Floats], _Metric | _ThinMetric]
-) -> Floats:
-    """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps."""
+) -> Floats | None:
+    """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps.
+
+    None where they do not end: it may lie at infinity.
+    """
     for _ in range(_MOST_NEWTON_STEPS):
         cancelling.check("uniform sample")
         at = metric(frame, y)
@@ -355,7 +365,7 @@ def _centred(
         while _rise(step, relative, slope, curve) < 0.1 * step * gain:
             step /= 2
         y = _shifted(y, at.moving, step * relative)
-    raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
+    return None
 
 
 def _rise(step: float, relative: Floats, slope: float, curve: float) -> float:
