@@ -48,6 +48,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
     "full": float,
     "stretch": float,
     "overlay": _flag,
+    "drawn": str,
     "sort": str,
     "scale": str,
     "figure": str,

@@ -45,6 +45,7 @@ SORTS = {
     "position": "place of the original in its interval",
     "shortened": "how much what is known shortened it",
 }
+DRAWN = {"some": "a few dozen", "all": "all"}
 # What single tabs can show.
 FIGURES = {
     "eta": "How does friction matter?",
@@ -123,6 +124,9 @@ class AppState(param.Parameterized):
     )  # fmt: skip
     stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
+    drawn: Any = param.Selector(
+        default="some", objects=list(DRAWN), doc="of which contacts intervals are drawn"
+    )
     sort: Any = param.Selector(
         default="original", objects=list(SORTS), doc="order of the intervals"
     )

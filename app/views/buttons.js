@@ -61,12 +61,7 @@ const BUTTONS = `
   <div class="quiz" role="status"></div>
   <div class="read">
     <span>network <b class="state"></b></span>
-    <span class="running">
-      <span>(<b class="played"></b> shown so far):</span>
-      <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
-      <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
-      <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
-    </span>
+    <span class="differs">forces differ from the original's by <b class="apart"></b> of the mean force</span>
   </div>`
 const VIEW = `
   ${button("closer", "zoom in (wheel, pinch)")}
@@ -81,6 +76,12 @@ const CHECKS = `<summary>Check this network</summary>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
     <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
     <span tabindex="0" data-term="distance">from the centre of the states <b class="distance"></b> ⟨fₙ⟩</span>
+    <span class="running">
+      <span>of the <b class="played"></b> shown so far:</span>
+      <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
+      <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
+      <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
+    </span>
   </div>`
 
 export class Buttons {
@@ -189,6 +190,7 @@ export class Buttons {
     const accepted = walk.acceptance[seen]
     const texts = {
       state: replay.place,
+      apart: `${Math.round(100 * replay.apart)} %`,
       eta1: form(walk.eta1[seen], 3),
       eta2: form(walk.eta2[seen], 3),
       eta3: form(walk.eta3[seen], 3),
@@ -199,6 +201,7 @@ export class Buttons {
     }
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text
     this.root.classList.toggle("ran", seen > 1 && !replay.held)
+    this.root.classList.toggle("other", replay.apart > 0)
     this.part("scrub").value = replay.position
     this.count()
   }

@@ -76,7 +76,7 @@ def rest(summary):
         "contact carry a wider range of forces, but a packing made with more friction comes to "
         "rest with fewer contacts, so fewer forces are free. With little friction many directions "
         "are open, but narrow; with a lot of it few, but wide: the indeterminacy rises and "
-        "then falls, and is largest around μ = 0.1 to 0.2.</p>"
+        "then falls, and is largest around μ = 0.2 to 0.3.</p>"
         f"<p><b>Where the states come from.</b> {term('walk')}: kick all forces at random, take "
         f"the network in balance that is nearest to the kicked forces, go on from there. The "
         f"{term('original')} is the one it came to rest with. All this follows "

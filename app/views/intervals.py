@@ -1,43 +1,50 @@
 """Intervals of each contact's normal force (Fig. 3 of PRE 79, 052302); η1, η2, η3 as they grow."""
 
+from functools import partial
+
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 
 from .. import live
-from ..state import SCALES, SORTS
+from ..state import DRAWN, SCALES, SORTS
 from .contacts import Contacts
 from .hints import term
 from .known import Known
 from .packing import exact_intervals
-from .parts import MOVES, figure, note
+from .parts import MOVES, figure, folded_away, note
 from .select import Select
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
+SOME = 40  # bars that can be told apart, and taken by their dots
+APART = 100  # bars up to which there is room between them, and for large dots
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
 BARS += ("whole_low", "whole_high")  # exact intervals without what is known
-SEEN = 0.9  # width of a bar of what was seen, in that of one contact; see layer.js
+# Widths of what was possible before, is possible, and was seen, in that of one contact, and size
+# of dots, px; of few bars, and of many.
+FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
 ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
 ETAS = ("eta1", "eta2", "eta3")
-SMALL = {"width": 190, "margin": (6, 8, 2, 8)}
+SMALL = {"width": 166, "margin": (6, 2, 2, 8)}
 
 
+GROWS = "How many networks does it take?"
 LEAD = (
     "<b>How far can each force go?</b> Each bar is one contact, from the smallest to the largest "
     "normal force that it can have while every disk stays in balance. Drag a red dot, its force "
-    "now: all others follow."
+    "now: all others follow. Click a contact in the packing to find its bar."
 )
-HELP = f"""
+HELP = f"""<details><summary>What do the bars and curves show?</summary>
 Pale: every force that a contact can have in any network in balance
 ({term("exact", "possible")}); dark: what the states passed so far had; yellow: in the
 {term("original")}; dots: in the state on screen. Curves: η of the states passed so far (of η3,
 {term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
 {term("known", "known")}, the faintest part of a bar is what was possible without that knowledge.
 Click a bar to find its contact in the packing.
-"""
+</details>"""
 
 
 class View:
@@ -54,6 +61,8 @@ class View:
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
         ]
         self.figure, self.growth_figure = self._bars_figure(), self._growth_figure()
+        self.contacts = np.array([], dtype=int)
+        self.drawn = _select("Contacts", DRAWN, state.drawn)
         self.sort = _select("Sorted by", SORTS, state.sort)
         self.scale = _select("Scale", SCALES, state.scale)
         self.exact = pmui.Button(
@@ -64,41 +73,42 @@ class View:
             margin=(14, 8, 2, 8),
         )
         self.told = note(HELP)
-        self.left_out = pn.pane.HTML(margin=(0, 10), styles={"font-size": "12px", "opacity": "0.8"})
         self._connect()
         self._show()
 
     def panel(self):
-        """Choices, bars and growth."""
+        """Choices and bars; growth, to be opened."""
         wide = {"sizing_mode": "stretch_width", "margin": 0}
-        choices = pn.FlexBox(self.sort, self.scale, sizing_mode="stretch_width")
+        choices = pn.FlexBox(self.drawn, self.sort, self.scale, sizing_mode="stretch_width")
         return pn.Column(
             note(LEAD),
             choices,
             pn.pane.Bokeh(self.figure, **wide),
             self.exact,  # below, as the plot must not move when the button goes
-            self.left_out,
             Known(self.state),
-            pn.pane.Bokeh(self.growth_figure, **wide),
             self.told,
+            folded_away(GROWS, pn.pane.Bokeh(self.growth_figure, **wide)),
             Contacts(self.state),
             sizing_mode="stretch_width",
         )
 
     def _connect(self):
         state = self.state
-        self.sort.param.watch(lambda event: state.param.update(sort=event.new), "value")
-        self.scale.param.watch(lambda event: state.param.update(scale=event.new), "value")
+        for name in ("drawn", "sort", "scale"):
+            getattr(self, name).param.watch(partial(self._choose, name), "value")
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
-        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "sort", "scale"])
+        shown = ["replay", "growing", "exact", "narrowed", "drawn", "sort", "scale", "contact"]
+        state.param.watch(self._show, shown)
         state.param.watch(self._offer, ["replay", "growing", "exact", "arriving"])
-        state.param.watch(self._mark, "contact")
         state.param.watch(self._catch_up, "tab")
         for task in (state.computation, state.knowledge.task):
             task.param.watch(self._offer, "running")
         self._offer()
         self._stale = False
+
+    def _choose(self, name, event):
+        self.state.param.update({name: event.new})
 
     # Contents
 
@@ -112,16 +122,14 @@ class View:
         self._stale = state.tab != self.name
         if replay is None or self._stale:
             return
-        self.sort.value, self.scale.value = state.sort, state.scale
+        for name in ("drawn", "sort", "scale"):
+            getattr(self, name).value = getattr(state, name)
         exact = exact_intervals(state.possible, replay)
         order = sorted_contacts(replay, exact, state.sort, state.narrowed)
-        step = -(-len(order) // MOST_BARS)
-        ranks = np.arange(0, len(order), step)
-        self.contacts = order[ranks]
-        self._show_bars(replay, exact, ranks)
-        self.left_out.object = (
-            f"One contact in {step} is drawn: {len(ranks)} of {len(order)}." if step > 1 else ""
-        )
+        named = [one.contact for one in state.known]
+        named += [] if state.contact is None else [state.contact]
+        self.contacts = order[picked(order, SOME if state.drawn == "some" else MOST_BARS, named)]
+        self._show_bars(replay, exact, len(order))
         if not events or any(event.name in ("replay", "growing") for event in events):
             self._show_growth(replay)
         self._mark()
@@ -132,7 +140,7 @@ class View:
         self.exact.visible = state.replay is not None and state.exact_wanted
         self.exact_item.visible = state.possible is not None or state.arriving is not None
 
-    def _show_bars(self, replay, exact, ranks):
+    def _show_bars(self, replay, exact, of):
         contacts = self.contacts
         original = replay.normal[0, contacts]
         unit = original if self.state.scale == "own" else np.ones_like(original)
@@ -142,11 +150,13 @@ class View:
         if exact and self.state.narrowed is not None:
             before = exact_intervals(self.state.narrowed.before, replay)
             whole = before["low"][contacts], before["high"][contacts]
-        for renderer, part in zip(self.layers, (1, 1, SEEN), strict=True):
-            renderer.glyph.width = part * float(ranks[1] - ranks[0] if len(ranks) > 1 else 1)
+        *widths, size = FEW if len(contacts) <= APART else MANY
+        for renderer, width in zip(self.layers, widths, strict=True):
+            renderer.glyph.width = width
+        self.dots.glyph.size = size
         self.whole.visible = self.whole_item.visible = whole[0] is not none
         self.bars.data = {
-            "rank": (ranks + 1).astype(np.float32),
+            "rank": np.arange(1, len(contacts) + 1, dtype=np.float32),
             "at": contacts.astype(np.int32),
             "contact": replay.backbone[contacts].astype(np.int32),
             "original": original / unit,
@@ -156,13 +166,13 @@ class View:
             "exact_high": high / unit,
             **{name: original / unit for name in ("low", "high", "now")},
         }
-        self.width = len(contacts) if self.state.sort == "shortened" else len(replay.order)
-        _set_range(self.figure.x_range, 0, self.width + 1)
+        _set_range(self.figure.x_range, 0, len(contacts) + 1)
         top = 3.0 if self.state.scale == "own" else _top(replay, before or exact)
         if self.state.growing is not None:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
-        self.figure.xaxis.axis_label = f"contacts, sorted by {SORTS[self.state.sort]}"
+        some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
+        self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.state.sort]}"
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.state.scale]})"
 
     def _show_growth(self, replay):
@@ -234,8 +244,9 @@ class View:
             **bar,
         )
         seen = fig.vbar(
-            bottom="low", top="high", width=SEEN, fill_color=DARK, legend_label="seen so far", **bar
+            bottom="low", top="high", width=1, fill_color=DARK, legend_label="seen so far", **bar
         )
+        seen.name = "seen"  # see layer.js
         self.layers = self.whole, exact, seen
         for glyph in self.layers:
             glyph.nonselection_glyph = None
@@ -247,14 +258,14 @@ class View:
             line_width=1.5,
             legend_label="original",
         )
-        dots = fig.scatter(
+        self.dots = dots = fig.scatter(
             "rank",
             "now",
             source=self.bars,
-            size=2.4,
             color=DOT,
             legend_label="now",
             nonselection_alpha=1,
+            name="dots",
         )
         for moving in (seen, line, dots):
             moving.tags = MOVES
@@ -320,6 +331,12 @@ def sorted_contacts(replay, exact, by, narrowed=None):
             with np.errstate(invalid="ignore", divide="ignore"):
                 value = (replay.normal[0] - exact["low"]) / value
     return np.argsort(value, kind="stable")
+
+
+def picked(order, most, named):
+    """Ranks (k,) of contacts to be drawn of an order: evenly spaced, at most so many, and named."""
+    step = -(-len(order) // most)
+    return np.union1d(np.arange(0, len(order), step), np.flatnonzero(np.isin(order, named)))
 
 
 def _top(replay, exact):

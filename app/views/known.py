@@ -9,7 +9,10 @@ from .hints import term
 from .scripts import FOLDER, Scripted, module
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
-ASK = "Click a line, then hold its force (Hold, or H): the other intervals can only shrink."
+ASK = (
+    "Click a line in the packing and hold its force (with the button Hold that appears, or H): the "
+    "other intervals can only shrink."
+)
 
 
 class Known(Scripted):

@@ -63,11 +63,12 @@ function linear(scale) {
 }
 
 export const LAYERS = {
-  bars(context, { x, y }, plots) {
+  bars(context, { x, y, fig }, plots) {
+    const glyph = (name) => fig.renderers.find((each) => each.name === name).glyph
     const column = (name) => plots.find("bars").get_column(name)
     const rank = column("rank"), low = column("low"), high = column("high")
     const now = column("now"), original = column("original")
-    const step = rank.length > 1 ? rank[1] - rank[0] : 1, half = 0.45 * step * Math.abs(x(1) - x(0))
+    const half = 0.5 * glyph("seen").width.value * Math.abs(x(1) - x(0)), radius = glyph("dots").size.value / 2
     context.fillStyle = plots.colours.seen
     for (let k = 0; k < rank.length; k++) {
       const top = y(high[k])
@@ -77,8 +78,12 @@ export const LAYERS = {
     context.lineWidth = 1.5
     line(context, rank, original, x, y, rank.length)
     context.fillStyle = plots.colours.now
-    const size = 2.4 * Math.min(1.6, Math.max(1, half))
-    for (let k = 0; k < rank.length; k++) context.fillRect(x(rank[k]) - size / 2, y(now[k]) - size / 2, size, size)
+    context.beginPath()
+    for (let k = 0; k < rank.length; k++) {
+      context.moveTo(x(rank[k]) + radius, y(now[k]))
+      context.arc(x(rank[k]), y(now[k]), radius, 0, 2 * Math.PI)
+    }
+    context.fill()
     const chosen = plots.find("chosen")?.get_column("rank")?.[0]
     const at = chosen === undefined ? -1 : rank.indexOf(chosen)
     if (at < 0) return

@@ -90,6 +90,12 @@ export class Replay {
     return Math.sqrt(Math.max(0, square))
   }
 
+  /** Mean |f_n − original f_n| of the contacts, in ⟨f_n⟩. */
+  get apart() {
+    const { walk, mixed: { normal } } = this
+    return normal.reduce((sum, value, c) => sum + Math.abs(value - walk.normal[c]), 0) / normal.length
+  }
+
   get residual() {
     if (this.held) return this.held.residual
     const [a, b, portion] = this.spot

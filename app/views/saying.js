@@ -20,7 +20,10 @@ export function stopping({ scene }, side) {
     const verb = `${disk ?? ""}${what === OPENS ? "would lose contact" : `about to slide${way(scene, contact, what)}`}`
     kinds.set(verb, [...(kinds.get(verb) ?? []), place])
   }
-  return [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ").replace("at the left wall and at the right wall", "at both walls")
+  const said = [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ")
+  // A disk between two walls cannot slide down both: what is so is that friction does all it can.
+  return said.replace(/about to slide (up|down) at the left wall and at the right wall/,
+    (_, slides) => `friction at its limit, ${slides === "up" ? "down" : "up"} both walls`)
 }
 
 /** Where a disk is about to slide: against the friction on it; of two disks, which way round each other. */

@@ -1,5 +1,7 @@
 """Statistics of the states on screen, and of all those in the stores that were made alike."""
 
+from itertools import chain
+
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
@@ -10,7 +12,7 @@ from ..jobs import reading
 from ..state import AXES, FIGURES
 from . import studied
 from .packing import exact_intervals
-from .parts import TabView, chosen, figure, folded, note, question
+from .parts import TabView, chosen, figure, folded, folded_away, note, question
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
@@ -86,16 +88,14 @@ class View(TabView):
 
     def _showing(self, found):
         figures, self.lead.object, self.told.object = found
-        panes = self._panes(figures)
-        self.plots.objects = panes[:1]
-        yield
-        if self.plots.objects == panes[:1]:  # nothing else was chosen
-            self.plots.extend(panes[1:])
-
-    def _panes(self, figures):
         for fig in figures:
             self._choosable(fig)
-        return [_pane(fig) for fig in figures]
+        first, more = [_pane(figures[0])], figures[1:]
+        self.plots.objects = first
+        yield
+        if more and self.plots.objects == first:  # nothing else was chosen
+            titled = [(fig.title.text, _pane(fig)) for fig in more]
+            self.plots.append(folded_away(*chain(*titled)))
 
     def _follow(self, *events):
         self.bar.visible = self.task.running and self.what.value in DRAWN

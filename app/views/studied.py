@@ -110,8 +110,8 @@ def indeterminacy(own, exact, log):
         f"{term('eta3', '0.15 η3')}; {STUDY}; {RINGS}. Friction "
         "widens what each contact may carry, but a packing made with more of it has fewer contacts "
         "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ "
-        "has its own packing. A tap on a point shows the states of that μ, or asks for them. The "
-        f"last figure: 0.15 η3 of the {term('walk', 'random walk')}, of the "
+        "has its own packing. A tap on a point shows the states of that μ, or asks for them. Found "
+        f"in several ways: 0.15 η3 of the {term('walk', 'random walk')}, of the "
         f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')} to two unbalances, of states "
         f"{term('uniform')}, and {term('exact', 'exact')}."
     )

@@ -1036,23 +1036,29 @@ def test_intervals_take_nothing_over_while_hidden(state, wait_for):
     state.choose(mu=1)
     wait_for(state)
     assert len(view.bars.data["rank"]) == 0
-    state.tab = "intervals"
+    state.tab, state.drawn = "intervals", "all"
     assert len(view.bars.data["rank"]) == state.replay.normal.shape[1]
 
 
-def test_many_contacts_are_drawn_in_part_and_that_is_told(state, monkeypatch):
-    from app.views import intervals
+def test_few_bars_are_drawn_evenly_and_the_selected_one_among_them(state):
+    from app.views.intervals import SOME, View
 
-    monkeypatch.setattr(intervals, "MOST_BARS", 20)
-    view = intervals.View(state)
-    assert 10 <= len(view.bars.data["rank"]) <= 20
-    assert view.left_out.object.startswith("One contact in ")
+    view, all_of_them = View(state), len(state.replay.order)
+    shown = view.bars.data["at"]
+    assert SOME / 2 <= len(shown) <= SOME < all_of_them
+    assert view.figure.xaxis.axis_label.startswith(f"{len(shown)} of {all_of_them} contacts")
+    state.contact = int(np.setdiff1d(state.replay.order, shown)[0])
+    assert np.array_equal(np.sort(view.bars.data["at"]), np.sort([*shown, state.contact]))
+    assert np.all(np.diff(view.bars.data["original"]) >= 0)
+    state.drawn = "all"
+    assert np.array_equal(view.bars.data["at"], state.replay.order)
 
 
 def test_a_tap_on_a_bar_selects_its_contact(state):
     from app.views.intervals import View
 
     view = View(state)
+    state.drawn = "all"
     view.bars.selected.indices = [4]
     assert state.contact == state.replay.order[4]
     assert view.chosen.data["rank"] == [5.0]
