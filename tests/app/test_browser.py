@@ -479,9 +479,12 @@ def test_numbers_told_while_playing_are_those_of_measures(page):
         "eta3": measures.eta3(*measures.intervals_seen(states)),
     }
     for name, value in expected.items():
-        assert float(page.locator(f"b.{name}").inner_text()) == pytest.approx(value, abs=6e-4)
+        assert float(page.locator(f"b.{name}").text_content()) == pytest.approx(value, abs=6e-4)
         drawn = value * (0.15 if name == "eta3" else 1)  # on one scale with the others
         assert column(page, "growth", name)[-1] == pytest.approx(drawn, rel=1e-3)
+    original = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)[0]
+    apart = np.mean(np.abs(states[-1, :, 0] - original))
+    assert page.locator("b.apart").inner_text() == f"{100 * apart:.0f} %"
     assert page.locator("b.acceptance").text_content().endswith("%")
     assert re.fullmatch(r"\de-\d+", page.locator("b.residual").text_content())
 

@@ -414,9 +414,9 @@ def dot(page, contact):
 
 def test_a_dot_of_the_intervals_is_dragged_along_its_bar(visit):
     page = visit()
-    contact, _, _ = chain(page)
-    page.wait_for_function(f"() => {MODEL}('bars').get_column('at').length > 0")
+    page.wait_for_function(f"() => {MODEL}('bars')?.get_column('at').length > 0")
     laid_out(page, "bars_figure")
+    contact = column(page, "bars", "at")[-1]
     before, (x, y) = normal(page), dot(page, contact)
     page.mouse.move(x, y)
     page.mouse.down()
@@ -469,7 +469,7 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
     laid_out(page, "path_figure")
     page.get_by_role("tab", name="Force space").wait_for(state="hidden")
     assert inside(page, ".scene")
-    for name in ("path_figure", "bars_figure", "growth_figure"):
+    for name in ("path_figure", "bars_figure"):
         box = page.evaluate(
             """name => {
                 const page = Bokeh.documents[0], view = page.views_manager.find_one(
@@ -480,7 +480,7 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
             name,
         )
         assert min(box) >= 0 and box[2] <= 1920 and box[3] <= 1080
-    # the state on screen moves in all three
+    # the state on screen moves in all of them
     before = column(page, "here", "x")[0]
     page.locator("button.step").click()
     page.wait_for_function(f"b => {MODEL}('here').get_column('x')[0] !== b", arg=before)

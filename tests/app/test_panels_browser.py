@@ -155,6 +155,8 @@ def test_statistics_are_drawn_one_after_another(visit):
 
 def test_statistics_by_night_on_a_narrow_screen(visit):
     page = visit("?tab=statistics&dark=1", width=400, height=2200)
+    drawn(page)
+    page.get_by_role("button", name="Why it falls again").click()
     drawn(page, 2)
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
