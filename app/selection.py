@@ -166,7 +166,7 @@ def brief(selection: Selection, series: str) -> str:
     """A series in the few words that are read over its picture; the whole of an import's."""
     if selection.imported:
         return series
-    return f"{selection.packing['n']} disks, {selection.states} states"
+    return f"{selection.packing['n']} disks, {selection.states} networks"
 
 
 def command(selection: Selection) -> str:

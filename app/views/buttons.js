@@ -61,7 +61,7 @@ const BUTTONS = `
   <div class="quiz" role="status"></div>
   <div class="read">
     <span>network <b class="state"></b></span>
-    <span class="differs">forces differ from the original's by <b class="apart"></b> of the mean force</span>
+    <span class="differs">forces differ by <b class="apart"></b> of the mean from those the disks came to rest with</span>
   </div>`
 const VIEW = `
   ${button("closer", "zoom in (wheel, pinch)")}

@@ -21,8 +21,7 @@ from .select import Select
 WIDE = {"sizing_mode": "stretch_width"}
 SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
 FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
-HEADING = {"variant": "overline", "margin": (6, 10, -4, 10)}
-MADE, SCALES = "How it is made", "Scales of colour and width"
+LOOKS, MADE = "Colours and widths of lines", "How it is made"
 # What went wrong is told at the page's lower edge, whether the sidebar is open or closed.
 AT_EDGE = """
 :host { position: fixed; inset: auto 0 calc(var(--task, 0px) + var(--card, 0px)); z-index: 1400; }
@@ -118,20 +117,24 @@ class Controls:
             self.mu,
             self.go,
             pn.Column(
-                pmui.Typography("Force chains", **HEADING),
-                self.colour,
-                self.thickness,
-                self.overlay,
-                self._made(),
+                self._folded(),
                 self.link,
                 styles=EXTRA,
                 **WIDE,
             ),
         ]
 
-    def _made(self):
-        """What only those need who compute something of their own, closed until it is opened."""
-        inside = pn.Column(
+    def _folded(self):
+        """What only those need who look for, or compute, something of their own."""
+        look = pn.Column(
+            self.colour,
+            self.thickness,
+            self.overlay,
+            pn.Row(self.full, self.stretch, **WIDE),
+            margin=(-10, -14),
+            **WIDE,
+        )
+        made = pn.Column(
             self.series,
             pn.Row(self.n, self.seed, **WIDE),
             self.states,
@@ -142,8 +145,7 @@ class Controls:
             margin=(-10, -14),
             **WIDE,
         )
-        scales = pn.Row(self.full, self.stretch, margin=(-10, -14), **WIDE)
-        return folded_away(MADE, inside, SCALES, scales)
+        return folded_away(LOOKS, look, MADE, made)
 
     def _connect(self):
         state = self.state

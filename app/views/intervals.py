@@ -34,8 +34,9 @@ SMALL = {"width": 166, "margin": (6, 2, 2, 8)}
 GROWS = "How many networks does it take?"
 LEAD = (
     "<b>How far can each force go?</b> Each bar is one contact, from the smallest to the largest "
-    "normal force that it can have while every disk stays in balance. Drag a red dot, its force "
-    "now: all others follow. Click a contact in the packing to find its bar."
+    "normal force that it can have while every disk stays in balance; dark is what the networks "
+    "passed so far had, as chance rarely goes to the ends. Drag a dot, the force now: all others "
+    "follow."
 )
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
 Pale: every force that a contact can have in any network in balance

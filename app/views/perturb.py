@@ -19,7 +19,7 @@ TILE = (
     '<div style="font-size:15px;font-variant-numeric:tabular-nums">{}</div></div>'
 )
 EXPLAINED = {  # words on tiles → keys of the glossary
-    "force before": "fn",
+    "carries now": "fn",
     "gives way at": "critical_force",
     "limit load": "limit_load",
 }
@@ -33,13 +33,10 @@ SKETCH = """<svg viewBox="0 0 300 92" width="300" height="92" role="img"
  <path d="M106 46H20M32 36L20 46L32 56M194 46H280M268 36L280 46L268 56"/></g>
 </svg>"""
 LEAD = (
-    "<b>Two growing forces press the two disks of a contact apart</b>, along the line through "
-    "their centres, until the packing gives way."
+    "<b>Two growing forces push the two disks of a contact apart</b>, along the line through "
+    "their centres, until the packing gives way. Guess: how many times the mean force does it bear?"
 )
-HINT = (
-    "Click any contact in the packing, or take the strongest one. Why it matters: "
-    "indeterminacy shows in the failure load and in how far a push reaches."
-)
+HINT = "Click any contact in the packing, or take the strongest one."
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
     "needs (it is isostatic)."
@@ -164,7 +161,7 @@ class View(TabView):
         if state.contact is None:
             self._say(HINT, lead=drawn)
             return
-        tiles = [("force before", f"{replay.normal[0, state.contact]:.2f}")]
+        tiles = [("carries now", f"{replay.normal[0, state.contact]:.2f}")]
         if self.pushed is None:
             if self.loads is not None:
                 tiles.append(("limit load", f"{self.loads.load[state.contact]:.2f}"))

@@ -5,6 +5,7 @@ import { plain } from "./plain.js"
 
 const PIN = 17 // px, its height
 const ARROW_PX = 34 // beyond the edge of the disk that is pushed
+const COPY = 0.35 // opacity of the arrows at a periodic copy
 const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
 
 export class Pins {
@@ -34,24 +35,25 @@ export class Pins {
     context.restore()
   }
 
-  /** The two forces that press the disks of the selected contact apart. */
+  /** The two forces that push the disks of the selected contact apart; faintly at its periodic copies. */
   push(context, scene) {
-    const { geometry, ratio, palette, scale } = scene
+    const { geometry, ratio, palette, scale } = scene, first = geometry.contact.indexOf(scene.selected)
     context.save()
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
     context.lineCap = context.lineJoin = "round"
-    context.beginPath()
     for (let k = 0; k < geometry.contact.length; k++) {
       if (geometry.contact[k] !== scene.selected) continue
       const [xa, ya, xb, yb] = scene.ends(k), a = scene.toPixel(xa, ya), b = scene.toPixel(xb, yb)
       const far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, u = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
+      context.globalAlpha = k === first ? 1 : COPY
+      context.beginPath()
       arrow(context, a, u.map((v) => -v), scale * geometry.radius[geometry.i[k]] + ARROW_PX)
       arrow(context, b, u, scale * geometry.radius[geometry.j[k]] + ARROW_PX)
-    }
-    for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
-      context.lineWidth = width
-      context.strokeStyle = colour
-      context.stroke()
+      for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
+        context.lineWidth = width
+        context.strokeStyle = colour
+        context.stroke()
+      }
     }
     context.restore()
   }

@@ -22,7 +22,6 @@ ALSO = {"walk": "also show uniformly sampled states", "uniform": "also show the 
 CALLED = {"uniform": "uniformly sampled states", "walk": "walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "states of the walk (triangles)"}
 ENOUGH = 300  # states beside those shown, where they have to be computed
-NEARLY_ALL = 0.8  # part of the states in the inner half, from which on that is said
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
 
 WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
@@ -41,8 +40,8 @@ WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 230px))"}
 
 LEAD = (
     "<b>Every network of forces that holds these disks lies in the shaded area</b>{flattened}. "
-    "Each dot is one network found at random. The red dot is the one on screen: drag it, and the "
-    "forces in the packing follow."
+    "Each dot is one network, a thin line leads to the one found next. The red dot is the one on "
+    "screen: drag it, and the forces in the packing follow.{crowded}"
 )
 HELP = (
     f"Shown is the shadow ({term('principal', 'projection')}) that {term('s')} casts on a plane, "
@@ -211,7 +210,7 @@ class View(TabView):
         self.beside.data = {"x": x.astype(np.float32), "y": y.astype(np.float32)}
         self.marks.update(visible=True, label=value(CALLED[self.other_kind]))
         if self.found is not None and self.found.plane is plane:
-            self._tell(replay, self.found)
+            self._tell(self.found)
 
     def _components(self, replay):
         """The plane of one contact's forces, or of two contacts' normal forces."""
@@ -273,17 +272,17 @@ class View(TabView):
             closed = np.concatenate([corners, corners[:1]])
             source.data = {"x": closed[:, 0], "y": closed[:, 1]}
         self.cone.data = self._cone(found.plane, 1.05 * float(found.outer[:, 0].max()))
-        self._tell(replay, found)
+        self._tell(found)
 
-    def _tell(self, replay, found):
-        """How much of the outline the states reach, and why most huddle in its middle."""
+    def _tell(self, found):
+        """How much of the outline the states reach."""
         if found.plane.kind == planes.STRESS:
             self.told.object = stresses.told(found)
             return
         path = found.plane.path[1:]
         part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
-        h, inner = replay.summary["dimension"], planes.inner_share(path, found.outer)
+        inner = planes.inner_share(path, found.outer)
         words = (
             f"The {len(path)} dots span {part[0]:.0%} of the area across, {part[1]:.0%} upwards; "
             f"<b>{inner:.0%} of them lie in its inner half</b>"
@@ -292,14 +291,8 @@ class View(TabView):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
             words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
-        words += "."
-        if h >= MANY and inner >= NEARLY_ALL:
-            words += (
-                f" That is no failure to explore: S is a body of {h} dimensions, and nearly all "
-                "volume of such a body casts its shadow near the middle."
-            )
         share = f" The dots fill {area:.1%} of its area{_variance(found.plane)}."
-        self.told.object = words + folded(HELP + share + COMPUTED.format(found=found))
+        self.told.object = words + "." + folded(HELP + share + COMPUTED.format(found=found))
 
     @property
     def other_kind(self):
@@ -365,17 +358,22 @@ class View(TabView):
         legend_above(fig, 5)
         (self.marks,) = (item for item in fig.legend[0].items if item.label == value("beside"))
         self.marks.visible = False
-        corner(fig, "exact outline; sampled states")
+        corner(fig, "outline: exact; dots: found at random")
         fig.add_tools(hover([states], ("state", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
 
 
 def _lead(free):
     """What the plane shows of a space with so many dimensions."""
-    flattened = (
-        f", of which this is a shadow: of {free} dimensions two are seen" if free > 2 else ""
-    )
-    return LEAD.format(flattened=flattened)
+    flattened = crowded = ""
+    if free > 2:
+        flattened = f", of which this is a shadow: of {free} dimensions two are seen"
+    if free >= MANY:
+        crowded = (
+            f" Found at random, networks stay near the middle: to come near the edge, {free} free "
+            "numbers would have to agree."
+        )
+    return LEAD.format(flattened=flattened, crowded=crowded)
 
 
 def _variance(plane):

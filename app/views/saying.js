@@ -37,7 +37,9 @@ function way(scene, contact, what) {
 export function legend({ scene, empty, load }) {
   if (empty && !scene.idle) return "orange: the motion in which they give way; grey: weight and other loads"
   const pulled = load.some((v, k) => k < 3 * scene.r.length && v), pressed = scene.pressing.length > 0
-  const loads = [pulled ? "weight" : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
+  const weights = Array.from(scene.r, (_, d) => Math.hypot(load[3 * d], load[3 * d + 1]))
+  const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
+  const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   return `blue: contact forces; wedge: where friction lets them point, tangential ≤ μ × normal${loads ? `; grey: ${loads}` : ""}; orange: at the limit`
 }
 
@@ -102,7 +104,9 @@ export function sentence(body, mu, now) {
   if (h > 3) return `${h} free numbers: infinitely many sets of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many sets. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
-  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}`
+  const grips = body.sides.some((side) => stopping(body, side).includes("down both walls"))
+    ? " Where friction points down, the walls grip the disk as if it had been pressed in." : ""
+  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}${grips}`
 }
 
 /** Why S is empty: which disks and walls give way in the motion that proves it, and which friction would do. */

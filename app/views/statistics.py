@@ -33,6 +33,9 @@ class View(TabView):
         self.what = question("Question", FIGURES, state, "figure")
         self.scale = chosen(AXES, state, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
+        # Always on the page: what React draws must not leave it meanwhile.
+        self.folded = [pn.Column(sizing_mode="stretch_width") for _ in studied.FOLDED]
+        self.more = folded_away(*chain(*zip(studied.FOLDED, self.folded, strict=True)))
         self.lead, self.told = note(), note()
         self.task = state.task(reading)
         self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
@@ -51,6 +54,7 @@ class View(TabView):
             self.bar,
             self.lead,
             self.plots,
+            self.more,
             self.told,
             sizing_mode="stretch_width",
         )
@@ -66,6 +70,7 @@ class View(TabView):
         """Draw the figure chosen: at once from the states on screen, or over μ in a thread."""
         state, what = self.state, self.what.value
         self.scale.visible = what in SCALED
+        self.more.visible = what == "eta"
         self.task.cancel()
         if what != self._drawn:  # another figure's plot is no answer to this choice
             self.plots.objects, self.lead.object, self.told.object = [], "", ""
@@ -90,12 +95,12 @@ class View(TabView):
         figures, self.lead.object, self.told.object = found
         for fig in figures:
             self._choosable(fig)
-        first, more = [_pane(figures[0])], figures[1:]
+        first = [_pane(figures[0])]
         self.plots.objects = first
         yield
-        if more and self.plots.objects == first:  # nothing else was chosen
-            titled = [(fig.title.text, _pane(fig)) for fig in more]
-            self.plots.append(folded_away(*chain(*titled)))
+        if self.plots.objects == first:  # nothing else was chosen
+            for place, fig in zip(self.folded, figures[1:], strict=False):
+                place.objects = [_pane(fig)]
 
     def _follow(self, *events):
         self.bar.visible = self.task.running and self.what.value in DRAWN

@@ -31,6 +31,11 @@ OWN = "on this page"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
+# Titles of the second and third figure of indeterminacy, which are closed at first.
+FOLDED = (
+    "Why it falls again: with more friction, packings have fewer contacts",
+    "Found in several ways",
+)
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
 CLAIMS = """<details><summary>What the paper says, and what was found here</summary>
 <table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
@@ -89,7 +94,7 @@ def indeterminacy(own, exact, log):
     for k, (name, _, factor) in enumerate(MEASURES):
         _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
     corner(etas, "measured: of the random walk's states")
-    seen = _over_mu("samplers", "0.15 × range η3", 270, title="Found in several ways", **kind)
+    seen = _over_mu("samplers", "0.15 × range η3", 270, title=FOLDED[1], **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
         look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
         points = statistics.means(studied.rows(part), "eta3", factor=0.15)
@@ -97,8 +102,7 @@ def indeterminacy(own, exact, log):
     _own(seen, statistics.means(own, "eta3", factor=0.15), log, COLOURS[0], MARKERS[0])
     _own(seen, statistics.means(exact, "eta3", factor=0.15), log, COLOURS[3], MARKERS[3])
     corner(seen, "dashed exact, others measured")
-    why = "Why it falls again: with more friction, packings have fewer contacts"
-    z = _over_mu("coordination", "contacts per disk z", 220, title=why)
+    z = _over_mu("coordination", "contacts per disk z", 220, title=FOLDED[0])
     _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
     _own(z, statistics.means(own, "coordination"), False, COLOURS[0])
     corner(z, "measured: of the packings")
@@ -128,10 +132,11 @@ def most_undetermined(own):
     where = " to ".join(f"{mu:g}" for mu in dict.fromkeys((peaks[0], peaks[-1])))
     many, few = (max(Counter(row["mu"] for row in part).values()) for part in (walks, own))
     return (
-        f"<b>Forces are least determined at friction {where}.</b> Each point: by how much the "
-        "forces of a packing made with this friction can differ, as a part of the mean force. "
+        f"<b>Forces are least determined at friction {where}.</b> More friction allows more "
+        "forces on the same disks, but disks packed with more friction touch less. Each point: by "
+        "how much the forces of a packing made with this friction differ, in mean forces. "
         f"Filled: means over {many} packings; open: over {few} computed on this page "
-        "(packings made in the same way differ). Grey: the friction on screen."
+        "(packings differ). Grey: the friction on screen."
     )
 
 

@@ -61,24 +61,24 @@ def doubts(summary):
 
 
 def numbers(summary):
-    """How undetermined the forces are, and what speaks against these numbers, as HTML."""
+    """How undetermined the forces are, and what speaks against that, as HTML."""
     flags = "".join(map(FLAG.format, doubts(summary)))
-    return f'<p class="first">{finding(summary)}</p>{_tiles(TILES, summary)}{flags}'
+    return f'<p class="first">{finding(summary)}</p>{flags}'
 
 
 def checks(summary):
-    """What the numbers stand on, and what was left out, as HTML."""
+    """The measures of that, what they stand on, and what was left out, as HTML."""
     style, rest = f"<style>{STYLE}</style>", f'<div class="rest">{left_out(summary)}</div>'
-    return style + _tiles(CHECKS, summary) + rest
+    return style + _tiles(TILES, summary) + _tiles(CHECKS, summary) + rest
 
 
 def finding(summary):
     """What the numbers say, in one sentence."""
     if not summary["dimension"]:
         return "<b>How undetermined?</b> Not at all: balance leaves every force one value."
-    states = "the state" if summary["states"] == 1 else f"all {summary['states']} states"
+    networks = "one network" if summary["states"] == 1 else f"{summary['states']} networks"
     return (
-        f"<b>How undetermined?</b> Over {states} a contact's force scatters by "
+        f"<b>How undetermined?</b> Over {networks} found at random a contact's force scatters by "
         f"<b>{100 * summary['eta1']:.2g} %</b> of the mean force."
     )
 
@@ -130,7 +130,7 @@ def left_out(summary):
 
 def tiles(state, volume):
     """The numbers of the replay on screen, its Volume, and what they stand on, to be opened."""
-    folded = Foldout(line="Check", margin=(2, 12), styles={"flex": "1 0 90px"})
+    folded = Foldout(line="In numbers", margin=(2, 12), styles={"flex": "1 0 110px"})
 
     def tell(*events):
         folded.inside = "" if state.replay is None else checks(state.replay.summary)

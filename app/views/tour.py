@@ -37,8 +37,9 @@ STEPS = (
     (
         "All networks form one body",
         "Every point here is one whole network of forces, seen as the shadow that force space S "
-        "casts on a plane: dots are states of the walk, and the shaded outline holds every network "
-        "there is. S is convex: go straight from any network to any other, and you stay inside.",
+        "casts on a plane: dots are networks found at random, and the shaded outline holds every "
+        "network there is. S is convex: go straight from any network to any other, and you stay "
+        "inside.",
         "plane",
     ),
     (
@@ -50,7 +51,7 @@ STEPS = (
     ),
     (
         "Push until it gives way",
-        "Two forces press the disks of the marked contact apart until the packing gives way: press "
+        "Two forces push the disks of the marked contact apart until the packing gives way: press "
         "Push to see how much load it can take, and how it begins to move. That's the tour. Try "
         "anything.",
         "perturb",

@@ -22,8 +22,8 @@ class Volume:
         self.state, self.found = state, None
         self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
         self.measure = pmui.Button(
-            label="How many networks are there? Measure the volume of S",
-            variant="text",
+            label="Measure the volume of all networks",
+            variant="outlined",
             color="default",
             sx=PLAIN,
             size="small",

@@ -70,7 +70,16 @@ def wait_until_served(url, server, log):
 
 def how_it_is_made(page):
     """Open what only those need who compute something of their own; the page."""
-    heading = page.get_by_role("button", name="How it is made")
+    return _opened(page, "How it is made")
+
+
+def looks(page):
+    """Open what lines show and how; the page."""
+    return _opened(page, "Colours and widths of lines")
+
+
+def _opened(page, name):
+    heading = page.get_by_role("button", name=name)
     if heading.get_attribute("aria-expanded") != "true":
         heading.click()
     return page

@@ -1,7 +1,7 @@
 """The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
 
 import pytest
-from serving import MANY, how_it_is_made, painted
+from serving import MANY, how_it_is_made, looks, painted
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
@@ -57,7 +57,7 @@ def test_no_tab_has_a_serious_finding(chromium, address, dark):
 
 def test_nothing_serious_while_something_is_computed_and_lists_are_open(chromium, address):
     page = opened(chromium, address, "", 1280)
-    page.get_by_role("combobox", name="Colour").click()
+    looks(page).get_by_role("combobox", name="Colour").click()
     how_it_is_made(page).get_by_label("Disks N").first.fill("9000")
     page.get_by_label("Disks N").first.press("Enter")
     page.get_by_text("Pale: still of").wait_for()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import MANY, MODEL, column, how_it_is_made, painted, scene, serve
+from serving import MANY, MODEL, column, how_it_is_made, looks, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 from granforce import measures
@@ -254,7 +254,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page.locator("input.typed").press("Enter")
     page.wait_for_function("() => location.search.includes('mu=1&')")
     assert "full=0.2" in page.url and "stretch=2" in page.url
-    page.get_by_role("button", name="Scales of colour and width").click()
+    looks(page)
     page.get_by_label("Width, times").fill("-3")
     page.get_by_label("Width, times").press("Enter")
     page.get_by_text("a number from 0.1 to 10, got '-3'").first.wait_for()

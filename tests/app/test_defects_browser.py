@@ -4,7 +4,17 @@ import signal
 
 import numpy as np
 import pytest
-from serving import MANY, MODEL, column, free_port, how_it_is_made, painted, scene, serve
+from serving import (
+    MANY,
+    MODEL,
+    column,
+    free_port,
+    how_it_is_made,
+    looks,
+    painted,
+    scene,
+    serve,
+)
 from small_store import KEPT, ROOT
 
 # Pictures to be looked at; ignored by git.
@@ -243,7 +253,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
 
 @pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
 def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
-    page = visit("?tab=statistics" if focused == "toggle" else "")
+    page = looks(visit("?tab=statistics" if focused == "toggle" else ""))
     clicked = {
         "tab": page.get_by_role("tab", name="Intervals"),
         "toggle": page.get_by_role("button", name="logarithmic", exact=True),
@@ -260,7 +270,7 @@ def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
 
 
 def test_who_goes_by_tab_means_the_widget(visit):
-    page = visit()
+    page = looks(visit())
     switch = page.get_by_label("Strong and undetermined contacts")
     page.get_by_role("combobox", name="Width").focus()
     page.keyboard.press("Tab")
@@ -294,9 +304,9 @@ def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old
     shows(page, 0.4)
     assert len(page.evaluate("window.mostBars")) <= 1
     page.locator(".task").first.wait_for(state="hidden")
-    tiles = page.locator(".tiles").first
+    finding = page.locator(".first").first
     page.wait_for_function(
-        "e => getComputedStyle(e.getRootNode().host).opacity === '1'", arg=tiles.element_handle()
+        "e => getComputedStyle(e.getRootNode().host).opacity === '1'", arg=finding.element_handle()
     )
     assert at_rest(plot)["y"] == before["y"]
 
@@ -446,7 +456,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     "tab, words",
     [
         ("intervals", ("pale: possible, exact; dark: seen so far",)),
-        ("plane", ("exact outline; sampled states",)),
+        ("plane", ("outline: exact; dots: found at random",)),
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],
 )

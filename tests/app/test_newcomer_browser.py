@@ -175,7 +175,7 @@ def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height)
 def test_words_that_were_not_understood_are_explained(visit, where, term):
     page = visit(AT + "&frame=5")
     page.locator(".checks summary").click()
-    page.get_by_text("Check", exact=True).click()
+    page.get_by_text("In numbers").click()
     page.locator(where).first.hover()
     tip = page.get_by_role("tooltip").filter(visible=True)
     tip.get_by_text(TERMS[term].sentence).wait_for()
