@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from bokeh.document import Document
 from bokeh.embed import components
 from bokeh.resources import Resources
 
@@ -76,6 +77,11 @@ def html(
     shown, acceptance = thinned(replay)
     plane = planes.principal(shown)
     figures = still.figures(shown, exact, plane, outlined, view)
+    # In a document of their own: else Bokeh adds what a page that is served just then has its
+    # browser do.
+    bare = Document()
+    for figure in figures:
+        bare.add_root(figure)
     script, plots = components(figures)
     frame = min(view["frame"], len(shown.normal) - 1)
     between = view["between"]

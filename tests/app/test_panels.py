@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 import xarray as xr
 import zarr
+from bokeh.document import Document
+from bokeh.io.doc import patch_curdoc
+from bokeh.models import CustomJS
 from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
 from PIL import Image
 from small_store import KEPT, STATES
 
 import granforce as gf
-from app import distributions, exports, movies, perturbations, planes, studied, uploads
+from app import distributions, exports, movies, perturbations, planes, standalone, studied, uploads
+from app.links import VIEW
 from app.views import labels
 from app.views import plane as plane_view
 from app.views import studied as drawn_study
@@ -385,7 +389,7 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     assert not view.plots.objects and not view.task.running
     state.tab = view.name
     settled(state)
-    figures = [pane.object for pane in view.plots.select(Bokeh)]
+    figures = [pane.object for pane in [*view.plots.select(Bokeh), *view.more.select(Bokeh)]]
     assert len(figures) == (3 if what == "eta" else 1)
     columns = [r.data_source.data for fig in figures for r in fig.renderers]
     drawn = np.concatenate([np.ravel(v).astype(float) for c in columns for v in c.values()])
@@ -735,3 +739,14 @@ def test_walk_and_uniform_states_are_shown_together(state, wait_for):
     assert view.also.value and len(view.beside.data["x"]) == KEPT
     view.also.value = False
     assert not len(view.beside.data["x"]) and not view.marks.visible
+
+
+def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
+    served = Document()
+    served.js_on_event("document_ready", CustomJS(code="ofAnotherPage()"))
+    opened(state)
+    view = {name: getattr(state, name) for name in VIEW}
+    told = {"link": "", "command": "", "source": ""}
+    with patch_curdoc(served):
+        page = standalone.html(state.library, state.cell, state.replay, None, view=view, **told)
+    assert b"bk-" in page and b"ofAnotherPage" not in page
