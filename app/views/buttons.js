@@ -48,9 +48,11 @@ const BUTTONS = `
       aria-label="speed"><span class="rate"></span></label>
   </div>
   <div class="bar tools">
-    ${button("pin", "pin this state, to compare others with it", "Pin")}
-    ${button("between", "between the pinned state and this one", "To and fro")}
-    ${button("split", "the pinned state and this one; another μ then comes beside this one", "Side by side")}
+    <details class="compare"><summary>Compare</summary>
+      ${button("pin", "pin this network, to compare others with it", "Pin")}
+      ${button("between", "between the pinned network and this one", "To and fro")}
+      ${button("split", "the pinned network and this one; another μ then comes beside this one", "Side by side")}
+    </details>
     ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
     <span class="knowing">
       ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
@@ -171,6 +173,7 @@ export class Buttons {
 
   /** Whether two networks are asked for, and whether they are there. */
   tellSplit(asked, there) {
+    if (asked) this.part("compare").open = true
     this.part("split").classList.toggle("on", asked)
     this.root.classList.toggle("two", there)
   }
@@ -180,6 +183,7 @@ export class Buttons {
     scrub.max = last
     scrub.step = swinging ? 0.01 : 1
     between.classList.toggle("on", swinging)
+    if (swinging) this.part("compare").open = true
     between.disabled = !swinging && walk.number.length < 2
   }
 

@@ -32,16 +32,20 @@ def first(summary, more=""):
     forces = (2 if mu > 0 else 1) * summary["contacts"]
     loose = summary.get("rattlers", 0)
     still = f"<b>These {n} disks never move.</b> "
-    those = f"The {n - loose} of them that carry (pale ones are loose)" if loose else "They"
-    given = f"{those} give {forces - free} equations of balance for {forces} contact forces: "
+    carry = f"{n - loose} of them carry (pale ones are loose)" if loose else "All of them carry"
+    each = "two forces" if mu > 0 else "one force"
+    given = (
+        f"{carry}, with {each} at each of {summary['contacts']} contacts: {forces} unknowns, but "
+        f"only {forces - free} independent equations of balance. "
+    )
     if free == 0:
         question = "Same disks, same pressure: here the forces are fixed."
-        told = f"none is left free, and there is just one {term('network', 'force network')}."
+        told = f"No number is left free: there is just one {term('network', 'force network')}."
         told += " Choose some friction to see more." if mu == 0 else ""
     else:
         question = "Same disks, same pressure: why are the forces not fixed?"
         networks = term("network", "force networks")
-        told = f"<b>{free} numbers are left free.</b> Play shows {networks} that all balance{more}."
+        told = f"<b>{free} numbers are free.</b> Play shows {networks} that all balance{more}."
     return f"<h2>{question}</h2><p>{still}{given}{told}</p>"
 
 

@@ -49,7 +49,7 @@ LABELS = {
     "How hard can one contact be pushed?": "push",
     "Which contacts bear most?": "limit_load",
     "Are undetermined packings weaker?": "critical_force",
-    "Which measurement next?": "informative",
+    "Which force to measure next?": "informative",
     "Push": "push",
     "Force space": "s",
     "Intervals": "exact",

@@ -28,15 +28,15 @@ BARS += ("whole_low", "whole_high")  # exact intervals without what is known
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
 ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
 ETAS = ("eta1", "eta2", "eta3")
-SMALL = {"width": 166, "margin": (6, 2, 2, 8)}
+SMALL = {"width": 146, "margin": (6, 2, 2, 8)}
 
 
 GROWS = "How many networks does it take?"
 LEAD = (
     "<b>How far can each force go?</b> Each bar is one contact, from the smallest to the largest "
-    "normal force that it can have while every disk stays in balance; dark is what the networks "
-    "passed so far had, as chance rarely goes to the ends. Drag a dot, the force now: all others "
-    "follow."
+    "normal force that it can have while every disk stays in balance. Dark: how far the networks "
+    "shown so far went; chance rarely goes to the ends. Drag a dot, the force now: all others "
+    "follow, and a line in the packing lights up."
 )
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
 Pale: every force that a contact can have in any network in balance
@@ -274,7 +274,7 @@ class View:
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         self.whole_item, self.exact_item = fig.legend[0].items[:2]
         legend_above(fig, 5)
-        corner(fig, "pale: possible, exact; dark: seen so far")
+        corner(fig, "possible: exact")
         fig.add_tools(
             hover(
                 [seen, exact],

@@ -10,8 +10,8 @@ from .scripts import FOLDER, Scripted, module
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
 ASK = (
-    "Click a line in the packing and hold its force (with the button Hold that appears, or H): the "
-    "other intervals can only shrink."
+    "Is a force known, say measured? Hold it (button Hold, or H): the other intervals can only "
+    "shrink."
 )
 
 
@@ -29,7 +29,8 @@ class Known(Scripted):
     def __init__(self, state, **params):
         super().__init__(sizing_mode="stretch_width", margin=0, **params)
         self._state = state
-        state.param.watch(self._show, ["known", "narrowed", "ranked", "replay", "growing"])
+        shown = ["known", "narrowed", "ranked", "replay", "growing", "contact"]
+        state.param.watch(self._show, shown)
         for task in (state.knowledge.task, state.knowledge.ranking):
             task.param.watch(self._show, "running")
         self._show()
@@ -51,7 +52,9 @@ class Known(Scripted):
         number, knowledge = state.replay.backbone, state.knowledge
         best = state.ranked
         self.param.update(
-            visible=state.growing is None and state.replay.summary["dimension"] > 0,
+            visible=state.growing is None
+            and state.replay.summary["dimension"] > 0
+            and (state.contact is not None or bool(state.known)),
             chips=[[one.contact, one.words(number[one.contact])] for one in state.known],
             words=words(state),
             ranked=[] if best is None else _ranks(best, number),

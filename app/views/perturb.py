@@ -1,5 +1,7 @@
 """Push the disks of a contact apart: limit load, critical force, and how the packing gives way."""
 
+import html
+
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
@@ -34,7 +36,7 @@ SKETCH = """<svg viewBox="0 0 300 92" width="300" height="92" role="img"
 </svg>"""
 LEAD = (
     "<b>Two growing forces push the two disks of a contact apart</b>, along the line through "
-    "their centres, until the packing gives way. Guess: how many times the mean force does it bear?"
+    "their centres, until the packing gives way."
 )
 HINT = "Click any contact in the packing, or take the strongest one."
 ISOSTATIC = (
@@ -45,6 +47,7 @@ EVERY = (
     "<b>The failure load of a contact</b> (limit load): the largest pair of forces that may press "
     "its two disks apart before no forces at all can hold the packing."
 )
+LONGEST_GUESS = 12  # characters
 UNIT = "Forces are in units of the mean normal force ⟨fₙ⟩."
 
 
@@ -65,6 +68,9 @@ class View(TabView):
         )
         self.push = pmui.Button(
             label="Push", color="primary", size="small", margin=(4, 8), sx=PLAIN
+        )
+        self.guess = pmui.TextInput(
+            label="Your guess, in mean forces", size="small", width=210, margin=(4, 8)
         )
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
@@ -88,7 +94,7 @@ class View(TabView):
         return pn.Column(
             self.what,
             self.lead,
-            pn.FlexBox(self.push, self.strongest, self.animate, **wide),
+            pn.FlexBox(self.guess, self.push, self.strongest, self.animate, **wide),
             Progress(self.task),
             self.numbers,
             self.plots,
@@ -103,17 +109,18 @@ class View(TabView):
             self._shown, self.loads = state.replay, None
         if self.pushed is not None and not self._holds():
             self.task.cancel()
-            self.pushed = None
+            self.pushed, self.guess.value = None, ""
         one = what == "one"
         self.push.visible = (one and state.contact is not None) or what == "all"
         self.push.label = "Push" if one else "Compute for all contacts"
         self.strongest.visible = one and state.contact is None
         self.animate.visible = one and self.pushed is not None
+        self.guess.visible = one and state.contact is not None and self.pushed is None
         if state.replay is None:
             return
         if state.replay.summary["mu"] == 0:
             self._say("", lead=ISOSTATIC)
-            self.push.visible = self.strongest.visible = False
+            self.push.visible = self.strongest.visible = self.guess.visible = False
             return
         {"one": self._one, "all": self._all, "store": self._store}[what]()
         self._animate()
@@ -175,6 +182,8 @@ class View(TabView):
             f"way:</b> {pushed.opened} of its contacts open, {pushed.slid} slide, {pushed.kept} "
             "hold. The disks set off as the packing shows."
         )
+        if self.guess.value:
+            lead += f" You guessed {html.escape(self.guess.value[:LONGEST_GUESS])}."
         text = (
             f"The {term('critical_force', 'critical force')} of contact "
             f"{replay.backbone[state.contact]}, with which the packing gives way, lies between "

@@ -284,7 +284,8 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         words = (
-            f"The {len(path)} dots span {part[0]:.0%} of the area across, {part[1]:.0%} upwards; "
+            f"The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of the area across, "
+            f"{part[1]:.0%} upwards; "
             f"<b>{inner:.0%} of them lie in its inner half</b>"
         )
         if self.other is not None and len(self.beside.data["x"]):
@@ -370,10 +371,16 @@ def _lead(free):
         flattened = f", of which this is a shadow: of {free} dimensions two are seen"
     if free >= MANY:
         crowded = (
-            f" Found at random, networks stay near the middle: to come near the edge, {free} free "
-            "numbers would have to agree."
+            " Found at random, networks stay near the middle: only very special ones lie at the "
+            "edge."
         )
     return LEAD.format(flattened=flattened, crowded=crowded)
+
+
+def _of(replay):
+    """Of how many networks those on screen are a part."""
+    summary = replay.summary
+    return f" (of {summary['states']} networks)" if summary["kept"] < summary["states"] else ""
 
 
 def _variance(plane):

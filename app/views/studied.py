@@ -31,9 +31,10 @@ OWN = "on this page"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
-# Titles of the second and third figure of indeterminacy, which are closed at first.
+# Titles of the figures of indeterminacy after the first, which are closed at first.
 FOLDED = (
     "Why it falls again: with more friction, packings have fewer contacts",
+    "Measured in three ways",
     "Found in several ways",
 )
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
@@ -85,16 +86,19 @@ def written(text):
 
 
 def indeterminacy(own, exact, log):
-    """η against μ by the walk, 0.15 η3 by all samplers, and z: three figures."""
+    """η1 against μ by the walk, z, all three η, and 0.15 η3 by all samplers: four figures."""
     kind = {"y_axis_type": "log" if log else "linear"}
-    etas = _over_mu("indeterminacy", "how undetermined, η (0: not at all)", 310, **kind)
-    for k, (name, label, factor) in enumerate(MEASURES):
-        look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
-        _line(etas, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
-    for k, (name, _, factor) in enumerate(MEASURES):
-        _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
-    corner(etas, "measured: of the random walk's states")
-    seen = _over_mu("samplers", "0.15 × range η3", 270, title=FOLDED[1], **kind)
+    spread = _over_mu("spread", "how much a force scatters, in mean forces", 310, **kind)
+    etas = _over_mu("indeterminacy", "how undetermined, η", 270, title=FOLDED[1], **kind)
+    for fig, measures in ((spread, MEASURES[:1]), (etas, MEASURES)):
+        for k, (name, label, factor) in enumerate(measures):
+            look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
+            _line(fig, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
+        for k, (name, _, factor) in enumerate(measures):
+            _own(fig, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
+        corner(fig, "measured: in networks found at random")
+        legend_above(fig)
+    seen = _over_mu("samplers", "0.15 × range η3", 270, title=FOLDED[2], **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
         look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
         points = statistics.means(studied.rows(part), "eta3", factor=0.15)
@@ -106,7 +110,6 @@ def indeterminacy(own, exact, log):
     _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
     _own(z, statistics.means(own, "coordination"), False, COLOURS[0])
     corner(z, "measured: of the packings")
-    legend_above(etas)
     legend_above(seen, 3)
     z.legend.visible = False
     text = (
@@ -119,7 +122,7 @@ def indeterminacy(own, exact, log):
         f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')} to two unbalances, of states "
         f"{term('uniform')}, and {term('exact', 'exact')}."
     )
-    return [etas, z, seen], most_undetermined(own), text
+    return [spread, z, etas, seen], most_undetermined(own), text
 
 
 def most_undetermined(own):
@@ -127,14 +130,12 @@ def most_undetermined(own):
     walks = studied.rows("walk")
     if not walks or not own:
         return ""
-    points = [statistics.means(walks, name) for name, _, _ in MEASURES]
-    peaks = sorted({max(curve, key=lambda point: point[1])[0] for curve in points})
-    where = " to ".join(f"{mu:g}" for mu in dict.fromkeys((peaks[0], peaks[-1])))
+    peak = max(statistics.means(walks, "eta1"), key=lambda point: point[1])[0]
     many, few = (max(Counter(row["mu"] for row in part).values()) for part in (walks, own))
     return (
-        f"<b>Forces are least determined at friction {where}.</b> More friction allows more "
-        "forces on the same disks, but disks packed with more friction touch less. Each point: by "
-        "how much the forces of a packing made with this friction differ, in mean forces. "
+        f"<b>Forces are least determined at friction {peak:g}.</b> More friction allows more "
+        "forces on the same disks, but disks packed with more friction have fewer contacts. Each "
+        "point: by how much a contact's force scatters over the networks of a packing. "
         f"Filled: means over {many} packings; open: over {few} computed on this page "
         "(packings differ). Grey: the friction on screen."
     )

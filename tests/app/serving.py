@@ -78,6 +78,13 @@ def looks(page):
     return _opened(page, "Colours and widths of lines")
 
 
+def compare(page):
+    """Open what compares networks; the page."""
+    if page.locator(".compare:not([open])").count():
+        page.locator(".compare summary").click()
+    return page
+
+
 def _opened(page, name):
     heading = page.get_by_role("button", name=name)
     if heading.get_attribute("aria-expanded") != "true":

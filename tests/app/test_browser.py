@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import MANY, MODEL, column, how_it_is_made, looks, painted, scene, serve
+from serving import MANY, MODEL, column, compare, how_it_is_made, looks, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 from granforce import measures
@@ -88,7 +88,7 @@ def page(shared):
     if shared.locator("button.between.on").count():
         shared.locator("button.between").click()
     shared.locator("button.restart").click()
-    shared.locator("button.pin").click()
+    compare(shared).locator("button.pin").click()
     scene(shared, "(scene.selected !== null && scene.onSelect(null), scene.reset())")
     shared.mouse.move(5, 5)
     shared.wait_for_function(
@@ -504,7 +504,7 @@ def test_intervals_grow_with_the_walk_and_shrink_on_the_way_back(page):
 
 def test_to_and_fro_between_the_pinned_state_and_this_one(page):
     page.locator("input.scrub").fill("3")
-    page.locator("button.pin").click()
+    compare(page).locator("button.pin").click()
     page.locator("input.scrub").fill("9")
     page.locator("button.between").click()
     page.wait_for_function("() => location.search.includes('between=3-9')")

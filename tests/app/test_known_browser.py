@@ -65,7 +65,10 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
 
 def test_contacts_worth_measuring_are_numbered(visit):
     page = visit()
-    page.get_by_role("button", name="Which measurement next?").click()
+    asking = page.get_by_role("button", name="Which force to measure next?")
+    assert not asking.is_visible()  # before a contact is chosen there is nothing to say
+    select(page, 9)
+    asking.click()
     page.locator(".ranked li").first.wait_for()
     page.get_by_text("mean interval").first.wait_for()
     assert scene(page, "scene.hand.player.pins.pins.ranked.length") == 10

@@ -390,7 +390,7 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     state.tab = view.name
     settled(state)
     figures = [pane.object for pane in [*view.plots.select(Bokeh), *view.more.select(Bokeh)]]
-    assert len(figures) == (3 if what == "eta" else 1)
+    assert len(figures) == (4 if what == "eta" else 1)
     columns = [r.data_source.data for fig in figures for r in fig.renderers]
     drawn = np.concatenate([np.ravel(v).astype(float) for c in columns for v in c.values()])
     row = distributions.rows([state.cell])[0]
