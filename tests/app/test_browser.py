@@ -554,7 +554,7 @@ def test_states_computed_while_the_page_is_on_its_way_are_shown(chromium, addres
         arg=page.locator(".scene").element_handle(),
         timeout=20_000,
     )
-    assert "5 states" in page.locator(".source").inner_text()
+    assert "5 networks" in page.locator(".source").inner_text()
     context.close()
     assert not problems
 

@@ -289,5 +289,5 @@ def test_questions_are_asked_before_the_page_shows_the_answers(visit):
     told.wait_for(state="hidden")
     page.get_by_role("button", name="Predict, then look").click()
     told.get_by_role("button", name="No, others balance as well").click()
-    told.get_by_text("numbers are free").wait_for()
+    told.get_by_text("numbers are left free").wait_for()
     page.locator(".stage.playing").wait_for()

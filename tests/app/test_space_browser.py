@@ -229,7 +229,7 @@ def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
 
 def test_exact_bounds_are_drawn_as_they_come(visit):
     """Of a bar that has one bound only, the other end is what was seen."""
-    page = visit()
+    page = visit("?drawn=all")
     bars_drawn(page)
     page.locator(".scene").evaluate(
         """e => {
