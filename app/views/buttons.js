@@ -47,30 +47,31 @@ const BUTTONS = `
     <label title="speed, networks per second">speed <input class="speed" type="range" min="0" max="6" step="0.25" value="3"
       aria-label="speed"><span class="rate"></span></label>
   </div>
-  <div class="bar tools">
-    <details class="compare"><summary>Compare</summary>
-      ${button("pin", "pin this network, to compare others with it", "Pin")}
-      ${button("between", "between the pinned network and this one", "To and fro")}
-      ${button("split", "the pinned network and this one; another μ then comes beside this one", "Side by side")}
-    </details>
-    ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
-    <span class="knowing">
-      ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
-      <label title="error bar of a force that is held, in mean forces ⟨fₙ⟩; 0: held exactly">±
-        <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in ⟨fₙ⟩"></label>
-    </span>
-  </div>
   <div class="quiz" role="status"></div>
   <div class="read">
     <span>network <b class="state"></b></span>
     <span class="differs">forces differ by <b class="apart"></b> of the mean from those the disks came to rest with</span>
   </div>`
+// Over the packing, as they come and go with what is selected.
+const TOOLS = `
+  ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
+  <span class="knowing">
+    ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
+    <label title="error bar of a force that is held, in mean forces ⟨fₙ⟩; 0: held exactly">±
+      <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in ⟨fₙ⟩"></label>
+  </span>`
 const VIEW = `
   ${button("closer", "zoom in (wheel, pinch)")}
   ${button("farther", "zoom out")}
   ${button("whole", "the whole packing (double click)")}
   ${button("full", "full screen")}`
 const CLOSER = 0.7 // of the view, by a button
+const COMPARE = `
+  <details class="compare"><summary>Compare</summary>
+    ${button("pin", "pin this network, to compare others with it", "Pin")}
+    ${button("between", "between the pinned network and this one", "To and fro")}
+    ${button("split", "the pinned network and this one; another μ then comes beside this one", "Side by side")}
+  </details>`
 const GAME = button("predict", "three questions, each asked before the page shows the answer", "Predict, then look") +
   button("differ", "two networks without colour: which lines differ most?", "Spot the difference")
 const CHECKS = `<summary>Check this network</summary>
@@ -104,14 +105,17 @@ export class Buttons {
     const view = document.createElement("div")
     view.className = "view"
     view.innerHTML = VIEW
-    this.scenes.append(scene.root, view)
+    const tools = document.createElement("div")
+    tools.className = "bar tools"
+    tools.innerHTML = TOOLS
+    this.scenes.append(scene.root, view, tools)
     const checks = document.createElement("details")
     checks.className = "checks"
     checks.innerHTML = CHECKS
     checks.append(this.skips)
     const game = document.createElement("div")
     game.className = "game"
-    game.innerHTML = GAME
+    game.innerHTML = COMPARE + GAME
     this.root.append(this.scenes, game, checks)
     this.scene = scene
     const zoom = (factor) => () => scene.zoom(factor, scene.size / 2, scene.size / 2)

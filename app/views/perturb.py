@@ -36,7 +36,8 @@ SKETCH = """<svg viewBox="0 0 300 92" width="300" height="92" role="img"
 </svg>"""
 LEAD = (
     "<b>Two growing forces push the two disks of a contact apart</b>, along the line through "
-    "their centres, until the packing gives way."
+    "their centres, while their neighbours hold them, until no forces can balance any more and the "
+    "packing gives way. With how many times the mean force?"
 )
 HINT = "Click any contact in the packing, or take the strongest one."
 ISOSTATIC = (
@@ -69,9 +70,7 @@ class View(TabView):
         self.push = pmui.Button(
             label="Push", color="primary", size="small", margin=(4, 8), sx=PLAIN
         )
-        self.guess = pmui.TextInput(
-            label="Your guess, in mean forces", size="small", width=210, margin=(4, 8)
-        )
+        self.guess = pmui.TextInput(label="Your guess", size="small", width=130, margin=(4, 8))
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
         self.plots = pn.Column(sizing_mode="stretch_width")
@@ -172,7 +171,10 @@ class View(TabView):
         if self.pushed is None:
             if self.loads is not None:
                 tiles.append(("limit load", f"{self.loads.load[state.contact]:.2f}"))
-            where = f"Contact {replay.backbone[state.contact]}, marked in the packing. {UNIT}"
+            where = (
+                f"Contact {replay.backbone[state.contact]}, marked in the packing; fainter where "
+                f"the box repeats. {UNIT}"
+            )
             self._say(where, numbers=_tiles(tiles), lead=drawn)
             return
         pushed = self.pushed[0]

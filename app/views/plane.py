@@ -39,7 +39,7 @@ COMPUTED = (
 WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 230px))"}
 
 LEAD = (
-    "<b>Every network of forces that holds these disks lies in the shaded area</b>{flattened}. "
+    "<b>Every network of forces that holds these disks lies in the shaded area S</b>{flattened}. "
     "Each dot is one network, a thin line leads to the one found next. The red dot is the one on "
     "screen: drag it, and the forces in the packing follow.{crowded}"
 )
@@ -284,8 +284,8 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         words = (
-            f"The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of the area across, "
-            f"{part[1]:.0%} upwards; "
+            f"The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of its width, "
+            f"{part[1]:.0%} of its height; "
             f"<b>{inner:.0%} of them lie in its inner half</b>"
         )
         if self.other is not None and len(self.beside.data["x"]):
@@ -371,8 +371,8 @@ def _lead(free):
         flattened = f", of which this is a shadow: of {free} dimensions two are seen"
     if free >= MANY:
         crowded = (
-            " Found at random, networks stay near the middle: only very special ones lie at the "
-            "edge."
+            f" Networks found at random differ in all {free} directions, and go only a little way "
+            "along these two."
         )
     return LEAD.format(flattened=flattened, crowded=crowded)
 

@@ -179,7 +179,7 @@ def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
     until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
     states = scene(page, "scene.geometry.states")
     page.wait_for_function(f"() => location.search.includes('states={states}')")
-    assert f"{states} states" in page.locator(".source").inner_text()
+    assert f"{states} networks" in page.locator(".source").inner_text()
     assert page.locator(".stage.pale").count() == 0
 
 
@@ -512,5 +512,7 @@ def test_the_sidebar_leaves_its_room_to_the_packing_where_there_is_little(visit,
 
 def test_on_a_phone_the_player_is_below_the_packing(visit):
     page = visit("", 400, 900)
-    above, below = (page.locator(f".stage .{name}").bounding_box() for name in ("scene", "tools"))
+    above, below = (
+        page.locator(f".stage {name}").bounding_box() for name in (".scene", ".bar:has(.play)")
+    )
     assert above["y"] + above["height"] <= below["y"] + 1
