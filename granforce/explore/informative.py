@@ -7,7 +7,7 @@ import numpy as np
 
 from granforce import measures, notebook
 from granforce.explore.intervals import intervals
-from granforce.explore.uniform import sample_uniform
+from granforce.explore.uniform import UniformSample, sample_uniform
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network
 from granforce.records import Cancel, Floats, InputError, Integers, Progress, whole
@@ -39,6 +39,7 @@ def informative(
     states: int = 400,
     seed: int = 0,
     check: int = 10,
+    sample: UniformSample | None = None,
     workers: int = 1,
     watch: Callable[..., object] | None = None,
     progress: Progress | None = None,
@@ -49,13 +50,15 @@ def informative(
     From `states` uniform states: were forces normally distributed, a known f_n of contact c would
     leave √(1 − ρ²) of the standard deviation of another one, ρ their correlation. The best `check`
     contacts are then put in order by exact bounds, with f_n held at its mean over the states.
+    sample: a UniformSample of S to take in place of new states.
     workers: threads; progress(done, total) counts those. watch(Informative) is called before the
     first of them, with the order by covariance.
 
     Raises InputError where nothing is left to measure, and as `sample_uniform` does.
     """
     k, check = whole(k, "k", 1), whole(check, "check")
-    sample = sample_uniform(ensemble, states, seed=seed, workers=workers)
+    if sample is None:
+        sample = sample_uniform(ensemble, states, seed=seed, workers=workers)
     normal, held = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)
     if not ensemble.admits(held):  # states of an S as thin as rounding may keep an unbalance
         held = some_network(ensemble, held)

@@ -138,7 +138,7 @@ def critical_forces(
     number, nor on the other contacts. finished(k, CriticalForce) is called from the threads as each
     ends. Other options and errors as for `critical_force`.
 
-    Raises UndecidedError where a limit load cannot be certified.
+    Raises UndecidedError where a limit load cannot be certified, or is given as NaN.
     """
     S, protocol = ensemble, Protocol(**protocol)
     protocol = protocol._replace(precision=positive(protocol.precision, "precision"))
@@ -146,9 +146,9 @@ def critical_forces(
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
         cancelling.check("critical force")  # which leaves limit loads open
-        if not np.isfinite(limit_loads).all():
-            number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]
-            raise UndecidedError(f"the limit load of contact {number} could not be certified")
+    if not np.isfinite(limit_loads).all():
+        number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]
+        raise UndecidedError(f"the limit load of contact {number} could not be certified")
     step, start = make_step(S), starting_network(S) / S.force_scale
     works = [
         _raised(S, step, int(contact), position, float(limit) / S.force_scale, start, protocol)

@@ -87,11 +87,14 @@ def _writable(folder: Path) -> bool:
     return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
 
 
-def temporary_place() -> str:
-    """The same folder each time, so that kernels are compiled once; a new one if it is not ours."""
+def temporary_place(folder: str | None = None) -> str:
+    """The same place each time, so that kernels are compiled once; a new one if it is not ours.
+
+    folder: where it lies, by default that of temporary files.
+    """
     if not hasattr(os, "getuid"):
-        return tempfile.mkdtemp(prefix="granforce-")
-    place = Path(tempfile.gettempdir()) / f"granforce-kernels-{os.getuid()}"
+        return tempfile.mkdtemp(prefix="granforce-", dir=folder)
+    place = Path(folder or tempfile.gettempdir()) / f"granforce-kernels-{os.getuid()}"
     try:
         place.mkdir(mode=0o700, exist_ok=True)
         found = place.lstat()
@@ -100,4 +103,4 @@ def temporary_place() -> str:
             return str(place)
     except OSError:
         pass
-    return tempfile.mkdtemp(prefix="granforce-kernels-")
+    return tempfile.mkdtemp(prefix="granforce-kernels-", dir=folder)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from packings import packed, reference, two_disks
 
-from granforce.explore import informative as module
 from granforce.explore.carrying import carrying
 from granforce.explore.informative import informative
 from granforce.explore.intervals import intervals
@@ -60,18 +59,13 @@ def test_nothing_is_left_to_measure_where_all_is_determined():
         informative(ensemble(two_disks()))
 
 
-def test_states_that_keep_an_unbalance_empty_nothing(monkeypatch):
+def test_states_that_keep_an_unbalance_empty_nothing():
     """S is 10⁻⁸ ⟨f_n⟩ wide there, and f_n held at a mean that is off by more lies beside it."""
     packing = load_packing(Path(__file__).parents[1] / "attacks" / "n30_mu2e-6.npz")
     K = ensemble(packing, frozen=FROZEN)
-
-    def unbalanced(*arguments, **options):
-        sample = sample_uniform(*arguments, **options)
-        off = 1 + 1e-6 * np.random.default_rng(0).normal(size=sample.states.shape[2:])
-        return sample._replace(states=sample.states * off)
-
-    monkeypatch.setattr(module, "sample_uniform", unbalanced)
-    found = informative(K, 1, states=40, check=1)
+    sample = sample_uniform(K, 40)
+    off = 1 + 1e-6 * np.random.default_rng(0).normal(size=sample.states.shape[2:])
+    found = informative(K, 1, check=1, sample=sample._replace(states=sample.states * off))
     assert K.dimension == 1 and 0 <= found.after[0] < found.before < 1e-6
 
 

@@ -5,6 +5,7 @@ with probability 5e-5 k, so a right sampler fails here with a new seed about onc
 """
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -217,11 +218,19 @@ def test_what_is_not_reached_is_told(S, monkeypatch):
     assert len(sample.flat) == 100
 
 
-def test_stuck_chains_are_recognised(S, monkeypatch):
-    monkeypatch.setattr(billiard, "MOST_TURNS", 0)
-    sample = sample_uniform(S, 40)
-    assert sample.counts["refused"] > 0.9 * 4 * uniform.PATHS_PER_STATE * 40
-    assert not sample.reached and sample.mixing.worst_r_hat > 2
+def test_stuck_chains_are_recognised(S, sample):
+    """Paths so long that they meet more walls than a path may."""
+    begun = sample._replace(
+        states=sample.states[:, :0],
+        residual=sample.residual[:, :0],
+        violation=sample.violation[:, :0],
+        reach=1e9,
+        ends=[uniform.init(sample.walls, seed) for seed in range(4)],
+    )
+    stuck = sample_uniform(S, 40, previous=begun)
+    refused = stuck.counts["refused"] - sample.counts["refused"]
+    assert refused > 0.9 * uniform.PATHS_PER_STATE * 40
+    assert not stuck.reached and stuck.mixing.worst_r_hat > 2
 
 
 def test_one_stuck_chain_or_component_is_recognised():
@@ -379,14 +388,17 @@ def test_the_benchmark_compares_walks_by_cost_and_by_moments():
     assert elsewhere and all("hopsy" in row["method"] for row in elsewhere)
 
 
-def test_rows_made_on_demand_change_no_bit(S, sample, monkeypatch):
+def test_rows_made_on_demand_change_no_bit(sample):
     """Room for as few rows as there can be: each is made again and again."""
-    drawn = sample_uniform(S, 40, seed=2)
-    monkeypatch.setattr(billiard, "MEMORY", 1)
-    for workers in (1, 3):
-        again = sample_uniform(S, 40, seed=2, workers=workers)
-        assert again.rows is None and np.array_equal(again.states, drawn.states)
-        assert again.counts == drawn.counts
+    made, few = sample.walls, billiard.some_rows(sample.walls, 0.0)
+    assert len(few.owner) < made.count == len(billiard.all_rows(made).owner)
+    on = partial(uniform.step, made, count=10, reach=sample.reach)
+    kept_ends, kept = on(sample.ends, sample.rows)
+    for stores in ([few], [billiard.some_rows(made, 0.0) for _ in range(3)]):
+        ends, moves = uniform.shared(stores, sample.ends, on)
+        for one, other in zip((*ends, *moves), (*kept_ends, *kept), strict=True):
+            assert np.array_equal(one.slacks, other.slacks)
+        assert [move[1:] for move in moves] == [move[1:] for move in kept]
 
 
 def test_slacks_move_as_the_null_space_lets_them(S):

@@ -4,22 +4,27 @@ import json
 import multiprocessing
 import os
 import random
+import re
+import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
 import warnings
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import platformdirs
 import pytest
 import xarray as xr
 import zarr
 
 from granforce.records import Contacts, InputError, Packing, make_contacts, make_packing
-from granforce.study import store as store_module
+from granforce.study import entries, keys
 from granforce.study.keys import canonical
 from granforce.study.schema import VARIABLES, dataset_packing, labelled, packing_dataset
 from granforce.study.store import default_path, open_store
@@ -115,10 +120,10 @@ def test_different_parameters_have_different_keys(store, kind, params, version):
     assert name != store.name("walk", PARAMS | {"seed": 2**60}, version=1)
 
 
-def test_schema_version_enters_the_key(store, monkeypatch):
+def test_schema_version_enters_the_key(store):
     name = store.name("walk", PARAMS, version=1)
-    monkeypatch.setattr(store_module.keys, "SCHEMA_VERSION", 99)
-    assert store.name("walk", PARAMS, version=1) != name
+    assert name == keys.entry_name("walk", PARAMS, 1, keys.SCHEMA_VERSION)
+    assert name != keys.entry_name("walk", PARAMS, 1, 99)
 
 
 def test_key_never_changes(store):
@@ -175,7 +180,7 @@ def test_walk_round_trip_and_labels(store):
     assert json.loads(attrs["parameters"]) == PARAMS
     assert (attrs["kind"], attrs["seed"], attrs["algorithm_version"]) == ("walk", 3, "a1")
     assert (attrs["note"], attrs["count"]) == ("µ = 0.1", 3)
-    assert attrs["schema_version"] == store_module.keys.SCHEMA_VERSION
+    assert attrs["schema_version"] == keys.SCHEMA_VERSION
     assert attrs["numpy_version"] == np.__version__ and attrs["zarr_version"] == zarr.__version__
     assert {"granforce_version", "numba_version", "xarray_version", "created"} <= attrs.keys()
     assert store.load("walk", PARAMS, version="a2") is None
@@ -204,10 +209,11 @@ def test_checksum_is_that_of_the_result(tmp_path):
     assert sums[0] == sums[1] and len(set(sums)) == 4
 
 
-def test_saving_twice_keeps_the_first(store, monkeypatch):
+def test_saving_twice_keeps_the_first(store):
+    """Nothing is written either, as in a folder where nothing can be."""
     name = store.save("walk", PARAMS, walk_dataset(0), version=1)
-    monkeypatch.setattr(store_module.entries, "write", None)
-    assert store.save("walk", PARAMS, walk_dataset(1), version=1) == name
+    with files_of(0):
+        assert store.save("walk", PARAMS, walk_dataset(1), version=1) == name
     xr.testing.assert_equal(store.load("walk", PARAMS, version=1), walk_dataset(0))
 
 
@@ -265,10 +271,11 @@ def test_every_row_of_the_schema_is_complete():
 # reading
 
 
-def test_entries_are_read_without_arrays(store, monkeypatch):
+def test_entries_are_read_without_arrays(store):
     store.save("walk", PARAMS, walk_dataset(), version=1)
     store.save("packing", PARAMS, packing_dataset(awkward_packing()), version=1)
-    monkeypatch.setattr(store_module.entries, "opened", None)
+    for array in store.path.glob("*/*/zarr.json"):
+        array.write_bytes(b"damaged")
     packing, walk = store.entries()
     assert (walk.kind, walk.params, walk.version) == ("walk", PARAMS, 1)
     on_disk = [f.stat().st_size for f in (store.path / walk.name).rglob("*") if f.is_file()]
@@ -295,13 +302,13 @@ def test_mapping_opens_lazily(store):
     with pytest.raises(KeyError):
         store["../store"]
     dataset = store[name]
-    assert not dataset["states"].variable._in_memory
     frame = dataset["states"].isel(state=120)
     # Only the chunk of states 100 … 199 is needed for frame 120.
     for chunk in (store.path / name / "states" / "c").iterdir():
         if chunk.name != "1":
             shutil.rmtree(chunk)
     np.testing.assert_array_equal(frame.values, walk_dataset()["states"][120])
+    assert not np.any(dataset["states"][0])
 
 
 def test_zarr_and_xarray_read_the_folder(store):
@@ -497,10 +504,14 @@ def test_location(tmp_path, monkeypatch):
     assert open_store().path == tmp_path / "from_environment"
     monkeypatch.setenv("HOME", str(tmp_path))
     assert open_store("~/home").path == tmp_path / "home"
-    for unset in (lambda: monkeypatch.setenv("GRANFORCE_CACHE", ""), monkeypatch.undo):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
+    for unset in (
+        lambda: monkeypatch.setenv("GRANFORCE_CACHE", ""),
+        lambda: monkeypatch.delenv("GRANFORCE_CACHE"),
+    ):
         unset()
-        monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: f"/somewhere/{name}")
-        assert default_path() == Path("/somewhere/granforce")
+        assert default_path() == Path(platformdirs.user_cache_dir("granforce"))
+        assert tmp_path in default_path().parents and default_path().name == "granforce"
 
 
 def test_missing_store_is_made_unless_readonly(tmp_path):
@@ -576,7 +587,7 @@ def test_temporaries_of_dead_writers_are_cleaned(store):
     ended.wait()
     zombie = subprocess.Popen(["true"])  # ended, but not waited for
     os.waitid(os.P_PID, zombie.pid, os.WEXITED | os.WNOWAIT)
-    host = store_module._host()
+    host = re.sub(r"\W", "_", socket.gethostname())  # as in the name of every temporary
     ages = {
         f".tmp-{host}-{ended.pid}-aa": 0,  # dead
         f".tmp-{host}-{zombie.pid}-ff": 0,  # dead too
@@ -598,12 +609,19 @@ def test_temporaries_of_dead_writers_are_cleaned(store):
     assert {item.name[-2:] for item in store.path.glob(".tmp-*")} == {"bb"}
 
 
-def test_failed_write_leaves_nothing(store, monkeypatch):
-    def full_disk(*_, **__):
-        raise OSError(28, "No space left on device")
+@contextmanager
+def files_of(most):
+    """Files cannot grow beyond so many bytes, as on a disk that is full."""
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, usual[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
 
-    monkeypatch.setattr(zarr.Group, "create_array", full_disk)
-    with pytest.raises(InputError, match="No space left"):
+
+def test_failed_write_leaves_nothing(store):
+    with files_of(4000), pytest.raises(InputError, match="File too large"):
         store.save("walk", PARAMS, walk_dataset(), version=1)
     assert [item.name for item in store.path.iterdir()] == ["zarr.json"]
 
@@ -641,14 +659,14 @@ def test_concurrent_writers(tmp_path, same):
 def test_loser_of_the_race_discards_its_copy(store, monkeypatch):
     """Another writer finishes the same entry between our check and our rename."""
     rival = open_store(store.path)
-    write = store_module.entries.write
+    write = entries.write
 
     def overtaken(*args):
         write(*args)
-        monkeypatch.setattr(store_module.entries, "write", write)
+        monkeypatch.setattr(entries, "write", write)
         rival.save("walk", PARAMS, walk_dataset(0), version=1)
 
-    monkeypatch.setattr(store_module.entries, "write", overtaken)
+    monkeypatch.setattr(entries, "write", overtaken)
     store.save("walk", PARAMS, walk_dataset(1), version=1)
     xr.testing.assert_equal(store.load("walk", PARAMS, version=1), walk_dataset(0))
     assert list(store.path.glob(".tmp-*")) == []

@@ -73,15 +73,14 @@ def test_nothing_is_said_where_a_home_or_a_setting_serves(installed):
     assert not list(installed.glob("granforce-kernels-*"))
 
 
-def test_a_folder_of_somebody_else_is_not_taken(tmp_path, monkeypatch):
+def test_a_folder_of_somebody_else_is_not_taken(tmp_path):
     """Kernels are code: who can write them can run anything."""
-    monkeypatch.setattr(compiled.tempfile, "tempdir", str(tmp_path))
     usual = tmp_path / f"granforce-kernels-{os.getuid()}"
-    assert compiled.temporary_place() == str(usual)
+    assert compiled.temporary_place(tmp_path) == str(usual)
     usual.chmod(0o777)
-    other = compiled.temporary_place()
+    other = compiled.temporary_place(tmp_path)
     assert other != str(usual) and stat.S_IMODE(os.stat(other).st_mode) == 0o700
     usual.rmdir()
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     usual.symlink_to(tmp_path / "elsewhere")
-    assert compiled.temporary_place() != str(usual)
+    assert compiled.temporary_place(tmp_path) != str(usual)

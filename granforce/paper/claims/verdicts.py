@@ -89,10 +89,12 @@ def over_all(
     fair: Ends | None = None,
     source: str = PRE,
     least: int = 2,
+    seed: int = 0,
 ) -> Claim:
     """The Claim about one number, statistic(keys, means over packings), of all groups.
 
-    groups: {μ: [(disks, value)]}, with values of any shape; least: so many it takes.
+    groups: {μ: [(disks, value)]}, with values of any shape; least: so many it takes. seed: of the
+    bootstrap.
     """
     ranges = Ranges(good, good if fair is None else fair)
     claim = _missing(statement, source, measured, ranges)
@@ -105,7 +107,7 @@ def over_all(
     if not np.isfinite(value):
         return claim
     claim = claim._replace(value=value)
-    drawn = statistics.resampled_means(values)
+    drawn = statistics.resampled_means(values, seed)
     found = np.array([statistic(keys, draw) for draw in drawn])
     single = max(map(len, values)) < 2
     few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
