@@ -5,7 +5,7 @@
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,8 @@ __all__ = [
 ]
 
 # Part → what it measures, and its heading.
-PARTS: dict[str, tuple[Callable[..., list[dict[str, Any]]], str]] = {
+Parts = Mapping[str, tuple[Callable[..., list[dict[str, Any]]], str]]
+PARTS: Parts = {
     "contact_updates": (contact_updates, "One contact update of Gauss–Seidel"),
     "relaxation": (relaxation, "One relaxation to 1e-9 ⟨f_n⟩, from the same kicked starts"),
     "scaling": (scaling, "One relaxation against the number of disks"),
@@ -89,10 +90,10 @@ def run(
     folder: str | Path | None = None,
     quick: bool = True,
     *,
-    parts: Sequence[str] | None = None,
+    parts: Parts = PARTS,
     show: Callable[[str], object] = print,
 ) -> dict[str, Any]:
-    """Measure all parts (or those named) and return {"environment": …, part: rows}.
+    """Measure parts, by default all, and return {"environment": …, part: rows}.
 
     folder: where bench.json is written, after every part so that nothing is lost, and the figures
     (bench.html, bench.png); None: nowhere.
@@ -100,8 +101,7 @@ def run(
     """
     folder = None if folder is None else make_folder(folder)
     results: dict[str, Any] = {"environment": environment(), "quick": bool(quick), "seconds": {}}
-    for name in parts or PARTS:
-        measure, heading = PARTS[name]
+    for name, (measure, heading) in parts.items():
         begin = time.perf_counter()
         results[name] = measure(quick)
         results["seconds"][name] = time.perf_counter() - begin
@@ -124,9 +124,14 @@ def _draw(folder: Path, results: dict[str, Any]) -> None:
             figures.save(figure, folder / name)
 
 
-def main(out: str | Path | None = None, quick: bool = False, as_json: bool = False) -> int:
+def main(
+    out: str | Path | None = None,
+    quick: bool = False,
+    as_json: bool = False,
+    parts: Parts = PARTS,
+) -> int:
     """The command `granforce bench`: tables or JSON on stdout, progress on stderr; returns 0."""
-    results = run(out, quick, show=(lambda text: None) if as_json else print)
+    results = run(out, quick, parts=parts, show=(lambda text: None) if as_json else print)
     if as_json:
         print(json_text(results, ascii_only=False))
     else:

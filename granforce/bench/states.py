@@ -4,7 +4,7 @@ import contextlib
 import multiprocessing
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,8 @@ from granforce.records import Floats, NotJammedError, Packing
 from granforce.system.clock import timed
 from granforce.tolerances import EQUILIBRIUM
 
-WALKS: dict[str, dict[str, Any]] = {
+Ways = Mapping[str, dict[str, Any]]
+WALKS: Ways = {
     "Gauss–Seidel alone": {
         "relax": gauss_seidel,
         "rest": None,
@@ -50,6 +51,7 @@ def walks(
     packings: int | None = None,
     states: int | None = None,
     frictions: Sequence[float] = FRICTIONS,
+    ways: Ways = WALKS,
 ) -> list[dict[str, Any]]:
     """Rows: η1, η2, η3 and distance from the centre, mean ± standard error over packings.
 
@@ -57,17 +59,18 @@ def walks(
     ⟨|F − C|⟩/|C|, C the mean over the solvers of their mean networks; `original` is that of the
     packing's own network. A walk that needed more than ATTEMPTS per state is left out and counted
     in `failed`: such a row is a mean over fewer packings, and not to be compared with the others.
+    ways: {name of a solver: options of `walk`}.
     """
     n = n or (100 if quick else 400)
     packings = packings or (3 if quick else 10)
     states = states or (50 if quick else 60)
     rows = []
     for mu in frictions:
-        found: dict[Any, list[Any]] = {name: [] for name in WALKS}
+        found: dict[Any, list[Any]] = {name: [] for name in ways}
         for seed in range(1, packings + 1):
             note(f"walks: N = {n}, μ = {mu:g}, packing {seed} of {packings}")
             S = ensemble(pack(n, mu, seed))
-            for name, values in _walked(S, states, seed).items():
+            for name, values in _walked(S, states, seed, ways).items():
                 found[name].append(values)
         for name, values in found.items():
             row = {"n": n, "mu": mu, "solver": name, "packings": packings, "states": states}
@@ -75,19 +78,19 @@ def walks(
     return rows
 
 
-def _walked(S: Ensemble, states: int, seed: int) -> dict[str, dict[str, float]]:
+def _walked(S: Ensemble, states: int, seed: int, ways: Ways) -> dict[str, dict[str, float]]:
     """Measures by solver on one packing; an empty dict for a walk that failed."""
     done, seconds = {}, {}
-    for name, options in WALKS.items():
+    for name, options in ways.items():
         begin = time.perf_counter()
         with contextlib.suppress(NotJammedError):
             done[name] = walk(S, states, seed, max_attempts=ATTEMPTS * states, **options)
         seconds[name] = time.perf_counter() - begin
     if not done:
-        return {name: {} for name in WALKS}
+        return {name: {} for name in ways}
     centre = np.mean([measures.mean_network(w.states) for w in done.values()], axis=0)
     size = np.linalg.norm(centre)
-    found: dict[Any, dict[Any, Any]] = {name: {} for name in WALKS}
+    found: dict[Any, dict[Any, Any]] = {name: {} for name in ways}
     for name, one in done.items():
         found[name] = {
             "eta1": measures.eta1(one.states),

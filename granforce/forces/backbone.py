@@ -66,10 +66,10 @@ def carrying(full: Ensemble) -> tuple[Mask, Floats | None]:
     dead = ~idle
     if trusted:
         idle = known[:, 0] <= SEEN_CARRYING * full.force_scale
-        dead = idle & _cannot_balance(full, idle)
-        idle = _not_pulled(full, known, idle & ~dead)
+        dead = idle & cannot_balance(full, idle)
+        idle = not_pulled(full, known, idle & ~dead)
     at_hand = known if trusted else None
-    return ~(dead | _proven_idle(full, idle, at_hand)), at_hand
+    return ~(dead | proven_idle(full, idle, at_hand)), at_hand
 
 
 def _raise_contradiction(full: Ensemble) -> None:
@@ -83,7 +83,7 @@ def _raise_contradiction(full: Ensemble) -> None:
         raise NotJammedError(message)
 
 
-def _not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
+def not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
     """Those of the idle contacts that press in none of the networks that are pulled towards them.
 
     Every network is pulled towards forces on all that have not pressed before.
@@ -99,7 +99,7 @@ def _not_pulled(full: Ensemble, known: Floats, idle: Mask) -> Mask:
     return idle
 
 
-def _cannot_balance(full: Ensemble, idle: Mask) -> Mask:
+def cannot_balance(full: Ensemble, idle: Mask) -> Mask:
     """Mask of idle contacts that even their own grains alone cannot balance: local, exact.
 
     Grains whose contacts are all idle must be in balance; all others may answer any force.
@@ -154,7 +154,7 @@ def _never_pressing(
     return idle
 
 
-def _proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
+def proven_idle(full: Ensemble, idle: Mask, known: Floats | None) -> Mask:
     """Those of the idle contacts whose sum, and so each, can only be 0 over S.
 
     known (N_c, 2): a network of S, or None.

@@ -52,19 +52,20 @@ class Puller:
         """known: forces that no pull changes, as for `conditions.conditions`."""
         self._S = ensemble(packing, mu, **conditions.of(conditions.conditions(known=known)))
 
-    def rail(self, contact: int, state: Floats) -> Rail:
+    def rail(self, contact: int, state: Floats, many: bool | None = None) -> Rail:
         """The whole Rail of a contact (its number in the packing) for the network `state` (N_c, 2).
 
-        Raises what `pull` and `reach` raise.
+        many: whether it has few stops; by default where S has more than MANY contacts. Raises what
+        `pull` and `reach` raise.
         """
-        *_, whole = self.rails(contact, state)
+        *_, whole = self.rails(contact, state, many)
         return whole
 
-    def rails(self, contact: int, state: Floats) -> Iterator[Rail]:
+    def rails(self, contact: int, state: Floats, many: bool | None = None) -> Iterator[Rail]:
         """The same; of many contacts first a part of it, without the ends, which take longest."""
         ends = reach(self._S, contact, workers=WORKERS)
         (position,) = self._S.positions([contact])
-        many = len(self._S.index) > MANY
+        many = len(self._S.index) > MANY if many is None else many
         inward = (ends.upper - ends.lower) * (INWARD if many else 0.0)
         low, high = ends.lower + inward, ends.upper - inward
         # The network itself is among them, so that nothing jumps when it is taken in hand.

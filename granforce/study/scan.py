@@ -97,15 +97,7 @@ def run(
         elif on_done is not None:
             on_done(k, True)
     failed = {}
-    ended, reached = 0, 0.0
-
-    def tell(parts: float) -> None:
-        # Cells may be counted as ended before they are seen to be, and anew where a worker died:
-        # progress goes forward only, in quarters of cells, which add up exactly.
-        nonlocal reached
-        reached = max(reached, min(int(4 * parts) / 4, len(todo)))
-        if progress is not None:
-            progress(reached, len(todo))
+    ended, tell = 0, forwards(progress, len(todo))
 
     def finished(k: int, get_result: Callable[[], bool]) -> None:
         nonlocal ended
@@ -126,6 +118,23 @@ def run(
         else:
             _over_dask(tasks, scheduler, finished)
     return [(cells[k], failed[k]) for k in sorted(failed)]
+
+
+def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
+    """tell(parts), which calls progress(parts done, total), in quarters, and never goes back.
+
+    Cells may be counted as ended before they are seen to be, and anew where a worker died; quarters
+    add up exactly.
+    """
+    reached = 0.0
+
+    def tell(parts: float) -> None:
+        nonlocal reached
+        reached = max(reached, min(int(4 * parts) / 4, total))
+        if progress is not None:
+            progress(reached, total)
+
+    return tell
 
 
 def _over_processes(

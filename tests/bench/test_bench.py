@@ -7,19 +7,12 @@ import pytest
 from packings import packed
 
 from granforce import bench
-from granforce.bench import conditions, packings, report, siconos, solvers, states
+from granforce.bench import packings, report, siconos, solvers, states
 from granforce.forces.ensemble import ensemble
 from granforce.numerics.lanes import LANES
-from granforce.records import NotJammedError
+from granforce.packing.compaction import pack
 
 SMALL = {"n": 30, "frictions": (0.3,)}
-
-
-@pytest.fixture(autouse=True)
-def one_packing(monkeypatch):
-    """Packings of the benchmark come from the shared ones."""
-    for module in (conditions, solvers, states):
-        monkeypatch.setattr(module, "pack", lambda n, mu, seed, **_: packed(n, mu, seed))
 
 
 def named(rows, key, value):
@@ -99,16 +92,10 @@ def test_an_exponent_is_the_slope_of_the_sizes_that_were_reached():
     assert fit["note"] == "N = 100 … 1600"
 
 
-def test_compaction_rows(monkeypatch):
-    def half(n, mu, seed, **options):
-        if options["dt"] > 0.07:
-            raise NotJammedError("not jammed")
-        return packed(30, 0.3)
-
-    monkeypatch.setattr(packings, "pack", half)
-    rows = bench.compaction(True, n=30, mu=0.3, steps=(0.05, 0.1), accuracies=(0.01,), seeds=2)
-    assert [row["failed"] for row in rows] == [0, 2]
-    S = ensemble(packed(30, 0.3))
+def test_compaction_rows():
+    rows = bench.compaction(True, n=30, mu=0.3, steps=(0.05, 1e9), accuracies=(0.01,), seeds=1)
+    assert [row["failed"] for row in rows] == [0, 1]
+    S = ensemble(pack(30, 0.3, 1, dt=0.05, accuracy=0.01))
     assert rows[0]["z"] == pytest.approx(S.coordination)
     assert rows[0]["h"] == S.dimension
     assert rows[0]["phi"] == pytest.approx(S.packing.packing_fraction)
@@ -148,10 +135,11 @@ def test_walks_of_one_optimum_agree_and_others_need_not():
         assert ours[key] == pytest.approx(piqp[key], rel=1e-4)
 
 
-def test_a_walk_that_fails_is_counted(monkeypatch):
-    monkeypatch.setitem(states.WALKS["Gauss–Seidel alone"], "max_iterations", 2)
-    rows = bench.walks(True, packings=1, states=2, **SMALL)
-    assert [row["failed"] for row in rows] == [1, 0, 0, 0]
+def test_a_walk_that_fails_is_counted():
+    alone = states.WALKS["Gauss–Seidel alone"] | {"max_iterations": 2}
+    ways = {"cut short": alone, "nearest": states.WALKS["nearest"]}
+    rows = bench.walks(True, packings=1, states=2, ways=ways, **SMALL)
+    assert [row["failed"] for row in rows] == [1, 0]
     assert "eta3" not in rows[0]
 
 
@@ -171,30 +159,27 @@ def test_missing_references_are_told(tmp_path):
     assert "not found" in row["note"]
 
 
-@pytest.fixture
-def two_parts(monkeypatch):
-    parts = {
-        "one": (lambda quick: [{"seconds": 1.5, "quick": quick, "note": ""}], "The first"),
-        "two": (lambda quick: [{"solver": "a", "ratio": None}, {"solver": "b"}], "The second"),
-    }
-    monkeypatch.setattr(bench, "PARTS", parts)
+TWO = {
+    "one": (lambda quick: [{"seconds": 1.5, "quick": quick, "note": ""}], "The first"),
+    "two": (lambda quick: [{"solver": "a", "ratio": None}, {"solver": "b"}], "The second"),
+}
 
 
-def test_run_writes_what_it_returns(two_parts, tmp_path, capsys):
-    found = bench.run(tmp_path / "new", quick=True)
+def test_run_writes_what_it_returns(tmp_path, capsys):
+    found = bench.run(tmp_path / "new", quick=True, parts=TWO)
     assert json.loads((tmp_path / "new" / "bench.json").read_text()) == found
     assert not list((tmp_path / "new").glob("*.part"))
     assert found["one"] == [{"seconds": 1.5, "quick": True, "note": ""}]
     told = capsys.readouterr()
     assert "The first" in told.out and "The second" in told.out
     assert "two: " in told.err and "two: " not in told.out
-    assert set(bench.run(None, parts=["two"])) == {"environment", "quick", "seconds", "two"}
+    assert {"environment", "quick", "seconds", *TWO} == set(found)
 
 
-def test_main_prints_json_only_when_asked(two_parts, capsys):
-    assert bench.main(None, True, True) == 0
+def test_main_prints_json_only_when_asked(capsys):
+    assert bench.main(None, True, True, TWO) == 0
     assert json.loads(capsys.readouterr().out)["quick"] is True
-    assert bench.main(None, True, False) == 0
+    assert bench.main(None, True, False, TWO) == 0
     assert "Environment" in capsys.readouterr().out
 
 

@@ -8,8 +8,10 @@ from scipy.optimize import linprog
 from granforce.explore.intervals import intervals
 from granforce.forces import backbone
 from granforce.forces.ensemble import ensemble
+from granforce.forces.nearest import some_network
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.records import Contacts, NotJammedError, make_contacts, make_packing
+from granforce.tolerances import SEEN_CARRYING
 
 REFERENCES = ["n100_mu0.1_s11", "n100_mu1_s12", "n400_mu0.1_s13"]
 
@@ -84,23 +86,20 @@ def test_pruning_changes_no_state():
 
 
 @pytest.mark.parametrize("given", [True, False])
-def test_networks_at_hand_and_local_proofs_spare_programs_and_change_no_backbone(
-    monkeypatch, given
-):
+def test_networks_at_hand_and_local_proofs_spare_programs_and_change_no_backbone(given):
     packing = reference("n100_mu1_s12")
     if not given:
         packing = packing._replace(forces=np.zeros_like(packing.forces))
-    asked, proven = [], backbone._proven_idle
-    monkeypatch.setattr(
-        backbone,
-        "_proven_idle",
-        lambda full, idle, known: asked.append(idle.sum()) or proven(full, idle, known),
-    )
-    spared = ensemble(packing)
-    monkeypatch.setattr(backbone, "_not_pulled", lambda full, known, idle: idle)
-    monkeypatch.setattr(backbone, "_cannot_balance", lambda full, idle: np.zeros_like(idle))
-    assert np.array_equal(ensemble(packing).index, spared.index)
-    assert asked[0] < asked[1]
+    full = ensemble(packing, prune=False)
+    known = full.original if given else some_network(full, np.zeros_like(full.original))
+    idle = known[:, 0] <= SEEN_CARRYING * full.force_scale
+    proved = backbone.proven_idle(full, idle, known)
+    dead = backbone.cannot_balance(full, idle)
+    left = backbone.not_pulled(full, known, idle & ~dead)
+    assert np.array_equal(dead | backbone.proven_idle(full, left, known), proved)
+    assert left.sum() < idle.sum()
+    mask, network = backbone.carrying(full)
+    assert np.array_equal(mask, ~proved) and np.array_equal(network, known)
 
 
 def relabelled(packing, order):

@@ -12,7 +12,7 @@ from packings import lattice, packed, reference, two_disks
 
 from granforce.bench import tile
 from granforce.explore.random_walk import walk
-from granforce.forces import contact_problem as module
+from granforce.forces.contact_problem import problem_of
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
@@ -142,11 +142,11 @@ def test_lanes_do_not_know_their_company():
 def test_the_plan_goes_with_its_ensemble():
     S = ensemble(packed(40, 0.3))
     nearest(S, S.original)
-    known, gone = len(module._known), weakref.ref(S)
+    gone, plan = weakref.ref(S), weakref.ref(problem_of(S).b)
+    assert plan() is problem_of(S).b
     del S
     gc.collect()
-    assert gone() is None
-    assert len(module._known) < known
+    assert gone() is None and plan() is None
 
 
 def test_too_few_steps_are_told():

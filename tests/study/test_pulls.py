@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.explore import pull
 from granforce.explore.intervals import intervals
+from granforce.explore.pull import pull
 from granforce.forces.ensemble import ensemble
+from granforce.numerics.lanes import LANES
 from granforce.records import InputError
 from granforce.study import pulls
 from granforce.study.pulls import Puller
@@ -35,11 +36,10 @@ def test_a_rail_goes_from_bound_to_bound_through_admissible_networks(S, puller):
         assert S.residual(states).max() <= BALANCED and S.violation(states).max() <= ADMISSIBLE
 
 
-def test_rails_of_many_contacts_have_fewer_stops_and_the_same_bounds(S, puller, monkeypatch):
+def test_rails_of_many_contacts_have_fewer_stops_and_the_same_bounds(S, puller):
     contact = int(S.index[7])
     whole = puller.rail(contact, S.original)
-    monkeypatch.setattr(pulls, "MANY", 1)
-    rail = puller.rail(contact, S.original)
+    rail = puller.rail(contact, S.original, many=True)
     assert (rail.lower, rail.upper) == (whole.lower, whole.upper)
     assert len(rail.values) <= pulls.FEW_STOPS + 1 < len(whole.values)
     width = rail.upper - rail.lower
@@ -49,17 +49,18 @@ def test_rails_of_many_contacts_have_fewer_stops_and_the_same_bounds(S, puller, 
         assert S.residual(states).max() <= BALANCED and S.violation(states).max() <= ADMISSIBLE
 
 
-def test_a_part_of_a_rail_comes_first_and_threads_change_nothing(S, puller, monkeypatch):
+def test_a_part_of_a_rail_comes_first_and_threads_change_nothing(S, puller):
     contact = int(S.index[7])
-    monkeypatch.setattr(pulls, "MANY", 1)
-    beside = puller.rail(contact, S.original)
-    monkeypatch.setattr(pull, "_ALONE", 1)  # each value by itself, on threads
-    part, rail = puller.rails(contact, S.original)
+    part, rail = puller.rails(contact, S.original, many=True)
     assert not part.whole and rail.whole and (part.lower, part.upper) == (rail.lower, rail.upper)
     kept = np.isin(rail.values, part.values)
     assert kept.tolist() == [False, *[True] * len(part.values), False]
     np.testing.assert_array_equal(part.states, rail.states[kept])
-    np.testing.assert_array_equal(rail.states, beside.states)
+    between = np.linspace(part.values[0], part.values[-1], LANES + 2)  # more than go side by side
+    beside, threads = (pull(S, contact, between, workers=workers) for workers in (1, 2))
+    np.testing.assert_array_equal(threads.states, beside.states)
+    alone = [pull(S, contact, value).states[0] for value in between]
+    np.testing.assert_array_equal(alone, beside.states)
 
 
 def test_the_network_itself_is_on_its_rail(S, puller):

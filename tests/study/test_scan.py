@@ -130,29 +130,14 @@ def test_twenty_parents_are_killed_alone(tmp_path, first):
     kill_parent_alone(tmp_path / "s", range(first, first + 8))
 
 
-def test_progress_of_cells_never_goes_back(tmp_path, monkeypatch):
+def test_progress_of_cells_never_goes_back():
     """However late the end of a cell is seen, and however often cells are begun anew."""
     told = []
-
-    def pool(tasks, workers, finished, advanced, before, enough):
-        advanced(before + 1.26)  # the first cell has ended, the second is under way
-        finished(next(iter(tasks)), lambda: False)
-        advanced(before + 1.9)
-        rest = dict(list(tasks.items())[1:])
-        if before:
-            advanced(before + 5)  # counted twice
-            for k in rest:
-                finished(k, lambda: False)
-            return {}
-        return rest  # a worker died
-
-    monkeypatch.setattr(scan, "warm_up", lambda needed: None)
-    monkeypatch.setattr(scan, "_one_pool", pool)
-    failed = scan.run(
-        tmp_path / "s", small_cells(), progress=lambda done, total: told.append((done, total))
-    )
-    assert not failed
-    assert told == sorted(told) and told[-1] == (6, 6)
+    tell = scan.forwards(lambda done, total: told.append((done, total)), 6)
+    # One has ended, another is under way; its worker dies, and it is counted twice.
+    for parts in (1.26, 1, 1.9, 2.26, 2, 2.9, 7, 3, 4, 5, 6):
+        tell(parts)
+    assert told == sorted(told) and told[0] == (1.25, 6) and told[-1] == (6, 6)
     assert {done % 0.25 for done, _ in told} == {0}
 
 
@@ -246,28 +231,29 @@ def test_a_killed_dask_worker_costs_nothing_but_time(tmp_path, cluster):
 @pytest.mark.slow
 def test_a_killed_worker_process_costs_nothing_but_time(tmp_path):
     cells = [Cell(kinds.WALK, cell(seed=seed, states=60)) for seed in range(1, 7)]
-    killed = []
+    killed, told = [], []
 
     def kill(k, cached):
         if not killed:
             children = multiprocessing.active_children
             killed.append(kill_one(lambda: [child.pid for child in children()]))
 
-    assert not scan.run(tmp_path / "one", cells, on_done=kill)
+    progress = lambda *counts: told.append(counts)  # noqa: E731
+    assert not scan.run(tmp_path / "one", cells, on_done=kill, progress=progress)
+    assert told == sorted(told) and told[-1] == (6, 6)
     assert killed
     assert not scan.run(tmp_path / "two", cells)
     assert_same(tmp_path / "one", tmp_path / "two")
 
 
-def die(*task):
+def die(*asked, **options):
     os._exit(1)
 
 
 @pytest.mark.slow
-def test_a_cell_that_kills_its_worker_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(scan, "run_cell", die)
-    monkeypatch.setattr(scan, "warm_up", lambda needed: None)
-    failed = scan.run(tmp_path / "s", small_cells()[:1])
+def test_a_cell_that_kills_its_worker_is_given_up(tmp_path):
+    deadly = Cell(kinds.WALK._replace(name="deadly", compute=die), cell())
+    failed = scan.run(tmp_path / "s", [deadly])
     assert "died 3 times" in failed[0][1]
 
 
