@@ -24,7 +24,7 @@ from granforce.numerics.lanes import LANES
 from granforce.perturb.critical_force import MOST_STEPS
 from granforce.records import InputError, Progress
 from granforce.study import kinds, scan
-from granforce.study.cells import Cell, load
+from granforce.study.cells import Cell, Kind, load
 from granforce.study.store import open_store
 
 # The smallest two lie where soft modes do not yet amplify friction beyond its linear effect.
@@ -181,40 +181,35 @@ def compute(
     return failed + scan.run(path, cells, progress=progress("cells"), **options)
 
 
-def _walk(
+def _task(
     part: str,
+    kind: Kind,
     n: int,
     seed: int,
     mu: float,
-    plan: Plan,
-    *,
+    *arguments: Any,
     packing_mu: float | None = None,
-    states: int | None = None,
     made: dict[str, Any] | None = None,
     **how: Any,
 ) -> Task:
-    packing = kinds.PACKING.parameters(
+    """The Task of a kind; its arguments beside the packing, and what that was made with."""
+    packed = kinds.PACKING.parameters(
         n, mu if packing_mu is None else packing_mu, seed, **made or {}
     )
+    return Task(part, Cell(kind, kind.parameters(packed, *arguments, mu=mu, **how)), n, mu, seed)
+
+
+def _walk(
+    part: str, n: int, seed: int, mu: float, plan: Plan, *, states: int | None = None, **how: Any
+) -> Task:
     states = plan.states if states is None else states
     shown = part in SHOWN_PARTS and seed == 1 and mu in SHOWN_FRICTIONS
     keep = states if shown else min(KEPT_STATES, states)
-    named = kinds.WALK.parameters(packing, states, mu=mu, keep=keep, **how)
-    return Task(part, Cell(kinds.WALK, named), n, mu, seed)
+    return _task(part, kinds.WALK, n, seed, mu, states, keep=keep, **how)
 
 
-def _exact(
-    part: str,
-    n: int,
-    seed: int,
-    mu: float,
-    *,
-    packing_mu: float | None = None,
-    slice_: Sequence[float] | None = None,
-) -> Task:
-    packing = kinds.PACKING.parameters(n, mu if packing_mu is None else packing_mu, seed)
-    named = kinds.INTERVALS.parameters(packing, mu=mu, slice_=slice_)
-    return Task(part, Cell(kinds.INTERVALS, named), n, mu, seed)
+def _exact(part: str, n: int, seed: int, mu: float, **how: Any) -> Task:
+    return _task(part, kinds.INTERVALS, n, seed, mu, **how)
 
 
 def _frictions(plan: Plan, seed: int, packings: int, more: Iterable[float] = ()) -> list[float]:
@@ -265,14 +260,11 @@ def _exacts(plan: Plan, seed: int) -> list[Task]:
 
 
 def _uniform(plan: Plan, seed: int) -> list[Task]:
-    found = []
     if seed > min(plan.uniform_packings, plan.packings):
         return []
-    for mu in sorted(set(plan.frictions) | set(plan.fine_frictions)):
-        # All states are kept: their mean is the centre that distances are measured from.
-        named = kinds.UNIFORM.parameters(kinds.PACKING.parameters(plan.n, mu, seed), plan.states)
-        found.append(Task("uniform", Cell(kinds.UNIFORM, named), plan.n, mu, seed))
-    return found
+    # All states are kept: their mean is the centre that distances are measured from.
+    frictions = sorted(set(plan.frictions) | set(plan.fine_frictions))
+    return [_task("uniform", kinds.UNIFORM, plan.n, seed, mu, plan.states) for mu in frictions]
 
 
 def _responses(plan: Plan, seed: int) -> list[Task]:
@@ -286,9 +278,8 @@ def _responses(plan: Plan, seed: int) -> list[Task]:
         for mu in plan.frictions if seed <= min(packings, plan.packings) else ():
             if 0 < mu < LEAST_FOLLOWED:
                 continue
-            packing = kinds.PACKING.parameters(plan.n, mu, seed)
-            named = kinds.PERTURBATION.parameters(packing, random=contacts, **protocol)
-            found.append(Task(part, Cell(kinds.PERTURBATION, named), plan.n, mu, seed))
+            how: dict[str, Any] = {"random": contacts, **protocol}
+            found.append(_task(part, kinds.PERTURBATION, plan.n, seed, mu, **how))
     return found
 
 
@@ -343,12 +334,10 @@ def _stresses(plan: Plan, seed: int) -> list[Task]:
     for mu in plan.frictions if seed <= min(plan.stress_packings, plan.packings) else ():
         if mu == 0:
             continue  # one network, one stress
-        packing = kinds.PACKING.parameters(plan.n, mu, seed)
-        cells = {"stress": Cell(kinds.STRESS, kinds.STRESS.parameters(packing))}
+        at = plan.n, seed, mu
+        found.append(_task("stress", kinds.STRESS, *at))
         if seed <= plan.stress_uniform_packings:
-            named = kinds.UNIFORM.parameters(packing, plan.stress_states)
-            cells["stress_uniform"] = Cell(kinds.UNIFORM, named)
-        found += [Task(part, cell, plan.n, mu, seed) for part, cell in cells.items()]
+            found.append(_task("stress_uniform", kinds.UNIFORM, *at, plan.stress_states))
     return found
 
 
@@ -364,21 +353,19 @@ def _volumes(plan: Plan, seed: int) -> list[Task]:
 
 
 def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:
-    packing = kinds.PACKING.parameters(n, mu, seed)
-    named = kinds.VOLUME.parameters(packing, plan.volume_accuracy * max(1.0, n / plan.n))
-    return Task(part, Cell(kinds.VOLUME, named), n, mu, seed)
+    accuracy = plan.volume_accuracy * max(1.0, n / plan.n)
+    return _task(part, kinds.VOLUME, n, seed, mu, accuracy)
 
 
 def _tails(plan: Plan, seed: int) -> list[Task]:
-    found = []
     if seed > min(plan.tails_packings, max(plan.packings, plan.many_packings)):
         return []
-    for mu in plan.tails_frictions:
-        packing = kinds.PACKING.parameters(plan.tails_n, mu, seed)
-        for part, asked in (("tails", {}), ("tails_stress", {"prescribed": "stress"})):
-            named = kinds.UNIFORM.parameters(packing, plan.tails_states, **asked)
-            found.append(Task(part, Cell(kinds.UNIFORM, named), plan.tails_n, mu, seed))
-    return found
+    n, states = plan.tails_n, plan.tails_states
+    return [
+        _task(part, kinds.UNIFORM, n, seed, mu, states, **asked)
+        for mu in plan.tails_frictions
+        for part, asked in (("tails", {}), ("tails_stress", {"prescribed": "stress"}))
+    ]
 
 
 # The parts by families, which are computed by name; those of the paper first.
