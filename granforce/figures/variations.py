@@ -117,12 +117,11 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
     rows: dicts with mu, seed, friction (the largest) and own_shear (of the original network);
     uniform: with mu, seed, mean_shear and largest_shear of uniform states.
     """
-    largest = {(row["mu"], row["seed"]): row["friction"] for row in rows}
     own, states = (
         [
-            {"mu": row["mu"], **{n: row[n] / largest[row["mu"], row["seed"]] for n in names}}
-            for row in some
-            if largest.get((row["mu"], row["seed"]))
+            {"mu": row["mu"], **{name: row[name] / most["friction"] for name in names}}
+            for row, most in statistics.paired(some, rows)
+            if most["friction"]
         ]
         for some, names in ((rows, ("own_shear",)), (uniform, ("mean_shear", "largest_shear")))
     )

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize, stats
 
-from granforce.records import Floats
+from granforce.records import Floats, Rows
 
 T = TypeVar("T")
 
@@ -59,6 +59,13 @@ def grouped(rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu") -> dic
         if value is not None and np.isfinite(value):
             found.setdefault(row[by], []).append(value)
     return {key: np.array(found[key]) for key in sorted(found)}
+
+
+def paired(rows: Rows, others: Rows) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """Rows that have one of the same μ and seed among the others, each with that one."""
+    known = {(row["mu"], row["seed"]): row for row in others}
+    keys = [(row, (row["mu"], row["seed"])) for row in rows]
+    return [(row, known[key]) for row, key in keys if key in known]
 
 
 def means(

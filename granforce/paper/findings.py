@@ -152,16 +152,17 @@ def strength(table: Table) -> Iterator[Claim]:
         for name, label in (("critical_force", "⟨F_crit⟩"), ("decay_exponent", "α")):
             yield from _by_range(_ratios(table, name, part, "response"), f"{label}: {word}")
     # Counted in the pressure or not, loads differ by the scale of S: F/(1 − F ℓ/2PV), 2PV = Σ f ℓ.
-    known = {(row["mu"], row["seed"]): row["contacts"] for row in table.part("walk")}
-    factors: dict[Any, Any] = {}
-    for row in rows:
-        contacts = known.get((row["mu"], row["seed"]))
-        if contacts:
-            load = row["critical_force"] / contacts
-            factors.setdefault(row["mu"], []).append(1 / (1 - load))
-    yield from _by_range(
-        factors, "⟨F_crit⟩ with the pair left out of the pressure over the same with it"
-    )
+    factors = [
+        {
+            "mu": row["mu"],
+            "n": row["n"],
+            "factor": 1 / (1 - row["critical_force"] / walk["contacts"]),
+        }
+        for row, walk in statistics.paired(rows, table.part("walk"))
+        if walk["contacts"]
+    ]
+    told = "⟨F_crit⟩ with the pair left out of the pressure over the same with it"
+    yield from _by_range(_values(factors, "factor"), told)
 
 
 def shear(table: Table) -> Iterator[Claim]:
@@ -173,17 +174,12 @@ def shear(table: Table) -> Iterator[Claim]:
     told = "shear stress over pressure"
     yield from _by_range(groups, f"largest {told}")
     yield from _by_range(_values(rows, "own_shear"), f"{told} of the original network")
-    largest = {(row["mu"], row["seed"]): row["friction"] for row in rows}
     for some, name, word in (
         (rows, "own_shear", "of the original network"),
         (uniform, "mean_shear", "of uniform states, mean"),
         (uniform, "largest_shear", "of uniform states, largest"),
     ):
-        parts: dict[Any, Any] = {}
-        for row in some:
-            whole = largest.get((row["mu"], row["seed"]))
-            if whole:
-                parts.setdefault(row["mu"], []).append(row[name] / whole)
+        parts = _quotients(statistics.paired(some, rows), name, "friction")
         yield from _by_range(parts, f"{told} {word}, over the largest of the packing")
 
 
@@ -200,17 +196,10 @@ def volume(table: Table) -> Iterator[Claim]:
             top = peak if name == "extent" else _largest
             yield _trend(f"μ where {told} is largest", top, groups)
         yield from _by_range(groups, told)
-    known = {(row["mu"], row["seed"]): row for row in table.part("walk")}
-    for name in ("eta1", "eta2"):
-        ratios: dict[Any, Any] = {}
-        for row in rows:
-            walk = known.get((row["mu"], row["seed"]))
-            if walk and walk.get(name) and row.get("extent"):
-                ratios.setdefault(row["mu"], []).append(row["extent"] / walk[name])
-        yield from _by_range(ratios, f"width of S over {name[:-1].replace('eta', 'η')}{name[-1]}")
-    walked = [
-        (row, known[row["mu"], row["seed"]]) for row in rows if (row["mu"], row["seed"]) in known
-    ]
+    walked = statistics.paired(rows, table.part("walk"))
+    wide = [(row, walk) for row, walk in walked if row.get("extent")]
+    for name, label in (("eta1", "η1"), ("eta2", "η2")):
+        yield from _by_range(_quotients(wide, "extent", name), f"width of S over {label}")
     for name, other, what in (
         ("log_volume_per_grain", "coordination", "ln V per grain with z"),
         ("log_volume_per_grain", "eta2", "ln V per grain with η2"),
@@ -268,12 +257,16 @@ def _values(rows: Rows, name: str) -> Values:
 
 def _ratios(table: Table, name: str, above: str, below: str) -> Values:
     """{μ: ratios of one number in the same packings}, where both parts have it."""
-    known = {(row["mu"], row["seed"]): row.get(name) for row in table.part(below)}
+    rows = [r for r in table.part(above) if r["dimension"] > 0 and r.get("reached_part", 1) > 0]
+    return _quotients(statistics.paired(rows, table.part(below)), name, name)
+
+
+def _quotients(pairs: Sequence[tuple[Any, Any]], above: str, below: str) -> Values:
+    """{μ: one number of a row over one of the row beside it}, where they have both."""
     ratios: dict[Any, Any] = {}
-    for row in table.part(above):
-        value = known.get((row["mu"], row["seed"]))
-        if value and row["dimension"] > 0 and name in row and row.get("reached_part", 1) > 0:
-            ratios.setdefault(row["mu"], []).append(row[name] / value)
+    for row, other in pairs:
+        if above in row and other.get(below):
+            ratios.setdefault(row["mu"], []).append(row[above] / other[below])
     return ratios
 
 

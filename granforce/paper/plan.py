@@ -361,10 +361,11 @@ def _tails(plan: Plan, seed: int) -> list[Task]:
     if seed > min(plan.tails_packings, max(plan.packings, plan.many_packings)):
         return []
     n, states = plan.tails_n, plan.tails_states
+    parts: dict[str, Any] = {"tails": {}, "tails_stress": {"prescribed": "stress"}}
     return [
         _task(part, kinds.UNIFORM, n, seed, mu, states, **asked)
         for mu in plan.tails_frictions
-        for part, asked in (("tails", {}), ("tails_stress", {"prescribed": "stress"}))
+        for part, asked in parts.items()
     ]
 
 

@@ -15,6 +15,7 @@ from granforce import measures
 from granforce.explore.stress_outline import plane_of
 from granforce.figures import ratio_counts
 from granforce.forces.balance import stress_of
+from granforce.measures import statistics
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import Floats, InputError, Integers, Packing, friction
@@ -76,9 +77,9 @@ class Table(NamedTuple):
 
     def answers(self, part: str = "walk", eta: str = "eta2") -> list[dict[str, Any]]:
         """Rows of the perturbation, each with the η of a part in the same packing."""
-        known = {(row["mu"], row["seed"]): row[eta] for row in self.part(part) if eta in row}
-        keys = [(row, (row["mu"], row["seed"])) for row in self.responses()]
-        return [row | {eta: known[key]} for row, key in keys if key in known]
+        known = [row for row in self.part(part) if eta in row]
+        pairs = statistics.paired(self.responses(), known)
+        return [row | {eta: other[eta]} for row, other in pairs]
 
 
 def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -> Table:

@@ -132,11 +132,10 @@ def skipped(row: dict[str, Any]) -> bool:
 
 def measure(table: Table, sampler: str) -> Iterator[Claim]:
     """η3, from largest and smallest forces, does not depend on how states are drawn."""
-    exact = {(row["mu"], row["seed"]): row.get("eta3", 0) for row in table.part("exact")}
     rows = [
-        row | {"part_seen": row["eta3"] / exact[row["mu"], row["seed"]]}
-        for row in dynamic(drawn(table, sampler))
-        if row.get("eta3", 0) > 0 and exact.get((row["mu"], row["seed"]), 0) > 0
+        row | {"part_seen": row["eta3"] / exact["eta3"]}
+        for row, exact in statistics.paired(dynamic(drawn(table, sampler)), table.part("exact"))
+        if row.get("eta3", 0) > 0 and exact.get("eta3", 0) > 0
     ]
     yield at_each(
         "η3 does not depend on how states are drawn",
