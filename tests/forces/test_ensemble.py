@@ -97,7 +97,8 @@ def test_networks_at_hand_and_local_proofs_spare_programs_and_change_no_backbone
     dead = backbone.cannot_balance(full, idle)
     left = backbone.not_pulled(full, known, idle & ~dead)
     assert np.array_equal(dead | backbone.proven_idle(full, left, known), proved)
-    assert left.sum() < idle.sum()
+    assert dead.any() and (given or left.sum() < (idle & ~dead).sum())
+    assert np.array_equal(backbone.not_pulled(full, known, proved), proved)
     mask, network = backbone.carrying(full)
     assert np.array_equal(mask, ~proved) and np.array_equal(network, known)
 
