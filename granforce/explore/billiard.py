@@ -216,7 +216,7 @@ def _onward(flight, middle, harmonic, row, time, kick):
     soonest, next_wall = 1.0 / (np.tan(0.5 * rest) if harmonic else rest), -1
     cos, sin = (np.cos(time), np.sin(time)) if harmonic else (1.0, time)
     # Rounding must not move a harmonic path where it begins.
-    moves, lowest = kick != 0.0 or not harmonic, lanes.same(MANY, -np.inf if harmonic else _LEAST)
+    moves, lowest = kick != 0.0 or not harmonic, -np.inf if harmonic else _LEAST
     for first in range(0, len(s), LANES):
         if moves:
             _move(s, w, middle, row, cos, sin, kick, lowest, first)
@@ -231,7 +231,6 @@ def _onward(flight, middle, harmonic, row, time, kick):
 @inline
 def _move(s, w, middle, row, cos, sin, kick, lowest, first):
     """Motion and turn of LANES walls."""
-    cos, sin, kick = lanes.same(MANY, cos), lanes.same(MANY, sin), lanes.same(MANY, kick)
     for k in range(first // lanes.LANES, (first + LANES) // lanes.LANES):
         slack, speed, m = (
             lanes.load(s, k, MANY),
@@ -246,28 +245,20 @@ def _move(s, w, middle, row, cos, sin, kick, lowest, first):
 @inline
 def _some_nearer(s, w, middle, harmonic, soonest, first):
     """Whether any of LANES walls has a larger rate than `soonest`, but for rounding."""
-    soonest, nearer, one, zero = (
-        lanes.same(MANY, soonest),
-        lanes.same(MANY, 0.0),
-        lanes.same(MANY, 1.0),
-        lanes.same(MANY, 0.0),
-    )
+    nearer = lanes.same(MANY, 0.0)
     for k in range(first // lanes.LANES, (first + LANES) // lanes.LANES):
-        slack, speed = (
-            lanes.larger(lanes.load(s, k, MANY), lanes.same(MANY, _LEAST)),
-            lanes.load(w, k, MANY),
-        )
+        slack, speed = lanes.larger(lanes.load(s, k, MANY), _LEAST), lanes.load(w, k, MANY)
         by = soonest * slack + speed
         if harmonic:
             # The larger root of s q² + 2 w q + r (`_rate`) is above q where that is negative, or
             # falls while there are roots.
-            rest = lanes.same(MANY, 2.0) * lanes.load(middle, k, MANY) - slack
-            roots = lanes.pick(speed * speed, rest * slack, one, zero)
+            rest = 2.0 * lanes.load(middle, k, MANY) - slack
+            roots = lanes.pick(speed * speed, rest * slack, 1.0, 0.0)
             nearer = nearer + lanes.pick(
-                zero, soonest * (by + speed) + rest, one, lanes.pick(zero, by, roots, zero)
+                0.0, soonest * (by + speed) + rest, 1.0, lanes.pick(0.0, by, roots, 0.0)
             )
         else:
-            nearer = nearer + lanes.pick(zero, by, one, zero)
+            nearer = nearer + lanes.pick(0.0, by, 1.0, 0.0)
     return not lanes.vanishes(nearer)
 
 

@@ -289,7 +289,7 @@ def _look(looks, lane, done, residual, settled, tolerance, most):
 
 @within
 def _residual(velocity, dilation, unit, lanes):
-    worst = size(dilation * same(lanes, unit[-1]))
+    worst = size(dilation * unit[-1])
     for k in range(unit.shape[0] - 1):
-        worst = larger(worst, size(load(velocity, k, lanes)) * same(lanes, unit[k]))
+        worst = larger(worst, size(load(velocity, k, lanes)) * unit[k])
     return worst

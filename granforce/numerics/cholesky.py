@@ -35,7 +35,7 @@ from granforce.numerics.blocks import (
     subtract_panel,
 )
 from granforce.numerics.contact_matrix import Factors, Network
-from granforce.numerics.lanes import compiled, fma, load, pick, root, same, store, within
+from granforce.numerics.lanes import compiled, fma, load, pick, root, store, within
 from granforce.records import Integers, Mask
 
 # What stands for a pivot that is none: its row gets no weight.
@@ -78,19 +78,18 @@ def factor(network, least, factors, stop, lanes):
 
 
 @within
-def _pivot(value, least, lanes):
+def _pivot(value, least):
     """One over the root of a pivot."""
-    value = pick(value, same(lanes, least), value, same(lanes, _NO_WEIGHT))
-    return same(lanes, 1.0) / root(value)
+    return 1.0 / root(pick(value, least, value, _NO_WEIGHT))
 
 
 @within
 def _factor_diagonal(L, d, least, k, lanes):
     """Cholesky factor of the diagonal block of rows k to k + 2; its own diagonal is inverted."""
-    r0 = _pivot(load(L, d, lanes), least[k], lanes)
+    r0 = _pivot(load(L, d, lanes), least[k])
     l10 = load(L, d + 3, lanes) * r0
     l20 = load(L, d + 6, lanes) * r0
-    r1 = _pivot(fma(l10, -l10, load(L, d + 4, lanes)), least[k + 1], lanes)
+    r1 = _pivot(fma(l10, -l10, load(L, d + 4, lanes)), least[k + 1])
     l21 = fma(l20, -l10, load(L, d + 7, lanes)) * r1
     p2 = fma(l21, -l21, fma(l20, -l20, load(L, d + 8, lanes)))
     store(L, d, lanes, r0)
@@ -98,7 +97,7 @@ def _factor_diagonal(L, d, least, k, lanes):
     store(L, d + 4, lanes, r1)
     store(L, d + 6, lanes, l20)
     store(L, d + 7, lanes, l21)
-    store(L, d + 8, lanes, _pivot(p2, least[k + 2], lanes))
+    store(L, d + 8, lanes, _pivot(p2, least[k + 2]))
 
 
 @within
@@ -111,9 +110,8 @@ def _factor_corner(corner, m, lanes):
             store(corner, m * a + b, lanes, value * load(corner, m * b + b, lanes))
         value = load(corner, m * a + a, lanes)
         value = less_product(value, corner, m * a, corner, m * a, a, lanes)
-        zero, tiny = same(lanes, 0.0), same(lanes, NO_PIVOT)
-        inverse = same(lanes, 1.0) / root(pick(value, tiny, value, same(lanes, 1.0)))
-        store(corner, m * a + a, lanes, pick(value, tiny, inverse, zero))
+        inverse = 1.0 / root(pick(value, NO_PIVOT, value, 1.0))
+        store(corner, m * a + a, lanes, pick(value, NO_PIVOT, inverse, 0.0))
 
 
 @within

@@ -25,10 +25,8 @@ def project(problem, at, work, lanes):
     For w = 1 and no sides: once those forces are balanced they are the optimum, exactly in their
     cones.
     """
-    zero, one = same(lanes, 0.0), same(lanes, 1.0)
-    mu2 = same(lanes, problem.mu * problem.mu)
-    flat = same(lanes, 1.0 / (1.0 + problem.mu * problem.mu))
-    soft = one / larger(mu2, same(lanes, 1e-300))
+    mu2 = problem.mu * problem.mu
+    flat, soft = 1.0 / (1.0 + mu2), 1.0 / max(mu2, 1e-300)
     for k in range(0, len(problem.w), 2):
         normal, tangential = pull(problem.network, k // 2, at.v, at.v_border, lanes)
         # f_n, and μ f_t, of target + Aᵀv.
@@ -36,44 +34,42 @@ def project(problem, at, work, lanes):
         tangential = tangential - load(at.c, k, lanes) + load(at.c, k + 1, lanes)
         across = size(tangential)
         sliding = flat * (normal + across)
-        sign = pick(zero, tangential, -one, one)
+        sign = pick(0.0, tangential, -1.0, 1.0)
         inside = mu2 * normal
-        f_n, f_t = pick(across, inside, sliding, normal), pick(across, inside, sign * sliding, zero)
-        f_t = pick(across, inside, f_t, soft * tangential)
-        nn = pick(across, inside, flat, one)
-        nt, tt = pick(across, inside, sign * flat, zero), pick(across, inside, flat, soft)
+        f_n = pick(across, inside, sliding, normal)
+        f_t = pick(across, inside, sign * sliding, soft * tangential)
+        nn = pick(across, inside, flat, 1.0)
+        nt, tt = pick(across, inside, sign * flat, 0.0), pick(across, inside, flat, soft)
         if problem.w[k] >= PINNED or problem.w[k + 1] >= PINNED:
             _project_pinned(problem, k, normal, soft * tangential, at, work, lanes)
             continue
         # The tip comes last: without friction a pull without tangential part would pass as inside.
-        beyond = -normal
-        tip = pick(across, beyond, one, zero)
+        tip = pick(across, -normal, 1.0, 0.0)
         store(work.K, 3 * (k // 2), lanes, tip * nn)
         store(work.K, 3 * (k // 2) + 1, lanes, tip * nt)
         store(work.K, 3 * (k // 2) + 2, lanes, tip * tt)
         store(at.y, k, lanes, tip * (f_n + f_t))
         store(at.y, k + 1, lanes, tip * (f_n - f_t))
     unbalance(problem, at, work, lanes)
-    worst = worst_of(work.r_border, worst_of(work.r, zero, lanes), lanes)
+    worst = worst_of(work.r_border, worst_of(work.r, same(lanes, 0.0), lanes), lanes)
     store(work.unbalance, 0, lanes, worst)
 
 
 @within
 def _project_pinned(problem, k, normal, tangential, at, work, lanes):
     """The same for a contact of which f_n, f_t or both stay: the nearest point of a line."""
-    zero, one, half = same(lanes, 0.0), same(lanes, 1.0), same(lanes, 0.5)
     y0, y1 = load(at.y, k, lanes), load(at.y, k + 1, lanes)
-    f_n, f_t, nn, tt = half * (y0 + y1), half * (y0 - y1), zero, zero
+    f_n, f_t = 0.5 * (y0 + y1), 0.5 * (y0 - y1)
+    nn = tt = same(lanes, 0.0)
     if problem.w[k] < PINNED:
         least = size(f_t)
-        f_n, nn = larger(normal, least), pick(normal, least, one, zero)
+        f_n, nn = larger(normal, least), pick(normal, least, 1.0, 0.0)
     elif problem.w[k + 1] < PINNED:
-        soft = same(lanes, 1.0 / max(problem.mu * problem.mu, 1e-300))
-        tt = pick(f_n, size(tangential), soft, zero)
+        tt = pick(f_n, size(tangential), 1.0 / max(problem.mu * problem.mu, 1e-300), 0.0)
         f_t = -larger(-f_n, -larger(-f_n, tangential))
         f_t = pick(f_n, size(tangential), tangential, f_t)
     store(work.K, 3 * (k // 2), lanes, nn)
-    store(work.K, 3 * (k // 2) + 1, lanes, zero)
+    store(work.K, 3 * (k // 2) + 1, lanes, 0.0)
     store(work.K, 3 * (k // 2) + 2, lanes, tt)
     store(at.y, k, lanes, f_n + f_t)
     store(at.y, k + 1, lanes, f_n - f_t)

@@ -98,8 +98,8 @@ def pull(network, c, x, y, lanes):
     m = len(g) // 2
     for a in range(m):
         value = load(y, a, lanes)
-        normal = fma(same(lanes, g[a]), value, normal)
-        tangential = fma(same(lanes, g[m + a]), value, tangential)
+        normal = fma(g[a], value, normal)
+        tangential = fma(g[m + a], value, tangential)
     return normal, tangential
 
 
@@ -117,15 +117,15 @@ def push(network, c, normal, tangential, x, y, lanes):
     g = network.border[c]
     m = len(g) // 2
     for a in range(m):
-        value = fma(same(lanes, g[m + a]), tangential, load(y, a, lanes))
-        store(y, a, lanes, fma(same(lanes, g[a]), normal, value))
+        value = fma(g[m + a], tangential, load(y, a, lanes))
+        store(y, a, lanes, fma(g[a], normal, value))
 
 
 @within
 def clear(values, lanes):
     """values ← 0, number by number: arrays set to slices take numba half a second to compile."""
     for k in range(len(values)):
-        store(values, k, lanes, same(lanes, 0.0))
+        store(values, k, lanes, 0.0)
 
 
 @within
@@ -146,7 +146,7 @@ def begin(network, diagonal, factors, lanes):
     clear(factors.tops, lanes)
     for k in range(len(start) - 1):
         for a in range(3):
-            store(factors.lower, 9 * start[k] + 4 * a, lanes, same(lanes, diagonal[3 * k + a]))
+            store(factors.lower, 9 * start[k] + 4 * a, lanes, diagonal[3 * k + a])
 
 
 @inline
@@ -174,7 +174,7 @@ def _add_diagonal(network, c, nn, nt, tn, tt, factors, lanes):
     g = network.border[c]
     m = len(g) // 2
     for b in range(m):
-        by_n, by_t = _through(nn, nt, tn, tt, same(lanes, g[b]), same(lanes, g[m + b]))
+        by_n, by_t = _through(nn, nt, tn, tt, g[b], g[m + b])
         for a in range(m):
             _add_to(factors.corner, m * a + b, g[a], by_n, g[m + a], by_t, lanes)
 
@@ -190,8 +190,9 @@ def _add_between(network, c, nn, nt, tn, tt, blocks, sides, lanes):
     if m:
         by_high = _times(nn, nt, tn, tt, high)
         for a in range(m):
-            _add_row(sides, 3 * (a * grains + network.low[c]), g[a], g[m + a], by_low, lanes)
-            _add_row(sides, 3 * (a * grains + network.high[c]), g[a], g[m + a], by_high, lanes)
+            row = 3 * a * grains
+            _add_three(sides, row + 3 * network.low[c], g[a], g[m + a], by_low, lanes)
+            _add_three(sides, row + 3 * network.high[c], g[a], g[m + a], by_high, lanes)
 
 
 @within
@@ -228,13 +229,8 @@ def _add_block(blocks, place, e, by, lanes):
 
 
 @within
-def _add_row(sides, place, e_n, e_t, by, lanes):
-    """Add a global row's three entries."""
-    _add_three(sides, place, same(lanes, e_n), same(lanes, e_t), by, lanes)
-
-
-@within
 def _add_three(values, place, e_n, e_t, by, lanes):
+    """Add e byᵀ to a row of a block, or to a global row's three entries."""
     first = fma(e_t, by[3], fma(e_n, by[0], load(values, place, lanes)))
     second = fma(e_t, by[4], fma(e_n, by[1], load(values, place + 1, lanes)))
     third = fma(e_t, by[5], fma(e_n, by[2], load(values, place + 2, lanes)))
@@ -264,5 +260,5 @@ def add_one(network, c, K, factors, lane):
 
 @within
 def _add_to(values, place, e_n, by_n, e_t, by_t, lanes):
-    value = fma(same(lanes, e_n), by_n, load(values, place, lanes))
-    store(values, place, lanes, fma(same(lanes, e_t), by_t, value))
+    value = fma(e_n, by_n, load(values, place, lanes))
+    store(values, place, lanes, fma(e_t, by_t, value))

@@ -28,7 +28,6 @@ from granforce.numerics.lanes import (
     load,
     pick,
     room,
-    same,
     side_by_side,
     size,
     store,
@@ -211,27 +210,26 @@ def worst_of(values, worst, lanes):
 @within
 def unbalance(problem, at, work, lanes):
     """r ← b − A T y − a F, rest ← d − E f − s."""
-    n, zero, one = len(problem.w), same(lanes, 0.0), same(lanes, 1.0)
     for k in range(len(problem.b)):
-        store(work.r, k, lanes, same(lanes, problem.b[k]))
+        store(work.r, k, lanes, problem.b[k])
     for k in range(len(problem.b_border)):
-        store(work.r_border, k, lanes, same(lanes, problem.b_border[k]))
+        store(work.r_border, k, lanes, problem.b_border[k])
     less_pushed(problem, at, at.y, work, lanes)
     for a in range(len(problem.side)):
-        limit = same(lanes, problem.limit[a])
-        rest = limit - load(at.y, n + a, lanes) - side_force(problem, a, at.y, lanes)
+        limit, beside = problem.limit[a], load(at.y, len(problem.w) + a, lanes)
+        rest = limit - beside - side_force(problem, a, at.y, lanes)
         # Rounding of f is none of s, which may be much smaller.
-        least = same(lanes, _ROUNDING) * (one + size(limit))
-        store(work.rest, a, lanes, pick(size(rest), least, rest, zero))
+        least = _ROUNDING * (1.0 + abs(limit))
+        store(work.rest, a, lanes, pick(size(rest), least, rest, 0.0))
 
 
 @within
 def less_pushed(problem, at, y, work, lanes):
     """r ← r − A T y − a F."""
-    half, last = same(lanes, 0.5), len(y) - 1
+    last = len(y) - 1
     for k in range(0, len(problem.w), 2):
         y0, y1 = load(y, k, lanes), load(y, k + 1, lanes)
-        normal, tangential = -half * (y0 + y1), -half * (y0 - y1)
+        normal, tangential = -0.5 * (y0 + y1), -0.5 * (y0 - y1)
         push(problem.network, k // 2, normal, tangential, work.r, work.r_border, lanes)
     for lane in range(len(at.loaded)):
         push_one(problem.network, -y[last, lane], work.r, work.r_border, at.loaded[lane], lane)
@@ -244,7 +242,7 @@ def side_force(problem, a, y, lanes):
     first = component - component % 2
     y0, y1 = load(y, first, lanes), load(y, first + 1, lanes)
     y1 = -y1 if component % 2 else y1
-    return same(lanes, 0.5 * problem.sign[a]) * (y0 + y1)
+    return 0.5 * problem.sign[a] * (y0 + y1)
 
 
 @within

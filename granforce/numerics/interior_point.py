@@ -84,30 +84,30 @@ def look(problem, loads, at, work, lanes):
     """
     unbalance(problem, at, work, lanes)
     _push_sides(problem, at, work, lanes)
-    half, zero, last = same(lanes, 0.5), same(lanes, 0.0), len(at.y) - 1
-    product = slackness = zero
+    last = len(at.y) - 1
+    product = slackness = same(lanes, 0.0)
     for k in range(0, len(problem.w), 2):
         normal, tangential = pull(problem.network, k // 2, at.v, at.v_border, lanes)
         # What stays is held by forces that cost nothing.
         w_n = problem.w[k] if problem.w[k] < PINNED else 0.0
         w_t = problem.w[k + 1] if problem.w[k + 1] < PINNED else 0.0
-        stiff, cross = same(lanes, 0.25 * (w_n + w_t)), same(lanes, 0.25 * (w_n - w_t))
+        stiff, cross = 0.25 * (w_n + w_t), 0.25 * (w_n - w_t)
         y0, y1 = load(at.y, k, lanes), load(at.y, k + 1, lanes)
         z0, z1 = load(at.z, k, lanes), load(at.z, k + 1, lanes)
-        h0 = fma(half, normal + tangential, -load(at.c, k, lanes))
-        h1 = fma(half, normal - tangential, -load(at.c, k + 1, lanes))
+        h0 = fma(0.5, normal + tangential, -load(at.c, k, lanes))
+        h1 = fma(0.5, normal - tangential, -load(at.c, k + 1, lanes))
         h0 = fma(-stiff, y0, fma(-cross, y1, h0))
         h1 = fma(-stiff, y1, fma(-cross, y0, h1))
         store(work.h, k, lanes, h0)
         store(work.h, k + 1, lanes, h1)
         product = fma(y0, z0, fma(y1, z1, product))
         push_n, push_t = load(work.push, k, lanes), load(work.push, k + 1, lanes)
-        off0 = h0 + z0 - half * (push_n + push_t)
-        off1 = h1 + z1 - half * (push_n - push_t)
+        off0 = h0 + z0 - 0.5 * (push_n + push_t)
+        off1 = h1 + z1 - 0.5 * (push_n - push_t)
         if problem.w[k] >= PINNED:
-            off0, off1 = half * (off0 - off1), half * (off1 - off0)
+            off0, off1 = 0.5 * (off0 - off1), 0.5 * (off1 - off0)
         if problem.w[k + 1] >= PINNED:
-            off0 = off1 = half * (off0 + off1)
+            off0 = off1 = 0.5 * (off0 + off1)
         slackness = larger(size(off0), larger(size(off1), slackness))
     for a in range(len(problem.side)):
         s, zeta = load(at.y, len(problem.w) + a, lanes), load(at.z, len(problem.w) + a, lanes)
@@ -117,7 +117,7 @@ def look(problem, loads, at, work, lanes):
         product = fma(load(at.y, last, lanes), load(at.z, last, lanes), product)
     store(work.product, 0, lanes, product)
     store(work.slackness, 0, lanes, slackness)
-    worst = worst_of(work.r_border, worst_of(work.r, zero, lanes), lanes)
+    worst = worst_of(work.r_border, worst_of(work.r, same(lanes, 0.0), lanes), lanes)
     store(work.unbalance, 0, lanes, worst_of(work.rest, worst, lanes))
     for lane in range(len(at.loaded)):
         work.h[last, lane] = pull_one(problem.network, at.v, at.v_border, at.loaded[lane], lane)
@@ -133,7 +133,7 @@ def advance(problem, loads, mode, at, work, lanes):
         clear(work.h, lanes)
     if mode == CENTRE:
         clear(work.turn, lanes)
-        store(work.target, 0, lanes, same(lanes, 1.0))
+        store(work.target, 0, lanes, 1.0)
         _aim(problem, pairs, at, work, lanes)
     _factor(problem, mode, at, work, lanes)
     optimum = mode == OPTIMUM or mode == REFINED
@@ -161,7 +161,7 @@ def _add_side(problem, a, force, h, lanes):
     """h ← h + Tᵀ Eᵀ of a force along side a."""
     component = problem.side[a]
     first = component - component % 2
-    part = same(lanes, 0.5 * problem.sign[a]) * force
+    part = 0.5 * problem.sign[a] * force
     store(h, first, lanes, load(h, first, lanes) + part)
     part = -part if component % 2 else part
     store(h, first + 1, lanes, load(h, first + 1, lanes) + part)
@@ -171,19 +171,17 @@ def _add_side(problem, a, force, h, lanes):
 def _push_sides(problem, at, work, lanes):
     """Eᵀ ζ."""
     for a in range(len(problem.side)):
-        store(work.push, problem.side[a], lanes, same(lanes, 0.0))
+        store(work.push, problem.side[a], lanes, 0.0)
     for a in range(len(problem.side)):
         k, zeta = problem.side[a], load(at.z, len(problem.w) + a, lanes)
-        store(
-            work.push, k, lanes, fma(same(lanes, problem.sign[a]), zeta, load(work.push, k, lanes))
-        )
+        store(work.push, k, lanes, fma(problem.sign[a], zeta, load(work.push, k, lanes)))
 
 
 @within
 def _stiffen(problem, mode, at, work, lanes):
     """k ← w + Σ ζ/s."""
     for a in range(len(problem.side)):
-        store(work.k, problem.side[a], lanes, same(lanes, problem.w[problem.side[a]]))
+        store(work.k, problem.side[a], lanes, problem.w[problem.side[a]])
     for a in range(len(problem.side)):
         k = problem.side[a]
         stiffer = _stiffness(len(problem.w) + a, at.y, at.z, mode, lanes)
@@ -195,8 +193,8 @@ def _stiffness(k, y, z, mode, lanes):
     """z/y of one cone coordinate; when the balance is restored, what keeps y that are zero."""
     if mode == BALANCE:
         # Softer than 1/y where y is large: what is nearly zero must not be driven below it.
-        heavy = larger(load(y, k, lanes), same(lanes, _LIGHT))
-        return same(lanes, 1.0) / (heavy * root(heavy))
+        heavy = larger(load(y, k, lanes), _LIGHT)
+        return 1.0 / (heavy * root(heavy))
     return load(z, k, lanes) / load(y, k, lanes)
 
 
@@ -210,10 +208,9 @@ def _load_stiffness(at, mode, lane):
 
 
 @within
-def _determinant(d0, d1, k_n, k_t, lanes):
+def _determinant(d0, d1, k_n, k_t):
     # Tᵀ k T + diag(d) without the difference of its large parts, which cancel at small μ.
-    quarter = same(lanes, 0.25)
-    return fma(quarter * (k_n + k_t), d0 + d1, fma(d0, d1, quarter * k_n * k_t))
+    return fma(0.25 * (k_n + k_t), d0 + d1, fma(d0, d1, 0.25 * k_n * k_t))
 
 
 @within
@@ -221,7 +218,6 @@ def _factor(problem, mode, at, work, lanes):
     """Factor A K Aᵀ + shift, K = T (Tᵀ k T + diag(z/y))⁻¹ Tᵀ."""
     network = problem.network
     contact_matrix.begin(network, problem.diagonal, work.factors, lanes)
-    quarter = same(lanes, 0.25)
     for k in range(0, len(problem.w), 2):
         c = 3 * (k // 2)
         if mode == PROJECTED:
@@ -231,7 +227,7 @@ def _factor(problem, mode, at, work, lanes):
             d0 = _stiffness(k, at.y, at.z, mode, lanes)
             d1 = _stiffness(k + 1, at.y, at.z, mode, lanes)
             k_n, k_t = load(work.k, k, lanes), load(work.k, k + 1, lanes)
-            scale = quarter / _determinant(d0, d1, k_n, k_t, lanes)
+            scale = 0.25 / _determinant(d0, d1, k_n, k_t)
             nn = scale * (d0 + d1 + k_t)
             nt, tt = scale * (d1 - d0), scale * (d0 + d1 + k_n)
         contact_matrix.add(network, k // 2, nn, nt, tt, work.factors, lanes)
@@ -243,10 +239,10 @@ def _factor(problem, mode, at, work, lanes):
 
 
 @within
-def _answer(p0, p1, d0, d1, k_n, k_t, lanes):
+def _answer(p0, p1, d0, d1, k_n, k_t):
     """(Tᵀ k T + diag(d))⁻¹ p, each component to its own relative precision."""
-    scale = same(lanes, 1.0) / _determinant(d0, d1, k_n, k_t, lanes)
-    off, half = same(lanes, 0.25) * (k_n - k_t), same(lanes, 0.5) * k_t
+    scale = 1.0 / _determinant(d0, d1, k_n, k_t)
+    off, half = 0.25 * (k_n - k_t), 0.5 * k_t
     return scale * fma(off, p0 - p1, (half + d1) * p0), scale * fma(off, p1 - p0, (half + d0) * p1)
 
 
@@ -254,7 +250,7 @@ def _answer(p0, p1, d0, d1, k_n, k_t, lanes):
 def _towards(problem, mode, at, work, lanes):
     """δv and δy of the step that h asks for; after `project`, δv alone."""
     network, n, last = problem.network, len(problem.w), len(at.y) - 1
-    half, pairs = same(lanes, 0.5), 0 if mode == PROJECTED else n
+    pairs = 0 if mode == PROJECTED else n
     for k in range(len(work.r)):
         store(work.dv, k, lanes, load(work.r, k, lanes))
     for a in range(len(work.r_border)):
@@ -264,8 +260,8 @@ def _towards(problem, mode, at, work, lanes):
         d1 = _stiffness(k + 1, at.y, at.z, mode, lanes)
         h0, h1 = load(work.h, k, lanes), load(work.h, k + 1, lanes)
         k_n, k_t = load(work.k, k, lanes), load(work.k, k + 1, lanes)
-        y0, y1 = _answer(h0, h1, d0, d1, k_n, k_t, lanes)
-        normal, tangential = -half * (y0 + y1), -half * (y0 - y1)
+        y0, y1 = _answer(h0, h1, d0, d1, k_n, k_t)
+        normal, tangential = -0.5 * (y0 + y1), -0.5 * (y0 - y1)
         push(network, k // 2, normal, tangential, work.dv, work.dv_border, lanes)
     for lane in range(len(at.loaded)):
         force = -work.h[last, lane] / _load_stiffness(at, mode, lane)
@@ -275,10 +271,10 @@ def _towards(problem, mode, at, work, lanes):
         d0 = _stiffness(k, at.y, at.z, mode, lanes)
         d1 = _stiffness(k + 1, at.y, at.z, mode, lanes)
         normal, tangential = pull(network, k // 2, work.dv, work.dv_border, lanes)
-        p0 = fma(half, normal + tangential, load(work.h, k, lanes))
-        p1 = fma(half, normal - tangential, load(work.h, k + 1, lanes))
+        p0 = fma(0.5, normal + tangential, load(work.h, k, lanes))
+        p1 = fma(0.5, normal - tangential, load(work.h, k + 1, lanes))
         k_n, k_t = load(work.k, k, lanes), load(work.k, k + 1, lanes)
-        y0, y1 = _answer(p0, p1, d0, d1, k_n, k_t, lanes)
+        y0, y1 = _answer(p0, p1, d0, d1, k_n, k_t)
         store(work.dy, k, lanes, y0)
         store(work.dy, k + 1, lanes, y1)
     for a in range(0 if mode == PROJECTED else len(problem.side)):
@@ -296,15 +292,14 @@ def _refine(problem, at, work, lanes):
     Near a vertex y/z are so far apart that a step alone may leave more than it takes off.
     """
     dy, dv, dv_border = work.dy.copy(), work.dv.copy(), work.dv_border.copy()
-    one = same(lanes, 1.0)
     clear(work.h, lanes)
     clear(work.rest, lanes)
     for _ in range(_REFINEMENTS):
         less_pushed(problem, at, work.dy, work, lanes)
         _towards(problem, REFINED, at, work, lanes)
-        _move(dy, work.dy, one, len(dy), lanes)
-        _move(dv, work.dv, one, len(dv), lanes)
-        _move(dv_border, work.dv_border, one, len(dv_border), lanes)
+        _move(dy, work.dy, 1.0, len(dy), lanes)
+        _move(dv, work.dv, 1.0, len(dv), lanes)
+        _move(dv_border, work.dv_border, 1.0, len(dv_border), lanes)
     copy(work.dy, dy, lanes)
     copy(work.dv, dv, lanes)
     copy(work.dv_border, dv_border, lanes)
@@ -313,12 +308,11 @@ def _refine(problem, at, work, lanes):
 @within
 def _step_beside(problem, a, mode, at, work, lanes):
     """E δf of side a, to its own relative precision: δy, as a difference, would lose it."""
-    quarter = same(lanes, 0.25)
     k = problem.side[a] - problem.side[a] % 2
     d0 = _stiffness(k, at.y, at.z, mode, lanes)
     d1 = _stiffness(k + 1, at.y, at.z, mode, lanes)
     k_n, k_t = load(work.k, k, lanes), load(work.k, k + 1, lanes)
-    scale = quarter / _determinant(d0, d1, k_n, k_t, lanes)
+    scale = 0.25 / _determinant(d0, d1, k_n, k_t)
     normal, tangential = pull(problem.network, k // 2, work.dv, work.dv_border, lanes)
     h0, h1 = load(work.h, k, lanes), load(work.h, k + 1, lanes)
     normal, tangential = normal + (h0 + h1), tangential + (h0 - h1)
@@ -326,21 +320,20 @@ def _step_beside(problem, a, mode, at, work, lanes):
         change = (d0 + d1 + k_n) * tangential + (d1 - d0) * normal
     else:
         change = (d0 + d1 + k_t) * normal + (d1 - d0) * tangential
-    return same(lanes, problem.sign[a]) * scale * change
+    return problem.sign[a] * scale * change
 
 
 @within
 def _predict(pairs, at, work, lanes):
     """How far the step towards τ = 0 may go, the τ that follows from that, and δy δz."""
-    zero, one = same(lanes, 0.0), same(lanes, 1.0)
-    primal = dual = one
-    z_dy = y_dz = both = zero
+    primal = dual = same(lanes, 1.0)
+    z_dy = y_dz = both = same(lanes, 0.0)
     for k in range(pairs):
         y, z, dy = load(at.y, k, lanes), load(at.z, k, lanes), load(work.dy, k, lanes)
         ratio = dy / y
         dz = fma(-z, ratio, -z)
         primal = larger(-ratio, primal)
-        dual = larger(one + ratio, dual)  # −δz/z
+        dual = larger(1.0 + ratio, dual)  # −δz/z
         turn = dy * dz
         z_dy, y_dz, both = fma(z, dy, z_dy), fma(y, dz, y_dz), both + turn
         store(work.turn, k, lanes, turn)
@@ -348,7 +341,7 @@ def _predict(pairs, at, work, lanes):
     left = product + z_dy / primal + (y_dz + both / primal) / dual
     ratio = left / product
     # The further the predictor gets, the lower the next barrier.
-    target = ratio * ratio * ratio * product / same(lanes, 1.0 * pairs)
+    target = ratio * ratio * ratio * product / (1.0 * pairs)
     store(work.target, 0, lanes, target)
 
 
@@ -368,8 +361,7 @@ def _aim(problem, pairs, at, work, lanes):
 @within
 def _measure(pairs, inside, at, work, lanes):
     """Lengths of the step, part `inside` of the way to the nearest wall at most, and its δz."""
-    most = same(lanes, inside)
-    primal = dual = most
+    primal = dual = same(lanes, inside)
     target = load(work.target, 0, lanes)
     for k in range(pairs):
         y, z, dy = load(at.y, k, lanes), load(at.z, k, lanes), load(work.dy, k, lanes)
@@ -378,7 +370,7 @@ def _measure(pairs, inside, at, work, lanes):
         primal = larger(-ratio, primal)
         dual = larger(-dz / z, dual)
         store(work.turn, k, lanes, dz)
-    going = load(work.going, 0, lanes) * most
+    going = load(work.going, 0, lanes) * inside
     store(work.primal, 0, lanes, going / primal)
     store(work.dual, 0, lanes, going / dual)
 

@@ -29,7 +29,7 @@ from granforce.numerics.blocks import (
     subtract_column,
     subtract_panel,
 )
-from granforce.numerics.lanes import fma, load, pick, same, size, store, within
+from granforce.numerics.lanes import fma, load, pick, size, store, within
 
 
 @within
@@ -76,7 +76,7 @@ def factor(network, factors, stop, lanes):
             )
             store(corner, m * a + b, lanes, value)
     for k in range(m):
-        store(corner, m * k + k, lanes, _inverse(load(corner, m * k + k, lanes), lanes))
+        store(corner, m * k + k, lanes, _inverse(load(corner, m * k + k, lanes)))
         for a in range(k + 1, m):
             ratio = load(corner, m * a + k, lanes) * load(corner, m * k + k, lanes)
             store(corner, m * a + k, lanes, ratio)
@@ -89,7 +89,7 @@ def factor(network, factors, stop, lanes):
 def _factor_skew_diagonal(L, d, lanes):
     """Unit L below and U above the diagonal of a diagonal block in place, pivots inverted."""
     for k in range(3):
-        inverse = _inverse(load(L, d + 4 * k, lanes), lanes)
+        inverse = _inverse(load(L, d + 4 * k, lanes))
         store(L, d + 4 * k, lanes, inverse)
         for a in range(k + 1, 3):
             ratio = load(L, d + 3 * a + k, lanes) * inverse
@@ -111,11 +111,10 @@ def _divide_by_unit(U, x, L, d, lanes):
 
 
 @within
-def _inverse(pivot, lanes):
+def _inverse(pivot):
     """One over a pivot of either sign; 0 without pivot."""
-    zero, one = same(lanes, 0.0), same(lanes, 1.0)
-    there = pick(size(pivot), same(lanes, NO_PIVOT), pivot, one)
-    return pick(size(pivot), same(lanes, NO_PIVOT), one / there, zero)
+    there = pick(size(pivot), NO_PIVOT, pivot, 1.0)
+    return pick(size(pivot), NO_PIVOT, 1.0 / there, 0.0)
 
 
 @within

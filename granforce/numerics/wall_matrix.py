@@ -28,7 +28,6 @@ from granforce.numerics.lanes import (
     fma,
     load,
     room,
-    same,
     shared,
     store,
     within,
@@ -209,8 +208,7 @@ def make_scratch(matrix: WallMatrix, width: int) -> Scratch:
 def _begin(network, C, diagonal, factors, lanes):
     contact_matrix.begin(network, diagonal, factors, lanes)
     for c in range(len(C)):
-        nn, nt, tt = same(lanes, C[c, 0]), same(lanes, C[c, 1]), same(lanes, C[c, 2])
-        contact_matrix.add(network, c, nn, nt, tt, factors, lanes)
+        contact_matrix.add(network, c, C[c, 0], C[c, 1], C[c, 2], factors, lanes)
 
 
 @compiled
@@ -219,10 +217,10 @@ def _move(matrix, C, times, at, lanes):
     f = at.f
     for k in range(len(matrix.contact)):
         c, g = 2 * matrix.contact[k], load(at.g, k, lanes)
-        store(f, c, lanes, fma(same(lanes, matrix.normal[k, 0]), g, load(f, c, lanes)))
-        store(f, c + 1, lanes, fma(same(lanes, matrix.normal[k, 1]), g, load(f, c + 1, lanes)))
+        store(f, c, lanes, fma(matrix.normal[k, 0], g, load(f, c, lanes)))
+        store(f, c + 1, lanes, fma(matrix.normal[k, 1], g, load(f, c + 1, lanes)))
     for c in range(len(C)):
-        normal, tangential = _through(C, c, load(f, 2 * c, lanes), load(f, 2 * c + 1, lanes), lanes)
+        normal, tangential = _through(C, c, load(f, 2 * c, lanes), load(f, 2 * c + 1, lanes))
         store(f, 2 * c, lanes, normal)
         store(f, 2 * c + 1, lanes, tangential)
     for _ in range(times):
@@ -247,7 +245,7 @@ def _answer(matrix, at, lanes):
     cholesky.solve(matrix.network, matrix.factors, at.x, at.y, lanes)
     for c in range(len(matrix.C)):
         normal, tangential = pull(matrix.network, c, at.x, at.y, lanes)
-        normal, tangential = _through(matrix.C, c, normal, tangential, lanes)
+        normal, tangential = _through(matrix.C, c, normal, tangential)
         store(at.f, 2 * c, lanes, load(at.f, 2 * c, lanes) + normal)
         store(at.f, 2 * c + 1, lanes, load(at.f, 2 * c + 1, lanes) + tangential)
 
@@ -257,13 +255,12 @@ def _slacks(matrix, at, lanes):
     """out ← B f."""
     for k in range(len(matrix.contact)):
         c = 2 * matrix.contact[k]
-        value = same(lanes, matrix.normal[k, 0]) * load(at.f, c, lanes)
-        b_t = same(lanes, matrix.normal[k, 1])
-        store(at.out, k, lanes, fma(b_t, load(at.f, c + 1, lanes), value))
+        value = matrix.normal[k, 0] * load(at.f, c, lanes)
+        store(at.out, k, lanes, fma(matrix.normal[k, 1], load(at.f, c + 1, lanes), value))
 
 
 @within
-def _through(C, c, normal, tangential, lanes):
+def _through(C, c, normal, tangential):
     """C times the forces of a contact."""
-    nn, nt, tt = same(lanes, C[c, 0]), same(lanes, C[c, 1]), same(lanes, C[c, 2])
+    nn, nt, tt = C[c]
     return fma(nn, normal, nt * tangential), fma(nt, normal, tt * tangential)

@@ -329,9 +329,8 @@ def _step_along(values, given, length, direction, lanes):
 @within
 def _measure(step, flows, lanes):
     """Largest |M U|, and the relative velocities that forces still answer over the fastest one."""
-    zero, least, velocity = same(lanes, 0.0), same(lanes, 1e-300), flows.velocity
-    pace = load(flows.pace, 0, lanes)
-    heaviest = answered = fastest = zero
+    velocity, pace = flows.velocity, load(flows.pace, 0, lanes)
+    heaviest = answered = fastest = same(lanes, 0.0)
     for k in range(len(step.mass)):
         heaviest = larger(size(step.mass[k] * load(velocity.rows, k, lanes)), heaviest)
     for k in range(len(step.mass_border)):
@@ -342,7 +341,7 @@ def _measure(step, flows, lanes):
     for c in range(len(step.stiffness)):
         w_n, w_t = contact_matrix.pull(step.network, c, velocity.rows, velocity.border, lanes)
         fastest = larger(size(w_n), larger(size(w_t), fastest))
-    breach = pick(fastest, zero, larger(answered / fastest, least), least)
+    breach = pick(fastest, 0.0, larger(answered / fastest, 1e-300), 1e-300)
     store(flows.heaviest, 0, lanes, heaviest)
     store(flows.breach, 0, lanes, breach)
 
@@ -353,19 +352,18 @@ def _factor(step, flows, stop, lanes):
     network, m, factors = step.network, len(step.mass_border), flows.factors
     contact_matrix.begin(network, step.mass, factors, lanes)
     for a in range(m):
-        store(factors.corner, m * a + a, lanes, same(lanes, step.mass_border[a]))
-    zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
-    closed, sliding = same(lanes, 0.5), same(lanes, 1.5)
+        store(factors.corner, m * a + a, lanes, step.mass_border[a])
+    pace, closed, sliding = load(flows.pace, 0, lanes), 0.5, 1.5
     for c in range(len(step.stiffness)):
         state = load(flows.before, c, lanes)
         normal = pace * step.stiffness[c, 0]
         tangential = pace * step.stiffness[c, 1]
         across = 0.5 * state * step.mu * normal
         slides = size(state)
-        normal = pick(slides, closed, normal, zero)
-        across = pick(slides, sliding, across, zero)
-        tangential = pick(slides, sliding, zero, pick(slides, closed, tangential, zero))
-        contact_matrix.add_skew(network, c, normal, zero, across, tangential, factors, lanes)
+        normal = pick(slides, closed, normal, 0.0)
+        across = pick(slides, sliding, across, 0.0)
+        tangential = pick(slides, sliding, 0.0, pick(slides, closed, tangential, 0.0))
+        contact_matrix.add_skew(network, c, normal, 0.0, across, tangential, factors, lanes)
     lu.factor(network, factors, stop, lanes)
 
 
@@ -379,7 +377,7 @@ def _answer(step, flows, lanes):
     for k in range(len(step.mass_border)):
         moved = step.mass_border[k] * load(velocity.border, k, lanes)
         store(rest.border, k, lanes, -load(flows.load.border, k, lanes) - moved)
-    store(flows.changed, 0, lanes, same(lanes, 0.0))
+    store(flows.changed, 0, lanes, 0.0)
     for c in range(len(step.stiffness)):
         f_n, f_t = _next_forces(step, flows, c, lanes)
         contact_matrix.push(step.network, c, f_n, f_t, rest.rows, rest.border, lanes)
@@ -396,17 +394,16 @@ def _answer(step, flows, lanes):
 @inline
 def _next_forces(step, flows, c, lanes):
     """f⁺ of one contact; sets that, its state, and whether it changed."""
-    zero, pace = same(lanes, 0.0), load(flows.pace, 0, lanes)
+    pace = load(flows.pace, 0, lanes)
     rows, border = flows.velocity.rows, flows.velocity.border
     w_n, w_t = contact_matrix.pull(step.network, c, rows, border, lanes)
     f_n = load(flows.forces, 2 * c, lanes) - pace * step.stiffness[c, 0] * w_n
     f_t = load(flows.forces, 2 * c + 1, lanes) - pace * step.stiffness[c, 1] * w_t
-    f_n = larger(f_n, zero)
+    f_n = larger(f_n, 0.0)
     limit = step.mu * f_n
-    slides, sticks = same(lanes, 1.0 * SLIDING), same(lanes, 1.0 * STICKING)
-    state = pick(f_t, limit, slides, pick(-limit, f_t, -slides, sticks))
+    state = pick(f_t, limit, SLIDING, pick(-limit, f_t, -SLIDING, STICKING))
     f_t = pick(f_t, limit, limit, pick(-limit, f_t, -limit, f_t))
-    state, f_t = pick(f_n, zero, state, zero), pick(f_n, zero, f_t, zero)
+    state, f_t = pick(f_n, 0.0, state, 0.0), pick(f_n, 0.0, f_t, 0.0)
     store(flows.following, 2 * c, lanes, f_n)
     store(flows.following, 2 * c + 1, lanes, f_t)
     store(flows.state, c, lanes, state)
