@@ -4,7 +4,7 @@ import argparse
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -107,21 +107,39 @@ def get_packing(store: Store, parameters: Parameters, **options: Any) -> tuple[P
         return kinds.get_packing(store, parameters, progress=progress, watch=watch, **options)
 
 
-def get(
-    store: Store,
-    kind: Kind,
-    parameters: Parameters,
-    arguments: argparse.Namespace,
-    watching: Any = None,
-) -> tuple[xr.Dataset, bool]:
-    """The dataset of a kind, computed or found, and whether it was found.
+class Found(NamedTuple):
+    """What a command reports: a result that is kept."""
 
-    watching(bar): what the kind's compute calls with what it finds, which tells of it on the bar.
+    entry: str  # its name in the store
+    parameters: Parameters
+    dataset: xr.Dataset
+    ends: dict[str, Any]  # last lines of the report: what it took, and whether it was there
+
+
+def found(
+    arguments: argparse.Namespace,
+    kind: Kind,
+    *outputs: str | None,
+    watching: Any = None,
+    options: Any = None,
+    **named: Any,
+) -> Found:
+    """The result of a kind, computed or found; outputs: files that will be written.
+
+    named: its parameters beside the packing and the friction of the cones. watching(bar): what the
+    kind's compute calls with what it finds, which tells of it on the bar; options: its others.
     """
+    store, parameters = prepared(
+        arguments,
+        lambda packing: kind.parameters(packing, mu=arguments.ensemble_mu, **named),
+        *outputs,
+    )
     with Bar(kind.title, kind.unit) as progress:
-        watch = {} if watching is None else {"watch": watching(progress)}
-        told = {"workers": arguments.workers, "progress": progress, **watch}
-        return study.get(store, kind, parameters, **told)
+        told = {"workers": arguments.workers, "progress": progress, **(options or {})}
+        told |= {} if watching is None else {"watch": watching(progress)}
+        dataset, cached = study.get(store, kind, parameters, **told)
+    ends = {"seconds": dataset["seconds"].item(), "cached": cached}
+    return Found(study.entry_name(store, kind, parameters), parameters, dataset, ends)
 
 
 def telling_eta(bar: Any) -> Callable[[Any], None]:
@@ -150,25 +168,17 @@ def known_forces(arguments: argparse.Namespace) -> dict[str, Any]:
     return {} if given is None else {"known": importers.read_known(given)}
 
 
-def walked(
-    arguments: argparse.Namespace, *outputs: str | None
-) -> tuple[Store, Parameters, xr.Dataset, bool]:
-    asked = conditions(arguments)
-
-    def name(packing: Parameters) -> Parameters:
-        return kinds.WALK.parameters(
-            packing,
-            arguments.states,
-            arguments.walk_seed,
-            mu=arguments.ensemble_mu,
-            relax=arguments.relax,
-            chains=arguments.chains,
-            **asked,
-        )
-
-    store, parameters = prepared(arguments, name, *outputs)
-    dataset, cached = get(store, kinds.WALK, parameters, arguments, telling_eta)
-    return store, parameters, dataset, cached
+def walked(arguments: argparse.Namespace, output: str | None = None) -> Found:
+    """The walk that the options ask for; output: a file that will be written."""
+    return found(
+        *(arguments, kinds.WALK, output),
+        watching=telling_eta,
+        states=arguments.states,
+        seed=arguments.walk_seed,
+        relax=arguments.relax,
+        chains=arguments.chains,
+        **conditions(arguments),
+    )
 
 
 def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:

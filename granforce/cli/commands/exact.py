@@ -2,35 +2,29 @@
 
 import argparse
 import json
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from granforce.cli.asked import conditions, get, known_forces, numbers, prepared, write_csv
+from granforce.cli.asked import conditions, found, known_forces, numbers, write_csv
 from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
-from granforce.study.keys import Parameters
-from granforce.study.store import Store
+from granforce.study.cells import Kind
 from granforce.system.terminal import print_report
 
 
 def perturb(arguments: argparse.Namespace) -> None:
     """Critical forces and first motions of contacts, computed or found; report them."""
     chosen = numbers("--contacts", arguments.contacts, int)
-    asked = conditions(arguments)
-
-    def name(packing: Parameters) -> Parameters:
-        return kinds.PERTURBATION.parameters(
-            packing,
-            mu=arguments.ensemble_mu,
-            contacts=chosen,
-            random=None if arguments.all or chosen is not None else arguments.random,
-            seed=arguments.draw_seed,
-            precision=arguments.precision,
-            **asked,
-        )
-
-    store, parameters = prepared(arguments, name, arguments.csv)
-    dataset, cached = get(store, kinds.PERTURBATION, parameters, arguments)
+    _, _, dataset, ends = found(
+        *(arguments, kinds.PERTURBATION, arguments.csv),
+        contacts=chosen,
+        random=None if arguments.all or chosen is not None else arguments.random,
+        seed=arguments.draw_seed,
+        precision=arguments.precision,
+        **conditions(arguments),
+    )
     scale = dataset["force_scale"].item()
     load, limit = (dataset[name].values / scale for name in ("critical_low", "limit_load"))
     lines = {
@@ -45,8 +39,7 @@ def perturb(arguments: argparse.Namespace) -> None:
         **{name: dataset[name].item() for name in ("rattlers", "unloaded_contacts")},
         "largest_residual": float(dataset["load_residual"].max()),
         "largest_breach": float(dataset["motion_breach"].max()),
-        "seconds": dataset["seconds"].item(),
-        "cached": cached,
+        **ends,
     }
     if arguments.csv is not None:
         names = ("limit_load", "critical_low", "critical_high", "pair_opening")
@@ -56,23 +49,17 @@ def perturb(arguments: argparse.Namespace) -> None:
     print_report(lines, arguments.json)
 
 
-def _exact(arguments: argparse.Namespace) -> tuple[Store, Parameters]:
+def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[str, Any]]:
+    """The dataset of exact bounds or limit loads, and the last lines of its report."""
     contacts = numbers("--contacts", arguments.contacts, int)
     edges = numbers("--slice", arguments.slice, float)
-    asked = conditions(arguments)
-
-    def name(packing: Parameters) -> Parameters:
-        return kinds.INTERVALS.parameters(
-            packing, mu=arguments.ensemble_mu, contacts=contacts, slice_=edges, **asked
-        )
-
-    return prepared(arguments, name, arguments.csv)
+    asked = {"contacts": contacts, "slice_": edges, **conditions(arguments)}
+    return found(arguments, kind, arguments.csv, **asked)[2:]
 
 
 def intervals(arguments: argparse.Namespace) -> None:
     """Exact intervals, computed or found; report them."""
-    store, parameters = _exact(arguments)
-    dataset, cached = get(store, kinds.INTERVALS, parameters, arguments)
+    dataset, ends = _exact(arguments, kinds.INTERVALS)
     scale = dataset["force_scale"].item()
     extent = (dataset["high"] - dataset["low"]).values[:, 0]
     position = dataset["position"].values
@@ -91,8 +78,7 @@ def intervals(arguments: argparse.Namespace) -> None:
         "position_of_f_n_in_tenths": histogram.tolist(),
         **json.loads(dataset.attrs["counts"]),
         "largest_duality_gap": dataset["max_gap"].item(),
-        "seconds": dataset["seconds"].item(),
-        "cached": cached,
+        **ends,
     }
     if arguments.csv is not None:
         columns = {"contact": dataset["backbone"].values}
@@ -105,8 +91,7 @@ def intervals(arguments: argparse.Namespace) -> None:
 
 def limit_loads(arguments: argparse.Namespace) -> None:
     """Limit loads, computed or found; report them."""
-    store, parameters = _exact(arguments)
-    dataset, cached = get(store, kinds.LIMIT_LOADS, parameters, arguments)
+    dataset, ends = _exact(arguments, kinds.LIMIT_LOADS)
     load = dataset["limit_load"].values / dataset["force_scale"].item()
     lines = {
         "contacts": len(load),
@@ -115,8 +100,7 @@ def limit_loads(arguments: argparse.Namespace) -> None:
         "largest_limit_load": float(load.max()),
         **json.loads(dataset.attrs["counts"]),
         "largest_duality_gap": dataset["max_gap"].item(),
-        "seconds": dataset["seconds"].item(),
-        "cached": cached,
+        **ends,
     }
     if arguments.csv is not None:
         names = {"contact": "backbone", "limit_load": "limit_load"}
@@ -126,15 +110,8 @@ def limit_loads(arguments: argparse.Namespace) -> None:
 
 def stress(arguments: argparse.Namespace) -> None:
     """The outline of stresses, computed or found; report it."""
-    known = known_forces(arguments)
-
-    def name(packing: Parameters) -> Parameters:
-        return kinds.STRESS.parameters(
-            packing, mu=arguments.ensemble_mu, angles=arguments.angles, **known
-        )
-
-    store, parameters = prepared(arguments, name, arguments.csv)
-    dataset, cached = get(store, kinds.STRESS, parameters, arguments)
+    asked = {"angles": arguments.angles, **known_forces(arguments)}
+    _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.csv, **asked)
     own = dataset["stress_own"].values
     lines = {
         "dimension": dataset["dimension"].item(),
@@ -145,8 +122,7 @@ def stress(arguments: argparse.Namespace) -> None:
         "own_shear_stress": float(own[1]),
         **json.loads(dataset.attrs["counts"]),
         "largest_duality_gap": float(dataset["stress_gap"].max()),
-        "seconds": dataset["seconds"].item(),
-        "cached": cached,
+        **ends,
     }
     if arguments.csv is not None:
         names = {"angle": "stress_angle", "largest": "stress_support"}

@@ -5,14 +5,12 @@ import argparse
 import numpy as np
 
 from granforce.cli import frames
-from granforce.cli.asked import conditions, prepared, write_csv
+from granforce.cli.asked import conditions, found, write_csv
 from granforce.cli.commands.packings import flaws_and_walls
 from granforce.packing import importers
 from granforce.records import InputError
-from granforce.study import cells as study
 from granforce.study import kinds
-from granforce.study.keys import Parameters
-from granforce.system.terminal import Bar, print_report
+from granforce.system.terminal import print_report
 from granforce.tolerances import CARRYING
 
 INFERENCE_LINES = (
@@ -31,33 +29,22 @@ def infer(arguments: argparse.Namespace) -> int | None:
         )
     asked, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
     measured = importers.read_measurement(arguments.measured)
-
-    def name(packing: Parameters) -> Parameters:
-        return kinds.INFERENCE.parameters(
-            packing,
-            measured,
-            states,
-            arguments.sample_seed,
-            mu=arguments.ensemble_mu,
-            chains=arguments.chains,
-            unmeasured=arguments.unmeasured,
-            again=arguments.again,
-            certain=arguments.certain,
-            **asked,
-        )
-
-    store, parameters = prepared(arguments, name, arguments.csv)
-    with Bar(kinds.INFERENCE.title, kinds.INFERENCE.unit) as progress:
-        dataset, cached = study.get(
-            *(store, kinds.INFERENCE, parameters),
-            workers=arguments.workers,
-            progress=progress,
-            measured=measured,
-        )
+    entry, _, dataset, ends = found(
+        *(arguments, kinds.INFERENCE, arguments.csv),
+        options={"measured": measured},
+        measured=measured,
+        states=states,
+        seed=arguments.sample_seed,
+        chains=arguments.chains,
+        unmeasured=arguments.unmeasured,
+        again=arguments.again,
+        certain=arguments.certain,
+        **asked,
+    )
     scale, given = dataset["force_scale"].item(), measured.forces + measured.sigma
     change = np.abs(dataset["inferred"].values - dataset["measured"].values)
     lines = {
-        "entry": study.entry_name(store, kinds.INFERENCE, parameters),
+        "entry": entry,
         "contacts": len(change),
         "measured_components": int(np.isfinite(change).sum()),
         "measured_where_nothing_can_carry": int(
@@ -89,5 +76,5 @@ def infer(arguments: argparse.Namespace) -> int | None:
             columns |= {f"error_{part}": error[:, k]}
     if arguments.csv is not None:
         write_csv(arguments.csv, columns)
-    print_report(lines | {"seconds": dataset["seconds"].item(), "cached": cached}, arguments.json)
+    print_report(lines | ends, arguments.json)
     return None

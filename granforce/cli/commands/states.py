@@ -7,10 +7,9 @@ from collections.abc import Sequence
 
 from granforce.cli.asked import (
     conditions,
-    get,
+    found,
     numbers,
     packing_parameters,
-    prepared,
     walked,
     write_csv,
 )
@@ -26,15 +25,14 @@ from granforce.system.terminal import Bar, print_report, table
 
 def walk(arguments: argparse.Namespace) -> None:
     """Random walk, made or found; report how it went."""
-    store, parameters, dataset, cached = walked(arguments)
+    entry, _, dataset, ends = walked(arguments)
     lines = {
-        "entry": study.entry_name(store, kinds.WALK, parameters),
+        "entry": entry,
         **{name: dataset[name].item() for name in (*study.ROW, *study.ROW_COUNTS)},
         "mean_iterations": float(dataset["sweeps"].mean()),
         "largest_residual": float(dataset["residual"].max()),
         "largest_violation": float(dataset["violation"].max()),
-        "seconds": dataset["seconds"].item(),
-        "cached": cached,
+        **ends,
     }
     print_report(lines, arguments.json)
 
@@ -48,24 +46,17 @@ UNIFORM_LINES = (
 
 def uniform(arguments: argparse.Namespace) -> int:
     """Uniform sample, drawn or found; report it. Returns 1 if it is not worth what was wanted."""
-    asked = conditions(arguments)
-
-    def name(packing: Parameters) -> Parameters:
-        return kinds.UNIFORM.parameters(
-            packing,
-            arguments.states,
-            arguments.sample_seed,
-            mu=arguments.ensemble_mu,
-            chains=arguments.chains,
-            effective=arguments.effective,
-            **asked,
-        )
-
-    store, parameters = prepared(arguments, name)
-    dataset, cached = get(store, kinds.UNIFORM, parameters, arguments)
+    entry, _, dataset, ends = found(
+        *(arguments, kinds.UNIFORM),
+        states=arguments.states,
+        seed=arguments.sample_seed,
+        chains=arguments.chains,
+        effective=arguments.effective,
+        **conditions(arguments),
+    )
     reached = bool(dataset["reached"].item())
     lines = {
-        "entry": study.entry_name(store, kinds.UNIFORM, parameters),
+        "entry": entry,
         "states": dataset.sizes["state"],
         **{name: dataset[name].item() for name in UNIFORM_LINES},
         "reached": reached,
@@ -75,8 +66,7 @@ def uniform(arguments: argparse.Namespace) -> int:
         "largest_violation": float(dataset["violation"].max()),
         "setup_seconds": dataset["setup_seconds"].item(),
         "sampling_seconds": dataset["sampling_seconds"].item(),
-        "seconds": dataset["seconds"].item(),
-        "cached": cached,
+        **ends,
     }
     print_report(lines, arguments.json)
     return 1 if arguments.effective is not None and not reached else 0
@@ -84,18 +74,12 @@ def uniform(arguments: argparse.Namespace) -> int:
 
 def volume(arguments: argparse.Namespace) -> int:
     """The volume of S, measured or found; report it. Returns 1 if it is not as sure as wanted."""
-    asked = conditions(arguments)
-
-    def name(packing: Parameters) -> Parameters:
-        accuracy, seed = arguments.accuracy, arguments.volume_seed
-        return kinds.VOLUME.parameters(packing, accuracy, seed, mu=arguments.ensemble_mu, **asked)
-
-    store, parameters = prepared(arguments, name)
-    dataset, cached = get(store, kinds.VOLUME, parameters, arguments)
+    asked = {"accuracy": arguments.accuracy, "seed": arguments.volume_seed, **conditions(arguments)}
+    entry, _, dataset, ends = found(arguments, kinds.VOLUME, **asked)
     down, up = dataset["log_volume_ladders"].values
     reached = bool(dataset["reached"].item())
     lines = {
-        "entry": study.entry_name(store, kinds.VOLUME, parameters),
+        "entry": entry,
         "dimension": dataset["dimension"].item(),
         "ln_volume": dataset["log_volume"].item(),
         "standard_error": dataset["log_volume_error"].item(),
@@ -105,8 +89,7 @@ def volume(arguments: argparse.Namespace) -> int:
         "extent_over_mean_normal_force": dataset["extent"].item(),
         "reached": reached,
         **json.loads(dataset.attrs["counts"]),
-        "seconds": dataset["seconds"].item(),
-        "cached": cached,
+        **ends,
     }
     print_report(lines, arguments.json)
     return 0 if reached else 1
