@@ -10,8 +10,9 @@ value it prescribes. What the interior-point method leaves open is solved from s
 """
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple
 
 import highspy
@@ -100,6 +101,21 @@ def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> Floats:
     return rows
 
 
+class _Asked(NamedTuple):
+    """Programs that are solved together, and what is known of them."""
+
+    keys: Sequence[Any]
+    tasks: Sequence[Program]
+    bounds: dict[Any, tuple[float, float]]  # {key: (value attained in S, value that bounds it)}
+    points: dict[Any, Floats] | None  # {key: y (n,) at which the value is attained}
+
+    def open(self, numbers: Iterable[int]) -> list[int]:
+        """Those of the numbers without a value and bound as close as they are to be."""
+        none = np.inf, -np.inf
+        known = [(k, *self.bounds.get(self.keys[k], none)) for k in numbers]
+        return [k for k, value, bound in known if not value - bound <= INTERVAL_GAP]
+
+
 class Solver:
     """Solves and certifies programs over one System; keeps count of what it did."""
 
@@ -131,79 +147,44 @@ class Solver:
         points: a dict to fill with the y (n,) at which each key's value is attained. Once
         cancelled, those that were reached are given.
         """
-        bounds: dict[Any, tuple[float, float]] = {}
+        asked = _Asked(keys, tasks, {}, points)
         with suppress(Cancelled):
-            self._solve(keys, tasks, bounds, points)
-        return bounds
+            self._solve(asked, range(len(keys)))
+        return asked.bounds
 
-    def _solve(
-        self,
-        keys: Sequence[Any],
-        tasks: Sequence[Program],
-        bounds: dict[Any, tuple[float, float]],
-        points: dict[Any, Floats] | None,
-    ) -> None:
+    def _solve(self, asked: _Asked, every: Sequence[int]) -> None:
         if self.system.middle.reached:
-            self._carry(keys, tasks, range(len(keys)), False, bounds, points)
+            self._carry(asked, every, refined=False)
             # Of thousands of contacts, rounding may leave the bound of one or two short.
-            self._carry(keys, tasks, self._open(keys, bounds), True, bounds, points)
+            self._carry(asked, asked.open(every), refined=True)
         else:
-            for outcome in one_after_another(self.system, tasks):
-                self._take([outcome], keys, tasks, bounds, points)
-        for number in self._open(keys, bounds):
+            for outcome in one_after_another(self.system, asked.tasks):
+                self._take(asked, [outcome])
+        for number in asked.open(every):
             cancelling.check()
             self.counts["again"] += 1
-            for outcome in from_scratch(self.system, number, tasks[number]):
-                self._take([outcome], keys, tasks, bounds, points)
-                if not self._open([keys[number]], bounds):
+            for outcome in from_scratch(self.system, number, asked.tasks[number]):
+                self._take(asked, [outcome])
+                if not asked.open([number]):
                     break
 
-    def _carry(
-        self,
-        keys: Sequence[Any],
-        tasks: Sequence[Program],
-        numbers: Sequence[int],
-        refined: bool,
-        bounds: dict[Any, tuple[float, float]],
-        points: dict[Any, Floats] | None,
-    ) -> None:
+    def _carry(self, asked: _Asked, numbers: Sequence[int], refined: bool) -> None:
         """Take what the interior-point method makes of the tasks of these numbers."""
-        problem, middle = self.system.problem, self.system.middle
-        if not len(numbers):
-            return
+        if len(numbers):
+            linear_programs.run(
+                *(self.system.problem, self.system.middle, asked.tasks, numbers),
+                refined=refined,
+                workers=self.workers,
+                finished=partial(self._take, asked),
+            )
 
-        def finished(outcomes: Sequence[Outcome]) -> None:
-            self._take(outcomes, keys, tasks, bounds, points)
-
-        linear_programs.run(
-            problem,
-            middle,
-            tasks,
-            numbers,
-            refined=refined,
-            workers=self.workers,
-            finished=finished,
-        )
-
-    def _open(self, keys: Sequence[Any], bounds: dict[Any, tuple[float, float]]) -> list[int]:
-        """Numbers of the keys without a value and bound as close as they are to be."""
-        none = np.inf, -np.inf
-        value_and_bound = [bounds.get(key, none) for key in keys]
-        return [k for k, (a, b) in enumerate(value_and_bound) if not a - b <= INTERVAL_GAP]
-
-    def _take(
-        self,
-        outcomes: Sequence[Outcome],
-        keys: Sequence[Any],
-        tasks: Sequence[Program],
-        bounds: dict[Any, tuple[float, float]],
-        points: dict[Any, Floats] | None,
-    ) -> None:
+    def _take(self, asked: _Asked, outcomes: Sequence[Outcome]) -> None:
         """Certify outcomes; of a key's outcomes keep the better value and the better bound."""
-        attained, bound = certify(self.system, outcomes, tasks)
+        bounds, points = asked.bounds, asked.points
+        attained, bound = certify(self.system, outcomes, asked.tasks)
         with self.lock:
             for k, outcome in enumerate(outcomes):
-                key = keys[outcome.number]
+                key = asked.keys[outcome.number]
                 if key not in bounds:
                     self.counts["programs"] += 1
                     self.report(1)
