@@ -20,6 +20,7 @@ import xarray as xr
 
 from granforce.explore.remeasured import remeasured
 from granforce.forces.ensemble import ensemble
+from granforce.packing.importers.geometry import vectors
 from granforce.packing.importers.pegs import Photoelastic, open_frames, read_pegs
 from granforce.packing.importers.repair import KINDS
 from granforce.records import (
@@ -243,8 +244,7 @@ def regional_stress(contacts: Contacts, x: Floats, grains: Any, forces: Floats) 
     arm = np.where(contacts.j < grains, contacts.length, contacts.arm_i)
     at = x[contacts.i] + contacts.arm_i[:, None] * contacts.normal
     cell, side = regions(at, x[:grains])
-    tangent = np.column_stack([-contacts.normal[:, 1], contacts.normal[:, 0]])
-    force = forces[..., :1] * contacts.normal + forces[..., 1:] * tangent
+    force = vectors(forces, contacts.normal)
     branch = arm[:, None] * contacts.normal
     parts = np.stack([force[..., a] * branch[:, b] for a, b in ((0, 0), (1, 1), (0, 1))], axis=-1)
     total = np.zeros((*forces.shape[:-2], REGIONS**2, 3))

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing.importers.geometry import check_disks, listed
+from granforce.packing.importers.geometry import check_disks, components, listed
 from granforce.packing.importers.network import adopt
 from granforce.packing.importers.text import Source, Table, check_grains, make_table, read_text
 from granforce.records import (
@@ -139,10 +139,7 @@ def _packing(
     if not len(carrying):
         raise InputError(f"{links.name}: no contact carries force; is the packing compressed?")
     joined = listed(x, r, cell, i[carrying], j[carrying], lambda c: links.place(carrying[c]))
-    across = np.column_stack([-joined.normal[:, 1], joined.normal[:, 0]])
-    forces = np.column_stack(
-        [np.sum(force[carrying] * way, axis=1) for way in (joined.normal, across)]
-    )
+    forces = components(force[carrying], joined.normal)
     info = {"source": source, "contacts_skipped": len(force) - len(carrying)}
     return adopt(make_packing(x, r, cell.box, joined, forces, mu, info=info), forces="given")
 

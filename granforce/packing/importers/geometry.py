@@ -149,3 +149,15 @@ def _check_branches(misfit: Floats, largest: float, place: Callable[[int], str])
 
 def _pair(i: Integers, j: Integers, c: int) -> str:
     return f"grains {i[c]} and {j[c]} (counted from 0)"
+
+
+def components(force: Floats, normal: Floats) -> Floats:
+    """f_n and f_t (k, 2) of forces (k, 2) on contacts of these normals n; t = (−n_y, n_x)."""
+    across = np.column_stack([-normal[:, 1], normal[:, 0]])
+    return np.column_stack([np.sum(force * way, axis=1) for way in (normal, across)])
+
+
+def vectors(forces: Floats, normal: Floats) -> Floats:
+    """The forces f_n n + f_t t (…, k, 2) of components (…, k, 2) along normals (k, 2)."""
+    across = np.column_stack([-normal[:, 1], normal[:, 0]])
+    return forces[..., :1] * normal + forces[..., 1:] * across

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.packing.importers.geometry import MISFIT, check_disks, listed
+from granforce.packing.importers.geometry import MISFIT, check_disks, components, listed
 from granforce.packing.importers.network import adopt
 from granforce.packing.importers.text import (
     Source,
@@ -248,12 +248,11 @@ def _check_distances(
 def _components(
     n: Floats, normal_force: Floats, tangential_force: Floats, place: Callable[[int], str]
 ) -> Floats:
-    t = np.column_stack([-n[:, 1], n[:, 0]])
     total = normal_force + tangential_force
-    skew = np.abs(np.sum(normal_force * t, axis=1))
+    skew = np.abs(components(normal_force, n)[:, 1])
     for c in np.flatnonzero(skew > SKEW * np.hypot(*total.T).mean())[:1]:
         raise InputError(
             f"{place(c)}: the normal force does not point along the line of centres; "
             "name the columns by columns="
         )
-    return np.column_stack([np.sum(total * n, axis=1), np.sum(total * t, axis=1)])
+    return components(total, n)

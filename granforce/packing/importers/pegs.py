@@ -19,7 +19,7 @@ from granforce.forces.ensemble import ensemble
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
 from granforce.packing.importers import solved
-from granforce.packing.importers.geometry import OPEN, check_disks
+from granforce.packing.importers.geometry import OPEN, check_disks, vectors
 from granforce.packing.importers.listing import Frames, Listing, plain, read_frames
 from granforce.packing.importers.network import judged
 from granforce.packing.importers.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
@@ -278,12 +278,10 @@ def _gain_by_reversing(x: Floats, listed: _Listed, at_wall: Mask) -> float:
     """
     branch = x[listed.pairs[:, 1]] - x[listed.pairs[:, 0]]
     normal = branch / np.hypot(*branch.T)[:, None]
-    across = np.column_stack([-normal[:, 1], normal[:, 0]])
     inner = ~at_wall & (np.bincount(listed.pairs.ravel(), minlength=len(x)) >= _ENOUGH)
     off = []
     for sign in (1, -1):
-        force = np.nan_to_num(listed.forces)
-        force = force[:, :1] * normal + sign * force[:, 1:] * across
+        force = vectors(np.nan_to_num(listed.forces) * [1, sign], normal)
         total = np.zeros_like(x)
         np.add.at(total, listed.pairs[:, 1], force)
         np.add.at(total, listed.pairs[:, 0], -force)

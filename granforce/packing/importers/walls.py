@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize
 
+from granforce.packing.importers.geometry import components
 from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.repair import rows_of
 from granforce.records import Contacts, Floats, InputError, Integers, Mask, make_contacts, positive
@@ -257,10 +258,7 @@ def bodies(
     arm = np.where(i < len(x), radii[i], 0.0)
     contacts = contacts._replace(arm_i=arm, arm_j=np.zeros(len(j)))
     values = np.array([forces[name] for name in cells]).reshape(-1, 3)
-    across = np.column_stack([-_NORMALS[walls, 1], _NORMALS[walls, 0]])
-    held = np.column_stack(
-        [np.sum(values[:, :2] * way, axis=1) for way in (_NORMALS[walls], across)]
-    )
+    held = components(values[:, :2], _NORMALS[walls])
     sigma = np.full((len(i), 2), np.nan)
     sigma[len(found.grain) :] = values[:, 2:]
     return Bodies(
