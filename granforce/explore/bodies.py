@@ -151,7 +151,9 @@ def _corners(
     in_side = near <= _IN_SIDE * (1 + np.linalg.norm(found, axis=1))[:, None]
     far = in_side[:, -1] if open_ended else np.zeros(len(found), bool)
     real = slice(None, -1) if open_ended else slice(None)
-    corners = [_solved(slope[real], rest[real], member[real]) for member in in_side[~far]]
+    # To rounding, from the sides that meet there.
+    sides = [np.flatnonzero(member[real]) for member in in_side[~far]]
+    corners = [np.linalg.lstsq(slope[some], -rest[some], rcond=None)[0] for some in sides]
     rays = [_along(slope[real], member[real], total) for member in in_side[far]]
     members = {int(row): np.flatnonzero(in_side[~far][:, k]) for k, row in enumerate(rows)}
     return np.reshape(corners, (-1, h)), np.reshape(rays, (-1, h)), members
@@ -170,11 +172,6 @@ def _meetings(slope: Floats, rest: Floats) -> Floats:
     apart = np.linalg.norm(found[:, None] - found[None], axis=-1) > _IN_SIDE * scale[:, None]
     first = [k for k in range(len(found)) if np.all(apart[k, :k])]
     return found[first]
-
-
-def _solved(slope: Floats, rest: Floats, member: Any) -> Floats:
-    """The corner where these sides meet, to rounding."""
-    return np.linalg.lstsq(slope[member], -rest[member], rcond=None)[0]
 
 
 def _along(slope: Floats, member: Any, total: Floats) -> Floats:

@@ -270,7 +270,8 @@ def limit_load_bounds(
     keys = [int(place) for place in _positions(ensemble, contacts)]
     report = _counting(progress, len(keys))
     solver = Solver(make_system(ensemble), workers=workers, report=report)
-    bounds = solver.solve(keys, [_limit_load(key) for key in keys])
+    # Of each contact: maximise F, where f_n + F and f_t act on the grains.
+    bounds = solver.solve(keys, [Program([], [], key) for key in keys])
     load, gap = np.full(len(keys), np.nan), np.full(len(keys), np.nan)
     for k, key in enumerate(keys):
         if key in bounds:
@@ -301,11 +302,6 @@ def bound_of(ensemble: Ensemble, contact: int, component: int, side: int) -> Pro
     half = -0.5 if side else 0.5
     columns, unit = [2 * contact, 2 * contact + 1], ensemble.mu if component else 1.0
     return Program(columns, [half * unit, (-half if component else half) * unit], -1)
-
-
-def _limit_load(contact: int) -> Program:
-    """The program of one limit load: maximise F, where f_n + F and f_t act on the grains."""
-    return Program([], [], contact)
 
 
 class _Seen:

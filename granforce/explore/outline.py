@@ -88,11 +88,13 @@ def outline(
         if len(support.d) + len(new) > _MOST:
             break
     if support is None:
-        return Outline(np.empty((0, 2)), np.empty((0, 2)), np.inf, False, _counts(solver, 0))
+        counts = {"directions": 0, **solver.counts}
+        return Outline(np.empty((0, 2)), np.empty((0, 2)), np.inf, False, counts)
     gap = float(gap.max()) * length
     inner, outer = _hull(support.point) * length, _hull(corners) * length
     converged = bool(gap <= allowed * length)
-    return Outline(inner, outer, gap, converged, _counts(solver, len(support.d)))
+    counts = {"directions": len(support.d), **solver.counts}
+    return Outline(inner, outer, gap, converged, counts)
 
 
 def supports(
@@ -128,10 +130,6 @@ def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:
     if not np.all(np.isfinite(list(bounds.values()))):
         raise InputError("the outline cannot be certified: linear programs over S fail")
     return np.stack([forces_of(ensemble, points[key]) for key in range(len(tasks))])
-
-
-def _counts(solver: Solver, directions: int) -> dict[str, int]:
-    return {"directions": directions, **solver.counts}
 
 
 def _solve(solver: Solver, plane: Any, directions: Floats, first: int) -> _Support | None:

@@ -64,7 +64,9 @@ def make_system(
         combination[bounding] = 1.0
         weight, total = A[bounding].toarray().ravel(), float(b[bounding])
     else:
-        combination = -_centre_multipliers(problem, middle, A)
+        balance = np.concatenate([middle.v, middle.v_border])[problem.place]
+        no_cost = np.zeros(A.shape[1])
+        combination = -linear_programs.multipliers(problem, A, no_cost, balance, middle.z)
         weight = A.T @ combination
         if not middle.reached or weight.min(initial=1.0) <= 0:
             combination = _bounding_rows(A, b)
@@ -80,11 +82,6 @@ def make_system(
         total=total,
         gains=-(loads.T @ combination),
     )
-
-
-def _centre_multipliers(problem: Problem, middle: Centre, A: sparse.csr_matrix) -> Floats:
-    balance = np.concatenate([middle.v, middle.v_border])[problem.place]
-    return linear_programs.multipliers(problem, A, np.zeros(A.shape[1]), balance, middle.z)
 
 
 def _bounding_rows(A: sparse.csr_matrix, b: Floats) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
-from granforce.explore.infer import Inference
+from granforce.explore.infer import Draws, Inference
 from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
 from granforce.forces.ensemble import Ensemble
@@ -53,24 +53,14 @@ def uniform_dataset(
 ) -> xr.Dataset:
     """A UniformSample with its measures as a dataset; states kept as in `walk_dataset`."""
     pick = _picked(len(drawn.flat), keep)
-    mixing = drawn.mixing
     return labelled(
         {
             **_measured(S, drawn.flat, pick),
-            "residual": drawn.residual.ravel()[pick],
-            "violation": drawn.violation.ravel()[pick],
-            "chain": drawn.chain[pick],
-            "r_hat": mixing.r_hat,
-            "bulk_size": mixing.bulk,
-            "tail_size": mixing.tail,
-            "worst_r_hat": mixing.worst_r_hat,
-            "least_bulk_size": mixing.least_bulk,
-            "least_tail_size": mixing.least_tail,
-            "reached": drawn.reached,
-            **drawn.counts,
+            **_drawn(drawn, pick),
+            "r_hat": drawn.mixing.r_hat,
+            "bulk_size": drawn.mixing.bulk,
+            "tail_size": drawn.mixing.tail,
             **S.skipped,
-            "setup_seconds": drawn.setup_seconds,
-            "sampling_seconds": drawn.sampling_seconds,
             "seconds": seconds,
         }
     )
@@ -109,24 +99,26 @@ def inference_dataset(
         arrays["least_normal"] = np.full(len(S.index), np.nan)
         arrays["least_normal"][S.positions(sure.contacts)] = sure.least
     if found.draws is not None:
-        drawn, worth = found.draws, found.draws.mixing
-        pick = _picked(len(drawn.flat), keep)
-        arrays |= {
-            "states": drawn.flat[pick],
-            "residual": drawn.residual.ravel()[pick],
-            "violation": drawn.violation.ravel()[pick],
-            "chain": drawn.chain[pick],
-            "expected": found.mean,
-            "standard_error": found.error,
-            "worst_r_hat": worth.worst_r_hat,
-            "least_bulk_size": worth.least_bulk,
-            "least_tail_size": worth.least_tail,
-            "reached": drawn.reached,
-            **drawn.counts,
-            "setup_seconds": drawn.setup_seconds,
-            "sampling_seconds": drawn.sampling_seconds,
-        }
+        pick = _picked(len(found.draws.flat), keep)
+        arrays |= {"states": found.draws.flat[pick], **_drawn(found.draws, pick)}
+        arrays |= {"expected": found.mean, "standard_error": found.error}
     return labelled(arrays)
+
+
+def _drawn(drawn: UniformSample | Draws, pick: slice | Integers) -> dict[str, Any]:
+    """How states were drawn by chains, and whether those mixed; states are picked."""
+    return {
+        "residual": drawn.residual.ravel()[pick],
+        "violation": drawn.violation.ravel()[pick],
+        "chain": drawn.chain[pick],
+        "worst_r_hat": drawn.mixing.worst_r_hat,
+        "least_bulk_size": drawn.mixing.least_bulk,
+        "least_tail_size": drawn.mixing.least_tail,
+        "reached": drawn.reached,
+        **drawn.counts,
+        "setup_seconds": drawn.setup_seconds,
+        "sampling_seconds": drawn.sampling_seconds,
+    }
 
 
 def _picked(count: int, keep: int | None) -> slice | Integers:

@@ -76,7 +76,7 @@ def frames_of(*paths: str | Path) -> list[Frame]:
         solved = files
     if solved:
         pairs = [(one, None) for one in solved]
-    elif len(files) == 2 and not any(map(_is_folder, paths)):
+    elif len(files) == 2 and not any(expanded(path).is_dir() for path in paths):
         pairs = [tuple(files)]
     else:
         pairs = _paired([one for one in files if one.suffix.lower() in _TEXT])
@@ -95,10 +95,6 @@ def frames_of(*paths: str | Path) -> list[Frame]:
         if one.number == two.number:
             raise InputError(f"{one.positions} and {two.positions} are both frame {one.number:g}")
     return found
-
-
-def _is_folder(path: str | Path) -> bool:
-    return expanded(path).is_dir()
 
 
 def _numbers(one: Path, two: Path | None, count: int) -> list[float]:
