@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
+from granforce.bench.report import table
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import highs as programs
@@ -86,13 +87,13 @@ def cobra_loop(ensemble: Ensemble) -> tuple[Floats, ...]:
     return tuple(ensemble.to_forces(value * ensemble.force_scale))
 
 
-def run(quick: bool = True, folder: Path = Path("tests/reference")) -> dict[str, Any]:
-    """Times (s), ratios and errors (⟨f_n⟩) as {file: {method: …}}; prints them as a table.
+def run(quick: bool = True, folder: Path = Path("tests/reference")) -> list[dict[str, Any]]:
+    """Rows: times (s), their ratios to the plain loop's, and errors (⟨f_n⟩), by file and method.
 
     quick: only the 100-disk files; otherwise 400 disks at μ = 0.1 as well (two minutes).
     """
     names = ["n100_mu0.1_s11", "n100_mu1_s12"] + ([] if quick else ["n400_mu0.1_s13"])
-    results = {}
+    found: list[dict[str, Any]] = []
     for name in names:
         system, data = read_reference(Path(folder) / f"{name}.npz")
         intervals(system, system.index[:1])  # compiles
@@ -103,15 +104,17 @@ def run(quick: bool = True, folder: Path = Path("tests/reference")) -> dict[str,
             rows["scipy linprog"] = _timed(linprog_loop, system, data)
             if importlib.util.find_spec("cobra"):
                 rows["cobra FVA"] = _timed(cobra_loop, system, data)
-        results[name] = rows
-        _print_table(name, rows)
-    return results
+        plain = rows["plain loop"]["seconds"]
+        for method, row in rows.items():
+            told = {"packing": name, "method": method, "seconds": row["seconds"]}
+            found.append(told | {"ratio": plain / row["seconds"]} | row)
+    return found
 
 
 def _ours(system: Ensemble, data: Any, workers: int) -> dict[str, Any]:
     seconds, found = timed(intervals, system, workers=workers)
     error = _error(system, data, found.lower, found.upper)
-    return {"seconds": seconds, "error": error, "gap": found.max_gap, "counts": found.counts}
+    return {"seconds": seconds, "error": error, "gap": found.max_gap, "counts": str(found.counts)}
 
 
 def _timed(method: Callable[..., Any], system: Ensemble, data: Any) -> dict[str, Any]:
@@ -124,19 +127,7 @@ def _error(system: Ensemble, data: Any, lower: Floats, upper: Floats) -> float:
     return float(np.max(off) / system.force_scale)
 
 
-def _print_table(name: str, rows: dict[str, Any]) -> None:
-    print(f"\n{name}\n{'method':24}{'time/s':>9}{'ratio':>8}{'error':>10}{'gap':>10}  counts")
-    plain = rows["plain loop"]["seconds"]
-    for method, row in rows.items():
-        gap = f"{row['gap']:10.1e}" if "gap" in row else " " * 10
-        ratio = plain / row["seconds"]
-        print(
-            f"{method:24}{row['seconds']:9.2f}{ratio:8.1f}{row['error']:10.1e}{gap}"
-            f"  {row.get('counts', '')}"
-        )
-
-
 if __name__ == "__main__":
     import sys
 
-    run(quick="--full" not in sys.argv)
+    print(table("Exact intervals against other tools", run(quick="--full" not in sys.argv)))
