@@ -39,28 +39,18 @@ def indeterminacy(
                 curves.append((points, f"{label}, {source}", style.COLOURS[k], dash, k))
     # Above the curves is room for the inset.
     top = max((y + e for points, *_ in curves for _, y, e in points), default=1.0) or 1.0
-    linear = style.frame(
-        style.curves(curves, backend),
-        backend,
+    linear = style.graph(
+        *(curves, backend),
         title="Indeterminacy",
         x="μ",
         y="η",
         ylim=(0, 2.4 * top) if backend == "matplotlib" else (0, 1.1 * top),
         legend=style.beside("top_right", backend),
     )
-    log = style.frame(
-        style.curves(curves, backend, logx=True, logy=True),
-        backend,
-        title="the same, log–log",
-        x="μ",
-        y="η",
-        logx=True,
-        logy=True,
-    )
+    words = {"title": "the same, log–log", "x": "μ", "y": "η"}
+    log = style.graph(curves, backend, **words, logx=True, logy=True)
     z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
-    contacts = style.frame(
-        style.curves(z, backend, logx=True), backend, title="Coordination", x="μ", y="z", logx=True
-    )
+    contacts = style.graph(z, backend, title="Coordination", x="μ", y="z", logx=True)
     both = style.inset(linear, log, (0.25, 0.56, 0.72, 0.42), backend)
     # In pictures the legend stands beside the last frame.
     frames = [*both, contacts] if backend == "bokeh" else [contacts, *both]

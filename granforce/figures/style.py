@@ -168,6 +168,14 @@ def frame(
     )
 
 
+def graph(
+    series: Iterable[Any], backend: str, *, logx: bool = False, logy: bool = False, **options: Any
+) -> hv.Overlay:
+    """The frame of some `curves`; options as for `frame`."""
+    drawn = curves(series, backend, logx, logy)
+    return frame(drawn, backend, logx=logx, logy=logy, **options)
+
+
 def inset(
     outer: hv.Overlay, inner: hv.Overlay, place: Sequence[float], backend: str
 ) -> list[hv.Overlay]:

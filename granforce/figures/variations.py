@@ -46,17 +46,9 @@ def sizes(rows: Rows, *, backend: str = "bokeh") -> hv.Layout:
             (statistics.means(chosen, name, "n", factor), label, style.COLOURS[k], "solid", k)
             for k, (name, label, factor) in enumerate(_MEASURES)
         ]
-        frames.append(
-            style.frame(
-                style.curves(series, backend, logx=True),
-                backend,
-                title=f"μ = {mu:g}",
-                x="N",
-                y="η",
-                logx=True,
-                legend="right" if mu == frictions[-1] else None,
-            )
-        )
+        words: dict[str, Any] = {"title": f"μ = {mu:g}", "x": "N", "y": "η"}
+        legend = "right" if mu == frictions[-1] else None
+        frames.append(style.graph(series, backend, **words, logx=True, legend=legend))
     return style.page(frames, backend, columns=2)
 
 
@@ -150,18 +142,8 @@ def stresses(rows: Rows, uniform: Rows, *, backend: str = "bokeh") -> hv.Layout:
         ]
         # The left frame's own room is above the curves at small μ.
         legend = "top_left" if title == "Shear stress" else style.beside("bottom_right", backend)
-        frames.append(
-            style.frame(
-                style.curves(series, backend, logx=True),
-                backend,
-                title=title,
-                x="μ",
-                y=label,
-                logx=True,
-                ylim=(0, None),
-                legend=legend,
-            )
-        )
+        axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "ylim": (0, None)}
+        frames.append(style.graph(series, backend, title=title, legend=legend, **axes))
     return style.page(frames, backend, columns=2)
 
 
@@ -176,9 +158,8 @@ def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layou
     axes: dict[str, Any]
     for name, label, logy in by_mu:
         series = [(statistics.means(rows, name), label, style.COLOURS[0], "solid", 0)]
-        drawn = style.curves(series, backend, logx=True, logy=logy)
         axes = {"x": "μ", "y": label, "logx": True, "logy": logy}
-        frames.append(style.frame(drawn, backend, title=label, **axes))
+        frames.append(style.graph(series, backend, title=label, **axes))
     frictions = sorted({row["mu"] for row in larger})
     series = [
         (
@@ -190,9 +171,8 @@ def volumes(rows: Rows, larger: Any = (), *, backend: str = "bokeh") -> hv.Layou
         for k, mu in enumerate(frictions)
     ]
     if series:
-        drawn = style.curves(series, backend, logx=True)
         axes = {"x": "N", "y": "ln V / grain", "logx": True, "legend": "right"}
-        frames.append(style.frame(drawn, backend, title="against the number of disks", **axes))
+        frames.append(style.graph(series, backend, title="against the number of disks", **axes))
     return style.page(frames, backend, columns=2)
 
 
@@ -244,8 +224,7 @@ def _frames(
             (statistics.means(rows, name, factor=factor), word, style.COLOURS[k], dash, k)
             for k, (word, rows, dash) in enumerate(sources)
         ]
-        drawn = style.curves(series, backend, logx=True, logy=name in logy)
         shown = None if last and legend == "right" else legend  # between frames is no room for one
         axes: dict[str, Any] = {"x": "μ", "y": label, "logx": True, "logy": name in logy}
-        frames.append(style.frame(drawn, backend, title=label, legend=shown, **axes))
+        frames.append(style.graph(series, backend, title=label, legend=shown, **axes))
     return style.page(frames, backend, columns=columns)
