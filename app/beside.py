@@ -11,7 +11,7 @@ from .selection import Selection
 
 
 class Beside:
-    """What is seen beside the states on screen where `state.beside` names another μ.
+    """What is seen beside the states on screen where `looks.beside` names another μ.
 
     It is the same selection at that μ, with its own packing: `state.twin`. While the view is split,
     who chooses another μ leaves there what was on screen; who pins a state or ends the split view
@@ -19,33 +19,34 @@ class Beside:
     """
 
     def __init__(self, state: Any) -> None:
-        self.state, self.task = state, state.task()
-        state.param.watch(self._follow, ["split", "beside", "cell", "missing"])
+        self.state, self.looks, self.task = state, state.looks, state.task()
+        state.param.watch(self._follow, ["cell", "missing"])
+        self.looks.param.watch(self._follow, ["split", "beside"])
 
     def keep(self, wanted: Selection) -> None:
         """Another Selection was chosen: if only μ differs, what is on screen stays beside it."""
-        state = self.state
-        if not state.split or state.beside is not None or state.cell is None:
+        state, looks = self.state, self.looks
+        if not looks.split or looks.beside is not None or state.cell is None:
             return
         shown = state.cell.selection
         if shown.mu != wanted.mu and shown.at(wanted.mu).names(wanted):
-            state.beside = shown.mu
+            looks.beside = shown.mu
 
     def _follow(self, *events: Any) -> None:
         """Have the other packing found, or computed if no store has it."""
-        state = self.state
+        state, looks = self.state, self.looks
         came = any(event.name in ("cell", "missing") for event in events) and not state.missing
-        if not state.split or (came and state.cell is not None and state.beside == state.cell.mu):
-            state.beside = None  # nothing stands beside itself
-        if state.beside is None or state.cell is None:
+        if not looks.split or (came and state.cell is not None and looks.beside == state.cell.mu):
+            looks.beside = None  # nothing stands beside itself
+        if looks.beside is None or state.cell is None:
             self.task.cancel()
             state.twin = None
             return
         try:
-            wanted = state.cell.selection.at(state.beside)
+            wanted = state.cell.selection.at(looks.beside)
             wanted.check(LIMITS)
         except InputError as error:
-            state.param.update(beside=None, message=str(error))
+            looks.beside, state.message = None, str(error)
             return
         if state.twin is None or not state.twin.cell.selection.names(wanted):
             self._find(wanted)

@@ -62,8 +62,10 @@ class Hand:
         self.state, self._task, self._tell = state, task, tell
         self._made: list[tuple[Pull, Held]] = []  # of the pulls made
         self._base: tuple[Any, ...] | None = None  # and where from
+        self._on_screen = state.replay, state.looks.frame  # what was pulled
         task.param.watch(self._failed, "message")
-        state.param.watch(self._follow, ["pulls", "replay", "frame", "known"])
+        state.param.watch(self._follow, ["pulls", "replay", "known"])
+        state.looks.param.watch(self._follow, "frame")
         if state.pulls:  # of the link
             self._work()
 
@@ -72,7 +74,7 @@ class Hand:
         state = self.state
         if state.replay is None or state.growing is not None:
             return
-        state.contact = contact
+        state.looks.contact = contact
         if contact in _held(state.known):
             state.message = (
                 f"contact {state.replay.backbone[contact]} is held: let it go (H) to pull it"
@@ -122,23 +124,25 @@ class Hand:
     def _follow(self, *events: Any) -> None:
         """Pulls belong to one state: with another one on screen they are gone."""
         names = {event.name for event in events}
+        (replay, frame), now = self._on_screen, (self.state.replay, self.state.looks.frame)
+        self._on_screen = now
         if "pulls" in names:
             self._work()
-        elif self.state.pulls and names != {"known"}:
+        elif self.state.pulls and (replay is not now[0] or frame != now[1]):
             self.state.pulls = []
-        elif self.state.pulls:
+        elif self.state.pulls and "known" in names:
             self._work()  # the networks that keep what is known now
 
     def _work(self, grabbed: int | planes.Plane | None = None) -> None:
         """Make the networks of all pulls, and the rail of a contact or the fan of a Plane."""
         state = self.state
-        replay, cell, pulls = state.replay, state.cell, list(state.pulls)
+        replay, cell, pulls, frame = state.replay, state.cell, list(state.pulls), state.looks.frame
         if replay is None or cell is None:
             return
         told = tuple(state.known)
-        base = cell.name, state.frame, told
+        base = cell.name, frame, told
         made = self._made if self._base == base else []
-        first = Held(_forces(replay, state.frame), float(replay.residual[state.frame]))
+        first = Held(_forces(replay, frame), float(replay.residual[frame]))
         library = state.library
 
         def work(job: Job) -> tuple[Any, ...]:

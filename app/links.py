@@ -6,7 +6,7 @@ from typing import Any
 from . import grabs, known
 from .replays import Replay
 
-View = dict[str, Any]  # parameters of AppState by name
+View = dict[str, Any]  # parameters that a link may name
 
 
 def _pair(text: str) -> tuple[int, int]:

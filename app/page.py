@@ -151,11 +151,11 @@ def _small(document: Document, asked: scenes.Asked) -> Any:
 def _large(document: Document, query: str) -> Any:
     """The page of a large packing."""
     state = AppState(pn.state.as_cached("library", _open_library), _turns(document), query)
-    state.message = state.message or " ".join(state.library.notes)
+    looks, state.message = state.looks, state.message or " ".join(state.library.notes)
     wide = {"sizing_mode": "stretch_width"}
     packing = PackingView(state)
     Stream(state, packing.player, document)
-    packing.player.on_wide = lambda wide: state.param.update(wide=wide)
+    packing.player.on_wide = lambda wide: looks.param.update(wide=wide)
     packing.player.on_hand = Hand(state, state.task(reading), packing.player.hand_over).heard
     packing.player.on_known = state.knowledge.heard
     left = pn.Column(packing.player, **wide)
@@ -171,7 +171,7 @@ def _large(document: Document, query: str) -> Any:
         **around,
         template=EARLY % pmui.Page._render_esm(server=True),
         stylesheets=[UNSEEN, NARROW],
-        dark_theme=state.dark,
+        dark_theme=looks.dark,
         busy_indicator=None,  # but the player's: for this one Bokeh looks through the whole page
     )
     with edit_readonly(whole):
@@ -205,17 +205,17 @@ def _large(document: Document, query: str) -> Any:
         tabs = Tabs(state)
         _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
         packing.player.on_digit = tabs.choose
-        state.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
+        looks.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
         yield
         right.append(tabs.tabs)
         yield
         right.append(figure.panel(state))
-        yield from tabs.filling(state.tab)
+        yield from tabs.filling(looks.tab)
         yield from tabs.beside(middle)
         state.read_ahead()
 
     pn.state.onload(partial(state.piecewise, parts()))
-    whole.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
+    whole.param.watch(lambda event: looks.param.update(dark=event.new), "dark_theme")
     _poll_while_running(state, document)
     document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
     closed = garbage.opened()
@@ -284,7 +284,7 @@ class Tabs:
     """Views beside the packing; each is made when it is first seen, and told when it is hidden."""
 
     def __init__(self, state: AppState) -> None:
-        self.state = state
+        self.state, self.looks = state, state.looks
         self.names = list(TABS)
         self._begun: set[str] = set()
         self._space: Any = None  # the view of force space, wherever it is
@@ -292,16 +292,16 @@ class Tabs:
             name: pn.Column(sizing_mode="stretch_width", css_classes=[f"in-{name}"])
             for name in self.names
         }
-        if state.tab not in self.names:
-            state.tab = self.names[0]
+        if self.looks.tab not in self.names:
+            self.looks.tab = self.names[0]
         self.tabs = pmui.Tabs(
             *((TABS[name], self.pages[name]) for name in self.names),
-            active=self.names.index(state.tab),
+            active=self.names.index(self.looks.tab),
             sx=TAB,
             sizing_mode="stretch_width",
         )
         self.tabs.param.watch(lambda event: state.piecewise(self._showing()), "active")
-        state.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
+        self.looks.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
 
     def choose(self, number: int) -> None:
         """Show tab 1, 2, …; other numbers do nothing, and what is on screen anyway stays there."""
@@ -312,17 +312,17 @@ class Tabs:
         name = self.names[self.tabs.active]
         yield from self.filling(name)  # first, so that those who follow the state find it there
         if name == self.names[self.tabs.active]:
-            self.state.tab = name
+            self.looks.tab = name
 
     def beside(self, place: Any) -> Iterator[None]:
         """Put force space into a place of its own on a wide screen, else back into its tab."""
-        wide, page = self.state.wide, self.pages["plane"]
+        wide, page = self.looks.wide, self.pages["plane"]
         self.tabs.sx = TAB_LESS if wide else TAB
         if wide == place.visible:
             return
         place.visible = wide  # at once: nobody else need begin with it
         if wide:
-            if self.state.tab == "plane":
+            if self.looks.tab == "plane":
                 self.tabs.active = self.names.index("intervals")
             self._begun.add("plane")
             self._leave(page)
@@ -360,11 +360,11 @@ class Tabs:
                     return
                 self.pages[name].extend(pieces[max(k, 0) : k + 2])
                 yield
-            self.state.views += 1
+            self.looks.views += 1
 
     def _has_place(self, name: str) -> bool:
         """Whether a tab's view is beside the packing instead, where there may be but one of it."""
-        return self.state.wide and name == "plane"
+        return self.looks.wide and name == "plane"
 
 
 def _module(name: str) -> ModuleType:

@@ -1,6 +1,7 @@
 """What the page is showing and doing, as parameters: no widgets, no plots."""
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from typing import Any
 
@@ -17,62 +18,28 @@ from .known import Knowledge
 from .limits import LIMITS
 from .links import OF_A_REPLAY, UNSEEN, VIEW, View, fitting, read_view, spelled
 from .live import Arriving, Following
+from .looks import Looks
 from .replays import Replay
 from .selection import Selection, brief, command, link, read_link
 
-# What colour, width and order can show: word in links → words on screen.
-COLOURS = {
-    "change": "change from the original",
-    "mobilised": "mobilisation fₜ/(μ fₙ)",
-    "extent": "length of the interval ΔFₙ",
-    "sign": "sign of fₙ − pinned fₙ",
-    "load": "limit load",
-    "known": "what is known: part of the interval gone",
-    "deviation": "inferred less measured fₙ, in σ",
-}
-WIDTHS = {
-    "normal": "normal force fₙ",
-    "extent": "ΔFₙ",
-    "difference": "|fₙ − pinned fₙ|",
-    "load": "limit load",
-    "known": "what is known: length of the interval gone",
-    "measured": "measured fₙ",
-}
-SORTS = {
-    "original": "original fₙ",
-    "extent": "ΔFₙ of all states",
-    "exact": "exact ΔFₙ",
-    "position": "place of the original in its interval",
-    "shortened": "how much what is known shortened it",
-}
-DRAWN = {"some": "a few dozen", "all": "all"}
-# What single tabs can show.
-FIGURES = {
-    "eta": "How does friction matter?",
-    "extent": "How far can single forces differ?",
-    "correlation": "Are strong contacts the less determined ones?",
-    "scatter": "Which contacts are least determined?",
-    "force": "How many forces are large?",
-}
-AXES = {"linear": "linear", "log": "logarithmic"}
-PUSHES = {
-    "one": "How hard can one contact be pushed?",
-    "all": "Which contacts bear most?",
-    "store": "Are undetermined packings weaker?",
-}
-PLANES = {
-    "principal": "the plane in which networks differ most",
-    "contact": "both forces of one contact",
-    "pair": "the normal forces of two contacts",
-    "stress": "the stress that networks carry",
-}
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
-SCALES = {"mean": "mean force = 1", "own": "original force = 1"}
+
+
+@contextmanager
+def as_one(*parts: param.Parameterized) -> Iterator[None]:
+    """What is set of these parts is told when all of it is there; the last part tells first."""
+    with ExitStack() as stack:
+        for part in parts:
+            stack.enter_context(param.parameterized.batch_call_watchers(part))
+        yield
 
 
 class AppState(param.Parameterized):
-    """The states selected, the catalogue to select from, what is seen of them, and the tasks."""
+    """The states selected, the catalogue to select from, and the tasks.
+
+    What is looked at is `looks`, which knows nothing of all this.
+    """
 
     catalogue = param.List(doc="all cells, by series and μ")
     selection = param.Parameter(doc="Selection asked for; not on screen while it is `missing`")
@@ -90,54 +57,15 @@ class AppState(param.Parameterized):
     source = param.String(doc="where the states on screen come from, in words")
     message = param.String(doc="one line about what went wrong, or empty")
 
-    tab = param.String(default="intervals", doc="name of the visible tab; others compute nothing")
-    wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
-    views = param.Integer(doc="how many views of tabs there are: what moves in them is drawn then")
-    contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
-    second = param.Integer(default=None, allow_None=True, doc="contact beside it in a plane")
-    frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
-    reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
-    split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
-    predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
-    beside = param.Number(
-        default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
-    )
     twin = param.Parameter(doc="the Shown of that μ, or None")
-    zoom = param.Tuple(
-        default=None, length=3, allow_None=True,
-        doc="middle and half width of what is seen, in largest radii; None: the whole packing",
-    )  # fmt: skip
-    between = param.Tuple(
-        default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
+    pulls = param.List(
+        doc="what was pulled one after the other, from `looks.frame` on; see `grabs`"
     )
-    pulls = param.List(doc="what was pulled one after the other, from `frame` on; see `grabs`")
-    held = param.Parameter(doc="the grabs.Held that pulls have led to; None: `frame` is on screen")
+    held = param.Parameter(doc="the grabs.Held that pulls have led to, or None")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
     known = param.List(doc="known.Statements: forces of contacts that are taken for known")
     narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
     ranked = param.Parameter(doc="known.Ranked: contacts to measure next, or None")
-    colour: Any = param.Selector(default="change", objects=list(COLOURS))
-    thickness: Any = param.Selector(default="normal", objects=list(WIDTHS))
-    full = param.Number(
-        default=None, bounds=(1e-3, 1e3), allow_None=True,
-        doc="⟨f_n⟩ at which colours are full; None: half for changes, else as the packing has it",
-    )  # fmt: skip
-    stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
-    overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
-    drawn: Any = param.Selector(
-        default="some", objects=list(DRAWN), doc="of which contacts intervals are drawn"
-    )
-    sort: Any = param.Selector(
-        default="original", objects=list(SORTS), doc="order of the intervals"
-    )
-    scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
-    figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
-    axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
-    pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
-    axes: Any = param.Selector(
-        default="principal", objects=list(PLANES), doc="of force space on screen"
-    )
-    dark = param.Boolean(doc="theme")
     busy = param.Boolean(doc="whether any task is running")
     displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
 
@@ -154,6 +82,14 @@ class AppState(param.Parameterized):
         """
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
         self.library, self._wake = library, wake
+        self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
+        # The parameters that a link may name.
+        self._viewed: dict[str, Any] = {
+            name: part.param[name]
+            for name in VIEW
+            for part in (self.looks, self)
+            if name in part.param
+        }
         self.tasks: list[Task] = []
         self._ahead: list[Job] = []
         self._closed = False
@@ -162,7 +98,8 @@ class AppState(param.Parameterized):
         self.looking, self.measuring = self.task(reading), self.task()  # for the volume of S
         self.knowledge = Knowledge(self)
         self.besides = Beside(self)
-        self.param.watch(self._need_loads, ["colour", "thickness", "replay"])
+        self.param.watch(self._need_loads, "replay")
+        self.looks.param.watch(self._need_loads, ["colour", "thickness"])
         self.computation.param.watch(self._bring_back, "dismissed")
         self.open(query)
 
@@ -225,15 +162,21 @@ class AppState(param.Parameterized):
         except InputError as error:
             wanted, view = None, {}
             self.message = str(error)
-        self._look_up(wanted, self._as_new() | read_view(view, type(self).param))
+        self._look_up(wanted, self._as_new() | read_view(view, self._viewed))
 
     def _as_new(self) -> View:
         """What a new page shows, but for the theme: what a link does not name."""
-        return {name: self.param[name].default for name in VIEW if name != "dark"}
+        return {name: self._viewed[name].default for name in VIEW if name != "dark"}
 
-    def shows(self, name: str) -> bool:
-        """Whether what has this tab is on screen."""
-        return name == self.tab or (self.wide and name == "plane")
+    @property
+    def view(self) -> View:
+        """What a link may name, as it is on screen."""
+        return {name: getattr(parameter.owner, name) for name, parameter in self._viewed.items()}
+
+    def _look(self, view: View) -> None:
+        """See this."""
+        for part in (self, self.looks):
+            part.param.update(**{name: view[name] for name in view if name in part.param})
 
     @property
     def seen(self) -> Replay | None:
@@ -270,7 +213,7 @@ class AppState(param.Parameterized):
             self.message = str(error)
             return
         # Told as one: nobody sees what is computed at once as missing, which would move the page.
-        with param.parameterized.batch_call_watchers(self):
+        with as_one(self):
             self.param.update(selection=selection, missing=True)
             if at_once:
                 self.compute()
@@ -336,7 +279,7 @@ class AppState(param.Parameterized):
             cells, shown, damage = found
             self.message = damage or self.message
             self._list(cells)
-            self.param.update(**{k: v for k, v in view.items() if k not in OF_A_REPLAY})
+            self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
             if shown is not None:
                 self._show(shown, view)
             if wanted is not None and (shown is None or not shown.cell.selection.names(wanted)):
@@ -364,22 +307,23 @@ class AppState(param.Parameterized):
             fresh = {}
         if self.live is not None and not self.live.selection.names(cell.selection):
             self.computation.cancel()  # it was not waited for
-        self.param.update(
-            selection=cell.selection,
-            missing=False,
-            live=None,
-            moving=False,
-            arriving=None,
-            growing=None,
-            cell=cell,
-            replay=replay,
-            exact=exact,
-            source=self._source(cell),
-            displacement=None,
-            loads=self.loads if self.replay is replay else None,
-            plane=self.plane if self.replay is replay else None,
-            **fresh | fitting(view or {}, replay),
-        )
+        with as_one(self.looks, self):
+            self.param.update(
+                selection=cell.selection,
+                missing=False,
+                live=None,
+                moving=False,
+                arriving=None,
+                growing=None,
+                cell=cell,
+                replay=replay,
+                exact=exact,
+                source=self._source(cell),
+                displacement=None,
+                loads=self.loads if self.replay is replay else None,
+                plane=self.plane if self.replay is replay else None,
+            )
+            self._look(fresh | fitting(view or {}, replay))
 
     def _source(self, cell: Cell | None = None) -> str:
         """Where the states of a cell, by default the one on screen, come from."""
@@ -431,18 +375,22 @@ class AppState(param.Parameterized):
         asked = self.live.selection
         told = brief(asked, self.library.series(asked))
         source = f"μ = {asked.mu:g}, {told} (as they are found)"
-        self.param.update(
-            growing=replay, fourfold=0, plane=None, moving=False, source=source, displacement=None,
-            **UNSEEN,
-        )  # fmt: skip
+        with as_one(self.looks, self):
+            self.param.update(
+                growing=replay, fourfold=0, plane=None, moving=False, source=source,
+                displacement=None,
+            )  # fmt: skip
+            self._look(UNSEEN)
 
     def follow(self) -> Following | Arriving | None:
         """The Following or Arriving of what is computed, or None; what has ended is dropped."""
         if self.live is not None and not self.computation.running:
             plane = self.plane if self.growing is None else None
-            self.param.update(
-                live=None, moving=False, growing=None, plane=plane, source=self._source(), **UNSEEN
-            )
+            with as_one(self.looks, self):
+                self.param.update(
+                    live=None, moving=False, growing=None, plane=plane, source=self._source()
+                )
+                self._look(UNSEEN)
         if not self.computation.running:
             self.arriving = None
         return self.live or self.arriving
@@ -480,7 +428,7 @@ class AppState(param.Parameterized):
     def _need_loads(self, *events: Any) -> None:
         """Limit loads of all contacts are computed where colour or width show them."""
         replay, cell = self.replay, self.cell
-        if "load" not in (self.colour, self.thickness) or replay is None:
+        if "load" not in (self.looks.colour, self.looks.thickness) or replay is None:
             self.loading.cancel()
         elif self.loads is None and replay.summary["mu"] > 0:
             self.loading.start(
@@ -506,14 +454,12 @@ class AppState(param.Parameterized):
         """The query of an address that reopens this view."""
         if self.selection is None:
             return ""
-        view = {}
-        for name in VIEW:
-            value = getattr(self, name)
+        view = self.view
+        if view["beside"] == self.selection.mu:
             # Between the choice of another μ and its states, what is beside is still on screen.
-            alone = name == "beside" and value == self.selection.mu
-            if value != self.param[name].default and not alone:
-                view[name] = spelled(name, value)
-        return link(self.selection, view)
+            view["beside"] = None
+        told = {name: value for name, value in view.items() if value != self._viewed[name].default}
+        return link(self.selection, {name: spelled(name, told[name]) for name in told})
 
 
 def _read(library: Library, cell: Cell, job: Job) -> Shown:

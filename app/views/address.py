@@ -29,7 +29,8 @@ class Address(Scripted):
     def __init__(self, state, **params):
         super().__init__(**params)
         self._state = state
-        state.param.watch(self._tell, ["selection", *VIEW])
+        for part in (state, state.looks):
+            part.param.watch(self._tell, [n for n in ("selection", *VIEW) if n in part.param])
         self._tell()
 
     def _tell(self, *events):

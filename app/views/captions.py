@@ -1,6 +1,6 @@
 """What pictures and files say about themselves: captions, and their names."""
 
-from ..state import WIDTHS
+from ..looks import WIDTHS
 from .packing import colour_bar, colour_words
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
@@ -9,15 +9,15 @@ NAMED = 4  # known forces that a caption names
 
 def caption(state):
     """What a picture says about itself: background, colour bar, scale and words."""
-    pulled = bool(state.pulls)
+    pulled, looks = bool(state.pulls), state.looks
     low, stops, high = colour_bar(state, pulled)
-    contrast = "#f2f5f9" if state.dark else "#18191d"
+    contrast = "#f2f5f9" if looks.dark else "#18191d"
     return {
-        "background": GROUND[state.dark],
+        "background": GROUND[looks.dark],
         "ink": contrast,
         "bar": {"low": low, "high": high, "stops": stops},
         "lines": [
-            f"Width: {WIDTHS[state.thickness]}; colour: {colour_words(state, pulled)}.",
+            f"Width: {WIDTHS[looks.thickness]}; colour: {colour_words(looks, pulled)}.",
             origin(state.cell),
             *known_words(state),
             f"granforce ?{state.link()}",

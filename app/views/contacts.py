@@ -15,6 +15,6 @@ class Contacts(Scripted):
     _esm = module("contacts")
     _stylesheets: ClassVar = [FOLDER / "contacts.css"]
 
-    def __init__(self, state):
-        super().__init__(sizing_mode="stretch_width", dark=state.dark)
-        state.param.watch(lambda event: self.param.update(dark=event.new), "dark")
+    def __init__(self, looks):
+        super().__init__(sizing_mode="stretch_width", dark=looks.dark)
+        looks.param.watch(lambda event: self.param.update(dark=event.new), "dark")

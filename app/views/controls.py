@@ -9,8 +9,8 @@ from .. import studied
 from ..data import SOURCES
 from ..jobs import reading
 from ..limits import LIMITS, RANGES
+from ..looks import COLOURS, WIDTHS
 from ..selection import KINDS, SOLVERS, differing, select
-from ..state import COLOURS, WIDTHS
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
@@ -51,9 +51,10 @@ def _frictions(found):
 
 def meaningful(state, labels, name):
     """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
-    there = {"sign": state.reference, "difference": state.reference, "known": state.known}
+    pinned = state.looks.reference
+    there = {"sign": pinned, "difference": pinned, "known": state.known}
     there |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
-    chosen = getattr(state, name)
+    chosen = getattr(state.looks, name)
     return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
 
 
@@ -70,7 +71,7 @@ class Controls:
     """Widgets for the state's selection and view; they follow what is on screen."""
 
     def __init__(self, state):
-        self.state = state
+        self.state, self.looks = state, state.looks
         self._following = False
         self.mu = FrictionSlider(self._typed, **WIDE)
         # Where the sidebar lies over the page, the one control that all need stays on the page.
@@ -92,7 +93,7 @@ class Controls:
         self.full = pmui.TextInput(label="Full colour, ⟨fₙ⟩", placeholder="by itself", **SMALL)
         self.stretch = pmui.TextInput(label="Width, times", **SMALL)
         self.overlay = pmui.Switch(
-            label="Strong and undetermined contacts", value=state.overlay, margin=(2, 10)
+            label="Strong and undetermined contacts", value=self.looks.overlay, margin=(2, 10)
         )
         self.error = pmui.Alert(
             severity="error", variant="filled", visible=False, closeable=True, margin=0,
@@ -148,7 +149,7 @@ class Controls:
         return folded_away(LOOKS, look, MADE, made)
 
     def _connect(self):
-        state = self.state
+        state, looks = self.state, self.looks
         self.mu.param.watch(lambda event: self._ask(), "mu")
         for widget in (self.n, self.seed, self.packed, self.states, self.kind, self.relax):
             widget.param.watch(lambda event: self._ask(), "value")
@@ -157,22 +158,15 @@ class Controls:
         for name in ("colour", "thickness", "overlay"):
             widget = getattr(self, name)
             widget.param.watch(
-                lambda event, name=name: state.param.update({name: event.new}), "value"
+                lambda event, name=name: looks.param.update({name: event.new}), "value"
             )
         self.full.param.watch(self._scale, "value")
         self.stretch.param.watch(self._scale, "value")
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
-        looks = [
-            "colour",
-            "thickness",
-            "full",
-            "stretch",
-            "overlay",
-            "reference",
-            "known",
-            "measured",
-        ]
-        state.param.watch(self._look, looks)
+        state.param.watch(self._look, ["known", "measured"])
+        looks.param.watch(
+            self._look, ["colour", "thickness", "full", "stretch", "overlay", "reference"]
+        )
         state.param.watch(self._command, ["selection", "missing", "replay", "known"])
         self._command()
         state.param.watch(self._tell, "message")
@@ -262,9 +256,9 @@ class Controls:
         """Where colours are full and how wide chains are, as typed; empty: by itself."""
         name = "full" if event.obj is self.full else "stretch"
         text = event.new.strip().replace(",", ".")
-        low, high = self.state.param[name].bounds
+        low, high = self.looks.param[name].bounds
         try:
-            value = float(text) if text else self.state.param[name].default
+            value = float(text) if text else self.looks.param[name].default
             if value is not None and not low <= value <= high:
                 raise ValueError
         except ValueError:
@@ -272,16 +266,16 @@ class Controls:
             self.state.message = f"{label}: a number from {low:g} to {high:g}, got {text[:30]!r}"
             self._look()
             return
-        self.state.param.update({name: value})
+        self.looks.param.update({name: value})
 
     def _look(self, *events):
         for name, labels in (("colour", COLOURS), ("thickness", WIDTHS)):
             getattr(self, name).options = _swap(meaningful(self.state, labels, name))
         for name in ("colour", "thickness", "overlay"):
-            getattr(self, name).value = getattr(self.state, name)
-        full = self.state.full
+            getattr(self, name).value = getattr(self.looks, name)
+        full = self.looks.full
         self.full.value = "" if full is None else f"{full:g}"
-        self.stretch.value = f"{self.state.stretch:g}"
+        self.stretch.value = f"{self.looks.stretch:g}"
 
     def _read(self, event):
         """What was read and closed may be told again."""

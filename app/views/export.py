@@ -6,7 +6,6 @@ from .. import exports, movies, planes, standalone
 from ..compute import found_or_made
 from ..data import SOURCES
 from ..jobs import reading
-from ..links import VIEW
 from .captions import caption, known_words, origin, stem
 from .handover import Handover
 from .packing import exact_intervals, full_extent, gone, measured, pins
@@ -89,7 +88,7 @@ class View:
         possible = state.possible
         loads, given, known = state.loads, gone(state, replay), pins(state)
         seen = measured(state, replay)
-        view = {name: getattr(state, name) for name in VIEW}
+        view = state.view
         source = " ".join([origin(cell), *known_words(state)])
         told = {"link": state.link(), "command": state.command, "source": source}
         legend = {name: caption(state)[name] for name in ("ink", "bar", "lines")}
@@ -143,9 +142,9 @@ class View:
         """Work that makes a file of what is on screen now."""
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
-        frame = min(state.frame, len(replay.normal) - 1)
+        frame = min(state.looks.frame, len(replay.normal) - 1)
         source, held = origin(cell), state.held
-        link, view = state.link(), {name: getattr(state, name) for name in VIEW}
+        link, view = state.link(), state.view
 
         def work(job):
             job.begin("making the file")

@@ -8,7 +8,7 @@ import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 
 from .. import live
-from ..state import DRAWN, SCALES, SORTS
+from ..looks import DRAWN, SCALES, SORTS
 from .contacts import Contacts
 from .hints import term
 from .known import Known
@@ -54,7 +54,7 @@ class View:
     name, title = "intervals", "Intervals"
 
     def __init__(self, state):
-        self.state = state
+        self.state, self.looks = state, state.looks
         self.bars = _source("bars", BARS)
         self.growth = _source("growth", ("state", *ETAS))
         self.chosen = _source("chosen", ("rank", "low", "high"))
@@ -63,9 +63,9 @@ class View:
         ]
         self.figure, self.growth_figure = self._bars_figure(), self._growth_figure()
         self.contacts = np.array([], dtype=int)
-        self.drawn = _select("Contacts", DRAWN, state.drawn)
-        self.sort = _select("Sorted by", SORTS, state.sort)
-        self.scale = _select("Scale", SCALES, state.scale)
+        self.drawn = _select("Contacts", DRAWN, self.looks.drawn)
+        self.sort = _select("Sorted by", SORTS, self.looks.sort)
+        self.scale = _select("Scale", SCALES, self.looks.scale)
         self.exact = pmui.Button(
             label="Compute exact intervals",
             variant="outlined",
@@ -89,7 +89,7 @@ class View:
             Known(self.state),
             self.told,
             folded_away(GROWS, pn.pane.Bokeh(self.growth_figure, **wide)),
-            Contacts(self.state),
+            Contacts(self.looks),
             sizing_mode="stretch_width",
         )
 
@@ -99,17 +99,17 @@ class View:
             getattr(self, name).param.watch(partial(self._choose, name), "value")
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
-        shown = ["replay", "growing", "exact", "narrowed", "drawn", "sort", "scale", "contact"]
-        state.param.watch(self._show, shown)
+        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed"])
+        self.looks.param.watch(self._show, ["drawn", "sort", "scale", "contact"])
         state.param.watch(self._offer, ["replay", "growing", "exact", "arriving"])
-        state.param.watch(self._catch_up, "tab")
+        self.looks.param.watch(self._catch_up, "tab")
         for task in (state.computation, state.knowledge.task):
             task.param.watch(self._offer, "running")
         self._offer()
         self._stale = False
 
     def _choose(self, name, event):
-        self.state.param.update({name: event.new})
+        self.looks.param.update({name: event.new})
 
     # Contents
 
@@ -119,17 +119,17 @@ class View:
 
     def _show(self, *events):
         """Take over contacts, exact intervals and the walk's length."""
-        state, replay = self.state, self.state.seen
-        self._stale = state.tab != self.name
+        state, looks, replay = self.state, self.looks, self.state.seen
+        self._stale = looks.tab != self.name
         if replay is None or self._stale:
             return
         for name in ("drawn", "sort", "scale"):
-            getattr(self, name).value = getattr(state, name)
+            getattr(self, name).value = getattr(looks, name)
         exact = exact_intervals(state.possible, replay)
-        order = sorted_contacts(replay, exact, state.sort, state.narrowed)
+        order = sorted_contacts(replay, exact, looks.sort, state.narrowed)
         named = [one.contact for one in state.known]
-        named += [] if state.contact is None else [state.contact]
-        self.contacts = order[picked(order, SOME if state.drawn == "some" else MOST_BARS, named)]
+        named += [] if looks.contact is None else [looks.contact]
+        self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact, len(order))
         if not events or any(event.name in ("replay", "growing") for event in events):
             self._show_growth(replay)
@@ -144,7 +144,7 @@ class View:
     def _show_bars(self, replay, exact, of):
         contacts = self.contacts
         original = replay.normal[0, contacts]
-        unit = original if self.state.scale == "own" else np.ones_like(original)
+        unit = original if self.looks.scale == "own" else np.ones_like(original)
         none = np.full_like(original, np.nan)
         low, high = (exact[name][contacts] if exact else none for name in ("low", "high"))
         whole, before = (none, none), {}
@@ -168,13 +168,13 @@ class View:
             **{name: original / unit for name in ("low", "high", "now")},
         }
         _set_range(self.figure.x_range, 0, len(contacts) + 1)
-        top = 3.0 if self.state.scale == "own" else _top(replay, before or exact)
+        top = 3.0 if self.looks.scale == "own" else _top(replay, before or exact)
         if self.state.growing is not None:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
-        self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.state.sort]}"
-        self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.state.scale]})"
+        self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
+        self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
 
     def _show_growth(self, replay):
         grows = self.state.growing is not None
@@ -199,15 +199,15 @@ class View:
 
     def _tapped(self, name, old, new):
         if new:
-            self.state.contact = int(self.contacts[new[0]])
+            self.looks.contact = int(self.contacts[new[0]])
             self.bars.selected.indices = []
 
     def _mark(self, *events):
         """Show where the selected contact stands."""
-        state = self.state
+        looks = self.looks
         marks = {"rank": [], "low": [], "high": []}
-        if state.contact is not None and state.seen is not None and state.tab == self.name:
-            at = np.flatnonzero(self.contacts == state.contact)
+        if looks.contact is not None and self.state.seen is not None and looks.tab == self.name:
+            at = np.flatnonzero(self.contacts == looks.contact)
             if len(at):
                 column = self.bars.data
                 low, high = self.figure.y_range.start, self.figure.y_range.end
@@ -314,7 +314,7 @@ class View:
 
 
 def sorted_contacts(replay, exact, by, narrowed=None):
-    """Positions of the contacts (N_c,), ascending in what `by`, one of state.SORTS, names.
+    """Positions of the contacts (N_c,), ascending in what `by`, one of looks.SORTS, names.
 
     narrowed: known.Narrowed; the STRONGEST whose interval it has shortened most, alone.
     """

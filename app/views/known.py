@@ -43,7 +43,7 @@ class Known(Scripted):
             case {"next": True}:
                 knowledge.rank()
             case {"choose": int(contact)} if 0 <= contact < len(self._state.replay.backbone):
-                self._state.contact = contact
+                self._state.looks.contact = contact
 
     def _show(self, *events):
         state = self._state

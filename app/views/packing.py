@@ -1,29 +1,18 @@
-"""The packing: the player, what it shares with the state, and the legend."""
+"""The packing: the player, what it shares with the server, and the legend."""
 
 import numpy as np
 import panel as pn
 
 from .. import live
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
-from ..state import COLOURS, WIDTHS
+from ..looks import COLOURS, WIDTHS
 from . import explanation
 from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
-FOLLOWED = (
-    "second",
-    "source",
-    "busy",
-    "tab",
-    "views",
-    "wide",
-    "thickness",
-    "full",
-    "stretch",
-    "overlay",
-    "scale",
-)  # from the state
+FOLLOWED = ("second", "tab", "views", "wide", "thickness", "full", "stretch", "overlay", "scale")
+TOLD = ("source", "busy")  # by the state
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
@@ -71,59 +60,55 @@ class PackingView:
 
     def __init__(self, state):
         self.state = state
+        self.looks = looks = state.looks
         self.player = Player(
             name="player",  # by which others in the page find it
             sizing_mode="stretch_width",
-            palettes=palettes(state.dark),
-            zoom=None if state.zoom is None else list(state.zoom),
-            **{name: getattr(state, name) for name in (*SHARED, *FOLLOWED)},
+            palettes=palettes(looks.dark),
+            zoom=None if looks.zoom is None else list(looks.zoom),
+            **{name: getattr(looks, name) for name in (*SHARED, *FOLLOWED)},
+            **{name: getattr(state, name) for name in TOLD},
         )
         self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(2, 10))
         for name in SHARED:
-            self.player.param.watch(lambda event: state.param.update({event.name: event.new}), name)
+            self.player.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
         self._shown = None
         self.player.param.watch(self._swing, "between")
         self.player.param.watch(self._look_at, "zoom")
         self.player.param.watch(self._explain, "pulled")
-        state.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(
-            self._show, ["replay", "growing", "exact", "narrowed", "between", "full", "measured"]
-        )
+        looks.param.watch(self._follow, [*SHARED, *FOLLOWED])
+        state.param.watch(self._follow, [*TOLD])
+        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "measured"])
+        looks.param.watch(self._show, ["between", "full"])
         state.param.watch(self._pin, ["known", "ranked", "replay"])
         state.param.watch(self._displace, "displacement")
         state.param.watch(self._accompany, "twin")
         state.param.watch(self._load, "loads")
         state.param.watch(self._project, "plane")
-        state.param.watch(self._dress, ["dark"])
-        shown = [
-            "colour",
-            "thickness",
-            "full",
-            "stretch",
-            "overlay",
-            "exact",
-            "narrowed",
-            "loads",
-            "dark",
-        ]
-        state.param.watch(self._explain, [*shown, "replay", "growing", "moving", "pulls"])
+        looks.param.watch(self._dress, "dark")
+        looks.param.watch(
+            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark"]
+        )
+        state.param.watch(
+            self._explain, ["replay", "growing", "moving", "exact", "narrowed", "loads", "pulls"]
+        )
         self._show()
         self._accompany()
         self._pin()
         self._explain()
 
     def _swing(self, event):
-        self.state.between = None if event.new is None else tuple(event.new)
+        self.looks.between = None if event.new is None else tuple(event.new)
 
     def _look_at(self, event):
-        self.state.zoom = None if event.new is None else tuple(event.new)
+        self.looks.zoom = None if event.new is None else tuple(event.new)
 
     def _follow(self, *events):
         self.player.param.update({event.name: event.new for event in events})
 
     def _show(self, *events):
         """What belongs together comes in one message."""
-        state, replay = self.state, self.state.seen
+        state, looks, replay = self.state, self.looks, self.state.seen
         if replay is None:
             return
         exact = exact_intervals(state.possible, replay)
@@ -131,8 +116,8 @@ class PackingView:
             "exact": exact,
             "gone": gone(state, replay),
             "measured": measured(state, replay),
-            "most": full_extent(replay, exact, state.full),
-            "between": None if state.between is None else list(state.between),
+            "most": full_extent(replay, exact, looks.full),
+            "between": None if looks.between is None else list(looks.between),
         }
         if self._shown is not replay:
             self._shown = replay
@@ -238,25 +223,26 @@ def full_extent(replay, exact, asked=None):
 def colour_bar(state, pulled):
     """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
-    full = state.full or FULL_CHANGE
+    looks = state.looks
+    full = looks.full or FULL_CHANGE
     change = f"{full:.3g} ⟨fₙ⟩ less", diverging, f"{full:.3g} ⟨fₙ⟩ more"
     if pulled:
         return change
-    most = full_extent(state.seen, exact_intervals(state.possible, state.seen), state.full)
+    most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
-        "extent": ("0", list(palettes(state.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
-        "load": ("0", list(palettes(state.dark)["load"][::8]), _largest(state.loads, state.full)),
+        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
+        "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"{FULL_DEVIATION:g} σ less", diverging, f"{FULL_DEVIATION:g} σ more"),
-        "known": ("0", list(palettes(state.dark)["known"][::8]), "1"),
+        "known": ("0", list(palettes(looks.dark)["known"][::8]), "1"),
         "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
-    }[state.colour]
+    }[looks.colour]
 
 
-def colour_words(state, pulled):
+def colour_words(looks, pulled):
     """What colours mean just now."""
-    return "change by what was pulled" if pulled else COLOURS[state.colour]
+    return "change by what was pulled" if pulled else COLOURS[looks.colour]
 
 
 def _largest(loads, full):
@@ -267,25 +253,25 @@ def _largest(loads, full):
 
 def legend(state, pulled=False):
     """What width and colour mean just now, as HTML."""
-    replay = state.seen
+    looks, replay = state.looks, state.seen
     if replay is None:
         return ""
     low, stops, high = colour_bar(state, pulled)
     bar = BAR.format(low=low, stops=",".join(stops), high=high)
-    if state.colour == "mobilised" and not pulled and replay.summary["mu"] == 0:
+    if looks.colour == "mobilised" and not pulled and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
-    if state.colour == "known" and not pulled and state.narrowed is None:
+    if looks.colour == "known" and not pulled and state.narrowed is None:
         bar = "(nothing is known: select a contact and press H)"
     sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
     tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
     return LEGEND.format(
-        width=WIDTHS[state.thickness],
-        widest=2 / (CHAIN_WIDTH * state.stretch),
-        width_term=EXPLAINED[state.thickness],
-        colour_term=EXPLAINED[state.colour],
-        colour=colour_words(state, pulled),
+        width=WIDTHS[looks.thickness],
+        widest=2 / (CHAIN_WIDTH * looks.stretch),
+        width_term=EXPLAINED[looks.thickness],
+        colour_term=EXPLAINED[looks.colour],
+        colour=colour_words(looks, pulled),
         bar=bar,
-        marks=_marks(state.dark) if state.overlay else "",
+        marks=_marks(looks.dark) if looks.overlay else "",
         sides=f" of {' × '.join(sides)} largest radii{tilted}" if sides else "",
     )
 

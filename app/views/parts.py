@@ -111,18 +111,20 @@ def together(function, **arguments):
 class TabView:
     """A tab's view, which calls `update` when something watched has changed, but only on screen.
 
-    Subclasses have a `name`, that of their tab.
+    Subclasses have a `name`, that of their tab. watched: parameters of the state; looks: of its
+    looks.
     """
 
-    def __init__(self, state, *watched):
-        self.state = state
+    def __init__(self, state, *watched, looks=()):
+        self.state, self.looks = state, state.looks
         self._stale, self.left = True, False  # whether it was taken off the page
-        state.param.watch(self._changed, ["tab", "wide", *watched])
+        state.param.watch(self._changed, [*watched])
+        self.looks.param.watch(self._changed, ["tab", "wide", *looks])
 
     @property
     def visible(self):
         """Whether the view's tab is on screen."""
-        return not self.left and self.state.shows(self.name)
+        return not self.left and self.looks.shows(self.name)
 
     def catch_up(self):
         """Update if need be and if seen; to be called once when the view has been built."""
@@ -217,23 +219,23 @@ def choice(labels, value):
     )
 
 
-def chosen(labels, state, name):
-    """A `choice` of the state's parameter of this name."""
-    return _linked(choice(labels, getattr(state, name)), state, name)
+def chosen(labels, looks, name):
+    """A `choice` of the parameter of this name."""
+    return _linked(choice(labels, getattr(looks, name)), looks, name)
 
 
-def question(label, labels, state, name):
+def question(label, labels, looks, name):
     """The same as a list under a label, for choices that are sentences."""
     options = {words: key for key, words in labels.items()}
     wide = {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
-    made = Select(label=label, options=options, value=getattr(state, name), **wide)
-    return _linked(made, state, name)
+    made = Select(label=label, options=options, value=getattr(looks, name), **wide)
+    return _linked(made, looks, name)
 
 
-def _linked(widget, state, name):
-    """A widget whose value is the state's parameter of this name."""
-    widget.param.watch(lambda event: state.param.update({name: event.new}), "value")
-    state.param.watch(lambda event: widget.param.update(value=event.new), name)
+def _linked(widget, looks, name):
+    """A widget whose value is the parameter of this name."""
+    widget.param.watch(lambda event: looks.param.update({name: event.new}), "value")
+    looks.param.watch(lambda event: widget.param.update(value=event.new), name)
     return widget
 
 

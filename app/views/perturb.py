@@ -8,7 +8,7 @@ import panel_material_ui as pmui
 from bokeh.models import BoxAnnotation, ColumnDataSource, TapTool
 
 from .. import perturbations
-from ..state import PUSHES
+from ..looks import PUSHES
 from . import studied
 from .hints import term
 from .parts import PLAIN, TabView, figure, folded, note, question
@@ -58,8 +58,8 @@ class View(TabView):
     name, title = "perturb", "Push"
 
     def __init__(self, state):
-        super().__init__(state, "replay", "contact")
-        self.what = question("Question", PUSHES, state, "pushing")
+        super().__init__(state, "replay", looks=["contact"])
+        self.what = question("Question", PUSHES, self.looks, "pushing")
         self.strongest = pmui.Button(
             label="Take the strongest contact",
             color="primary",
@@ -84,7 +84,7 @@ class View(TabView):
         self.strongest.on_click(lambda event: self._take_strongest())
         self.task.param.watch(self._failed, "message")
         self.task.param.watch(lambda event: self.push.param.update(disabled=event.new), "running")
-        state.param.watch(self._animate, "tab")
+        self.looks.param.watch(self._animate, "tab")
         self.catch_up()
 
     def panel(self):
@@ -103,16 +103,16 @@ class View(TabView):
 
     def update(self):
         """Show what is chosen; what is not known yet waits for a click, but for Fig. 2."""
-        state, what = self.state, self.what.value
+        state, what, contact = self.state, self.what.value, self.looks.contact
         if state.replay is not self._shown:
             self._shown, self.loads = state.replay, None
         if self.pushed is not None and not self._holds():
             self.task.cancel()
             self.pushed, self.guess.value = None, ""
         one = what == "one"
-        self.push.visible = (one and state.contact is not None) or what == "all"
+        self.push.visible = (one and contact is not None) or what == "all"
         self.push.label = "Push" if one else "Compute for all contacts"
-        self.strongest.visible = one and state.contact is None
+        self.strongest.visible = one and contact is None
         self.animate.visible = one and self.pushed is not None
         self.guess.visible = one and state.contact is not None and self.pushed is None
         if state.replay is None:
@@ -127,7 +127,7 @@ class View(TabView):
     def _holds(self):
         """Whether what was pushed is still the contact selected."""
         contact, replay = self.pushed[1:]
-        return contact == self.state.contact and replay is self.state.replay
+        return contact == self.looks.contact and replay is self.state.replay
 
     def _say(self, text, plots=(), numbers="", lead=""):
         self.lead.object, self.told.object, self.numbers.object = lead, text, numbers
@@ -142,7 +142,7 @@ class View(TabView):
     # One contact
 
     def _take_strongest(self):
-        self.state.contact = int(np.argmax(self.state.replay.normal[0]))
+        self.looks.contact = int(np.argmax(self.state.replay.normal[0]))
 
     def _push(self):
         state = self.state
@@ -150,29 +150,29 @@ class View(TabView):
             work = perturbations.limit_loads(state.library, state.cell)
             self.task.start(work, self._loads_known)
             return
-        contact, replay = state.contact, state.replay
+        contact, replay = self.looks.contact, state.replay
         if contact is None or replay is None:
             return
         work = perturbations.push(state.library, state.cell, replay, contact)
         self.task.start(work, lambda found: self._gave_way(found, contact, replay))
 
     def _gave_way(self, found, contact, replay):
-        if contact == self.state.contact and replay is self.state.replay:
+        if contact == self.looks.contact and replay is self.state.replay:
             self.pushed = found, contact, replay
             self.refresh()
 
     def _one(self):
-        state, replay = self.state, self.state.replay
+        contact, replay = self.looks.contact, self.state.replay
         drawn = LEAD + SKETCH.format(colour=DOT)
-        if state.contact is None:
+        if contact is None:
             self._say(HINT, lead=drawn)
             return
-        tiles = [("carries now", f"{replay.normal[0, state.contact]:.2f}")]
+        tiles = [("carries now", f"{replay.normal[0, contact]:.2f}")]
         if self.pushed is None:
             if self.loads is not None:
-                tiles.append(("limit load", f"{self.loads.load[state.contact]:.2f}"))
+                tiles.append(("limit load", f"{self.loads.load[contact]:.2f}"))
             where = (
-                f"Contact {replay.backbone[state.contact]}, marked in the packing; fainter where "
+                f"Contact {replay.backbone[contact]}, marked in the packing; fainter where "
                 f"the box repeats. {UNIT}"
             )
             self._say(where, numbers=_tiles(tiles), lead=drawn)
@@ -188,7 +188,7 @@ class View(TabView):
             lead += f" You guessed {html.escape(self.guess.value[:LONGEST_GUESS])}."
         text = (
             f"The {term('critical_force', 'critical force')} of contact "
-            f"{replay.backbone[state.contact]}, with which the packing gives way, lies between "
+            f"{replay.backbone[contact]}, with which the packing gives way, lies between "
             f"{pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩; it is never above the "
             f"{term('limit_load', 'limit load')}, beyond which no network in balance exists. "
             "|u| is how far a disk moves first, against the root mean square over all disks."
@@ -257,7 +257,7 @@ class View(TabView):
         fig.scatter(
             "x", "y", source=self.chosen, size=13, fill_alpha=0, line_color=DOT, line_width=2
         )
-        contact = self.state.contact
+        contact = self.looks.contact
         here = [] if contact is None else [contact]
         self.chosen.data = {"x": replay.normal[0, here], "y": loads.load[here]}
         fig.add_tools(
@@ -281,7 +281,7 @@ class View(TabView):
 
     def _tapped(self, name, old, new):
         if new:
-            self.state.contact = int(new[0])
+            self.looks.contact = int(new[0])
 
     # Over the store
 

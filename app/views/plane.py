@@ -10,7 +10,7 @@ from granforce.records import InputError
 
 from .. import compute, live, planes
 from ..jobs import reading
-from ..state import PLANES
+from ..looks import PLANES
 from . import stresses
 from .hints import term
 from .parts import MOVES, TabView, figure, folded, note, question, together
@@ -55,7 +55,7 @@ class View(TabView):
     name, title = "plane", "Force space"
 
     def __init__(self, state):
-        super().__init__(state, "replay", "growing", "fourfold", "contact", "second")
+        super().__init__(state, "replay", "growing", "fourfold", looks=["contact", "second"])
         empty = {"x": [], "y": []}
         self.path = ColumnDataSource(empty | {"state": []}, name="path")
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
@@ -63,9 +63,9 @@ class View(TabView):
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
         self.cone = ColumnDataSource(empty)
         self.figure = self._figure()
-        if state.second is not None and state.axes == "principal":
-            state.axes = "pair"
-        self.planes = question("Shown", PLANES, state, "axes")
+        if self.looks.second is not None and self.looks.axes == "principal":
+            self.looks.axes = "pair"
+        self.planes = question("Shown", PLANES, self.looks, "axes")
         self.task, self.placing = state.task(told=False), state.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
         self.others, self.other = state.task(), None  # who finds the other states; their Replay
@@ -73,7 +73,7 @@ class View(TabView):
         self.lead, self.told = note(), note()
         self.placing.param.watch(self._failed, "message")
         self.planes.param.watch(self._turn, "value")
-        state.param.watch(self._keep_first, "contact")
+        self.looks.param.watch(self._keep_first, "contact")
         self.task.param.watch(self._failed, "message")
         self.shown = self.found = None
         self.catch_up()
@@ -121,7 +121,7 @@ class View(TabView):
         """What a plane of the kind chosen depends on, beside the states."""
         state, kind = self.state, self.planes.value
         if kind not in WHOLE:
-            return state.contact, state.second
+            return self.looks.contact, self.looks.second
         return (state.fourfold,) if kind == "principal" and state.growing is not None else ()
 
     def _place(self, replay, kind):
@@ -214,14 +214,14 @@ class View(TabView):
 
     def _components(self, replay):
         """The plane of one contact's forces, or of two contacts' normal forces."""
-        contact = self.state.contact
+        contact = self.looks.contact
         if contact is None and self.planes.value == "pair":
             raise InputError("Click two contacts in the packing, one after the other.")
         if contact is None:
             contact = _loosest(replay)
         if self.planes.value == "contact":
             return planes.components(replay, (contact, 0), (contact, 1))
-        other = self.state.second
+        other = self.looks.second
         if other is None:
             raise InputError("Now click a second contact in the packing; both are marked there.")
         return planes.components(replay, (other, 0), (contact, 0))
@@ -229,21 +229,21 @@ class View(TabView):
     def _turn(self, event):
         """Another kind of plane; a second contact belongs to one of them only."""
         if event.new != "pair":
-            self.state.second = None
-        elif self.state.contact is None and self.state.replay is not None:
-            self.state.contact = _loosest(self.state.replay)
+            self.looks.second = None
+        elif self.looks.contact is None and self.state.replay is not None:
+            self.looks.contact = _loosest(self.state.replay)
         self.refresh()
 
     def _keep_first(self, event):
         """The last two contacts that were clicked span the plane."""
         if self.visible and self.planes.value == "pair" and event.new is not None:
-            self.state.second = event.old if event.old is not None else self.state.second
+            self.looks.second = event.old if event.old is not None else self.looks.second
 
     def _show(self, replay, plane):
         """Path, original and cone; the outline is to come."""
         self.state.plane = plane
         x, y = plane.path.T
-        frame = min(self.state.frame, len(x) - 1)
+        frame = min(self.looks.frame, len(x) - 1)
         self.path.data = self._path(replay, plane)
         self.original.data = {"x": x[:1], "y": y[:1]}
         self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}

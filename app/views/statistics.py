@@ -9,7 +9,7 @@ from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
 
 from .. import distributions
 from ..jobs import reading
-from ..state import AXES, FIGURES
+from ..looks import AXES, FIGURES
 from . import studied
 from .packing import exact_intervals
 from .parts import TabView, chosen, figure, folded, folded_away, note, question
@@ -30,8 +30,8 @@ class View(TabView):
 
     def __init__(self, state):
         super().__init__(state, "replay", "exact", "catalogue")
-        self.what = question("Question", FIGURES, state, "figure")
-        self.scale = chosen(AXES, state, "axis")
+        self.what = question("Question", FIGURES, self.looks, "figure")
+        self.scale = chosen(AXES, self.looks, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
         # Always on the page: what React draws must not leave it meanwhile.
         self.folded = [pn.Column(sizing_mode="stretch_width") for _ in studied.FOLDED]
@@ -44,7 +44,7 @@ class View(TabView):
         self.what.param.watch(self._choose, "value")
         self.scale.param.watch(self.refresh, "value")
         self.task.param.watch(self._follow, ["running", "message"])
-        state.param.watch(self._mark, "contact")
+        self.looks.param.watch(self._mark, "contact")
         self.catch_up()
 
     def panel(self):
@@ -170,12 +170,12 @@ class View(TabView):
 
     def _select(self, source, indices):
         if indices:
-            self.state.contact = int(indices[0])
+            self.looks.contact = int(indices[0])
             source.selected.indices = []
 
     def _mark(self, *events):
         """A ring around the selected contact."""
-        contact = self.state.contact
+        contact = self.looks.contact
         if self.what.value != "scatter" or not self.visible:
             return
         none = contact is None or not hasattr(self, "_points")

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..jobs import Task
+from ..looks import Looks
 from ..state import AppState
 from . import intervals, plane
 
@@ -20,22 +21,17 @@ class Light:
     """What of the state views ask for, by day."""
 
     param = _Deaf()
-    dark = False
 
-    def __init__(self, replay, exact, view, tab=None, loads=None):
+    def __init__(self, replay, exact, view, tab="", loads=None):
         # All else as where nothing is computed, chosen or known.
-        state = {name: AppState.param[name].default for name in AppState.param}
-        told = {"dark": False, "between": None, "second": None, "tab": tab, "loads": loads}
-        self.__dict__.update(state | view | told)
-        self.replay = self.seen = replay
+        self.__dict__.update({name: AppState.param[name].default for name in AppState.param})
+        here = view | {"dark": False, "between": None, "second": None, "tab": tab}
+        self.looks = Looks(**{name: here[name] for name in Looks.param if name in here})
+        self.loads, self.replay, self.seen = loads, replay, replay
         self.exact = self.possible = exact
         self.computation = SimpleNamespace(running=False, param=_Deaf())
         self.knowledge = SimpleNamespace(task=self.computation)
         self.exact_wanted = False
-
-    def shows(self, name):
-        """Whether what has this tab is on screen, as for AppState."""
-        return name == self.tab
 
     def task(self, *arguments, **options):
         """A Task that is never started."""

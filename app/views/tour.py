@@ -97,11 +97,11 @@ class Tour(Scripted):
         self.step = step
         self._set_up = self._state.replay is not None
         if step and self._set_up:
-            self._state.param.update(**_shown(self._state, step))
+            self._state.looks.param.update(**_shown(self._state, step))
 
 
 def _shown(state, step):
-    """Parameters of the state with which the page shows what a step is about."""
+    """Looks with which the page shows what a step is about."""
     normal, extent = state.replay.normal, (state.replay.high - state.replay.low)[:, 0]
     changes = {"between": None}
     if step == 2 and len(normal) > 1:
@@ -110,7 +110,7 @@ def _shown(state, step):
         changes["contact"] = int(np.argmax(extent))
     if step == 6:
         changes["contact"] = int(np.argmax(normal[0]))
-    if step in TABS and not state.shows(TABS[step]):
+    if step in TABS and not state.looks.shows(TABS[step]):
         changes["tab"] = TABS[step]
     return changes
 

@@ -238,10 +238,10 @@ def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
 
 def test_older_links_to_a_renamed_tab_open_it():
     from app.links import read_view
+    from app.looks import Looks
     from app.page import TABS
-    from app.state import AppState
 
-    (tab,) = read_view({"tab": "projection"}, AppState.param).values()
+    (tab,) = read_view({"tab": "projection"}, Looks.param).values()
     assert TABS[tab] == "Force space"
 
 
@@ -278,11 +278,12 @@ def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(library, wait_
 def test_the_view_travels_with_the_link(state, library, wait_for):
     from app.state import AppState
 
-    state.param.update(contact=3, frame=5, between=(2, 7), colour="extent", overlay=True, dark=True)
+    seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent"}
+    state.looks.param.update(**seen, overlay=True, dark=True)
     again = AppState(library, query=state.link())
     wait_for(again)
-    for name in ("contact", "frame", "between", "colour", "overlay", "dark", "selection"):
-        assert getattr(again, name) == getattr(state, name), name
+    assert again.selection == state.selection and again.view == state.view
+    assert seen.items() <= again.view.items()
 
 
 def test_views_that_make_no_sense_are_left_out(library, wait_for):
@@ -292,12 +293,8 @@ def test_views_that_make_no_sense_are_left_out(library, wait_for):
     state = AppState(library, query=query)
     wait_for(state)
     assert state.cell.mu == 1 and state.message == ""
-    assert (state.contact, state.frame, state.colour, state.between) == (
-        None,
-        0,
-        "change",
-        None,
-    )
+    looks = state.looks
+    assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
 
 
 @pytest.mark.parametrize("packed", [None, 0.0])
@@ -457,16 +454,17 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
 def test_a_friction_stands_beside_another_one_only(state, wait_for):
     """Back after a comparison once showed 0.1 beside 0.1."""
     first = state.cell.mu
-    state.split = True
+    state.looks.split = True
     links = []
-    state.param.watch(lambda *events: links.append(state.link()), ["beside", "selection", "cell"])
+    state.param.watch(lambda *events: links.append(state.link()), ["selection", "cell"])
+    state.looks.param.watch(lambda event: links.append(state.link()), "beside")
     state.choose(mu=1)
     wait_for(state)
-    assert state.beside == first and f"beside={first:g}" in state.link()
+    assert state.looks.beside == first and f"beside={first:g}" in state.link()
     assert not any(f"mu={first:g}" in link and "beside" in link for link in links)
     state.choose(mu=first)  # as Back does
     wait_for(state)
-    assert state.beside is None and state.twin is None
+    assert state.looks.beside is None and state.twin is None
 
 
 def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):
@@ -490,10 +488,10 @@ def test_a_link_keeps_what_single_tabs_show(library, state, wait_for):
 
     chosen = {"figure": "force", "axis": "log", "pushing": "all", "axes": "stress"}
     chosen["zoom"] = (3.5, 4.25, 2.0)
-    state.param.update(**chosen)
+    state.looks.param.update(**chosen)
     again = AppState(library, query=f"?{state.link()}")
     wait_for(again)
-    assert {name: getattr(again, name) for name in chosen} == chosen
+    assert chosen.items() <= again.view.items()
 
 
 def test_what_is_pale_says_of_which_friction_it_is(state):
@@ -1031,12 +1029,12 @@ def test_contacts_are_sorted_by_what_is_named(state, wait_for, by):
 def test_intervals_take_nothing_over_while_hidden(state, wait_for):
     from app.views.intervals import View
 
-    state.tab = "statistics"
+    state.looks.tab = "statistics"
     view = View(state)
     state.choose(mu=1)
     wait_for(state)
     assert len(view.bars.data["rank"]) == 0
-    state.tab, state.drawn = "intervals", "all"
+    state.looks.tab, state.looks.drawn = "intervals", "all"
     assert len(view.bars.data["rank"]) == state.replay.normal.shape[1]
 
 
@@ -1047,10 +1045,10 @@ def test_few_bars_are_drawn_evenly_and_the_selected_one_among_them(state):
     shown = view.bars.data["at"]
     assert SOME / 2 <= len(shown) <= SOME < all_of_them
     assert view.figure.xaxis.axis_label.startswith(f"{len(shown)} of {all_of_them} contacts")
-    state.contact = int(np.setdiff1d(state.replay.order, shown)[0])
-    assert np.array_equal(np.sort(view.bars.data["at"]), np.sort([*shown, state.contact]))
+    state.looks.contact = int(np.setdiff1d(state.replay.order, shown)[0])
+    assert np.array_equal(np.sort(view.bars.data["at"]), np.sort([*shown, state.looks.contact]))
     assert np.all(np.diff(view.bars.data["original"]) >= 0)
-    state.drawn = "all"
+    state.looks.drawn = "all"
     assert np.array_equal(view.bars.data["at"], state.replay.order)
 
 
@@ -1058,9 +1056,9 @@ def test_a_tap_on_a_bar_selects_its_contact(state):
     from app.views.intervals import View
 
     view = View(state)
-    state.drawn = "all"
+    state.looks.drawn = "all"
     view.bars.selected.indices = [4]
-    assert state.contact == state.replay.order[4]
+    assert state.looks.contact == state.replay.order[4]
     assert view.chosen.data["rank"] == [5.0]
 
 

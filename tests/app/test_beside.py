@@ -16,45 +16,50 @@ def test_with_the_view_split_another_mu_leaves_the_first_beside_it(state, wait_f
     player = PackingView(state).player
     state.ask(asked(1))
     wait_for(state)
-    assert state.beside is None and state.twin is None  # not split
-    state.split = True
+    assert state.looks.beside is None and state.twin is None  # not split
+    state.looks.split = True
     state.ask(asked(0.1))
     wait_for(state)
-    assert (state.cell.mu, state.beside, state.twin.cell.mu) == (0.1, 1, 1)
+    assert (state.cell.mu, state.looks.beside, state.twin.cell.mu) == (0.1, 1, 1)
     assert player.twin["mu"] == 1 and player.walk["mu"] == 0.1
     assert len(player.twin["x0"]) != len(player.walk["x0"])  # each its own packing
     state.choose(mu=0)
     wait_for(state)
     assert (state.cell.mu, state.twin.cell.mu) == (0, 1)
     player.beside = None  # pinned
-    assert state.twin is None and not player.twin and state.split
+    assert state.twin is None and not player.twin and state.looks.split
     state.choose(mu=1)
     wait_for(state)
     assert state.twin.cell.mu == 0
-    state.split = False
-    assert state.beside is None and state.twin is None
+    state.looks.split = False
+    assert state.looks.beside is None and state.twin is None
 
 
 def test_other_disks_are_no_other_friction(state, wait_for):
-    state.split = True
+    state.looks.split = True
     state.ask(asked(0.1, states=5), at_once=True)
     wait_for(state)
-    assert state.cell.selection.states == 5 and state.beside is None
+    assert state.cell.selection.states == 5 and state.looks.beside is None
 
 
 def test_a_link_holds_both(state, library, wait_for):
-    state.split = True
+    state.looks.split = True
     state.choose(mu=1)
     wait_for(state)
     query = state.link()
     assert "split=1" in query and "beside=0.1" in query
     again = AppState(library, query=f"?{query}")
     wait_for(again)
-    assert (again.cell.mu, again.beside, again.twin.cell.mu) == (1, 0.1, 0.1)
+    assert (again.cell.mu, again.looks.beside, again.twin.cell.mu) == (1, 0.1, 0.1)
     # back to a view with one of them
     again.open("?" + query.replace("&beside=0.1", "").replace("mu=1", "mu=0.1"))
     wait_for(again)
-    assert again.cell.mu == 0.1 and again.split and again.beside is None and again.twin is None
+    assert (
+        again.cell.mu == 0.1
+        and again.looks.split
+        and again.looks.beside is None
+        and again.twin is None
+    )
 
 
 def test_a_link_has_the_other_computed_where_no_store_has_it(library, wait_for):
@@ -70,4 +75,4 @@ def test_frictions_of_a_link_that_cannot_be_are_passed_over(library, wait_for, m
         library, query=f"?mu=0.1&n={DISKS}&states=30&relax=nearest&split=1&beside={mu}"
     )
     wait_for(again)
-    assert again.cell is not None and again.beside is None and again.twin is None
+    assert again.cell is not None and again.looks.beside is None and again.twin is None

@@ -38,7 +38,7 @@ def page(state, wait_for):
 def test_a_contact_that_is_taken_is_selected_and_gets_a_rail(page, state):
     rail = page.hear(grab=4)["rail"]
     contacts = len(state.replay.backbone)
-    assert state.contact == 4 and rail["contact"] == 4
+    assert state.looks.contact == 4 and rail["contact"] == 4
     normal = rail["normal"].reshape(-1, contacts)
     np.testing.assert_allclose(normal[:, 4], rail["values"], atol=1e-6)
     low, high = state.replay.low[4, 0], state.replay.high[4, 0]
@@ -100,7 +100,7 @@ def test_links_with_pulls_that_make_no_sense_pull_nothing(text):
 
 def test_what_was_pulled_is_gone_with_another_state_on_screen(page, state):
     page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
-    state.frame = 3
+    state.looks.frame = 3
     assert not state.pulls and page.told[-1] == {"held": None}
 
 
@@ -184,8 +184,8 @@ def test_the_table_of_contacts_holds_what_was_pulled(page, state):
     value = middle(page.hear(grab=4)["rail"])
     page.hear(hold=[4, value])
     replay = state.replay
-    table = contacts(replay, None, state.frame, state.held)
+    table = contacts(replay, None, state.looks.frame, state.held)
     assert table["f_n"][4] == pytest.approx(value * replay.force_scale)
-    assert "pulled" in on_screen(replay, state.frame, state.held)
+    assert "pulled" in on_screen(replay, state.looks.frame, state.held)
     page.hear(undo=True)
-    assert state.held is None and "original" in on_screen(replay, state.frame, state.held)
+    assert state.held is None and "original" in on_screen(replay, state.looks.frame, state.held)

@@ -99,7 +99,7 @@ def test_what_is_computed_at_once_is_never_offered_to_be_computed(state):
 
 def test_force_space_has_axes_of_the_states_found_so_far(state, wait_for):
     """New ones when the walk has grown fourfold; those of all states and an outline at its end."""
-    state.tab = "plane"
+    state.looks.tab = "plane"
     browser, tab = Browser(state), plane.View(state)
     wait_for(state)
     state.ask(asked(0.36, 400), at_once=True)
@@ -122,7 +122,7 @@ def test_force_space_has_axes_of_the_states_found_so_far(state, wait_for):
 
 
 def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state, wait_for):
-    state.tab = "plane"
+    state.looks.tab = "plane"
     browser, tab = Browser(state), plane.View(state)
     wait_for(state)
     tab.planes.value = "contact"

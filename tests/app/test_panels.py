@@ -95,7 +95,7 @@ def test_the_outline_holds_the_path_and_is_kept(state):
     opened(state)
     view = View(state)
     assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
-    state.tab = view.name
+    state.looks.tab = view.name
     assert view.placing.running
     settled(state)
     assert len(view.path.data["x"]) == KEPT + 1
@@ -111,17 +111,17 @@ def test_one_contact_is_seen_in_its_cone(state):
     from app.views.plane import View
 
     opened(state)
-    state.contact = 4
+    state.looks.contact = 4
     view = View(state)
     view.planes.value = "contact"
-    state.tab = view.name
+    state.looks.tab = view.name
     settled(state)
     normal, tangential = np.array(view.outer.data["x"]), np.array(view.outer.data["y"])
     assert np.all(np.abs(tangential) <= state.replay.summary["mu"] * normal + 1e-3)
     assert str(state.replay.backbone[4]) in view.figure.xaxis.axis_label
     assert len(view.cone.data["x"]) == 3
     before = normal
-    state.contact = 7
+    state.looks.contact = 7
     settled(state)
     assert not np.array_equal(before, view.outer.data["x"])
 
@@ -132,7 +132,7 @@ def test_a_point_has_no_outline(state):
     opened(state)
     state.choose(mu=0)
     settled(state, done=lambda: state.cell.mu == 0)
-    state.tab = "plane"
+    state.looks.tab = "plane"
     view = View(state)
     settled(state)
     assert "one point" in view.told.object and not len(view.outer.data["x"])
@@ -387,7 +387,7 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     view = View(state)
     view.what.value, view.scale.value = what, scale
     assert not view.plots.objects and not view.task.running
-    state.tab = view.name
+    state.looks.tab = view.name
     settled(state)
     figures = [pane.object for pane in [*view.plots.select(Bokeh), *view.more.select(Bokeh)]]
     assert len(figures) == (4 if what == "eta" else 1)
@@ -413,10 +413,10 @@ def test_a_tap_on_a_point_selects_its_contact(state):
     opened(state)
     view = View(state)
     view.what.value = "scatter"
-    state.tab = view.name
+    state.looks.tab = view.name
     fig = view.plots.objects[0].object
     fig.renderers[0].data_source.selected.indices = [5]
-    assert state.contact == 5 and view.chosen.data["x"] == [float(state.replay.normal[0, 5])]
+    assert state.looks.contact == 5 and view.chosen.data["x"] == [float(state.replay.normal[0, 5])]
 
 
 def test_a_tap_on_a_mu_shows_its_states(state):
@@ -424,7 +424,7 @@ def test_a_tap_on_a_mu_shows_its_states(state):
 
     opened(state)
     view = View(state)
-    state.tab = view.name
+    state.looks.tab = view.name
     settled(state)
     fig = view.plots.objects[0].object
     source = next(r.data_source for r in fig.renderers if r.glyph.__class__.__name__ == "Scatter")
@@ -538,12 +538,12 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     from app.views.perturb import View
 
     opened(state)
-    state.tab = "perturb"
+    state.looks.tab = "perturb"
     view = View(state)
     assert view.strongest.visible and not view.push.visible
     assert "Click any contact" in view.told.object and "<svg" in view.lead.object
     view._take_strongest()
-    assert state.contact == int(np.argmax(state.replay.normal[0])) and view.push.visible
+    assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and view.push.visible
     view._push()
     settled(state, done=lambda: view.pushed is not None)
     pushed = view.pushed[0]
@@ -561,20 +561,20 @@ def test_the_field_moves_only_while_its_tab_is_seen(state):
     from app.views.perturb import View
 
     opened(state)
-    state.contact, state.tab = 3, "perturb"
+    state.looks.contact, state.looks.tab = 3, "perturb"
     view = View(state)
     view._push()
     settled(state, done=lambda: view.pushed is not None)
     field = state.displacement
     assert field is not None
-    state.tab = "intervals"
+    state.looks.tab = "intervals"
     assert state.displacement is None
-    state.tab = "perturb"
+    state.looks.tab = "perturb"
     assert state.displacement is field
     view.animate.value = False
     assert state.displacement is None
     view.animate.value = True
-    state.contact = 4
+    state.looks.contact = 4
     assert view.pushed is None and state.displacement is None
 
 
@@ -582,7 +582,7 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     from app.views.perturb import View
 
     opened(state)
-    state.contact, state.tab = 3, "perturb"
+    state.looks.contact, state.looks.tab = 3, "perturb"
     view = View(state)
     view._push()
     settled(state, done=lambda: view.pushed is not None)
@@ -592,7 +592,7 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     settled(state, done=lambda: view.loads is not None)
     assert view.loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
     view.plots.objects[0].object.renderers[0].data_source.selected.indices = [8]
-    assert state.contact == 8 and view.chosen.data["y"] == [view.loads.load[8]]
+    assert state.looks.contact == 8 and view.chosen.data["y"] == [view.loads.load[8]]
 
 
 def test_nothing_is_pushed_without_friction(state):
@@ -601,7 +601,7 @@ def test_nothing_is_pushed_without_friction(state):
     opened(state)
     state.choose(mu=0)
     settled(state, done=lambda: state.cell.mu == 0)
-    state.contact, state.tab = 3, "perturb"
+    state.looks.contact, state.looks.tab = 3, "perturb"
     view = View(state)
     assert not view.push.visible and "isostatic" in view.lead.object
 
@@ -623,7 +623,7 @@ def test_figure_2_takes_what_the_stores_hold(state, monkeypatch):
     assert sorted(row["mu"] for row in found) == [0.1, 1]
     assert all(0 < row["critical_force"] <= row["limit_load"] for row in found)
     assert {row["eta2"] for row in found} == {row["eta2"] for row in distributions.rows(cells[1:])}
-    state.tab = "perturb"
+    state.looks.tab = "perturb"
     view = View(state)
     view.what.value = "store"
     settled(state)
@@ -663,12 +663,12 @@ def test_colours_and_widths_are_offered_once_there_is_what_they_show(state, wait
     controls = Controls(state)
     assert not {"sign", "known"} & set(controls.colour.options.values())
     assert not {"difference", "known"} & set(controls.thickness.options.values())
-    state.reference = 2
+    state.looks.reference = 2
     assert "sign" in controls.colour.options.values()
     assert "difference" in controls.thickness.options.values()
     state.knowledge.hold(3, float(state.replay.normal[0, 3]), 0.1)
     assert "known" in controls.colour.options.values()
-    state.colour = "known"
+    state.looks.colour = "known"
     state.knowledge.release(3)
     wait_for(state)
     assert controls.colour.value == "known"  # what was chosen stays
@@ -717,7 +717,7 @@ def test_the_inner_half_of_an_outline_has_a_quarter_of_its_area():
 
 
 def test_walk_and_uniform_states_are_shown_together(state, wait_for):
-    state.tab = "plane"
+    state.looks.tab = "plane"
     view = plane_view.View(state)
     wait_for(state)
     assert not view.also.value and not len(view.beside.data["x"])

@@ -27,7 +27,7 @@ def test_the_outline_of_stresses_holds_all_and_is_kept(state):
     opened(state)
     view = View(state)
     view.planes.value = "stress"
-    state.tab = view.name
+    state.looks.tab = view.name
     settled(state, done=lambda: "shear" in view.told.object)
     corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
     path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
@@ -37,7 +37,7 @@ def test_the_outline_of_stresses_holds_all_and_is_kept(state):
     friction = state.library.cache[entry.name]["friction"].item()
     assert f"{friction:.3f}" in view.told.object
     assert "σ" in view.figure.xaxis.axis_label and view.figure.match_aspect
-    state.contact = 4  # the same plane
+    state.looks.contact = 4  # the same plane
     assert not view.task.running and len(view.outer.data["x"])
 
 
@@ -46,7 +46,7 @@ def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):
     view, told = View(state), []
     hand = Hand(state, state.task(reading), told.append)
     view.planes.value = "stress"
-    state.tab = view.name
+    state.looks.tab = view.name
     settled(state, done=lambda: "shear" in view.told.object)
     value = float(state.replay.normal[0, 4])
     state.knowledge.hold(4, value)

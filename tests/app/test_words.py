@@ -5,8 +5,8 @@ from html import unescape
 
 from small_store import ROOT
 
+from app.looks import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
 from app.selection import KINDS, SOLVERS
-from app.state import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
 from app.views import hints
 from app.views.summary import TILES
 from granforce import glossary, notebook

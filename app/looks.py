@@ -1,0 +1,103 @@
+"""What of the states on screen is looked at, and how, as parameters: no widgets, no plots."""
+
+from typing import Any
+
+import param
+
+# What colour, width and order can show: word in links → words on screen.
+COLOURS = {
+    "change": "change from the original",
+    "mobilised": "mobilisation fₜ/(μ fₙ)",
+    "extent": "length of the interval ΔFₙ",
+    "sign": "sign of fₙ − pinned fₙ",
+    "load": "limit load",
+    "known": "what is known: part of the interval gone",
+    "deviation": "inferred less measured fₙ, in σ",
+}
+WIDTHS = {
+    "normal": "normal force fₙ",
+    "extent": "ΔFₙ",
+    "difference": "|fₙ − pinned fₙ|",
+    "load": "limit load",
+    "known": "what is known: length of the interval gone",
+    "measured": "measured fₙ",
+}
+SORTS = {
+    "original": "original fₙ",
+    "extent": "ΔFₙ of all states",
+    "exact": "exact ΔFₙ",
+    "position": "place of the original in its interval",
+    "shortened": "how much what is known shortened it",
+}
+DRAWN = {"some": "a few dozen", "all": "all"}
+# What single tabs can show.
+FIGURES = {
+    "eta": "How does friction matter?",
+    "extent": "How far can single forces differ?",
+    "correlation": "Are strong contacts the less determined ones?",
+    "scatter": "Which contacts are least determined?",
+    "force": "How many forces are large?",
+}
+AXES = {"linear": "linear", "log": "logarithmic"}
+PUSHES = {
+    "one": "How hard can one contact be pushed?",
+    "all": "Which contacts bear most?",
+    "store": "Are undetermined packings weaker?",
+}
+PLANES = {
+    "principal": "the plane in which networks differ most",
+    "contact": "both forces of one contact",
+    "pair": "the normal forces of two contacts",
+    "stress": "the stress that networks carry",
+}
+SCALES = {"mean": "mean force = 1", "own": "original force = 1"}
+
+
+class Looks(param.Parameterized):
+    """How a page looks at what is on screen; rows and contacts are those of its Replay."""
+
+    tab = param.String(default="intervals", doc="name of the visible tab; others compute nothing")
+    wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
+    views = param.Integer(doc="how many views of tabs there are: what moves in them is drawn then")
+    contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
+    second = param.Integer(default=None, allow_None=True, doc="contact beside it in a plane")
+    frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
+    reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
+    split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
+    predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
+    beside = param.Number(
+        default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
+    )
+    zoom = param.Tuple(
+        default=None, length=3, allow_None=True,
+        doc="middle and half width of what is seen, in largest radii; None: the whole packing",
+    )  # fmt: skip
+    between = param.Tuple(
+        default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
+    )
+    colour: Any = param.Selector(default="change", objects=list(COLOURS))
+    thickness: Any = param.Selector(default="normal", objects=list(WIDTHS))
+    full = param.Number(
+        default=None, bounds=(1e-3, 1e3), allow_None=True,
+        doc="⟨f_n⟩ at which colours are full; None: half for changes, else as the packing has it",
+    )  # fmt: skip
+    stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
+    overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
+    drawn: Any = param.Selector(
+        default="some", objects=list(DRAWN), doc="of which contacts intervals are drawn"
+    )
+    sort: Any = param.Selector(
+        default="original", objects=list(SORTS), doc="order of the intervals"
+    )
+    scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
+    figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
+    axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
+    pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
+    axes: Any = param.Selector(
+        default="principal", objects=list(PLANES), doc="of force space on screen"
+    )
+    dark = param.Boolean(doc="theme")
+
+    def shows(self, name: str) -> bool:
+        """Whether what has this tab is on screen."""
+        return name == self.tab or (self.wide and name == "plane")
