@@ -19,7 +19,7 @@ class Beside:
     """
 
     def __init__(self, state: Any) -> None:
-        self.state, self.looks, self.task = state, state.looks, state.task()
+        self.state, self.looks, self.task = state, state.looks, state.work.task()
         state.param.watch(self._follow, ["cell", "missing"])
         self.looks.param.watch(self._follow, ["split", "beside"])
 
@@ -46,7 +46,7 @@ class Beside:
             wanted = state.cell.selection.at(looks.beside)
             wanted.check(LIMITS)
         except InputError as error:
-            looks.beside, state.message = None, str(error)
+            looks.beside, state.work.message = None, str(error)
             return
         if state.twin is None or not state.twin.cell.selection.names(wanted):
             self._find(wanted)

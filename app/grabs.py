@@ -72,11 +72,11 @@ class Hand:
     def grab(self, contact: int) -> None:
         """Select a contact and have its rail made, from the network on screen."""
         state = self.state
-        if state.replay is None or state.growing is not None:
+        if state.replay is None or state.growing:
             return
         state.looks.contact = contact
         if contact in _held(state.known):
-            state.message = (
+            state.work.message = (
                 f"contact {state.replay.backbone[contact]} is held: let it go (H) to pull it"
             )
             self._tell({"rail": None})
@@ -85,14 +85,14 @@ class Hand:
 
     def grab_point(self) -> None:
         """Have the fan of the plane on screen made."""
-        if self.state.plane is not None and self.state.growing is None:
+        if self.state.plane is not None and not self.state.growing:
             self._work(self.state.plane)
 
     def hold(self, pull: Pull) -> None:
         """Let go: the pull stays."""
         pulls = self.state.pulls
         if len(pulls) >= MOST_PULLS:
-            self.state.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
+            self.state.work.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
             return
         self.state.pulls = [*pulls, pull]
 
@@ -166,7 +166,7 @@ class Hand:
         self._made, self._base = made, base
         self.state.held = made[-1][1] if made else None
         if refusal:
-            self.state.message = refusal
+            self.state.work.message = refusal
             self.state.pulls = [pull for pull, _ in made]
             return
         if ready is not None:
@@ -182,7 +182,7 @@ class Hand:
 
     def _failed(self, event: Any) -> None:
         if event.new:
-            self.state.message = event.new
+            self.state.work.message = event.new
             self._tell({"rail": None, "fan": None})
 
 

@@ -139,7 +139,7 @@ class Knowledge:
 
     def __init__(self, state: Any) -> None:
         self.state = state
-        self.task, self.ranking = state.task(told=False), state.task()
+        self.task, self.ranking = state.work.task(told=False), state.work.task()
         state.param.watch(self._follow, ["known", "replay"])
         self._arriving: Underway | None = None  # the Underway of what is being computed
         self.task.param.watch(self._failed, "message")
@@ -153,15 +153,15 @@ class Knowledge:
         """Take f_n of a contact for known, in ⟨f_n⟩; a message where it cannot be."""
         state = self.state
         others = [one for one in state.known if one.contact != contact]
-        if state.replay is None or state.growing is not None:
+        if state.replay is None or state.growing:
             return
         try:
             if len(others) >= MOST_KNOWN:
                 raise InputError(f"{MOST_KNOWN} known forces are the most; let some go")
             state.known = [*others, self._stated(contact, value, error)]
-            state.message = ""
+            state.work.message = ""
         except InputError as refusal:
-            state.message = str(refusal)
+            state.work.message = str(refusal)
 
     def release(self, contact: int) -> None:
         """Take f_n of a contact for unknown again."""
@@ -197,9 +197,9 @@ class Knowledge:
         """Find which contact to measure next, in the background."""
         state = self.state
         replay, known = state.replay, tuple(state.known)
-        if replay is None or state.growing is not None:
+        if replay is None or state.growing:
             return
-        state.message = ""
+        state.work.message = ""
 
         self._first = None
 
@@ -268,7 +268,7 @@ class Knowledge:
         if event.new:
             state = self.state
             state.known = list(state.narrowed.known) if self._settled else []
-            state.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
+            state.work.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
 
 
 def _number(value: float, what: str) -> float:

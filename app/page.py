@@ -38,6 +38,7 @@ from .views.stream import Stream
 from .views.summary import of_which, tiles
 from .views.tour import STEPS, Tour
 from .views.volume import Volume
+from .work import Work
 
 # Where it lies over the page, the sidebar begins unseen: player.js shows it once it is closed.
 UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
@@ -151,12 +152,13 @@ def _small(document: Document, asked: scenes.Asked) -> Any:
 def _large(document: Document, query: str) -> Any:
     """The page of a large packing."""
     state = AppState(pn.state.as_cached("library", _open_library), _turns(document), query)
-    looks, state.message = state.looks, state.message or " ".join(state.library.notes)
+    looks, work = state.looks, state.work
+    work.message = work.message or " ".join(state.library.notes)
     wide = {"sizing_mode": "stretch_width"}
     packing = PackingView(state)
     Stream(state, packing.player, document)
     packing.player.on_wide = lambda wide: looks.param.update(wide=wide)
-    packing.player.on_hand = Hand(state, state.task(reading), packing.player.hand_over).heard
+    packing.player.on_hand = Hand(state, work.task(reading), packing.player.hand_over).heard
     packing.player.on_known = state.knowledge.heard
     left = pn.Column(packing.player, **wide)
     middle = pn.Column(visible=False, css_classes=["in-plane"], styles=BESIDE, **wide)
@@ -205,7 +207,7 @@ def _large(document: Document, query: str) -> Any:
         tabs = Tabs(state)
         _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
         packing.player.on_digit = tabs.choose
-        looks.param.watch(lambda event: state.piecewise(tabs.beside(middle)), "wide")
+        looks.param.watch(lambda event: work.piecewise(tabs.beside(middle)), "wide")
         yield
         right.append(tabs.tabs)
         yield
@@ -214,14 +216,14 @@ def _large(document: Document, query: str) -> Any:
         yield from tabs.beside(middle)
         state.read_ahead()
 
-    pn.state.onload(partial(state.piecewise, parts()))
+    pn.state.onload(partial(work.piecewise, parts()))
     whole.param.watch(lambda event: looks.param.update(dark=event.new), "dark_theme")
-    _poll_while_running(state, document)
+    _poll_while_running(work, document)
     document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
     closed = garbage.opened()
 
     def end(context: object) -> None:
-        state.close()
+        work.close()
         closed()
 
     pn.state.on_session_destroyed(end)
@@ -274,8 +276,8 @@ def _open_library() -> Library:
 
 def in_title(state: AppState, query: str) -> list[Any]:
     """What stands in the title bar, where it covers nothing: what is computed, and the tour."""
-    knowledge = state.knowledge
-    tasks = state.computation, state.loading, state.measuring, state.besides.task
+    knowledge, work = state.knowledge, state.work
+    tasks = work.computation, work.loading, work.measuring, state.besides.task
     tasks += knowledge.task, knowledge.ranking
     return [Progress(*tasks, titled=True), Tour(state, query)]
 
@@ -300,7 +302,7 @@ class Tabs:
             sx=TAB,
             sizing_mode="stretch_width",
         )
-        self.tabs.param.watch(lambda event: state.piecewise(self._showing()), "active")
+        self.tabs.param.watch(lambda event: state.work.piecewise(self._showing()), "active")
         self.looks.param.watch(lambda event: self.choose(self.names.index(event.new) + 1), "tab")
 
     def choose(self, number: int) -> None:
@@ -382,25 +384,25 @@ def _pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:
         }
 
 
-def _poll_while_running(state: AppState, document: Document) -> None:
+def _poll_while_running(work: Work, document: Document) -> None:
     """Take over the progress of tasks while there are any; end them where nobody looks any more."""
     polling: list[Any] = []
     loaded: list[bool] = []
 
     def poll() -> None:
         if loaded and _left_alone(document.session_context):
-            state.cancel()
+            work.cancel()
         if not _in_transit(document):
-            state.poll()
+            work.poll()
 
     def switch(*events: Any) -> None:
-        if state.busy and not polling:
+        if work.busy and not polling:
             polling.append(document.add_periodic_callback(partial(together, poll), POLL_MS))
-        elif polling and not state.busy:
+        elif polling and not work.busy:
             document.remove_periodic_callback(polling.pop())
 
     pn.state.onload(lambda: loaded.append(True))
-    state.param.watch(switch, "busy")
+    work.param.watch(switch, "busy")
     switch()
 
 

@@ -1,4 +1,4 @@
-"""What the page is showing and doing, as parameters: no widgets, no plots."""
+"""Which states a page has selected and shows, as parameters: no widgets, no plots."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -10,10 +10,10 @@ import param
 
 from granforce.records import InputError
 
-from . import compute, known, perturbations
+from . import known, perturbations
 from .beside import Beside
 from .data import Cell, Library, Shown, best_cell, nearest_cell
-from .jobs import Job, Pool, Task, computing, reading
+from .jobs import Job
 from .known import Knowledge
 from .limits import LIMITS
 from .links import OF_A_REPLAY, UNSEEN, VIEW, View, fitting, read_view, spelled
@@ -21,6 +21,7 @@ from .live import Arriving, Following
 from .looks import Looks
 from .replays import Replay
 from .selection import Selection, brief, command, link, read_link
+from .work import Work
 
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
@@ -36,27 +37,21 @@ def as_one(*parts: param.Parameterized) -> Iterator[None]:
 
 
 class AppState(param.Parameterized):
-    """The states selected, the catalogue to select from, and the tasks.
+    """The states selected, and the catalogue to select from.
 
-    What is looked at is `looks`, which knows nothing of all this.
+    How they are looked at is `looks`, what is being computed is `work`; these know nothing of it.
     """
 
     catalogue = param.List(doc="all cells, by series and μ")
     selection = param.Parameter(doc="Selection asked for; not on screen while it is `missing`")
     missing = param.Boolean(doc="whether the selection is in no store and has to be computed")
     cell = param.Parameter(doc="the Cell on screen, or None")
-    replay = param.Parameter(doc="the Replay on screen, or None")
+    replay = param.Parameter(doc="the Replay of the cell on screen, or None")
+    seen = param.Parameter(doc="the same, or meanwhile that of the walk under way")
     exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
     measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
-    live = param.Parameter(doc="the Following of what is being computed, or None")
-    arriving = param.Parameter(doc="the Arriving of exact intervals under way, or None")
-    moving = param.Boolean(doc="whether a packing is on screen that is being compressed")
-    growing = param.Parameter(doc="the Replay of a walk under way, on screen before `replay`")
-    fourfold = param.Integer(doc="how often the walk under way has grown fourfold: new axes")
     source = param.String(doc="where the states on screen come from, in words")
-    message = param.String(doc="one line about what went wrong, or empty")
-
     twin = param.Parameter(doc="the Shown of that μ, or None")
     pulls = param.List(
         doc="what was pulled one after the other, from `looks.frame` on; see `grabs`"
@@ -66,7 +61,6 @@ class AppState(param.Parameterized):
     known = param.List(doc="known.Statements: forces of contacts that are taken for known")
     narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
     ranked = param.Parameter(doc="known.Ranked: contacts to measure next, or None")
-    busy = param.Boolean(doc="whether any task is running")
     displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
 
     def __init__(
@@ -81,7 +75,7 @@ class AppState(param.Parameterized):
         query: of the address that opened the page.
         """
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
-        self.library, self._wake = library, wake
+        self.library, self.work = library, Work(wake)
         self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
         # The parameters that a link may name.
         self._viewed: dict[str, Any] = {
@@ -90,68 +84,12 @@ class AppState(param.Parameterized):
             for part in (self.looks, self)
             if name in part.param
         }
-        self.tasks: list[Task] = []
-        self._ahead: list[Job] = []
-        self._closed = False
-        self.computation, self.reader = self.task(), self.task(reading)
-        self.loading = self.task()
-        self.looking, self.measuring = self.task(reading), self.task()  # for the volume of S
         self.knowledge = Knowledge(self)
         self.besides = Beside(self)
         self.param.watch(self._need_loads, "replay")
         self.looks.param.watch(self._need_loads, ["colour", "thickness"])
-        self.computation.param.watch(self._bring_back, "dismissed")
+        self.work.computation.param.watch(self._bring_back, "dismissed")
         self.open(query)
-
-    # Tasks
-
-    def piecewise(self, pieces: Iterator[Any]) -> None:
-        """Have a generator run to its end; other pages are served between its pieces."""
-        if self._wake is None:
-            for _ in pieces:
-                pass
-        elif next(pieces, "end") != "end":
-            self._wake(partial(self.piecewise, pieces))
-
-    def task(self, pool: Pool = computing, *, told: bool = True) -> Task:
-        """A new Task of this page: work off the event loop, ended when the page is closed.
-
-        told: whether the page tells what goes wrong in it; else whoever asks for it does.
-        """
-        task = Task(pool, self._wake)
-        if told:
-            task.param.watch(self._tell, "message")
-        task.param.watch(self._count, "running")
-        self.tasks.append(task)
-        if self._closed:
-            task.close()
-        return task
-
-    def poll(self) -> None:
-        """Take over the progress of all tasks."""
-        for task in self.tasks:
-            task.poll()
-
-    def cancel(self) -> None:
-        """End all work of the page that is under way."""
-        for task in self.tasks:
-            task.cancel()
-        for job in self._ahead:
-            job.cancel()
-
-    def close(self) -> None:
-        """End all work of the page for good."""
-        self._closed = True
-        self.cancel()
-        for task in self.tasks:
-            task.close()
-
-    def _tell(self, event: Any) -> None:
-        if event.new:
-            self.message = event.new
-
-    def _count(self, event: Any) -> None:
-        self.busy = any(task.running for task in self.tasks)
 
     # What is on screen
 
@@ -161,7 +99,7 @@ class AppState(param.Parameterized):
             wanted, view = read_link(query)
         except InputError as error:
             wanted, view = None, {}
-            self.message = str(error)
+            self.work.message = str(error)
         self._look_up(wanted, self._as_new() | read_view(view, self._viewed))
 
     def _as_new(self) -> View:
@@ -179,14 +117,14 @@ class AppState(param.Parameterized):
             part.param.update(**{name: view[name] for name in view if name in part.param})
 
     @property
-    def seen(self) -> Replay | None:
-        """The Replay on screen: that of the walk under way, if there is one."""
-        return self.replay if self.growing is None else self.growing
+    def growing(self) -> bool:
+        """Whether the Replay on screen is that of a walk under way."""
+        return self.seen is not self.replay
 
     @property
     def possible(self) -> Any:
         """The exact intervals of the Replay on screen, under what is known; or None."""
-        if self.growing is not None:
+        if self.growing:
             return None
         return self.exact if self.narrowed is None else self.narrowed.after
 
@@ -194,7 +132,7 @@ class AppState(param.Parameterized):
         """Read the catalogue anew; show what was just computed."""
         if shown is not None:
             self._show(shown)
-        self.reader.start(lambda job: self.library.cells(), self._list)
+        self.work.reader.start(lambda job: self.library.cells(), self._list)
 
     def ask(self, selection: Selection, at_once: bool = False) -> None:
         """Select states: shown if a store has them, else `missing`, or computed at_once."""
@@ -202,7 +140,7 @@ class AppState(param.Parameterized):
         self._ask(selection, at_once)
 
     def _ask(self, selection: Selection, at_once: bool) -> None:
-        self.message = ""
+        self.work.message = ""
         found = best_cell(self.catalogue, selection)
         if found is not None and found.selection.names(selection):
             self.show(found)
@@ -210,10 +148,10 @@ class AppState(param.Parameterized):
         try:
             selection.check(LIMITS)
         except InputError as error:
-            self.message = str(error)
+            self.work.message = str(error)
             return
         # Told as one: nobody sees what is computed at once as missing, which would move the page.
-        with as_one(self):
+        with as_one(self.work, self):
             self.param.update(selection=selection, missing=True)
             if at_once:
                 self.compute()
@@ -245,20 +183,18 @@ class AppState(param.Parameterized):
         if shown is not None:
             self._show_and_read_ahead(shown)
         else:
-            self.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
+            self.work.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
 
     def read_ahead(self) -> None:
         """Have the cells with the nearest μ read meanwhile: they are the likeliest next."""
         cells = self.cells()
         if self.cell in cells:
             here = cells.index(self.cell)
-            for job in self._ahead:
-                job.cancel()
-            self._ahead = [
-                Job(partial(_read, self.library, near), reading)
+            self.work.read_ahead(
+                partial(_read, self.library, near)
                 for near in cells[max(here - 1, 0) : here + 2]
                 if self.library.shown_in_memory(near) is None
-            ]
+            )
 
     def _look_up(self, wanted: Selection | None, view: View) -> None:
         library = self.library
@@ -277,7 +213,7 @@ class AppState(param.Parameterized):
 
         def done(found: tuple[list[Cell], Shown | None, str]) -> None:
             cells, shown, damage = found
-            self.message = damage or self.message
+            self.work.message = damage or self.work.message
             self._list(cells)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
             if shown is not None:
@@ -291,7 +227,7 @@ class AppState(param.Parameterized):
             done((library.catalogue, shown, ""))  # the first picture needs no thread
             self.refresh()
         else:
-            self.reader.start(read, done)
+            self.work.reader.start(read, done)
 
     def _list(self, cells: list[Cell]) -> None:
         self.catalogue = list(cells)
@@ -305,18 +241,14 @@ class AppState(param.Parameterized):
         fresh = dict(UNSEEN)
         if (self.replay is replay and view is None) or self._is_grown(replay):
             fresh = {}
-        if self.live is not None and not self.live.selection.names(cell.selection):
-            self.computation.cancel()  # it was not waited for
-        with as_one(self.looks, self):
+        with as_one(self.looks, self.work, self):
+            self.work.shown(cell.selection)
             self.param.update(
                 selection=cell.selection,
                 missing=False,
-                live=None,
-                moving=False,
-                arriving=None,
-                growing=None,
                 cell=cell,
                 replay=replay,
+                seen=replay,
                 exact=exact,
                 source=self._source(cell),
                 displacement=None,
@@ -336,24 +268,24 @@ class AppState(param.Parameterized):
 
     def _is_grown(self, replay: Replay) -> bool:
         """Whether a Replay is what the walk on screen has grown into."""
-        growing = self.growing
-        return growing is not None and np.array_equal(growing.normal[0], replay.normal[0])
+        return self.growing and np.array_equal(self.seen.normal[0], replay.normal[0])
 
     # What is computed
 
     def compute(self) -> None:
         """Compute the states selected, in the background, and show them as they are found."""
-        if self.selection is None or self._computes(self.selection):
-            return
-        self.message = ""
         asked = self.selection
+        if asked is None or self.work.computes(asked):
+            return
+        self.work.message = ""
         try:
             asked.parameters()
         except InputError as error:
-            self.message = str(error)
+            self.work.message = str(error)
             return
-        self.param.update(live=Following(asked), arriving=None, growing=None)
-        self.computation.start(compute.states(self.library, asked), self._computed)
+        with as_one(self.work, self):
+            self.seen = self.replay
+            self.work.compute(self.library, asked, self._computed)
 
     def _computed(self, shown: Shown) -> None:
         """Show states that were just computed; their exact intervals follow, if that is soon."""
@@ -366,34 +298,24 @@ class AppState(param.Parameterized):
         if event.new and self.missing and self.cell is not None:
             self.show(self.cell)
 
-    def _computes(self, selection: Selection) -> bool:
-        """Whether this is what is being computed."""
-        return self.computation.running and self.live and self.live.selection == selection
-
     def grow(self, replay: Replay) -> None:
         """Put the Replay of a walk that begins on screen."""
-        asked = self.live.selection
+        asked = self.work.live.selection
         told = brief(asked, self.library.series(asked))
         source = f"μ = {asked.mu:g}, {told} (as they are found)"
-        with as_one(self.looks, self):
-            self.param.update(
-                growing=replay, fourfold=0, plane=None, moving=False, source=source,
-                displacement=None,
-            )  # fmt: skip
+        with as_one(self.looks, self.work, self):
+            self.work.param.update(fourfold=0, moving=False)
+            self.param.update(seen=replay, plane=None, source=source, displacement=None)
             self._look(UNSEEN)
 
     def follow(self) -> Following | Arriving | None:
-        """The Following or Arriving of what is computed, or None; what has ended is dropped."""
-        if self.live is not None and not self.computation.running:
-            plane = self.plane if self.growing is None else None
-            with as_one(self.looks, self):
-                self.param.update(
-                    live=None, moving=False, growing=None, plane=plane, source=self._source()
-                )
+        """What is being computed, as `work` says; what was on screen is back where it ended."""
+        with as_one(self.looks, self.work, self):
+            if self.work.over:
+                plane = None if self.growing else self.plane
+                self.param.update(seen=self.replay, plane=plane, source=self._source())
                 self._look(UNSEEN)
-        if not self.computation.running:
-            self.arriving = None
-        return self.live or self.arriving
+            return self.work.follow()
 
     @property
     def asked(self) -> str:
@@ -401,37 +323,34 @@ class AppState(param.Parameterized):
         if not self.missing or self.cell is None:
             return ""
         words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
-        if self.computation.running:
+        if self.work.computation.running:
             return f"asked for: {words}"
         return f"of μ = {self.cell.mu:g}; not computed: {words}"
 
     def compute_exact(self) -> None:
         """Compute the exact intervals of the packing on screen, in the background."""
-        if self.computation.running or self.cell is None or self.exact is not None:
+        if self.work.computation.running or self.cell is None or self.exact is not None:
             return
-        self.message = ""
-        shown = self.library.shown(self.cell)
 
         def done(found: Shown) -> None:
             if found.cell == self.cell:
                 self._show(found)
 
-        self.computation.start(compute.exact(self.library, shown), done)
-        self.arriving = Arriving(compute.exact_parameters(self.cell.selection))
+        self.work.compute_exact(self.library, self.library.shown(self.cell), done)
 
     @property
     def exact_wanted(self) -> bool:
         """Whether exact intervals are neither there nor under way, nor anything before them."""
-        under_way = self.computation.running or self.knowledge.task.running
-        return self.exact is None and self.growing is None and not under_way
+        under_way = self.work.computation.running or self.knowledge.task.running
+        return self.exact is None and not self.growing and not under_way
 
     def _need_loads(self, *events: Any) -> None:
         """Limit loads of all contacts are computed where colour or width show them."""
         replay, cell = self.replay, self.cell
         if "load" not in (self.looks.colour, self.looks.thickness) or replay is None:
-            self.loading.cancel()
+            self.work.loading.cancel()
         elif self.loads is None and replay.summary["mu"] > 0:
-            self.loading.start(
+            self.work.loading.start(
                 perturbations.limit_loads(self.library, cell),
                 lambda found: self._loads_known(found, replay),
             )

@@ -78,7 +78,7 @@ class Controls:
         self.beside = FrictionSlider(self._typed, on_narrow=True, **WIDE)
         self.beside.link(self.mu, mu="mu", bidirectional=True)
         self.mu.link(self.beside, stored="stored", hill="hill")
-        state.task(reading).start(lambda job: studied.hill(), self._draw)
+        state.work.task(reading).start(lambda job: studied.hill(), self._draw)
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
         self.seed = self._number("Seed", 0, RANGES["seed"][1])
         self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
@@ -107,7 +107,7 @@ class Controls:
 
     def _number(self, label, start, end, step=1):
         def refuse(line):
-            self.state.message = line
+            self.state.work.message = line
 
         return NumberField(refuse, label=label, start=start, end=end, step=step, **FIELD)
 
@@ -169,9 +169,9 @@ class Controls:
         )
         state.param.watch(self._command, ["selection", "missing", "replay", "known"])
         self._command()
-        state.param.watch(self._tell, "message")
+        state.work.param.watch(self._tell, "message")
         self.error.param.watch(self._read, "closed")
-        state.computation.param.watch(self._rest, "running")
+        state.work.computation.param.watch(self._rest, "running")
         self._tell()
 
     def _draw(self, hill):
@@ -183,7 +183,7 @@ class Controls:
         try:
             self.mu.mu = friction(text.replace(",", "."))
         except InputError as error:
-            self.state.message = str(error)
+            self.state.work.message = str(error)
 
     def _ask(self):
         """Select what the widgets say."""
@@ -193,8 +193,8 @@ class Controls:
         try:
             state.ask(self._selection(), at_once=True)
         except InputError as error:
-            state.message = str(error)
-        if state.message:  # what was refused does not stay in its box
+            state.work.message = str(error)
+        if state.work.message:  # what was refused does not stay in its box
             self._follow()
 
     def _selection(self):
@@ -248,7 +248,7 @@ class Controls:
 
     def _rest(self, *events):
         state = self.state
-        self.go.visible = state.missing and not state.computation.running
+        self.go.visible = state.missing and not state.work.computation.running
         if state.missing:
             self.go.label = f"Compute {differs(state)}"
 
@@ -263,7 +263,9 @@ class Controls:
                 raise ValueError
         except ValueError:
             label = event.obj.label
-            self.state.message = f"{label}: a number from {low:g} to {high:g}, got {text[:30]!r}"
+            self.state.work.message = (
+                f"{label}: a number from {low:g} to {high:g}, got {text[:30]!r}"
+            )
             self._look()
             return
         self.looks.param.update({name: value})
@@ -280,8 +282,8 @@ class Controls:
     def _read(self, event):
         """What was read and closed may be told again."""
         if event.new:
-            self.state.message = ""
+            self.state.work.message = ""
 
     def _tell(self, *events):
-        message = self.state.message
+        message = self.state.work.message
         self.error.param.update(title=message, visible=bool(message), closed=False)

@@ -21,7 +21,7 @@ summary:focus-visible, .term:focus-visible { outline: 2px solid #e8710a; outline
 
 def lead(state):
     """The question that the picture answers, and what is seen, as HTML."""
-    if state.moving and not state.selection.imported:
+    if state.work.moving and not state.selection.imported:
         return jamming(state.selection)
     return "" if state.seen is None else first(state.seen.summary, PULL)
 
@@ -126,11 +126,12 @@ def view(state):
     made = Foldout(line=QUESTION, sizing_mode="stretch_width", margin=(4, 10))
 
     def tell(*events):
-        if state.moving and not state.selection.imported:
+        if state.work.moving and not state.selection.imported:
             made.inside = ""
         elif state.seen is not None:
             made.inside = rest(state.seen.summary)
 
-    state.param.watch(tell, ["replay", "growing", "moving"])
+    state.param.watch(tell, "seen")
+    state.work.param.watch(tell, "moving")
     tell()
     return made

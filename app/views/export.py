@@ -45,7 +45,7 @@ class View:
 
     def __init__(self, state):
         self.state = state
-        self.task, self.making = state.task(reading, told=False), state.task(told=False)
+        self.task, self.making = state.work.task(reading, told=False), state.work.task(told=False)
         self.buttons = Handover(self._asked, files=FILES, margin=(12, 10, 0, 10))
         self.told = note()
         for task in (self.task, self.making):

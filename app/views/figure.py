@@ -19,7 +19,7 @@ def panel(state):
     """The width, and a button for each kind of file; the browser makes them, see figure.js."""
 
     def refuse(line):
-        state.message = line
+        state.work.message = line
 
     def asked(kind):
         if state.replay is None:

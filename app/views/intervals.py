@@ -99,11 +99,12 @@ class View:
             getattr(self, name).param.watch(partial(self._choose, name), "value")
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
-        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed"])
+        state.param.watch(self._show, ["seen", "exact", "narrowed"])
         self.looks.param.watch(self._show, ["drawn", "sort", "scale", "contact"])
-        state.param.watch(self._offer, ["replay", "growing", "exact", "arriving"])
+        state.param.watch(self._offer, ["seen", "exact"])
+        state.work.param.watch(self._offer, "arriving")
         self.looks.param.watch(self._catch_up, "tab")
-        for task in (state.computation, state.knowledge.task):
+        for task in (state.work.computation, state.knowledge.task):
             task.param.watch(self._offer, "running")
         self._offer()
         self._stale = False
@@ -131,7 +132,7 @@ class View:
         named += [] if looks.contact is None else [looks.contact]
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact, len(order))
-        if not events or any(event.name in ("replay", "growing") for event in events):
+        if not events or any(event.name == "seen" for event in events):
             self._show_growth(replay)
         self._mark()
 
@@ -139,7 +140,7 @@ class View:
         """Exact intervals are to be asked for only where none are there or under way."""
         state = self.state
         self.exact.visible = state.replay is not None and state.exact_wanted
-        self.exact_item.visible = state.possible is not None or state.arriving is not None
+        self.exact_item.visible = state.possible is not None or state.work.arriving is not None
 
     def _show_bars(self, replay, exact, of):
         contacts = self.contacts
@@ -169,7 +170,7 @@ class View:
         }
         _set_range(self.figure.x_range, 0, len(contacts) + 1)
         top = 3.0 if self.looks.scale == "own" else _top(replay, before or exact)
-        if self.state.growing is not None:
+        if self.state.growing:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
@@ -177,7 +178,7 @@ class View:
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
 
     def _show_growth(self, replay):
-        grows = self.state.growing is not None
+        grows = self.state.growing
         number = live.numbers(replay.summary) if grows else replay.number
         unseen = np.full(len(number), np.nan, dtype=np.float32)
         self.growth.data = {"state": number.astype(np.int32)} | {

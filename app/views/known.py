@@ -29,8 +29,8 @@ class Known(Scripted):
     def __init__(self, state, **params):
         super().__init__(sizing_mode="stretch_width", margin=0, **params)
         self._state = state
-        shown = ["known", "narrowed", "ranked", "replay", "growing", "contact"]
-        state.param.watch(self._show, shown)
+        state.param.watch(self._show, ["known", "narrowed", "ranked", "seen"])
+        state.looks.param.watch(self._show, "contact")
         for task in (state.knowledge.task, state.knowledge.ranking):
             task.param.watch(self._show, "running")
         self._show()
@@ -52,9 +52,9 @@ class Known(Scripted):
         number, knowledge = state.replay.backbone, state.knowledge
         best = state.ranked
         self.param.update(
-            visible=state.growing is None
+            visible=not state.growing
             and state.replay.summary["dimension"] > 0
-            and (state.contact is not None or bool(state.known)),
+            and (state.looks.contact is not None or bool(state.known)),
             chips=[[one.contact, one.words(number[one.contact])] for one in state.known],
             words=words(state),
             ranked=[] if best is None else _ranks(best, number),

@@ -21,7 +21,7 @@ class Mine(Scripted):
 
     def __init__(self, state, **params):
         super().__init__(sizing_mode="stretch_width", **params)
-        self._state, self._task = state, state.task(reading)
+        self._state, self._task = state, state.work.task(reading)
         state.param.watch(self._list, ["catalogue", "cell"])
         self._list()
 
@@ -45,7 +45,7 @@ class Mine(Scripted):
                 try:
                     names.call(state.library.own, entry, name)
                 except InputError as error:
-                    state.message = str(error)
+                    state.work.message = str(error)
                 self._list()
             case {"delete": str(entry)} if entry in known:
                 self._task.start(lambda job: mine.delete(state.library, entry), self._gone)

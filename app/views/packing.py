@@ -12,7 +12,6 @@ from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
 FOLLOWED = ("second", "tab", "views", "wide", "thickness", "full", "stretch", "overlay", "scale")
-TOLD = ("source", "busy")  # by the state
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
@@ -67,7 +66,8 @@ class PackingView:
             palettes=palettes(looks.dark),
             zoom=None if looks.zoom is None else list(looks.zoom),
             **{name: getattr(looks, name) for name in (*SHARED, *FOLLOWED)},
-            **{name: getattr(state, name) for name in TOLD},
+            source=state.source,
+            busy=state.work.busy,
         )
         self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(2, 10))
         for name in SHARED:
@@ -77,8 +77,9 @@ class PackingView:
         self.player.param.watch(self._look_at, "zoom")
         self.player.param.watch(self._explain, "pulled")
         looks.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(self._follow, [*TOLD])
-        state.param.watch(self._show, ["replay", "growing", "exact", "narrowed", "measured"])
+        state.param.watch(self._follow, "source")
+        state.work.param.watch(self._follow, "busy")
+        state.param.watch(self._show, ["seen", "exact", "narrowed", "measured"])
         looks.param.watch(self._show, ["between", "full"])
         state.param.watch(self._pin, ["known", "ranked", "replay"])
         state.param.watch(self._displace, "displacement")
@@ -89,9 +90,8 @@ class PackingView:
         looks.param.watch(
             self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark"]
         )
-        state.param.watch(
-            self._explain, ["replay", "growing", "moving", "exact", "narrowed", "loads", "pulls"]
-        )
+        state.param.watch(self._explain, ["seen", "exact", "narrowed", "loads", "pulls"])
+        state.work.param.watch(self._explain, "moving")
         self._show()
         self._accompany()
         self._pin()
@@ -121,7 +121,7 @@ class PackingView:
         }
         if self._shown is not replay:
             self._shown = replay
-            room = 0 if state.growing is None else len(live.numbers(replay.summary))
+            room = len(live.numbers(replay.summary)) if state.growing else 0
             changes["walk"] = frames(replay, room)
             changes["free"] = replay.summary["dimension"]
         self.player.param.update(changes)
@@ -155,7 +155,7 @@ class PackingView:
 
     def _explain(self, *events):
         pulled = self.player.pulled or bool(self.state.pulls)
-        self.legend.object = JAMMING if self.state.moving else legend(self.state, pulled)
+        self.legend.object = JAMMING if self.state.work.moving else legend(self.state, pulled)
         self.player.lead = explanation.lead(self.state)
 
 

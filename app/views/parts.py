@@ -111,15 +111,16 @@ def together(function, **arguments):
 class TabView:
     """A tab's view, which calls `update` when something watched has changed, but only on screen.
 
-    Subclasses have a `name`, that of their tab. watched: parameters of the state; looks: of its
-    looks.
+    Subclasses have a `name`, that of their tab. watched: parameters of the state; looks, work: of
+    these.
     """
 
-    def __init__(self, state, *watched, looks=()):
+    def __init__(self, state, *watched, looks=(), work=()):
         self.state, self.looks = state, state.looks
         self._stale, self.left = True, False  # whether it was taken off the page
         state.param.watch(self._changed, [*watched])
         self.looks.param.watch(self._changed, ["tab", "wide", *looks])
+        state.work.param.watch(self._changed, [*work])
 
     @property
     def visible(self):

@@ -75,7 +75,7 @@ class View(TabView):
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.lead, self.told = note(), note()
-        self.task = state.task(told=False)
+        self.task = state.work.task(told=False)
         self.loads = self.pushed = self._shown = None
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.what.param.watch(self.refresh, "value")
@@ -114,7 +114,7 @@ class View(TabView):
         self.push.label = "Push" if one else "Compute for all contacts"
         self.strongest.visible = one and contact is None
         self.animate.visible = one and self.pushed is not None
-        self.guess.visible = one and state.contact is not None and self.pushed is None
+        self.guess.visible = one and contact is not None and self.pushed is None
         if state.replay is None:
             return
         if state.replay.summary["mu"] == 0:

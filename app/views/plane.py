@@ -55,7 +55,7 @@ class View(TabView):
     name, title = "plane", "Force space"
 
     def __init__(self, state):
-        super().__init__(state, "replay", "growing", "fourfold", looks=["contact", "second"])
+        super().__init__(state, "seen", looks=["contact", "second"], work=["fourfold"])
         empty = {"x": [], "y": []}
         self.path = ColumnDataSource(empty | {"state": []}, name="path")
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
@@ -66,9 +66,12 @@ class View(TabView):
         if self.looks.second is not None and self.looks.axes == "principal":
             self.looks.axes = "pair"
         self.planes = question("Shown", PLANES, self.looks, "axes")
-        self.task, self.placing = state.task(told=False), state.task(reading, told=False)
+        self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
-        self.others, self.other = state.task(), None  # who finds the other states; their Replay
+        self.others, self.other = (
+            state.work.task(),
+            None,
+        )  # who finds the other states; their Replay
         self.also.param.watch(lambda event: together(self._fetch), "value")
         self.lead, self.told = note(), note()
         self.placing.param.watch(self._failed, "message")
@@ -122,14 +125,14 @@ class View(TabView):
         state, kind = self.state, self.planes.value
         if kind not in WHOLE:
             return self.looks.contact, self.looks.second
-        return (state.fourfold,) if kind == "principal" and state.growing is not None else ()
+        return (state.work.fourfold,) if kind == "principal" and state.growing else ()
 
     def _place(self, replay, kind):
         """Have axes found that need a moment; of a walk under way from what there is of it."""
         state = self.state
-        library, following = state.library, state.live if state.growing is replay else None
+        library, following = state.library, state.work.live if state.growing else None
         selection = following.selection if following else state.cell.selection
-        states = following.states() if following and state.fourfold else None
+        states = following.states() if following and state.work.fourfold else None
         if kind == "principal" and following and states is None:
             self._clear()  # too few for axes
             self.told.object = COMING
@@ -154,7 +157,7 @@ class View(TabView):
         if state.seen is not replay:
             return
         self._show(replay, plane)
-        if state.growing is not None:
+        if state.growing:
             self.told.object = GROWS
             return
         if replay.summary["dimension"] == 0:
@@ -168,7 +171,7 @@ class View(TabView):
     def _look_beside(self):
         """Those of a store are shown; else the switch has them computed."""
         cell, self.other = self.state.cell, None
-        if self.state.growing is not None:
+        if self.state.growing:
             return self._fetch()
         self.others.cancel()
         self.also.label = ALSO[cell.kind]
@@ -183,7 +186,7 @@ class View(TabView):
         state, replay = self.state, self.state.replay
         self.others.cancel()
         self.other = None
-        if not self.also.value or state.cell is None or state.growing is not None:
+        if not self.also.value or state.cell is None or state.growing:
             self.beside.data = {"x": [], "y": []}
             self.marks.visible = False
             return
@@ -259,7 +262,7 @@ class View(TabView):
     def _path(self, replay, plane):
         """Columns of the path; of a walk under way the player fills in the states as they come."""
         path, number = plane.path, replay.number
-        if self.state.growing is not None:
+        if self.state.growing:
             number = live.numbers(replay.summary)
             path = np.full((len(number), 2), np.nan, dtype=np.float32)
             path[0] = plane.path[0]

@@ -37,7 +37,7 @@ class View(TabView):
         self.folded = [pn.Column(sizing_mode="stretch_width") for _ in studied.FOLDED]
         self.more = folded_away(*chain(*zip(studied.FOLDED, self.folded, strict=True)))
         self.lead, self.told = note(), note()
-        self.task = state.task(reading)
+        self.task = state.work.task(reading)
         self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self._drawn = None  # what the plots are of
@@ -89,7 +89,7 @@ class View(TabView):
         self.task.start(work, self._show)
 
     def _show(self, found):
-        self.state.piecewise(self._showing(found))
+        self.state.work.piecewise(self._showing(found))
 
     def _showing(self, found):
         figures, self.lead.object, self.told.object = found

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..jobs import Task
 from ..looks import Looks
 from ..state import AppState
+from ..work import Work
 from . import intervals, plane
 
 
@@ -29,13 +29,9 @@ class Light:
         self.looks = Looks(**{name: here[name] for name in Looks.param if name in here})
         self.loads, self.replay, self.seen = loads, replay, replay
         self.exact = self.possible = exact
-        self.computation = SimpleNamespace(running=False, param=_Deaf())
-        self.knowledge = SimpleNamespace(task=self.computation)
-        self.exact_wanted = False
-
-    def task(self, *arguments, **options):
-        """A Task that is never started."""
-        return Task()
+        self.work = Work()
+        self.knowledge = SimpleNamespace(task=self.work.task())
+        self.growing = self.exact_wanted = False
 
 
 def figures(replay, exact, chosen, outlined, view):

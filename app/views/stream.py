@@ -17,16 +17,17 @@ class Stream:
         self._sent = self._painted = 0
         self._awake, self._ticking = False, None
         player.on_live = self._heard
-        state.param.watch(self._follow, ["live", "arriving"])
-        state.param.watch(self._show, ["missing", "selection", "cell", "busy"])
+        state.work.param.watch(self._follow, ["live", "arriving"])
+        state.param.watch(self._show, ["missing", "selection", "cell"])
+        state.work.param.watch(self._show, "busy")
         self._follow()
 
     def _heard(self, message):
         """The browser tells that it draws anew, what it has painted, and whether it is seen."""
         if "anew" in message:
             self._sent = self._painted = 0
-            if self.state.live is not None:
-                self.state.live.rewind()
+            if self.state.work.live is not None:
+                self.state.work.live.rewind()
         self._painted = message.get("painted", self._painted)
         self._awake = message.get("seen", self._awake)
 
@@ -35,8 +36,8 @@ class Stream:
 
     def _follow(self, *events):
         self._show()
-        self.player.live = self.state.live is not None
-        ticking = self.player.live or self.state.arriving is not None
+        self.player.live = self.state.work.live is not None
+        ticking = self.player.live or self.state.work.arriving is not None
         if self._document is None or ticking == (self._ticking is not None):
             return
         if ticking:
@@ -57,8 +58,8 @@ class Stream:
                 self.state.grow(news["replay"])
                 continue
             if "picture" in news:
-                self.state.moving = True
+                self.state.work.moving = True
             self._sent += 1
             self.player.hand_over(news | {"number": self._sent})
             if "states" in news:
-                self.state.fourfold = following.fourfold
+                self.state.work.fourfold = following.fourfold

@@ -49,7 +49,7 @@ class View:
     def __init__(self, state):
         self.state = state
         self.files = {}
-        self.task = state.task(told=False)
+        self.task = state.work.task(told=False)
         self.dropper = Dropper(
             self._dropped,
             self._refuse,

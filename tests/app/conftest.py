@@ -123,7 +123,7 @@ def wait_for_fixture():
 def wait_for(state, seconds=240):
     """Poll as the page does until no task runs any more; the first ones compile all kernels."""
     end = time.monotonic() + seconds
-    while state.busy and time.monotonic() < end:
+    while state.work.busy and time.monotonic() < end:
         time.sleep(0.005)
-        state.poll()
-    assert not state.busy
+        state.work.poll()
+    assert not state.work.busy

@@ -55,7 +55,7 @@ def test_missing_stores_leave_a_note_not_an_error(tmp_path, wait_for):
     assert "no store" in library.notes[0]
     state = AppState(library)
     wait_for(state)
-    assert state.replay is None and state.message == ""
+    assert state.replay is None and state.work.message == ""
 
 
 @pytest.mark.parametrize("mu", [0, 0.1, 1])
@@ -271,7 +271,7 @@ def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(library, wait_
 
     state = AppState(library, query=query)
     wait_for(state)
-    assert state.message and "\n" not in state.message
+    assert state.work.message and "\n" not in state.work.message
     assert state.cell.mu == 0.1
 
 
@@ -292,7 +292,7 @@ def test_views_that_make_no_sense_are_left_out(library, wait_for):
     query = "mu=1&n=30&states=30&relax=nearest&contact=100000&frame=-2&colour=plaid&between=5"
     state = AppState(library, query=query)
     wait_for(state)
-    assert state.cell.mu == 1 and state.message == ""
+    assert state.cell.mu == 1 and state.work.message == ""
     looks = state.looks
     assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
 
@@ -332,11 +332,11 @@ def test_state_opens_near_mu_0_1_and_follows_the_selection(state, wait_for):
 def test_a_cell_in_memory_is_shown_at_once(state):
     state.library.shown(cell_at(state.library, 1))
     state.choose(mu=1)
-    assert state.cell.mu == 1 and not state.busy
+    assert state.cell.mu == 1 and not state.work.busy
 
 
 def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatch):
-    from app import state as module
+    from app import work as module
 
     asked = []
 
@@ -366,10 +366,10 @@ def test_stored_states_are_found_whatever_was_kept_of_them(state, wait_for):
 def test_states_in_no_store_are_missing_until_computed(state, wait_for):
     before = state.replay
     state.ask(small(0.3))
-    assert state.missing and state.replay is before and not state.busy
+    assert state.missing and state.replay is before and not state.work.busy
     state.compute()
     wait_for(state)
-    assert state.message == "" and state.cell.mu == 0.3 and not state.missing
+    assert state.work.message == "" and state.cell.mu == 0.3 and not state.missing
     assert "computed on this server" in state.source and len(state.replay.number) == 9
     assert [cell.mu for cell in state.cells()] == [0.3]
     assert len(state.catalogue) == 4
@@ -380,7 +380,7 @@ def test_a_series_without_states_at_a_friction_asks_for_them(state, wait_for):
     before = state.replay
     state.choose(mu=0.3)
     assert state.missing and state.replay is before and state.selection.mu == 0.3
-    assert state.selection == state.cell.selection.at(0.3) and not state.busy
+    assert state.selection == state.cell.selection.at(0.3) and not state.work.busy
     state.choose(mu=1)
     wait_for(state)
     assert not state.missing and state.cell.mu == 1
@@ -393,7 +393,7 @@ def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_f
     assert view.exact.visible
     state.compute_exact()
     assert not view.exact.visible
-    state.cancel()
+    state.work.cancel()
     wait_for(state)
     assert view.exact.visible
     state.knowledge.hold(3, float(state.replay.normal[0, 3]))  # which needs them
@@ -407,7 +407,7 @@ def test_too_little_friction_for_a_packing_is_called_that(state, wait_for):
     before = state.cell
     state.ask(small(0.0, packed_mu=1.0), at_once=True)
     wait_for(state)
-    assert "made at μ = 1" in state.message and "larger μ" in state.message
+    assert "made at μ = 1" in state.work.message and "larger μ" in state.work.message
     assert state.cell == before
 
 
@@ -444,9 +444,9 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
 
     before = state.replay
     state.ask(select(200, 0.05, 3, states=100), at_once=True)
-    state.computation.dismiss()
+    state.work.computation.dismiss()
     wait_for(state)
-    assert state.replay is before and state.message == ""
+    assert state.replay is before and state.work.message == ""
     assert state.selection == state.cell.selection and not state.missing
     assert len(state.catalogue) == 3
 
@@ -470,7 +470,7 @@ def test_a_friction_stands_beside_another_one_only(state, wait_for):
 def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):
     from app.selection import select
 
-    task = state.computation
+    task = state.work.computation
     state.ask(select(20, 0.05, 3, states=9), at_once=True)
     task._job.stop()  # before there is a state: it ends with the first one
     wait_for(state)
@@ -530,20 +530,20 @@ def test_what_is_refused_does_not_stay_in_its_box(state):
 
     controls = Controls(state)
     controls._typed("1e9")
-    assert "friction" in state.message.lower() and controls.mu.mu == state.cell.mu
+    assert "friction" in state.work.message.lower() and controls.mu.mu == state.cell.mu
     controls._typed("0,01")
-    assert state.selection.mu == 0.01 and not state.message
-    state.cancel()
+    assert state.selection.mu == 0.01 and not state.work.message
+    state.work.cancel()
 
 
 def test_closing_the_page_ends_its_computation(state):
     from app.selection import select
 
     state.ask(select(200, 0.05, 3, states=100), at_once=True)
-    job = state.computation._job
+    job = state.work.computation._job
     while job.fraction is None:
         time.sleep(0.01)  # until it is under way
-    state.close()
+    state.work.close()
     assert job.wait(30) and job.result is None and job.error == ""
 
 
@@ -552,7 +552,7 @@ def test_progress_grows_and_estimates_the_rest(state, wait_for, monkeypatch):
     from app.selection import select
 
     fractions = []
-    state.computation.param.watch(lambda event: fractions.append(event.new), "fraction")
+    state.work.computation.param.watch(lambda event: fractions.append(event.new), "fraction")
     state.ask(select(DISKS, 0.2, 2, states=100), at_once=True)
     wait_for(state)
     known = [value for value in fractions if value is not None]
@@ -567,7 +567,7 @@ def test_sizes_beyond_the_limits_are_refused(state, monkeypatch):
     monkeypatch.setattr(module, "LIMITS", Limits(n=50, states=10))
     for asked, word in ((small(0.2, 11), "states"), (select(51, 0.2, 1, states=5), "N must lie")):
         state.ask(asked, at_once=True)
-        assert not state.busy and word in state.message and "\n" not in state.message
+        assert not state.work.busy and word in state.work.message and "\n" not in state.work.message
 
 
 BEYOND = {
@@ -605,9 +605,9 @@ def test_links_beyond_the_limits_compute_nothing_and_say_so(state, name):
             line = str(error)
         else:
             state.ask(wanted, at_once=True)
-            line = state.message
+            line = state.work.message
         assert line and "\n" not in line and len(line) <= 300, value[:20]
-        assert not state.busy and state.replay is before and state.selection is selection
+        assert not state.work.busy and state.replay is before and state.selection is selection
 
 
 def test_all_that_a_link_may_name_is_limited():
@@ -776,7 +776,7 @@ def test_a_job_that_waits_for_another_page_can_be_cancelled():
 def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
     from app.views.progress import Progress
 
-    task = state.task()
+    task = state.work.task()
     progress, told = Progress(task), threading.Event()
     assert not progress.running
 
@@ -792,7 +792,7 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
 
     task.start(work)
     assert told.wait(10)
-    state.poll()
+    state.work.poll()
     assert progress.running and progress.fraction == 0.25
     assert progress.words == "counting — about 20 min more"
     progress._handle_msg({"cancel": True})
@@ -833,7 +833,7 @@ def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(
     state = AppState(library)
     with pytest.warns(UserWarning, match="damaged"):
         wait_for(state)
-    assert f"{best.name} in" in state.message and "\n" not in state.message
+    assert f"{best.name} in" in state.work.message and "\n" not in state.work.message
     assert state.cell is not None and state.cell.mu != 0.1
     assert [cell.mu for cell in state.catalogue] == [0, 1]
     if array == "*":
@@ -871,10 +871,10 @@ def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_pa
     assert library.expected_steps(DISKS, 0.1) is None
     state = AppState(library)
     wait_for(state)
-    assert "no store" in state.message and state.cell is None
+    assert "no store" in state.work.message and state.cell is None
     state.ask(small(1, 4), at_once=True)
     wait_for(state)
-    assert state.cell.mu == 1 and state.cell.store is library.cache and state.message == ""
+    assert state.cell.mu == 1 and state.cell.store is library.cache and state.work.message == ""
 
 
 # Survival
@@ -940,7 +940,7 @@ def test_a_pool_survives_pages_that_are_gone(library):
     from app.state import AppState
 
     pool, state = Pool(1, "test"), AppState(library, raising(RuntimeError("page destroyed")))
-    begun, tasks = threading.Event(), [state.task(pool) for _ in range(3)]
+    begun, tasks = threading.Event(), [state.work.task(pool) for _ in range(3)]
 
     def work(job):
         begun.set()
@@ -951,17 +951,17 @@ def test_a_pool_survives_pages_that_are_gone(library):
         task.start(work)
     jobs = [task._job for task in tasks]
     assert begun.wait(10)
-    state.close()
+    state.work.close()
     assert all(job.wait(10) for job in jobs) and next_on(pool)
 
 
 def test_nothing_begins_for_a_page_that_was_closed(state):
     begun = []
-    state.close()
-    task = state.task()
+    state.work.close()
+    task = state.work.task()
     task.start(begun.append)
-    state.reader.start(begun.append)
-    assert not task.running and not state.reader.running and begun == []
+    state.work.reader.start(begun.append)
+    assert not task.running and not state.work.reader.running and begun == []
 
 
 def test_a_result_that_cannot_be_shown_is_told_in_one_line():

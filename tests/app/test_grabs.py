@@ -16,7 +16,7 @@ class Page:
 
     def __init__(self, state, wait_for):
         self.state, self.told, self._wait = state, [], lambda: wait_for(state)
-        self.hand = Hand(state, state.task(reading), self._tell)
+        self.hand = Hand(state, state.work.task(reading), self._tell)
         self._wait()
 
     def _tell(self, message):
@@ -108,7 +108,7 @@ def test_a_force_that_cannot_be_is_one_clear_line(page, state):
     value = middle(page.hear(grab=4)["rail"])
     page.hear(hold=[4, value])
     page.hear(hold=[4, 900.0])
-    assert "outside its exact interval" in state.message
+    assert "outside its exact interval" in state.work.message
     assert state.pulls == [(4, value)]
 
 
@@ -122,7 +122,7 @@ def test_messages_that_make_no_sense_are_ignored(page, state):
         {"hold": [4, float("nan")]},
     ):
         page.hand.heard(message)
-    assert not page.told and not state.pulls and not state.busy
+    assert not page.told and not state.pulls and not state.work.busy
 
 
 def test_the_pulls_of_a_page_are_limited(page, state, monkeypatch):
@@ -130,7 +130,7 @@ def test_the_pulls_of_a_page_are_limited(page, state, monkeypatch):
     value = middle(page.hear(grab=4)["rail"])
     page.hear(hold=[4, value])
     page.hear(hold=[4, 0.99 * value])
-    assert len(state.pulls) == 1 and "undo" in state.message
+    assert len(state.pulls) == 1 and "undo" in state.work.message
 
 
 @pytest.mark.parametrize("pair", [None, ((4, 0), (9, 0)), ((4, 0), (4, 1))])

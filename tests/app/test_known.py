@@ -22,7 +22,7 @@ def held(state, wait_for, *contacts, error=0.0):
 def test_a_held_force_narrows_the_others(state, wait_for):
     held(state, wait_for, 4)
     found = state.narrowed
-    assert not state.message and found.known == tuple(state.known)
+    assert not state.work.message and found.known == tuple(state.known)
     (h, fewer), (mean, less) = found.dimension, found.mean
     assert fewer == h - 1 and less < mean
     assert np.all(found.extents[1] <= found.extents[0] + 1e-6)
@@ -119,8 +119,8 @@ def test_a_link_cannot_state_more_than_a_page(state):
     for contact in range(known.MOST_KNOWN):
         state.known = [*state.known, Statement(contact, 1.0, 5.0)]
     state.knowledge.hold(40, 1.0)
-    assert "let some go" in state.message and len(state.known) == known.MOST_KNOWN
-    state.cancel()
+    assert "let some go" in state.work.message and len(state.known) == known.MOST_KNOWN
+    state.work.cancel()
 
 
 def test_contradictions_are_one_clear_line_and_taken_back(state, library, wait_for):
@@ -128,11 +128,11 @@ def test_contradictions_are_one_clear_line_and_taken_back(state, library, wait_f
     before = state.known
     state.known = [*before, Statement(9, 30.0)]
     wait_for(state)
-    assert "agrees with" in state.message and "\n" not in state.message
+    assert "agrees with" in state.work.message and "\n" not in state.work.message
     assert state.known == before and state.narrowed.known == tuple(before)
     other = AppState(library, query=state.link().split("&known")[0] + "&known=9:30")
     wait_for(other)
-    assert "agrees with" in other.message and not other.known
+    assert "agrees with" in other.work.message and not other.known
 
 
 def test_what_is_left_no_room_for_is_refused_at_once(state, wait_for):
@@ -140,19 +140,19 @@ def test_what_is_left_no_room_for_is_refused_at_once(state, wait_for):
     low, high = state.narrowed.after["low"].values[:, 0], state.narrowed.after["high"].values[:, 0]
     scale = state.replay.force_scale
     state.knowledge.hold(9, float(high[9] / scale + 0.2))
-    assert "leaves" in state.message and len(state.known) == 1 and not state.busy
+    assert "leaves" in state.work.message and len(state.known) == 1 and not state.work.busy
     fixed = [c for c in np.flatnonzero(high - low < 1e-9) if c != 4]
     for contact in fixed[:1]:
         state.knowledge.hold(int(contact), float(low[contact] / scale))
-        assert "nothing new" in state.message and len(state.known) == 1
+        assert "nothing new" in state.work.message and len(state.known) == 1
 
 
 def test_messages_of_browsers_that_make_no_sense_are_ignored(state):
     for message in ({"hold": [10**9, 1.0, 0]}, {"hold": [1]}, {"release": "x"}, {"x": 1}):
         state.knowledge.heard(message)
-    assert not state.known and not state.busy
+    assert not state.known and not state.work.busy
     state.knowledge.heard({"hold": [4, float("nan"), 0]})
-    assert not state.known and "must lie between" in state.message
+    assert not state.known and "must lie between" in state.work.message
 
 
 def test_another_packing_has_its_own(state, wait_for):
@@ -164,7 +164,7 @@ def test_another_packing_has_its_own(state, wait_for):
 
 def test_pulls_keep_what_is_held(state, wait_for):
     told = []
-    hand = Hand(state, state.task(reading), told.append)
+    hand = Hand(state, state.work.task(reading), told.append)
     held(state, wait_for, 4)
     hand.heard({"grab": 9})
     wait_for(state)
@@ -173,12 +173,12 @@ def test_pulls_keep_what_is_held(state, wait_for):
     np.testing.assert_allclose(normal[:, 4], state.known[0].value, atol=1e-6)
     assert np.ptp(normal[:, 9]) > 0
     hand.heard({"grab": 4})
-    assert told[-1] == {"rail": None} and "let it go" in state.message
+    assert told[-1] == {"rail": None} and "let it go" in state.work.message
 
 
 def test_what_was_pulled_can_be_held(state, wait_for):
     told = []
-    hand = Hand(state, state.task(reading), told.append)
+    hand = Hand(state, state.work.task(reading), told.append)
     hand.heard({"grab": 9})
     wait_for(state)
     rail = told[-1]["rail"]
@@ -187,7 +187,7 @@ def test_what_was_pulled_can_be_held(state, wait_for):
     pulled = told[-1]["held"]["normal"]
     state.knowledge.hold(9, float(pulled[9]))
     wait_for(state)
-    assert len(state.pulls) == 1 and not state.message
+    assert len(state.pulls) == 1 and not state.work.message
     np.testing.assert_allclose(told[-1]["held"]["normal"], pulled, atol=1e-4)
 
 
@@ -198,7 +198,7 @@ def test_a_force_held_at_nothing_leaves_the_same_contacts(state, wait_for):
     contact = int(np.flatnonzero(low < 1e-9)[0])
     state.knowledge.hold(contact, 0.0)
     wait_for(state)
-    assert not state.message and state.narrowed.mean[1] < state.narrowed.mean[0]
+    assert not state.work.message and state.narrowed.mean[1] < state.narrowed.mean[0]
     np.testing.assert_array_equal(state.narrowed.after["backbone"], state.replay.backbone)
 
 
@@ -214,7 +214,7 @@ def test_bounds_arrive_the_held_contact_first(state, wait_for):
         )
 
     found = []
-    state.task().start(known.narrowing(state.library, shown, statements, begun), found.append)
+    state.work.task().start(known.narrowing(state.library, shown, statements, begun), found.append)
     wait_for(state)
     lefts = [one.left for one in told]
     assert lefts == sorted(lefts, reverse=True) and lefts[0] == 1 and len(lefts) > 50

@@ -16,6 +16,7 @@ from app.views.intervals import View
 from app.views.messages import TO_BROWSER, listed
 from app.views.packing import PackingView
 from app.views.stream import Stream
+from app.work import Work
 
 
 class Browser:
@@ -44,11 +45,11 @@ class Browser:
     def run(self, until=lambda: False, seconds=120):
         """Tick and poll as a page does until nothing runs any more."""
         end = time.monotonic() + seconds
-        while self.state.busy and not until() and time.monotonic() < end:
+        while self.state.work.busy and not until() and time.monotonic() < end:
             time.sleep(0.005)
             self.stream.tick()
-            self.state.poll()
-        assert until() or not self.state.busy
+            self.state.work.poll()
+        assert until() or not self.state.work.busy
 
 
 def asked(mu, states=20, **others):
@@ -61,7 +62,7 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     state.ask(asked(0.23), at_once=True)
     assert state.asked.startswith("asked for: μ = 0.23") and browser.player.asked == state.asked
     assert browser.player.live and state.seen is old
-    browser.run(lambda: state.growing is not None)
+    browser.run(lambda: state.growing)
     pictures = browser.parts("picture")
     fractions = [picture["fraction"] for picture in pictures]
     # The gas has φ = 0.5. At least 33 pictures are kept, one for each shrinking by STRAIN; a page
@@ -69,13 +70,13 @@ def test_compaction_and_walk_are_seen_as_they_go(state):
     assert len(pictures) > 18 and 0.5 - 1e-6 < fractions[0] < 0.55
     assert fractions[-1] > 0.75 and pictures[0]["box"][0] > 1.15 * pictures[-1]["box"][0]
     assert len(pictures[0]["x"]) == 2 * DISKS and pictures[-1]["mu"] == 0.23
-    assert state.seen is state.growing and state.replay is old
+    assert state.growing and state.replay is old
     assert "as they are found" in state.source
     begun = browser.player.walk
     assert begun["room"] == 21 and len(begun["number"]) == 1 and begun["mu"] == 0.23
     assert len(tab.growth.data["state"]) == 21
     browser.run()
-    assert state.growing is None and state.live is None and not state.asked
+    assert not state.growing and state.work.live is None and not state.asked
     assert not browser.player.live and browser.player.walk["room"] == 0
     states = browser.parts("states")
     normal = np.concatenate([part["normal"] for part in states]).reshape(-1, begun["contacts"])
@@ -92,7 +93,7 @@ def test_what_is_computed_at_once_is_never_offered_to_be_computed(state):
     controls.go.param.watch(lambda event: offered.append(event.new), "visible")
     browser = Browser(state)
     state.ask(asked(0.38), at_once=True)
-    assert state.missing and state.busy and not offered
+    assert state.missing and state.work.busy and not offered
     browser.run()
     assert not offered and state.replay.summary["mu"] == 0.38
 
@@ -103,17 +104,17 @@ def test_force_space_has_axes_of_the_states_found_so_far(state, wait_for):
     browser, tab = Browser(state), plane.View(state)
     wait_for(state)
     state.ask(asked(0.36, 400), at_once=True)
-    browser.run(lambda: state.growing is not None)
+    browser.run(lambda: state.growing)
     assert state.plane is None and not len(tab.path.data["x"]) and not len(tab.outer.data["x"])
     browser.run(lambda: state.plane is not None)
-    first, states = state.plane, state.live.states().astype(float)
+    first, states = state.plane, state.work.live.states().astype(float)
     assert len(states) >= 4 and len(tab.path.data["x"]) == 401
     x, y = (tab.path.data[name] for name in "xy")
     assert np.isfinite([x[0], y[0]]).all() and np.isnan(x[1:]).all()  # the player fills them in
     np.testing.assert_allclose(np.linalg.norm(first.axes, axis=(1, 2)), 1)
     assert not len(tab.outer.data["x"])
     browser.run(lambda: state.plane is not first)
-    assert state.growing is None or state.fourfold > 1
+    assert not state.growing or state.work.fourfold > 1
     browser.run()
     assert np.isfinite(tab.path.data["x"]).all() and len(tab.outer.data["x"])
     assert len(state.replay.normal) == len(tab.path.data["x"])
@@ -127,12 +128,12 @@ def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state, wai
     wait_for(state)
     tab.planes.value = "contact"
     state.ask(asked(0.37, 20_000), at_once=True)
-    browser.run(lambda: state.growing is not None)
+    browser.run(lambda: state.growing)
     kept = state.plane
-    assert kept.components and len(tab.path.data["x"]) == len(live.numbers(state.growing.summary))
-    browser.run(lambda: state.fourfold > 1)
+    assert kept.components and len(tab.path.data["x"]) == len(live.numbers(state.seen.summary))
+    browser.run(lambda: state.work.fourfold > 1)
     assert state.plane is kept
-    state.cancel()
+    state.work.cancel()
     browser.run()
     browser.stream.tick()
     wait_for(state)
@@ -147,21 +148,21 @@ def test_a_page_that_comes_later_joins_and_both_end_with_the_same(library, wait_
     first.ask(asked(0.24, 400), at_once=True)
     one.run(lambda: len(one.parts("states")) > 0)
     second.ask(asked(0.24, 400), at_once=True)
-    assert second.live is not first.live
-    two.run(lambda: second.growing is not None)
-    assert second.growing is first.growing  # not computed anew
-    two.run(lambda: "already under way" in second.computation.stage or not second.busy)
-    while first.busy or second.busy:
+    assert second.work.live is not first.work.live
+    two.run(lambda: second.growing)
+    assert second.seen is first.seen  # not computed anew
+    two.run(lambda: "already under way" in second.work.computation.stage or not second.work.busy)
+    while first.work.busy or second.work.busy:
         one.run(lambda: True)
         two.run(lambda: True)
         for browser in (one, two):
             browser.stream.tick()
-            browser.state.poll()
+            browser.state.work.poll()
     assert second.replay.summary["states"] == 400
     np.testing.assert_array_equal(first.replay.normal, second.replay.normal)
 
 
-@pytest.mark.parametrize(("leave", "mu"), [(AppState.cancel, 0.33), (AppState.close, 0.34)])
+@pytest.mark.parametrize(("leave", "mu"), [(Work.cancel, 0.33), (Work.close, 0.34)])
 def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, mu):
     first, second = AppState(library), AppState(library)
     for state in (first, second):
@@ -171,19 +172,19 @@ def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, 
     first.ask(wanted, at_once=True)
     one.run(lambda: len(one.parts("states")) > 0)
     second.ask(wanted, at_once=True)
-    two.run(lambda: second.growing is not None)
+    two.run(lambda: second.growing)
     walk = live.shared(live.Walking, wanted.parameters())
     run, found = walk.run, walk._found
-    leave(first)
+    leave(first.work)
     one.run(seconds=1)  # at once for who leaves
-    assert not first.busy and not second.computation.message
+    assert not first.work.busy and not second.work.computation.message
     two.run(lambda: walk._found > found + 20)
-    assert walk.run == run and second.computation.running  # not begun anew
-    second.cancel()
+    assert walk.run == run and second.work.computation.running  # not begun anew
+    second.work.cancel()
     two.run(seconds=60)
     found = walk._found
     time.sleep(0.3)
-    assert not second.busy and walk._found <= found + 1  # nobody wants it any more
+    assert not second.work.busy and walk._found <= found + 1  # nobody wants it any more
 
 
 def test_while_it_is_compressed_the_words_say_that_it_moves(state):
@@ -191,11 +192,11 @@ def test_while_it_is_compressed_the_words_say_that_it_moves(state):
     view = PackingView(state)
     assert "never move.</b>" in view.player.lead and " largest radii" in view.legend.object
     state.ask(asked(0.35, 20_000), at_once=True)
-    browser.run(lambda: state.moving)
+    browser.run(lambda: state.work.moving)
     assert "move until they jam" in view.player.lead and "which shrinks" in view.legend.object
-    browser.run(lambda: state.growing is not None)
+    browser.run(lambda: state.growing)
     assert "never move.</b>" in view.player.lead and " largest radii" in view.legend.object
-    state.cancel()
+    state.work.cancel()
     browser.run()
 
 
@@ -229,11 +230,11 @@ def test_a_browser_that_stops_painting_is_sent_no_more(state):
 def test_cancelled_the_old_picture_is_back_and_says_what_is_not_computed(state, wait_for):
     browser, old = Browser(state), state.replay
     state.ask(asked(0.27, 20_000), at_once=True)
-    browser.run(lambda: state.growing is not None)
-    state.cancel()
+    browser.run(lambda: state.growing)
+    state.work.cancel()
     browser.run()
     browser.stream.tick()
-    assert state.seen is old and state.live is None and state.missing
+    assert state.seen is old and state.work.live is None and state.missing
     assert state.asked.startswith("of μ = 0.1; not computed: μ = 0.27")
     assert "precomputed" in state.source
     assert browser.player.walk["room"] == 0 and browser.player.walk["mu"] == 0.1
@@ -252,7 +253,7 @@ def test_what_is_in_the_store_ends_what_is_computed(state, wait_for):
     state.ask(asked(0.31, 20_000), at_once=True)
     state.choose(mu=1)
     wait_for(state)
-    assert state.replay.summary["mu"] == 1 and not state.missing and state.live is None
+    assert state.replay.summary["mu"] == 1 and not state.missing and state.work.live is None
 
 
 def test_a_point_is_seen_to_be_compressed_and_needs_no_walk(state):
@@ -266,10 +267,10 @@ def test_exact_bounds_are_seen_as_they_are_found(state, monkeypatch):
     monkeypatch.setattr(live, "BOUNDS_S", 0)
     browser = Browser(state)
     state.compute_exact()
-    assert state.arriving is not None and not browser.player.live
+    assert state.work.arriving is not None and not browser.player.live
     browser.run()
     browser.stream.tick()
-    assert state.arriving is None and browser.stream._sent
+    assert state.work.arriving is None and browser.stream._sent
     seen = browser.parts("bounds")
     known = [np.isfinite(np.stack([part["low"], part["high"]])).sum(axis=1) for part in seen]
     assert np.all(np.diff(known, axis=0) >= 0) and known[0][1] < len(state.replay.backbone)

@@ -38,7 +38,7 @@ def test_computations_are_listed_named_opened_and_deleted(computed, wait_for):
         wait_for(state)
     assert not view.rows and not list(state.library.own)  # nothing of it is left
     assert names.names(state.library.own) == {}
-    assert state.replay is not None and state.message == ""  # what is on screen stays there
+    assert state.replay is not None and state.work.message == ""  # what is on screen stays there
 
 
 def test_what_is_not_in_the_list_is_left_alone(computed, wait_for):
@@ -60,7 +60,7 @@ def test_an_upload_is_called_by_its_files(state, wait_for):
 
     packing = state.library.packing(state.cell.params["packing"])
     brought = uploads.keep(state.library, packing, "NPZ archive: heap.npz")
-    task = state.task()
+    task = state.work.task()
     found = []
     task.start(brought, found.append)
     wait_for(state)

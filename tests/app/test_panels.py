@@ -41,8 +41,8 @@ def settled(state, seconds=240, done=lambda: True):
     """Poll as the page does until no task runs; the first ones compile all kernels."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        state.poll()
-        if not any(task.running for task in state.tasks) and done():
+        state.work.poll()
+        if not any(task.running for task in state.work.tasks) and done():
             return state
         time.sleep(0.02)
     raise AssertionError("a task did not end")
@@ -275,7 +275,7 @@ def test_an_upload_is_kept_reported_and_shown(state):
     assert view.task.running and not view.waiting.visible
     settled(state, 120, lambda: state.cell is not None and state.cell.selection.imported)
     assert "604" in view.report.object and "&lt;b&gt;c" in view.report.object
-    assert state.replay.summary["contacts"] == 604 and state.message == ""
+    assert state.replay.summary["contacts"] == 604 and state.work.message == ""
 
 
 def test_a_refused_upload_changes_nothing(state):

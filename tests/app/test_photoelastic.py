@@ -62,7 +62,7 @@ def test_exact_measurements_are_taken_as_they_are(state):
 def test_missing_contacts_are_filled_in_and_told(state, wait_for):
     opened(state)
     new, truth = files(n=100, missing=0.1, noise=0.05)
-    task, found = state.task(), []
+    task, found = state.work.task(), []
     given = uploads.added({}, new)
     assert not uploads.missing(given)
     task.start(photoelastic.infer(given, mu=0.3), found.append)
@@ -102,7 +102,7 @@ def test_it_can_be_cancelled(state, wait_for):
     view = dropped(state, new)
     begin = time.monotonic()
     while view.task.stage == "waiting for a free processor" and time.monotonic() < begin + 60:
-        state.poll()
+        state.work.poll()
     view.task.cancel()
     wait_for(state)
     assert not len(view.frame) and not view.error.visible

@@ -44,7 +44,7 @@ def test_the_outline_of_stresses_holds_all_and_is_kept(state):
 def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):
     opened(state)
     view, told = View(state), []
-    hand = Hand(state, state.task(reading), told.append)
+    hand = Hand(state, state.work.task(reading), told.append)
     view.planes.value = "stress"
     state.looks.tab = view.name
     settled(state, done=lambda: "shear" in view.told.object)

@@ -17,7 +17,7 @@ def test_the_volume_is_measured_once_and_found_again(state, view, wait_for):
 
     assert view.measure.visible and not view.tiles.object
     view.measure.clicks += 1
-    assert state.measuring.running and not view.measure.visible
+    assert state.work.measuring.running and not view.measure.visible
     wait_for(state)
     assert not view.measure.visible and "ln V" in view.tiles.object
     assert 0 < view.found["log_volume_error"].item() <= 0.1
