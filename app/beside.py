@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import param
+
 from granforce.records import InputError
 
 from . import compute
@@ -10,15 +12,18 @@ from .limits import LIMITS
 from .selection import Selection
 
 
-class Beside:
+class Beside(param.Parameterized):
     """What is seen beside the states on screen where `looks.beside` names another μ.
 
-    It is the same selection at that μ, with its own packing: `state.twin`. While the view is split,
+    It is the same selection at that μ, with its own packing: `twin`. While the view is split,
     who chooses another μ leaves there what was on screen; who pins a state or ends the split view
     gives it up.
     """
 
+    twin = param.Parameter(doc="the Shown of that μ, or None")
+
     def __init__(self, state: Any) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
         self.state, self.looks, self.task = state, state.looks, state.work.task()
         state.param.watch(self._follow, ["cell", "missing"])
         self.looks.param.watch(self._follow, ["split", "beside"])
@@ -40,7 +45,7 @@ class Beside:
             looks.beside = None  # nothing stands beside itself
         if looks.beside is None or state.cell is None:
             self.task.cancel()
-            state.twin = None
+            self.twin = None
             return
         try:
             wanted = state.cell.selection.at(looks.beside)
@@ -48,7 +53,7 @@ class Beside:
         except InputError as error:
             looks.beside, state.work.message = None, str(error)
             return
-        if state.twin is None or not state.twin.cell.selection.names(wanted):
+        if self.twin is None or not self.twin.cell.selection.names(wanted):
             self._find(wanted)
 
     def _find(self, wanted: Selection) -> None:
@@ -62,7 +67,7 @@ class Beside:
             self.task.start(lambda job: library.shown(cell), self._found)
         else:
             self.task.cancel()
-            state.twin = shown
+            self.twin = shown
 
     def _found(self, shown: Shown) -> None:
-        self.state.twin = shown
+        self.twin = shown

@@ -10,13 +10,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import param
 
 from granforce.records import Floats, InputError
 from granforce.study.pulls import Puller
 
 from . import known, planes
 from .data import Cell, Library
-from .jobs import Job, Task
+from .jobs import Job, reading
 from .replays import Replay
 
 Pull = tuple[Any, ...]  # see above
@@ -50,24 +51,28 @@ def _puller(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
     return found
 
 
-class Hand:
+class Hand(param.Parameterized):
     """The pulls of one page, as a stack; networks are made in the background.
 
-    `state.pulls` names them, from the state on screen on; what is known (`state.known`) stays in
-    all of them. tell(message) gets what the player shows: {"held": …}, {"rail": …} of a contact and
-    {"fan": …} of a plane.
+    What is known stays in all of them. `tell(message)`, once it is set, gets what the player shows:
+    {"held": …}, {"rail": …} of a contact and {"fan": …} of a plane.
     """
 
-    def __init__(self, state: Any, task: Task, tell: Callable[[Message], object]) -> None:
-        self.state, self._task, self._tell = state, task, tell
+    pulls = param.List(doc="what was pulled one after the other, from the state on screen on")
+    held = param.Parameter(doc="the Held that pulls have led to, or None")
+
+    def __init__(self, state: Any) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        self.state, self._task = state, state.work.task(reading)
+        self.tell: Callable[[Message], object] = lambda message: None
         self._made: list[tuple[Pull, Held]] = []  # of the pulls made
         self._base: tuple[Any, ...] | None = None  # and where from
-        self._on_screen = state.replay, state.looks.frame  # what was pulled
-        task.param.watch(self._failed, "message")
-        state.param.watch(self._follow, ["pulls", "replay", "known"])
+        self._followed: tuple[Any, ...] = self._all
+        self._task.param.watch(self._failed, "message")
+        self.param.watch(self._follow, "pulls")
+        state.param.watch(self._follow, "replay")
         state.looks.param.watch(self._follow, "frame")
-        if state.pulls:  # of the link
-            self._work()
+        state.knowledge.param.watch(self._follow, "known")
 
     def grab(self, contact: int) -> None:
         """Select a contact and have its rail made, from the network on screen."""
@@ -75,11 +80,11 @@ class Hand:
         if state.replay is None or state.growing:
             return
         state.looks.contact = contact
-        if contact in _held(state.known):
+        if contact in _held(state.knowledge.known):
             state.work.message = (
                 f"contact {state.replay.backbone[contact]} is held: let it go (H) to pull it"
             )
-            self._tell({"rail": None})
+            self.tell({"rail": None})
         else:
             self._work(contact)
 
@@ -90,15 +95,14 @@ class Hand:
 
     def hold(self, pull: Pull) -> None:
         """Let go: the pull stays."""
-        pulls = self.state.pulls
-        if len(pulls) >= MOST_PULLS:
+        if len(self.pulls) >= MOST_PULLS:
             self.state.work.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
             return
-        self.state.pulls = [*pulls, pull]
+        self.pulls = [*self.pulls, pull]
 
     def undo(self) -> None:
         """Step back before the last pull."""
-        self.state.pulls = self.state.pulls[:-1]
+        self.pulls = self.pulls[:-1]
 
     def heard(self, message: Message) -> None:
         """What the browser tells of the hand."""
@@ -117,29 +121,34 @@ class Hand:
             case {"undo": True}:
                 self.undo()
             case {"free": True}:
-                self.state.pulls = []
+                self.pulls = []
             case {"anew": True} if self._made:
                 self._show(self._made)
 
+    @property
+    def _all(self) -> tuple[Any, ...]:
+        """What is followed: pulls, the Replay and its row on screen, what is known."""
+        state = self.state
+        return self.pulls, state.replay, state.looks.frame, tuple(state.knowledge.known)
+
     def _follow(self, *events: Any) -> None:
         """Pulls belong to one state: with another one on screen they are gone."""
-        names = {event.name for event in events}
-        (replay, frame), now = self._on_screen, (self.state.replay, self.state.looks.frame)
-        self._on_screen = now
-        if "pulls" in names:
+        pulls, replay, frame, known = self._followed
+        self._followed = now = self._all
+        if pulls != now[0]:
             self._work()
-        elif self.state.pulls and (replay is not now[0] or frame != now[1]):
-            self.state.pulls = []
-        elif self.state.pulls and "known" in names:
+        elif pulls and (replay is not now[1] or frame != now[2]):
+            self.pulls = []
+        elif pulls and known != now[3]:
             self._work()  # the networks that keep what is known now
 
     def _work(self, grabbed: int | planes.Plane | None = None) -> None:
         """Make the networks of all pulls, and the rail of a contact or the fan of a Plane."""
-        state = self.state
-        replay, cell, pulls, frame = state.replay, state.cell, list(state.pulls), state.looks.frame
+        state, pulls = self.state, list(self.pulls)
+        replay, cell, frame = state.replay, state.cell, state.looks.frame
         if replay is None or cell is None:
             return
-        told = tuple(state.known)
+        told = tuple(state.knowledge.known)
         base = cell.name, frame, told
         made = self._made if self._base == base else []
         first = Held(_forces(replay, frame), float(replay.residual[frame]))
@@ -158,32 +167,32 @@ class Hand:
             self._task.start(work, self._done)
         else:
             self._task.cancel()
-            self._made, self._base, state.held = [], base, None
-            self._tell({"held": None})
+            self._made, self._base, self.held = [], base, None
+            self.tell({"held": None})
 
     def _done(self, found: tuple[Any, ...]) -> None:
         base, made, ready, more, refusal = found
         self._made, self._base = made, base
-        self.state.held = made[-1][1] if made else None
+        self.held = made[-1][1] if made else None
         if refusal:
             self.state.work.message = refusal
-            self.state.pulls = [pull for pull, _ in made]
+            self.pulls = [pull for pull, _ in made]
             return
         if ready is not None:
-            self._tell(ready)
+            self.tell(ready)
             if not ready.get("rail", {"whole": True})["whole"]:
-                self._task.start(lambda job: next(more), self._tell)
+                self._task.start(lambda job: next(more), self.tell)
         elif made:
             self._show(made)
 
     def _show(self, made: list[tuple[Pull, Held]]) -> None:
         pull, held = made[-1]
-        self._tell({"held": _spelled(held) | {"pull": list(pull)}})
+        self.tell({"held": _spelled(held) | {"pull": list(pull)}})
 
     def _failed(self, event: Any) -> None:
         if event.new:
             self.state.work.message = event.new
-            self._tell({"rail": None, "fan": None})
+            self.tell({"rail": None, "fan": None})
 
 
 def _forces(replay: Replay, frame: int) -> Floats:

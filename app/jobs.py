@@ -8,7 +8,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
@@ -195,6 +196,15 @@ def told(error: BaseException) -> str:
     return f"the computation failed: {type(error).__name__}: {line}"
 
 
+@contextmanager
+def as_one(*parts: param.Parameterized) -> Iterator[None]:
+    """What is set of these parts is told when all of it is there; the last part tells first."""
+    with ExitStack() as stack:
+        for part in parts:
+            stack.enter_context(param.parameterized.batch_call_watchers(part))
+        yield
+
+
 class Task(param.Parameterized):
     """One kind of work as a view sees it: at most one job at a time, a later one replaces it.
 
@@ -258,7 +268,7 @@ class Task(param.Parameterized):
             return
         done, self._job, self._done = self._done, None, None
         # Told as one: at no moment is the work over and its result not yet there.
-        with param.parameterized.batch_call_watchers(self):
+        with as_one(self):
             self.param.update(running=False, message=job.error)
             if done is not None and not job.error and not job.cancelled():
                 try:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
+import param
 import xarray as xr
 
 from granforce.records import Floats, InputError, Integers
@@ -14,7 +15,7 @@ from granforce.tolerances import CARRYING
 
 from . import compute
 from .data import Cell, Library, Shown
-from .jobs import Job
+from .jobs import Job, as_one
 from .replays import Replay
 from .selection import Selection, of_packing
 
@@ -130,42 +131,43 @@ class Ranked(NamedTuple):
     expected: Floats  # (k,) part by which errors fall, as forces go together over the states
 
 
-class Knowledge:
-    """The statements of one page; exact intervals under them are computed in the background.
+class Knowledge(param.Parameterized):
+    """The statements of one page; exact intervals under them are computed in the background."""
 
-    `state.known` holds the statements, `state.narrowed` what they leave open, `state.ranked` which
-    contact to measure next.
-    """
+    known = param.List(doc="Statements: forces of contacts that are taken for known")
+    narrowed = param.Parameter(doc="the Narrowed that they leave open, or None")
+    ranked = param.Parameter(doc="the Ranked contacts to measure next, or None")
 
     def __init__(self, state: Any) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
         self.state = state
         self.task, self.ranking = state.work.task(told=False), state.work.task()
-        state.param.watch(self._follow, ["known", "replay"])
+        self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
+        self.param.watch(self._follow, "known")
+        state.param.watch(self._follow, "replay")
         self._arriving: Underway | None = None  # the Underway of what is being computed
         self.task.param.watch(self._failed, "message")
         self.task.param.watch(self._arrive, "fraction")
-        self._first: Ranked | None = (
-            None  # the Ranked of what is being computed, before exact bounds
-        )
-        self.ranking.param.watch(lambda event: self._ranked(self._first), "fraction")
+        self._first: Ranked | None = None  # of what is being computed, before exact bounds
+        self.ranking.param.watch(lambda event: self._rank(self._first), "fraction")
 
     def hold(self, contact: int, value: float, error: float = 0.0) -> None:
         """Take f_n of a contact for known, in ⟨f_n⟩; a message where it cannot be."""
         state = self.state
-        others = [one for one in state.known if one.contact != contact]
+        others = [one for one in self.known if one.contact != contact]
         if state.replay is None or state.growing:
             return
         try:
             if len(others) >= MOST_KNOWN:
                 raise InputError(f"{MOST_KNOWN} known forces are the most; let some go")
-            state.known = [*others, self._stated(contact, value, error)]
+            self.known = [*others, self._stated(contact, value, error)]
             state.work.message = ""
         except InputError as refusal:
             state.work.message = str(refusal)
 
     def release(self, contact: int) -> None:
         """Take f_n of a contact for unknown again."""
-        self.state.known = [one for one in self.state.known if one.contact != contact]
+        self.known = [one for one in self.known if one.contact != contact]
 
     def heard(self, message: dict[str, Any]) -> None:
         """What a browser tells of the selected contact."""
@@ -180,7 +182,7 @@ class Knowledge:
     def compute(self) -> None:
         """Compute the exact intervals under what is known, in the background."""
         state = self.state
-        replay, known, cell = state.replay, tuple(state.known), state.cell
+        replay, known, cell = state.replay, tuple(self.known), state.cell
         shown = Shown(cell, replay, state.exact)
         self._arriving = None
 
@@ -189,14 +191,14 @@ class Knowledge:
 
         def done(narrowed: Narrowed) -> None:
             if state.replay is replay:
-                state.param.update(exact=narrowed.before, narrowed=narrowed)
+                self._narrow(narrowed)
 
         self.task.start(narrowing(state.library, shown, known, tell), done)
 
     def rank(self) -> None:
         """Find which contact to measure next, in the background."""
         state = self.state
-        replay, known = state.replay, tuple(state.known)
+        replay, known = state.replay, tuple(self.known)
         if replay is None or state.growing:
             return
         state.work.message = ""
@@ -206,22 +208,21 @@ class Knowledge:
         def tell(ranked: Ranked) -> None:
             self._first = ranked
 
-        self.ranking.start(ranking(state.library, state.cell, replay, known, tell), self._ranked)
+        self.ranking.start(ranking(state.library, state.cell, replay, known, tell), self._rank)
 
-    def _ranked(self, found: Ranked | None) -> None:
+    def _rank(self, found: Ranked | None) -> None:
         """Show contacts to measure next, if it is still this that is known."""
-        state = self.state
-        if found is not None and found.replay is state.replay:
-            state.ranked = found if found.known == tuple(state.known) else None
+        if found is not None and found.replay is self.state.replay:
+            self.ranked = found if found.known == tuple(self.known) else None
 
     def _stated(self, contact: int, value: float, error: float) -> Statement:
         """The Statement of a force, refused where what is known leaves no room for it."""
         state = self.state
         value, error = _number(value, "a known force"), _number(error, "an error bar")
         number = state.replay.backbone[contact]
-        current = self._settled and tuple(state.known) == state.narrowed.known
-        others = state.exact if not state.known else state.narrowed.after if current else None
-        if others is None or error or contact in {one.contact for one in state.known}:
+        current = self._settled and tuple(self.known) == self.narrowed.known
+        others = state.exact if not self.known else self.narrowed.after if current else None
+        if others is None or error or contact in {one.contact for one in self.known}:
             return Statement(contact, _rounded(value), _rounded(error))
         low, high = (float(_normal(others, name)[contact]) for name in ("low", "high"))
         width = high - low
@@ -241,33 +242,41 @@ class Knowledge:
     @property
     def _settled(self) -> bool:
         """Whether intervals under some known forces are there, all of them."""
-        return self.state.narrowed is not None and not self.state.narrowed.left
+        return self.narrowed is not None and not self.narrowed.left
 
     def _follow(self, *events: Any) -> None:
         """Intervals under what is known now; statements belong to one packing."""
-        state = self.state
-        state.ranked = None
+        (before, told), replay = self._followed, self.state.replay
+        self._followed = replay, tuple(self.known)
+        if before is replay and told == tuple(self.known):
+            return  # both came at once
+        self.ranked = None
         self.ranking.cancel()
-        if any(event.name == "replay" for event in events) or not state.known:
-            state.narrowed = None
-        done = state.narrowed.known if self._settled else ()
-        if state.known and state.replay is not None and tuple(state.known) != done:
+        if before is not replay or not self.known:
+            self.narrowed = None
+        done = self.narrowed.known if self._settled else ()
+        if self.known and replay is not None and tuple(self.known) != done:
             self.compute()
         else:
             self.task.cancel()
 
     def _arrive(self, event: Any) -> None:
         """Show the intervals that are there by now."""
-        arriving, state = self._arriving, self.state
-        if event.new and arriving is not None and arriving.known == tuple(state.known):
-            narrowed = arriving.narrowed
-            state.param.update(exact=narrowed.before, narrowed=narrowed)
+        arriving = self._arriving
+        if event.new and arriving is not None and arriving.known == tuple(self.known):
+            self._narrow(arriving.narrowed)
+
+    def _narrow(self, narrowed: Narrowed) -> None:
+        with as_one(self, self.state):
+            self.narrowed = narrowed
+            if self.state.exact is not narrowed.before:
+                self.state.exact = narrowed.before
 
     def _failed(self, event: Any) -> None:
         """What contradicts itself is taken back; the message says what it was."""
         if event.new:
             state = self.state
-            state.known = list(state.narrowed.known) if self._settled else []
+            self.known = list(self.narrowed.known) if self._settled else []
             state.work.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
 
 

@@ -16,8 +16,7 @@ from tornado.ioloop import IOLoop
 
 from . import garbage, scenes
 from .data import Library
-from .grabs import Hand
-from .jobs import Task, computing, reading
+from .jobs import Task, computing
 from .state import AppState
 from .views import explanation, figure
 from .views.address import Address
@@ -158,7 +157,7 @@ def _large(document: Document, query: str) -> Any:
     packing = PackingView(state)
     Stream(state, packing.player, document)
     packing.player.on_wide = lambda wide: looks.param.update(wide=wide)
-    packing.player.on_hand = Hand(state, work.task(reading), packing.player.hand_over).heard
+    packing.player.on_hand, state.hand.tell = state.hand.heard, packing.player.hand_over
     packing.player.on_known = state.knowledge.heard
     left = pn.Column(packing.player, **wide)
     middle = pn.Column(visible=False, css_classes=["in-plane"], styles=BESIDE, **wide)

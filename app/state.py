@@ -1,7 +1,6 @@
 """Which states a page has selected and shows, as parameters: no widgets, no plots."""
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -13,7 +12,8 @@ from granforce.records import InputError
 from . import known, perturbations
 from .beside import Beside
 from .data import Cell, Library, Shown, best_cell, nearest_cell
-from .jobs import Job
+from .grabs import Hand
+from .jobs import Job, as_one
 from .known import Knowledge
 from .limits import LIMITS
 from .links import OF_A_REPLAY, UNSEEN, VIEW, View, fitting, read_view, spelled
@@ -27,19 +27,12 @@ EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
 
-@contextmanager
-def as_one(*parts: param.Parameterized) -> Iterator[None]:
-    """What is set of these parts is told when all of it is there; the last part tells first."""
-    with ExitStack() as stack:
-        for part in parts:
-            stack.enter_context(param.parameterized.batch_call_watchers(part))
-        yield
-
-
 class AppState(param.Parameterized):
     """The states selected, and the catalogue to select from.
 
     How they are looked at is `looks`, what is being computed is `work`; these know nothing of it.
+    What is known of them is `knowledge`, what was pulled is in the `hand`, and `besides` is what is
+    seen beside them.
     """
 
     catalogue = param.List(doc="all cells, by series and μ")
@@ -52,15 +45,7 @@ class AppState(param.Parameterized):
     measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
     loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
     source = param.String(doc="where the states on screen come from, in words")
-    twin = param.Parameter(doc="the Shown of that μ, or None")
-    pulls = param.List(
-        doc="what was pulled one after the other, from `looks.frame` on; see `grabs`"
-    )
-    held = param.Parameter(doc="the grabs.Held that pulls have led to, or None")
     plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
-    known = param.List(doc="known.Statements: forces of contacts that are taken for known")
-    narrowed = param.Parameter(doc="known.Narrowed: what was known leaves so much open, or None")
-    ranked = param.Parameter(doc="known.Ranked: contacts to measure next, or None")
     displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
 
     def __init__(
@@ -77,15 +62,12 @@ class AppState(param.Parameterized):
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
         self.library, self.work = library, Work(wake)
         self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
-        # The parameters that a link may name.
+        self.knowledge, self.besides = Knowledge(self), Beside(self)
+        self.hand = Hand(self)  # which keeps what is known
+        self.parts = self.looks, self.knowledge, self.hand  # which a link names
         self._viewed: dict[str, Any] = {
-            name: part.param[name]
-            for name in VIEW
-            for part in (self.looks, self)
-            if name in part.param
+            name: part.param[name] for name in VIEW for part in self.parts if name in part.param
         }
-        self.knowledge = Knowledge(self)
-        self.besides = Beside(self)
         self.param.watch(self._need_loads, "replay")
         self.looks.param.watch(self._need_loads, ["colour", "thickness"])
         self.work.computation.param.watch(self._bring_back, "dismissed")
@@ -113,7 +95,7 @@ class AppState(param.Parameterized):
 
     def _look(self, view: View) -> None:
         """See this."""
-        for part in (self, self.looks):
+        for part in self.parts:
             part.param.update(**{name: view[name] for name in view if name in part.param})
 
     @property
@@ -126,7 +108,8 @@ class AppState(param.Parameterized):
         """The exact intervals of the Replay on screen, under what is known; or None."""
         if self.growing:
             return None
-        return self.exact if self.narrowed is None else self.narrowed.after
+        narrowed = self.knowledge.narrowed
+        return self.exact if narrowed is None else narrowed.after
 
     def refresh(self, shown: Shown | None = None) -> None:
         """Read the catalogue anew; show what was just computed."""
@@ -241,7 +224,7 @@ class AppState(param.Parameterized):
         fresh = dict(UNSEEN)
         if (self.replay is replay and view is None) or self._is_grown(replay):
             fresh = {}
-        with as_one(self.looks, self.work, self):
+        with as_one(*self.parts, self.work, self):
             self.work.shown(cell.selection)
             self.param.update(
                 selection=cell.selection,
@@ -303,14 +286,14 @@ class AppState(param.Parameterized):
         asked = self.work.live.selection
         told = brief(asked, self.library.series(asked))
         source = f"μ = {asked.mu:g}, {told} (as they are found)"
-        with as_one(self.looks, self.work, self):
+        with as_one(*self.parts, self.work, self):
             self.work.param.update(fourfold=0, moving=False)
             self.param.update(seen=replay, plane=None, source=source, displacement=None)
             self._look(UNSEEN)
 
     def follow(self) -> Following | Arriving | None:
         """What is being computed, as `work` says; what was on screen is back where it ended."""
-        with as_one(self.looks, self.work, self):
+        with as_one(*self.parts, self.work, self):
             if self.work.over:
                 plane = None if self.growing else self.plane
                 self.param.update(seen=self.replay, plane=plane, source=self._source())
@@ -364,9 +347,9 @@ class AppState(param.Parameterized):
     @property
     def command(self) -> str:
         """The commands that make the states asked for, and the intervals under what is known."""
-        made = command(self.selection)
-        if self.known and self.replay is not None and not self.missing:
-            made += "\n" + known.commands(self.selection, self.replay, self.known)
+        made, told = command(self.selection), self.knowledge.known
+        if told and self.replay is not None and not self.missing:
+            made += "\n" + known.commands(self.selection, self.replay, told)
         return made
 
     def link(self) -> str:

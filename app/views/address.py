@@ -29,8 +29,9 @@ class Address(Scripted):
     def __init__(self, state, **params):
         super().__init__(**params)
         self._state = state
-        for part in (state, state.looks):
-            part.param.watch(self._tell, [n for n in ("selection", *VIEW) if n in part.param])
+        state.param.watch(self._tell, "selection")
+        for part in state.parts:
+            part.param.watch(self._tell, [name for name in VIEW if name in part.param])
         self._tell()
 
     def _tell(self, *events):

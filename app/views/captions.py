@@ -9,7 +9,7 @@ NAMED = 4  # known forces that a caption names
 
 def caption(state):
     """What a picture says about itself: background, colour bar, scale and words."""
-    pulled, looks = bool(state.pulls), state.looks
+    pulled, looks = bool(state.hand.pulls), state.looks
     low, stops, high = colour_bar(state, pulled)
     contrast = "#f2f5f9" if looks.dark else "#18191d"
     return {
@@ -33,7 +33,7 @@ def origin(cell):
 def known_words(state):
     """What is known, in a line of a caption; none where nothing is."""
     number = state.replay.backbone
-    told = [one.words(number[one.contact]) for one in state.known]
+    told = [one.words(number[one.contact]) for one in state.knowledge.known]
     if told:
         more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
         yield f"Known: {'; '.join(told[:NAMED])}{more}."

@@ -52,7 +52,7 @@ def _frictions(found):
 def meaningful(state, labels, name):
     """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
     pinned = state.looks.reference
-    there = {"sign": pinned, "difference": pinned, "known": state.known}
+    there = {"sign": pinned, "difference": pinned, "known": state.knowledge.known}
     there |= dict.fromkeys(("deviation", "measured"), state.measured is not None)
     chosen = getattr(state.looks, name)
     return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
@@ -163,11 +163,13 @@ class Controls:
         self.full.param.watch(self._scale, "value")
         self.stretch.param.watch(self._scale, "value")
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
-        state.param.watch(self._look, ["known", "measured"])
+        state.param.watch(self._look, "measured")
+        state.knowledge.param.watch(self._look, "known")
         looks.param.watch(
             self._look, ["colour", "thickness", "full", "stretch", "overlay", "reference"]
         )
-        state.param.watch(self._command, ["selection", "missing", "replay", "known"])
+        state.param.watch(self._command, ["selection", "missing", "replay"])
+        state.knowledge.param.watch(self._command, "known")
         self._command()
         state.work.param.watch(self._tell, "message")
         self.error.param.watch(self._read, "closed")

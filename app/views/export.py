@@ -86,7 +86,7 @@ class View:
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
         possible = state.possible
-        loads, given, known = state.loads, gone(state, replay), pins(state)
+        loads, given, known = state.loads, gone(state.knowledge, replay), pins(state.knowledge)
         seen = measured(state, replay)
         view = state.view
         source = " ".join([origin(cell), *known_words(state)])
@@ -143,7 +143,7 @@ class View:
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
         frame = min(state.looks.frame, len(replay.normal) - 1)
-        source, held = origin(cell), state.held
+        source, held = origin(cell), state.hand.held
         link, view = state.link(), state.view
 
         def work(job):

@@ -99,7 +99,8 @@ class View:
             getattr(self, name).param.watch(partial(self._choose, name), "value")
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
-        state.param.watch(self._show, ["seen", "exact", "narrowed"])
+        state.param.watch(self._show, ["seen", "exact"])
+        state.knowledge.param.watch(self._show, "narrowed")
         self.looks.param.watch(self._show, ["drawn", "sort", "scale", "contact"])
         state.param.watch(self._offer, ["seen", "exact"])
         state.work.param.watch(self._offer, "arriving")
@@ -127,8 +128,8 @@ class View:
         for name in ("drawn", "sort", "scale"):
             getattr(self, name).value = getattr(looks, name)
         exact = exact_intervals(state.possible, replay)
-        order = sorted_contacts(replay, exact, looks.sort, state.narrowed)
-        named = [one.contact for one in state.known]
+        order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
+        named = [one.contact for one in state.knowledge.known]
         named += [] if looks.contact is None else [looks.contact]
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact, len(order))
@@ -149,8 +150,8 @@ class View:
         none = np.full_like(original, np.nan)
         low, high = (exact[name][contacts] if exact else none for name in ("low", "high"))
         whole, before = (none, none), {}
-        if exact and self.state.narrowed is not None:
-            before = exact_intervals(self.state.narrowed.before, replay)
+        if exact and self.state.knowledge.narrowed is not None:
+            before = exact_intervals(self.state.knowledge.narrowed.before, replay)
             whole = before["low"][contacts], before["high"][contacts]
         *widths, size = FEW if len(contacts) <= APART else MANY
         for renderer, width in zip(self.layers, widths, strict=True):

@@ -29,8 +29,9 @@ class Known(Scripted):
     def __init__(self, state, **params):
         super().__init__(sizing_mode="stretch_width", margin=0, **params)
         self._state = state
-        state.param.watch(self._show, ["known", "narrowed", "ranked", "seen"])
+        state.param.watch(self._show, "seen")
         state.looks.param.watch(self._show, "contact")
+        state.knowledge.param.watch(self._show, ["known", "narrowed", "ranked"])
         for task in (state.knowledge.task, state.knowledge.ranking):
             task.param.watch(self._show, "running")
         self._show()
@@ -50,25 +51,25 @@ class Known(Scripted):
         if state.replay is None:
             return
         number, knowledge = state.replay.backbone, state.knowledge
-        best = state.ranked
+        best = knowledge.ranked
         self.param.update(
             visible=not state.growing
             and state.replay.summary["dimension"] > 0
-            and (state.looks.contact is not None or bool(state.known)),
-            chips=[[one.contact, one.words(number[one.contact])] for one in state.known],
-            words=words(state),
+            and (state.looks.contact is not None or bool(knowledge.known)),
+            chips=[[one.contact, one.words(number[one.contact])] for one in knowledge.known],
+            words=words(knowledge, number),
             ranked=[] if best is None else _ranks(best, number),
             asking=knowledge.ranking.running,
         )
 
 
-def words(state):
+def words(knowledge, number):
     """What is known leaves so much open, as HTML."""
-    narrowed, known = state.narrowed, tuple(state.known)
+    narrowed, known = knowledge.narrowed, tuple(knowledge.known)
     if not known:
         return ASK
     if narrowed is None or narrowed.known != known:
-        working = state.knowledge.task.running
+        working = knowledge.task.running
         return "What it leaves open is being computed …" if working else "Not computed: cancelled."
     if narrowed.left:
         return f"Exact bounds are arriving, the strongest change first: {1 - narrowed.left:.0%}."
@@ -83,7 +84,6 @@ def words(state):
     short = narrowed.shortened
     order = [c for c in np.argsort(-short)[:STRONGEST] if short[c] > 0.005]
     if order:
-        number = state.replay.backbone
         most = ", ".join(f"{number[c]} (by {short[c]:.2f} ⟨fₙ⟩)" for c in order)
         told += f" Shortened most: contacts {most}."
     return told + " The states that play are of all of S; pulls keep what is known."

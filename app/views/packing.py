@@ -79,18 +79,22 @@ class PackingView:
         looks.param.watch(self._follow, [*SHARED, *FOLLOWED])
         state.param.watch(self._follow, "source")
         state.work.param.watch(self._follow, "busy")
-        state.param.watch(self._show, ["seen", "exact", "narrowed", "measured"])
+        state.param.watch(self._show, ["seen", "exact", "measured"])
+        state.knowledge.param.watch(self._show, "narrowed")
         looks.param.watch(self._show, ["between", "full"])
-        state.param.watch(self._pin, ["known", "ranked", "replay"])
+        state.param.watch(self._pin, "replay")
+        state.knowledge.param.watch(self._pin, ["known", "ranked"])
         state.param.watch(self._displace, "displacement")
-        state.param.watch(self._accompany, "twin")
+        state.besides.param.watch(self._accompany, "twin")
         state.param.watch(self._load, "loads")
         state.param.watch(self._project, "plane")
         looks.param.watch(self._dress, "dark")
         looks.param.watch(
             self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark"]
         )
-        state.param.watch(self._explain, ["seen", "exact", "narrowed", "loads", "pulls"])
+        state.param.watch(self._explain, ["seen", "exact", "loads"])
+        state.knowledge.param.watch(self._explain, "narrowed")
+        state.hand.param.watch(self._explain, "pulls")
         state.work.param.watch(self._explain, "moving")
         self._show()
         self._accompany()
@@ -114,7 +118,7 @@ class PackingView:
         exact = exact_intervals(state.possible, replay)
         changes = {
             "exact": exact,
-            "gone": gone(state, replay),
+            "gone": gone(state.knowledge, replay),
             "measured": measured(state, replay),
             "most": full_extent(replay, exact, looks.full),
             "between": None if looks.between is None else list(looks.between),
@@ -128,7 +132,7 @@ class PackingView:
 
     def _accompany(self, *events):
         """Another packing, beside the one on screen."""
-        twin = self.state.twin
+        twin = self.state.besides.twin
         if twin is None:
             self.player.twin = {}
         else:
@@ -136,7 +140,7 @@ class PackingView:
             self.player.twin = frames(twin.replay) | {"exact": exact}
 
     def _pin(self, *events):
-        self.player.pins = pins(self.state)
+        self.player.pins = pins(self.state.knowledge)
 
     def _load(self, event):
         self.player.loads = event.new
@@ -154,17 +158,17 @@ class PackingView:
         self.player.palettes = palettes(event.new)
 
     def _explain(self, *events):
-        pulled = self.player.pulled or bool(self.state.pulls)
+        pulled = self.player.pulled or bool(self.state.hand.pulls)
         self.legend.object = JAMMING if self.state.work.moving else legend(self.state, pulled)
         self.player.lead = explanation.lead(self.state)
 
 
-def pins(state):
+def pins(knowledge):
     """Contacts that are known, whether exactly, and those to measure next, the best first."""
     return {
-        "contacts": [one.contact for one in state.known],
-        "exact": [not one.error for one in state.known],
-        "ranked": [] if state.ranked is None else state.ranked.contacts.tolist(),
+        "contacts": [one.contact for one in knowledge.known],
+        "exact": [not one.error for one in knowledge.known],
+        "ranked": [] if knowledge.ranked is None else knowledge.ranked.contacts.tolist(),
     }
 
 
@@ -188,9 +192,9 @@ def exact_intervals(dataset, replay):
     }
 
 
-def gone(state, replay):
+def gone(knowledge, replay):
     """Of ΔF_n (N_c,), by what is known, in ⟨f_n⟩; or None while nothing is."""
-    narrowed = state.narrowed
+    narrowed = knowledge.narrowed
     if narrowed is None or len(narrowed.gone) != len(replay.backbone):
         return None
     return narrowed.gone.astype(np.float32)
@@ -260,7 +264,7 @@ def legend(state, pulled=False):
     bar = BAR.format(low=low, stops=",".join(stops), high=high)
     if looks.colour == "mobilised" and not pulled and replay.summary["mu"] == 0:
         bar = "(none at μ = 0)"
-    if looks.colour == "known" and not pulled and state.narrowed is None:
+    if looks.colour == "known" and not pulled and state.knowledge.narrowed is None:
         bar = "(nothing is known: select a contact and press H)"
     sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
     tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""

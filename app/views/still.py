@@ -30,7 +30,10 @@ class Light:
         self.loads, self.replay, self.seen = loads, replay, replay
         self.exact = self.possible = exact
         self.work = Work()
-        self.knowledge = SimpleNamespace(task=self.work.task())
+        self.knowledge = SimpleNamespace(
+            task=self.work.task(), narrowed=None, known=[], param=_Deaf()
+        )
+        self.hand = SimpleNamespace(pulls=[])
         self.growing = self.exact_wanted = False
 
 

@@ -464,7 +464,7 @@ def test_a_friction_stands_beside_another_one_only(state, wait_for):
     assert not any(f"mu={first:g}" in link and "beside" in link for link in links)
     state.choose(mu=first)  # as Back does
     wait_for(state)
-    assert state.looks.beside is None and state.twin is None
+    assert state.looks.beside is None and state.besides.twin is None
 
 
 def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from app import grabs, planes
-from app.grabs import Hand
-from app.jobs import reading
 from app.state import AppState
 from app.views.messages import FROM_BROWSER, TO_BROWSER, listed
 from granforce.study import pulls
@@ -16,8 +14,9 @@ class Page:
 
     def __init__(self, state, wait_for):
         self.state, self.told, self._wait = state, [], lambda: wait_for(state)
-        self.hand = Hand(state, state.work.task(reading), self._tell)
+        self.hand, state.hand.tell = state.hand, self._tell
         self._wait()
+        self.hear(anew=True)  # as a player that is drawn
 
     def _tell(self, message):
         assert listed(TO_BROWSER, "Player", message), message
@@ -73,10 +72,10 @@ def test_undo_steps_back_to_the_state(page, state):
     first = middle(page.hear(grab=4)["rail"])
     one = page.hear(hold=[4, first])["held"]
     page.hear(hold=[9, middle(page.hear(grab=9)["rail"])])
-    assert len(state.pulls) == 2
+    assert len(state.hand.pulls) == 2
     again = page.hear(undo=True)["held"]
     np.testing.assert_array_equal(again["normal"], one["normal"])
-    assert page.hear(undo=True) == {"held": None} and not state.pulls
+    assert page.hear(undo=True) == {"held": None} and not state.hand.pulls
 
 
 def test_pulls_travel_with_the_link(page, state, library, wait_for):
@@ -84,7 +83,7 @@ def test_pulls_travel_with_the_link(page, state, library, wait_for):
     held = page.hear(hold=[9, middle(page.hear(grab=9)["rail"])])["held"]
     other = AppState(library, query=state.link())
     wait_for(other)
-    assert len(other.pulls) == 2
+    assert len(other.hand.pulls) == 2
     again = Page(other, wait_for)
     np.testing.assert_allclose(again.told[-1]["held"]["normal"], held["normal"], atol=1e-4)
 
@@ -101,7 +100,14 @@ def test_links_with_pulls_that_make_no_sense_pull_nothing(text):
 def test_what_was_pulled_is_gone_with_another_state_on_screen(page, state):
     page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
     state.looks.frame = 3
-    assert not state.pulls and page.told[-1] == {"held": None}
+    assert not state.hand.pulls and page.told[-1] == {"held": None}
+
+
+def test_what_was_pulled_stays_when_exact_intervals_come(page, state, wait_for):
+    page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
+    state.compute_exact()
+    wait_for(state)
+    assert state.exact is not None and len(state.hand.pulls) == 1
 
 
 def test_a_force_that_cannot_be_is_one_clear_line(page, state):
@@ -109,7 +115,7 @@ def test_a_force_that_cannot_be_is_one_clear_line(page, state):
     page.hear(hold=[4, value])
     page.hear(hold=[4, 900.0])
     assert "outside its exact interval" in state.work.message
-    assert state.pulls == [(4, value)]
+    assert state.hand.pulls == [(4, value)]
 
 
 def test_messages_that_make_no_sense_are_ignored(page, state):
@@ -122,7 +128,7 @@ def test_messages_that_make_no_sense_are_ignored(page, state):
         {"hold": [4, float("nan")]},
     ):
         page.hand.heard(message)
-    assert not page.told and not state.pulls and not state.work.busy
+    assert not page.told and not state.hand.pulls and not state.work.busy
 
 
 def test_the_pulls_of_a_page_are_limited(page, state, monkeypatch):
@@ -130,7 +136,7 @@ def test_the_pulls_of_a_page_are_limited(page, state, monkeypatch):
     value = middle(page.hear(grab=4)["rail"])
     page.hear(hold=[4, value])
     page.hear(hold=[4, 0.99 * value])
-    assert len(state.pulls) == 1 and "undo" in state.work.message
+    assert len(state.hand.pulls) == 1 and "undo" in state.work.message
 
 
 @pytest.mark.parametrize("pair", [None, ((4, 0), (9, 0)), ((4, 0), (4, 1))])
@@ -165,7 +171,7 @@ def test_a_pulled_point_travels_with_the_link(page, state, library, wait_for):
     held = page.hear(hold_point=[float(fan["x"].mean()), float(fan["y"].mean())])["held"]
     other = AppState(library, query=state.link())
     wait_for(other)
-    assert other.pulls[0][0] == "4n-9t"
+    assert other.hand.pulls[0][0] == "4n-9t"
     np.testing.assert_allclose(
         Page(other, wait_for).told[-1]["held"]["normal"], held["normal"], atol=1e-4
     )
@@ -184,8 +190,10 @@ def test_the_table_of_contacts_holds_what_was_pulled(page, state):
     value = middle(page.hear(grab=4)["rail"])
     page.hear(hold=[4, value])
     replay = state.replay
-    table = contacts(replay, None, state.looks.frame, state.held)
+    table = contacts(replay, None, state.looks.frame, state.hand.held)
     assert table["f_n"][4] == pytest.approx(value * replay.force_scale)
-    assert "pulled" in on_screen(replay, state.looks.frame, state.held)
+    assert "pulled" in on_screen(replay, state.looks.frame, state.hand.held)
     page.hear(undo=True)
-    assert state.held is None and "original" in on_screen(replay, state.looks.frame, state.held)
+    assert state.hand.held is None and "original" in on_screen(
+        replay, state.looks.frame, state.hand.held
+    )

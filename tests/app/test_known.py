@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from app import known
-from app.grabs import Hand
-from app.jobs import reading
 from app.known import Statement
 from app.state import AppState
 
@@ -21,15 +19,17 @@ def held(state, wait_for, *contacts, error=0.0):
 
 def test_a_held_force_narrows_the_others(state, wait_for):
     held(state, wait_for, 4)
-    found = state.narrowed
-    assert not state.work.message and found.known == tuple(state.known)
+    found = state.knowledge.narrowed
+    assert not state.work.message and found.known == tuple(state.knowledge.known)
     (h, fewer), (mean, less) = found.dimension, found.mean
     assert fewer == h - 1 and less < mean
     assert np.all(found.extents[1] <= found.extents[0] + 1e-6)
     assert found.extents[1][4] < 1e-6 and found.shortened[4] == 0 < found.shortened.max()
     assert state.possible is found.after
     held(state, wait_for, 9)
-    assert state.narrowed.dimension == (h, h - 2) and state.narrowed.mean[1] < less
+    assert (
+        state.knowledge.narrowed.dimension == (h, h - 2) and state.knowledge.narrowed.mean[1] < less
+    )
 
 
 def test_colour_and_width_show_what_measuring_took_away(state, wait_for):
@@ -40,7 +40,7 @@ def test_colour_and_width_show_what_measuring_took_away(state, wait_for):
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     state.knowledge.hold(9, float(state.replay.normal[0, 9]), 0.02)
     wait_for(state)
-    before, after = state.narrowed.extents
+    before, after = state.knowledge.narrowed.extents
     assert player.gone == pytest.approx(np.maximum(before - after, 0), abs=1e-5)
     assert player.gone[4] == pytest.approx(before[4], abs=1e-4)  # held: all of it
     assert player.gone[9] > before[9] - 0.04 - 1e-4  # at most the error bar is left
@@ -55,9 +55,10 @@ def test_what_carries_for_certain_is_counted_by_certified_bounds(state, wait_for
 
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     wait_for(state)
-    low = state.narrowed.after["low"].values[:, 0] / state.replay.force_scale
-    assert 0 < state.narrowed.carrying <= np.sum(low > 1e-9) < len(low)
-    assert f"{state.narrowed.carrying} of {len(low)} contacts" in words(state)
+    low = state.knowledge.narrowed.after["low"].values[:, 0] / state.replay.force_scale
+    assert 0 < state.knowledge.narrowed.carrying <= np.sum(low > 1e-9) < len(low)
+    told = words(state.knowledge, state.replay.backbone)
+    assert f"{state.knowledge.narrowed.carrying} of {len(low)} contacts" in told
 
 
 def test_the_command_holds_what_is_known(state, wait_for, tmp_path):
@@ -80,21 +81,21 @@ def test_the_command_holds_what_is_known(state, wait_for, tmp_path):
 
 def test_an_error_bar_narrows_less_and_leaves_the_dimension(state, wait_for):
     held(state, wait_for, 4, error=0.05)
-    h, same = state.narrowed.dimension
-    wide = state.narrowed.mean[1]
-    assert h == same and wide < state.narrowed.mean[0]
+    h, same = state.knowledge.narrowed.dimension
+    wide = state.knowledge.narrowed.mean[1]
+    assert h == same and wide < state.knowledge.narrowed.mean[0]
     held(state, wait_for, 4)  # says it anew
-    assert len(state.known) == 1 and state.narrowed.mean[1] < wide
+    assert len(state.knowledge.known) == 1 and state.knowledge.narrowed.mean[1] < wide
 
 
 def test_let_go_all_is_as_before(state, wait_for):
     held(state, wait_for, 4, 9)
     state.knowledge.release(9)
     wait_for(state)
-    assert [one.contact for one in state.narrowed.known] == [4]
+    assert [one.contact for one in state.knowledge.narrowed.known] == [4]
     state.knowledge.release(4)
     wait_for(state)
-    assert state.narrowed is None and state.possible is state.exact
+    assert state.knowledge.narrowed is None and state.possible is state.exact
 
 
 def test_it_travels_with_the_link(state, library, wait_for):
@@ -102,7 +103,10 @@ def test_it_travels_with_the_link(state, library, wait_for):
     held(state, wait_for, 20, error=0.1)
     other = AppState(library, query=state.link())
     wait_for(other)
-    assert other.known == state.known and other.narrowed.mean == state.narrowed.mean
+    assert (
+        other.knowledge.known == state.knowledge.known
+        and other.knowledge.narrowed.mean == state.knowledge.narrowed.mean
+    )
 
 
 @pytest.mark.parametrize(
@@ -117,60 +121,65 @@ def test_a_link_cannot_state_more_than_a_page(state):
     with pytest.raises(ValueError):
         known.read("~".join(f"{c}:1" for c in range(known.MOST_KNOWN + 1)))
     for contact in range(known.MOST_KNOWN):
-        state.known = [*state.known, Statement(contact, 1.0, 5.0)]
+        state.knowledge.known = [*state.knowledge.known, Statement(contact, 1.0, 5.0)]
     state.knowledge.hold(40, 1.0)
-    assert "let some go" in state.work.message and len(state.known) == known.MOST_KNOWN
+    assert "let some go" in state.work.message and len(state.knowledge.known) == known.MOST_KNOWN
     state.work.cancel()
 
 
 def test_contradictions_are_one_clear_line_and_taken_back(state, library, wait_for):
     held(state, wait_for, 4)
-    before = state.known
-    state.known = [*before, Statement(9, 30.0)]
+    before = state.knowledge.known
+    state.knowledge.known = [*before, Statement(9, 30.0)]
     wait_for(state)
     assert "agrees with" in state.work.message and "\n" not in state.work.message
-    assert state.known == before and state.narrowed.known == tuple(before)
+    assert state.knowledge.known == before and state.knowledge.narrowed.known == tuple(before)
     other = AppState(library, query=state.link().split("&known")[0] + "&known=9:30")
     wait_for(other)
-    assert "agrees with" in other.work.message and not other.known
+    assert "agrees with" in other.work.message and not other.knowledge.known
 
 
 def test_what_is_left_no_room_for_is_refused_at_once(state, wait_for):
     held(state, wait_for, 4)
-    low, high = state.narrowed.after["low"].values[:, 0], state.narrowed.after["high"].values[:, 0]
+    low, high = (
+        state.knowledge.narrowed.after["low"].values[:, 0],
+        state.knowledge.narrowed.after["high"].values[:, 0],
+    )
     scale = state.replay.force_scale
     state.knowledge.hold(9, float(high[9] / scale + 0.2))
-    assert "leaves" in state.work.message and len(state.known) == 1 and not state.work.busy
+    assert (
+        "leaves" in state.work.message and len(state.knowledge.known) == 1 and not state.work.busy
+    )
     fixed = [c for c in np.flatnonzero(high - low < 1e-9) if c != 4]
     for contact in fixed[:1]:
         state.knowledge.hold(int(contact), float(low[contact] / scale))
-        assert "nothing new" in state.work.message and len(state.known) == 1
+        assert "nothing new" in state.work.message and len(state.knowledge.known) == 1
 
 
 def test_messages_of_browsers_that_make_no_sense_are_ignored(state):
     for message in ({"hold": [10**9, 1.0, 0]}, {"hold": [1]}, {"release": "x"}, {"x": 1}):
         state.knowledge.heard(message)
-    assert not state.known and not state.work.busy
+    assert not state.knowledge.known and not state.work.busy
     state.knowledge.heard({"hold": [4, float("nan"), 0]})
-    assert not state.known and "must lie between" in state.work.message
+    assert not state.knowledge.known and "must lie between" in state.work.message
 
 
 def test_another_packing_has_its_own(state, wait_for):
     held(state, wait_for, 4)
     state.choose(mu=1)
     wait_for(state)
-    assert not state.known and state.narrowed is None
+    assert not state.knowledge.known and state.knowledge.narrowed is None
 
 
 def test_pulls_keep_what_is_held(state, wait_for):
     told = []
-    hand = Hand(state, state.work.task(reading), told.append)
+    hand, state.hand.tell = state.hand, told.append
     held(state, wait_for, 4)
     hand.heard({"grab": 9})
     wait_for(state)
     rail = told[-1]["rail"]
     normal = rail["normal"].reshape(len(rail["values"]), -1)
-    np.testing.assert_allclose(normal[:, 4], state.known[0].value, atol=1e-6)
+    np.testing.assert_allclose(normal[:, 4], state.knowledge.known[0].value, atol=1e-6)
     assert np.ptp(normal[:, 9]) > 0
     hand.heard({"grab": 4})
     assert told[-1] == {"rail": None} and "let it go" in state.work.message
@@ -178,7 +187,7 @@ def test_pulls_keep_what_is_held(state, wait_for):
 
 def test_what_was_pulled_can_be_held(state, wait_for):
     told = []
-    hand = Hand(state, state.work.task(reading), told.append)
+    hand, state.hand.tell = state.hand, told.append
     hand.heard({"grab": 9})
     wait_for(state)
     rail = told[-1]["rail"]
@@ -187,7 +196,7 @@ def test_what_was_pulled_can_be_held(state, wait_for):
     pulled = told[-1]["held"]["normal"]
     state.knowledge.hold(9, float(pulled[9]))
     wait_for(state)
-    assert len(state.pulls) == 1 and not state.work.message
+    assert len(state.hand.pulls) == 1 and not state.work.message
     np.testing.assert_allclose(told[-1]["held"]["normal"], pulled, atol=1e-4)
 
 
@@ -198,8 +207,11 @@ def test_a_force_held_at_nothing_leaves_the_same_contacts(state, wait_for):
     contact = int(np.flatnonzero(low < 1e-9)[0])
     state.knowledge.hold(contact, 0.0)
     wait_for(state)
-    assert not state.work.message and state.narrowed.mean[1] < state.narrowed.mean[0]
-    np.testing.assert_array_equal(state.narrowed.after["backbone"], state.replay.backbone)
+    assert (
+        not state.work.message
+        and state.knowledge.narrowed.mean[1] < state.knowledge.narrowed.mean[0]
+    )
+    np.testing.assert_array_equal(state.knowledge.narrowed.after["backbone"], state.replay.backbone)
 
 
 def test_bounds_arrive_the_held_contact_first(state, wait_for):
@@ -229,10 +241,10 @@ def test_which_to_measure_next_is_in_order_and_worth_it(state, wait_for):
     held(state, wait_for, 4)
     state.knowledge.rank()
     wait_for(state)
-    best = state.ranked
-    assert best.known == tuple(state.known) and 4 not in best.contacts
+    best = state.knowledge.ranked
+    assert best.known == tuple(state.knowledge.known) and 4 not in best.contacts
     assert np.all(np.diff(best.after) >= 0) and best.after[0] < best.before
-    assert best.before == pytest.approx(state.narrowed.mean[1], abs=1e-6)
+    assert best.before == pytest.approx(state.knowledge.narrowed.mean[1], abs=1e-6)
     held(state, wait_for, int(best.contacts[0]))
-    assert state.ranked is None  # of what was known before
-    assert state.narrowed.mean[1] < best.before
+    assert state.knowledge.ranked is None  # of what was known before
+    assert state.knowledge.narrowed.mean[1] < best.before

@@ -6,8 +6,6 @@ from test_panels import opened, settled
 
 import granforce as gf
 from app import planes
-from app.grabs import Hand
-from app.jobs import reading
 from app.views.plane import View
 
 
@@ -44,7 +42,7 @@ def test_the_outline_of_stresses_holds_all_and_is_kept(state):
 def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):
     opened(state)
     view, told = View(state), []
-    hand = Hand(state, state.work.task(reading), told.append)
+    hand, state.hand.tell = state.hand, told.append
     view.planes.value = "stress"
     state.looks.tab = view.name
     settled(state, done=lambda: "shear" in view.told.object)
