@@ -53,13 +53,12 @@ class AppState(param.Parameterized):
         library: Library,
         wake: Callable[[Callable[[], object]], object] | None = None,
         query: str = "",
-        **params: Any,
     ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task.
 
         query: of the address that opened the page.
         """
-        super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
         self.library, self.work = library, Work(wake)
         self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
         self.knowledge, self.besides = Knowledge(self), Beside(self)
@@ -174,7 +173,7 @@ class AppState(param.Parameterized):
         if self.cell in cells:
             here = cells.index(self.cell)
             self.work.read_ahead(
-                partial(_read, self.library, near)
+                partial(lambda near, job: self.library.shown(near), near)
                 for near in cells[max(here - 1, 0) : here + 2]
                 if self.library.shown_in_memory(near) is None
             )
@@ -333,14 +332,12 @@ class AppState(param.Parameterized):
         if "load" not in (self.looks.colour, self.looks.thickness) or replay is None:
             self.work.loading.cancel()
         elif self.loads is None and replay.summary["mu"] > 0:
-            self.work.loading.start(
-                perturbations.limit_loads(self.library, cell),
-                lambda found: self._loads_known(found, replay),
-            )
 
-    def _loads_known(self, found: perturbations.Loads, replay: Replay) -> None:
-        if self.replay is replay:
-            self.loads = found.load
+            def done(found: perturbations.Loads) -> None:
+                if self.replay is replay:
+                    self.loads = found.load
+
+            self.work.loading.start(perturbations.limit_loads(self.library, cell), done)
 
     # What a link tells
 
@@ -362,7 +359,3 @@ class AppState(param.Parameterized):
             view["beside"] = None
         told = {name: value for name, value in view.items() if value != self._viewed[name].default}
         return link(self.selection, {name: spelled(name, told[name]) for name in told})
-
-
-def _read(library: Library, cell: Cell, job: Job) -> Shown:
-    return library.shown(cell)

@@ -68,10 +68,7 @@ class View(TabView):
         self.planes = question("Shown", PLANES, self.looks, "axes")
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
-        self.others, self.other = (
-            state.work.task(),
-            None,
-        )  # who finds the other states; their Replay
+        self.others, self.other = state.work.task(), None  # who finds other states; their Replay
         self.also.param.watch(lambda event: together(self._fetch), "value")
         self.lead, self.told = note(), note()
         self.placing.param.watch(self._failed, "message")
