@@ -63,7 +63,7 @@ class Hand(param.Parameterized):
 
     def __init__(self, state: Any) -> None:
         super().__init__()  # type: ignore[no-untyped-call]  # param says no types
-        self.state, self._task = state, state.work.task(reading)
+        self.state, self.work, self._task = state, state.work, state.work.task(reading)
         self.tell: Callable[[Message], object] = lambda message: None
         self._made: list[tuple[Pull, Held]] = []  # of the pulls made
         self._base: tuple[Any, ...] | None = None  # and where from
@@ -81,7 +81,7 @@ class Hand(param.Parameterized):
             return
         state.looks.contact = contact
         if contact in _held(state.knowledge.known):
-            state.work.message = (
+            self.work.message = (
                 f"contact {state.replay.backbone[contact]} is held: let it go (H) to pull it"
             )
             self.tell({"rail": None})
@@ -96,7 +96,7 @@ class Hand(param.Parameterized):
     def hold(self, pull: Pull) -> None:
         """Let go: the pull stays."""
         if len(self.pulls) >= MOST_PULLS:
-            self.state.work.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
+            self.work.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
             return
         self.pulls = [*self.pulls, pull]
 
@@ -175,7 +175,7 @@ class Hand(param.Parameterized):
         self._made, self._base = made, base
         self.held = made[-1][1] if made else None
         if refusal:
-            self.state.work.message = refusal
+            self.work.message = refusal
             self.pulls = [pull for pull, _ in made]
             return
         if ready is not None:
@@ -191,7 +191,7 @@ class Hand(param.Parameterized):
 
     def _failed(self, event: Any) -> None:
         if event.new:
-            self.state.work.message = event.new
+            self.work.message = event.new
             self.tell({"rail": None, "fan": None})
 
 

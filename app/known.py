@@ -140,8 +140,8 @@ class Knowledge(param.Parameterized):
 
     def __init__(self, state: Any) -> None:
         super().__init__()  # type: ignore[no-untyped-call]  # param says no types
-        self.state = state
-        self.task, self.ranking = state.work.task(told=False), state.work.task()
+        self.state, self.work = state, state.work
+        self.task, self.ranking = self.work.task(told=False), self.work.task()
         self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
         self.param.watch(self._follow, "known")
         state.param.watch(self._follow, "replay")
@@ -161,9 +161,9 @@ class Knowledge(param.Parameterized):
             if len(others) >= MOST_KNOWN:
                 raise InputError(f"{MOST_KNOWN} known forces are the most; let some go")
             self.known = [*others, self._stated(contact, value, error)]
-            state.work.message = ""
+            self.work.message = ""
         except InputError as refusal:
-            state.work.message = str(refusal)
+            self.work.message = str(refusal)
 
     def release(self, contact: int) -> None:
         """Take f_n of a contact for unknown again."""
@@ -201,7 +201,7 @@ class Knowledge(param.Parameterized):
         replay, known = state.replay, tuple(self.known)
         if replay is None or state.growing:
             return
-        state.work.message = ""
+        self.work.message = ""
 
         self._first = None
 
@@ -277,7 +277,7 @@ class Knowledge(param.Parameterized):
         if event.new:
             state = self.state
             self.known = list(self.narrowed.known) if self._settled else []
-            state.work.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
+            self.work.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
 
 
 def _number(value: float, what: str) -> float:

@@ -71,14 +71,14 @@ class Controls:
     """Widgets for the state's selection and view; they follow what is on screen."""
 
     def __init__(self, state):
-        self.state, self.looks = state, state.looks
+        self.state, self.looks, self.work = state, state.looks, state.work
         self._following = False
         self.mu = FrictionSlider(self._typed, **WIDE)
         # Where the sidebar lies over the page, the one control that all need stays on the page.
         self.beside = FrictionSlider(self._typed, on_narrow=True, **WIDE)
         self.beside.link(self.mu, mu="mu", bidirectional=True)
         self.mu.link(self.beside, stored="stored", hill="hill")
-        state.work.task(reading).start(lambda job: studied.hill(), self._draw)
+        self.work.task(reading).start(lambda job: studied.hill(), self._draw)
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
         self.seed = self._number("Seed", 0, RANGES["seed"][1])
         self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
@@ -107,7 +107,7 @@ class Controls:
 
     def _number(self, label, start, end, step=1):
         def refuse(line):
-            self.state.work.message = line
+            self.work.message = line
 
         return NumberField(refuse, label=label, start=start, end=end, step=step, **FIELD)
 
@@ -171,9 +171,9 @@ class Controls:
         state.param.watch(self._command, ["selection", "missing", "replay"])
         state.knowledge.param.watch(self._command, "known")
         self._command()
-        state.work.param.watch(self._tell, "message")
+        self.work.param.watch(self._tell, "message")
         self.error.param.watch(self._read, "closed")
-        state.work.computation.param.watch(self._rest, "running")
+        self.work.computation.param.watch(self._rest, "running")
         self._tell()
 
     def _draw(self, hill):
@@ -185,7 +185,7 @@ class Controls:
         try:
             self.mu.mu = friction(text.replace(",", "."))
         except InputError as error:
-            self.state.work.message = str(error)
+            self.work.message = str(error)
 
     def _ask(self):
         """Select what the widgets say."""
@@ -195,8 +195,8 @@ class Controls:
         try:
             state.ask(self._selection(), at_once=True)
         except InputError as error:
-            state.work.message = str(error)
-        if state.work.message:  # what was refused does not stay in its box
+            self.work.message = str(error)
+        if self.work.message:  # what was refused does not stay in its box
             self._follow()
 
     def _selection(self):
@@ -250,7 +250,7 @@ class Controls:
 
     def _rest(self, *events):
         state = self.state
-        self.go.visible = state.missing and not state.work.computation.running
+        self.go.visible = state.missing and not self.work.computation.running
         if state.missing:
             self.go.label = f"Compute {differs(state)}"
 
@@ -265,9 +265,7 @@ class Controls:
                 raise ValueError
         except ValueError:
             label = event.obj.label
-            self.state.work.message = (
-                f"{label}: a number from {low:g} to {high:g}, got {text[:30]!r}"
-            )
+            self.work.message = f"{label}: a number from {low:g} to {high:g}, got {text[:30]!r}"
             self._look()
             return
         self.looks.param.update({name: value})
@@ -284,8 +282,8 @@ class Controls:
     def _read(self, event):
         """What was read and closed may be told again."""
         if event.new:
-            self.state.work.message = ""
+            self.work.message = ""
 
     def _tell(self, *events):
-        message = self.state.work.message
+        message = self.work.message
         self.error.param.update(title=message, visible=bool(message), closed=False)

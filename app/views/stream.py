@@ -13,21 +13,22 @@ class Stream:
 
     def __init__(self, state, player, document=None):
         """document: on which the time is kept; without one, call `tick` yourself."""
-        self.state, self.player, self._document = state, player, document
+        self.state, self.work, self.player = state, state.work, player
+        self._document = document
         self._sent = self._painted = 0
         self._awake, self._ticking = False, None
         player.on_live = self._heard
-        state.work.param.watch(self._follow, ["live", "arriving"])
+        self.work.param.watch(self._follow, ["live", "arriving"])
         state.param.watch(self._show, ["missing", "selection", "cell"])
-        state.work.param.watch(self._show, "busy")
+        self.work.param.watch(self._show, "busy")
         self._follow()
 
     def _heard(self, message):
         """The browser tells that it draws anew, what it has painted, and whether it is seen."""
         if "anew" in message:
             self._sent = self._painted = 0
-            if self.state.work.live is not None:
-                self.state.work.live.rewind()
+            if self.work.live is not None:
+                self.work.live.rewind()
         self._painted = message.get("painted", self._painted)
         self._awake = message.get("seen", self._awake)
 
@@ -36,8 +37,8 @@ class Stream:
 
     def _follow(self, *events):
         self._show()
-        self.player.live = self.state.work.live is not None
-        ticking = self.player.live or self.state.work.arriving is not None
+        self.player.live = self.work.live is not None
+        ticking = self.player.live or self.work.arriving is not None
         if self._document is None or ticking == (self._ticking is not None):
             return
         if ticking:
@@ -58,8 +59,8 @@ class Stream:
                 self.state.grow(news["replay"])
                 continue
             if "picture" in news:
-                self.state.work.moving = True
+                self.work.moving = True
             self._sent += 1
             self.player.hand_over(news | {"number": self._sent})
             if "states" in news:
-                self.state.work.fourfold = following.fourfold
+                self.work.fourfold = following.fourfold

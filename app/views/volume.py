@@ -19,7 +19,7 @@ class Volume:
     """The volume of all networks of the packing on screen, once known: `tiles`; else `measure`."""
 
     def __init__(self, state):
-        self.state, self.found = state, None
+        self.state, self.work, self.found = state, state.work, None
         self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
         self.measure = pmui.Button(
             label="Measure the volume of all networks",
@@ -31,21 +31,21 @@ class Volume:
         )
         self.measure.on_click(lambda event: self._measure())
         state.param.watch(self._look, "replay")
-        state.work.measuring.param.watch(self._offer, "running")
+        self.work.measuring.param.watch(self._offer, "running")
         self._look()
 
     def _look(self, *events):
         """Whether a store has it already."""
         state, self.found = self.state, None
-        state.work.measuring.cancel()
+        self.work.measuring.cancel()
         self._show()
         if state.replay is not None and state.cell is not None:
-            state.work.looking.start(compute.known_volume(state.library, state.cell), self._take)
+            self.work.looking.start(compute.known_volume(state.library, state.cell), self._take)
 
     def _measure(self):
         cell = self.state.cell
         if cell is not None:
-            self.state.work.measuring.start(compute.volume(self.state.library, cell), self._take)
+            self.work.measuring.start(compute.volume(self.state.library, cell), self._take)
 
     def _take(self, result):
         cell, found = result
@@ -60,7 +60,7 @@ class Volume:
     def _offer(self, *events):
         replay = self.state.replay
         free = replay is not None and replay.summary["dimension"] > 0
-        wanted = free and self.found is None and not self.state.work.measuring.running
+        wanted = free and self.found is None and not self.work.measuring.running
         self.measure.visible = bool(wanted)
 
 
