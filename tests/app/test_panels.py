@@ -18,7 +18,6 @@ from small_store import KEPT, STATES
 
 import granforce as gf
 from app import distributions, exports, movies, perturbations, planes, standalone, studied, uploads
-from app.links import VIEW
 from app.views import labels
 from app.views import plane as plane_view
 from app.views import studied as drawn_study
@@ -745,7 +744,7 @@ def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     served = Document()
     served.js_on_event("document_ready", CustomJS(code="ofAnotherPage()"))
     opened(state)
-    view = {name: getattr(state, name) for name in VIEW}
+    view = state.view
     told = {"link": "", "command": "", "source": ""}
     with patch_curdoc(served):
         page = standalone.html(state.library, state.cell, state.replay, None, view=view, **told)
