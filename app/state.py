@@ -293,7 +293,7 @@ class AppState(param.Parameterized):
     def follow(self) -> Following | Arriving | None:
         """What is being computed, as `work` says; what was on screen is back where it ended."""
         with as_one(*self.parts, self.work, self):
-            if self.work.over:
+            if self.work.live is not None and not self.work.computation.running:
                 plane = None if self.growing else self.plane
                 self.param.update(seen=self.replay, plane=plane, source=self._source())
                 self._look(UNSEEN)

@@ -117,11 +117,6 @@ class Work(param.Parameterized):
             self.computation.cancel()
         self.param.update(live=None, moving=False, arriving=None)
 
-    @property
-    def over(self) -> bool:
-        """Whether what was followed has ended, and nothing came of it."""
-        return self.live is not None and not self.computation.running
-
     def follow(self) -> Following | Arriving | None:
         """The Following or Arriving of what is computed, or None; what has ended is dropped."""
         if not self.computation.running:
