@@ -77,11 +77,13 @@ class AppState(param.Parameterized):
     def open(self, query: str = "") -> None:
         """Show what a link selects, computing it if need be, or what is best to begin with."""
         try:
-            wanted, view = read_link(query)
+            wanted, told = read_link(query)
         except InputError as error:
-            wanted, view = None, {}
+            wanted, told = None, {}
             self.work.message = str(error)
-        self._look_up(wanted, self._as_new() | read_view(view, self._viewed))
+        view = read_view(told, self._viewed)
+        self.looks.dark = view.get("dark", self.looks.dark)  # before there is anything to be seen
+        self._look_up(wanted, self._as_new() | view)
 
     def _as_new(self) -> View:
         """What a new page shows, but for the theme: what a link does not name."""

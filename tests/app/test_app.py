@@ -297,6 +297,14 @@ def test_views_that_make_no_sense_are_left_out(library, wait_for):
     assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
 
 
+def test_a_page_by_night_is_dark_before_its_states_are_there(library):
+    from app.state import AppState
+
+    state = AppState(library, query="mu=0.3&n=30&states=4&dark=1")
+    assert state.replay is None and state.looks.dark
+    state.work.close()
+
+
 @pytest.mark.parametrize("packed", [None, 0.0])
 def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
     """The command line reads the words back as the parameters of the cell."""

@@ -18,7 +18,7 @@ from serving import (
 from small_store import KEPT, ROOT
 
 # Pictures to be looked at; ignored by git.
-STATISTICS = "measured: of the random walk's states"
+STATISTICS = "measured: in networks found at random"
 ARTEFACTS = ROOT / "artefacts" / "defects"
 PATIENCE = 60_000  # ms, on a busy machine
 
@@ -455,7 +455,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
 @pytest.mark.parametrize(
     "tab, words",
     [
-        ("intervals", ("pale: possible, exact; dark: seen so far",)),
+        ("intervals", ("pale bars: exact",)),
         ("plane", ("outline: exact; dots: found at random",)),
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],

@@ -3,6 +3,7 @@
 Whatever they do, the next visitor's computation begins and ends, and no thread of the server dies.
 """
 
+import re
 import urllib.request
 
 import pytest
@@ -58,7 +59,8 @@ def reloaded(page):
 def computes(page, address, seed):
     """Another computation is asked for, and succeeds."""
     page.goto(f"{address}?mu=0.2&n=30&states=5&seed={seed}")
-    page.get_by_text(f"N = 30, seed {seed}, 5 states").first.wait_for()
+    there = re.compile(f"^N = 30, seed {seed}, 5 states")  # among the finished results
+    page.locator("option", has_text=there).first.wait_for(state="attached")
 
 
 def test_after_three_reloads_while_computing_another_computation_succeeds(page, served):
