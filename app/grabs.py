@@ -180,7 +180,7 @@ class Hand(param.Parameterized):
             return
         if ready is not None:
             self.tell(ready)
-            if not ready.get("rail", {"whole": True})["whole"]:
+            if "rail" in ready and not ready["rail"]["whole"]:
                 self._task.start(lambda job: next(more), self.tell)
         elif made:
             self._show(made)

@@ -1,7 +1,5 @@
 """Intervals of each contact's normal force (Fig. 3 of PRE 79, 052302); η1, η2, η3 as they grow."""
 
-from functools import partial
-
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
@@ -13,7 +11,7 @@ from .contacts import Contacts
 from .hints import term
 from .known import Known
 from .packing import exact_intervals
-from .parts import MOVES, figure, folded_away, note
+from .parts import MOVES, figure, folded_away, linked, note
 from .select import Select
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
@@ -63,9 +61,11 @@ class View:
         ]
         self.figure, self.growth_figure = self._bars_figure(), self._growth_figure()
         self.contacts = np.array([], dtype=int)
-        self.drawn = _select("Contacts", DRAWN, self.looks.drawn)
-        self.sort = _select("Sorted by", SORTS, self.looks.sort)
-        self.scale = _select("Scale", SCALES, self.looks.scale)
+        self.choices = [
+            _select("Contacts", DRAWN, self.looks, "drawn"),
+            _select("Sorted by", SORTS, self.looks, "sort"),
+            _select("Scale", SCALES, self.looks, "scale"),
+        ]
         self.exact = pmui.Button(
             label="Compute exact intervals",
             variant="outlined",
@@ -80,7 +80,7 @@ class View:
     def panel(self):
         """Choices and bars; growth, to be opened."""
         wide = {"sizing_mode": "stretch_width", "margin": 0}
-        choices = pn.FlexBox(self.drawn, self.sort, self.scale, sizing_mode="stretch_width")
+        choices = pn.FlexBox(*self.choices, sizing_mode="stretch_width")
         return pn.Column(
             note(LEAD),
             choices,
@@ -95,8 +95,6 @@ class View:
 
     def _connect(self):
         state = self.state
-        for name in ("drawn", "sort", "scale"):
-            getattr(self, name).param.watch(partial(self._choose, name), "value")
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
         state.param.watch(self._show, ["seen", "exact"])
@@ -110,9 +108,6 @@ class View:
         self._offer()
         self._stale = False
 
-    def _choose(self, name, event):
-        self.looks.param.update({name: event.new})
-
     # Contents
 
     def _catch_up(self, event):
@@ -125,8 +120,6 @@ class View:
         self._stale = looks.tab != self.name
         if replay is None or self._stale:
             return
-        for name in ("drawn", "sort", "scale"):
-            getattr(self, name).value = getattr(looks, name)
         exact = exact_intervals(state.possible, replay)
         order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
         named = [one.contact for one in state.knowledge.known]
@@ -351,9 +344,10 @@ def _source(name, columns):
     return ColumnDataSource({column: [] for column in columns}, name=name)
 
 
-def _select(name, labels, value):
-    options = {label: key for key, label in labels.items()}
-    return Select(label=name, options=options, value=value, **SMALL)
+def _select(label, labels, looks, name):
+    options = {words: key for key, words in labels.items()}
+    made = Select(label=label, options=options, value=getattr(looks, name), **SMALL)
+    return linked(made, looks, name)
 
 
 def _set_range(axis, low, high):

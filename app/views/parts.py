@@ -222,7 +222,7 @@ def choice(labels, value):
 
 def chosen(labels, looks, name):
     """A `choice` of the parameter of this name."""
-    return _linked(choice(labels, getattr(looks, name)), looks, name)
+    return linked(choice(labels, getattr(looks, name)), looks, name)
 
 
 def question(label, labels, looks, name):
@@ -230,10 +230,10 @@ def question(label, labels, looks, name):
     options = {words: key for key, words in labels.items()}
     wide = {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
     made = Select(label=label, options=options, value=getattr(looks, name), **wide)
-    return _linked(made, looks, name)
+    return linked(made, looks, name)
 
 
-def _linked(widget, looks, name):
+def linked(widget, looks, name):
     """A widget whose value is the parameter of this name."""
     widget.param.watch(lambda event: looks.param.update({name: event.new}), "value")
     looks.param.watch(lambda event: widget.param.update(value=event.new), name)

@@ -6,6 +6,13 @@ export const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) <
 const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
 const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
 
+const BOTH = "at the left wall and at the right wall"
+// A disk between two walls cannot slide down both: what is so is that friction does all it can.
+const AT_BOTH = {
+  "about to slide up": "friction at its limit, down both walls",
+  "about to slide down": "friction at its limit, up both walls",
+}
+
 /** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
 export function forceName({ names }, index) {
   const place = names[index >> 1]
@@ -20,10 +27,10 @@ export function stopping({ scene }, side) {
     const verb = `${disk ?? ""}${what === OPENS ? "would lose contact" : `about to slide${way(scene, contact, what)}`}`
     kinds.set(verb, [...(kinds.get(verb) ?? []), place])
   }
-  const said = [...kinds].map(([verb, places]) => `${verb} ${places.join(" and ")}`).join(", ")
-  // A disk between two walls cannot slide down both: what is so is that friction does all it can.
-  return said.replace(/about to slide (up|down) at the left wall and at the right wall/,
-    (_, slides) => `friction at its limit, ${slides === "up" ? "down" : "up"} both walls`)
+  return [...kinds].map(([verb, places]) => {
+    const where = places.join(" and ")
+    return where !== BOTH ? `${verb} ${where}` : AT_BOTH[verb] ?? `${verb} at both walls`
+  }).join(", ")
 }
 
 /** Where a disk is about to slide: against the friction on it; of two disks, which way round each other. */
@@ -104,7 +111,7 @@ export function sentence(body, mu, now) {
   if (h > 3) return `${h} free numbers: infinitely many sets of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many sets. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
-  const grips = body.sides.some((side) => stopping(body, side).includes("down both walls"))
+  const grips = body.sides.some((side) => stopping(body, side) === AT_BOTH["about to slide up"])
     ? " Where friction points down, the walls grip the disk as if it had been pressed in." : ""
   return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}${grips}`
 }
