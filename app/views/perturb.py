@@ -45,7 +45,7 @@ ISOSTATIC = (
     "needs (it is isostatic)."
 )
 EVERY = (
-    "<b>The failure load of a contact</b> (limit load): the largest pair of forces that may press "
+    "<b>The failure load of a contact</b> (limit load): the largest pair of forces that may push "
     "its two disks apart before no forces at all can hold the packing."
 )
 LONGEST_GUESS = 12  # characters
