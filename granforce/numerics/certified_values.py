@@ -110,7 +110,8 @@ class _Asked(NamedTuple):
         """Those of the numbers without a value and bound as close as they are to be."""
         none = np.inf, -np.inf
         known = [(k, *self.bounds.get(self.keys[k], none)) for k in numbers]
-        return [k for k, value, bound in known if not value - bound <= INTERVAL_GAP]
+        # A value below its bound is one of a state whose unbalance, small as it is, weighs too much.
+        return [k for k, value, bound in known if not abs(value - bound) <= INTERVAL_GAP]
 
 
 class Solver:
@@ -186,13 +187,19 @@ class Solver:
                     self.counts["programs"] += 1
                     self.report(1)
                 before = bounds.get(key, (np.inf, -np.inf))
-                bounds[key] = min(before[0], attained[k]), max(before[1], bound[k])
+                least = max(before[1], bound[k])
+                bounds[key] = _nearer(before[0], attained[k], least), least
                 self.found(key, *bounds[key])
                 if points is not None and (key not in points or attained[k] < before[0]):
                     points[key] = outcome.y
                 self.counts["iterations"] += outcome.steps
                 if self.seen and outcome.loaded < 0 and np.isfinite(attained[k]):
                     self.seen(key, outcome.y)
+
+
+def _nearer(one: float, other: float, bound: float) -> float:
+    """The better of two values: the smaller, or the nearer to the bound where it lies below it."""
+    return min(one, other, key=lambda value: (abs(value - bound), value))
 
 
 def certify(

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from packings import lattice, packed
-from scipy import linalg
+from scipy import linalg, optimize
 
 from granforce.bench.exact import read_reference
 from granforce.explore import intervals as module
@@ -15,11 +15,13 @@ from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import ensemble
 from granforce.numerics import certified_values, linear_programs
 from granforce.numerics import highs as programs
+from granforce.packing.importers import load_packing
 from granforce.records import InputError, make_contacts, make_packing
 from granforce.study import slices
 from granforce.tolerances import INTERVAL_GAP
 
-REFERENCE = Path(__file__).parents[1] / "reference"
+TESTS = Path(__file__).parents[1]
+REFERENCE = TESTS / "reference"
 SMALL = ["n100_mu0.1_s11", "n100_mu1_s12"]
 
 
@@ -84,6 +86,21 @@ def test_bounds_where_some_contacts_can_do_nothing_but_slide():
             alone = next(certified_values.from_scratch(system, 0, program))
             ((attained,), _) = certified_values.certify(system, [alone], [program])
             assert abs(value[c, 0] / S.force_scale - (1 - 2 * side) * attained) <= 2 * INTERVAL_GAP
+
+
+def test_values_below_their_bounds_are_solved_again():
+    # Near isostaticity multipliers are so large that an unbalance within BALANCED is 2e-8 ⟨f_n⟩.
+    S = ensemble(load_packing(TESTS / "attacks" / "n100_mu1_h3.npz"))
+    found = intervals(S)
+    assert found.converged
+    assert found.counts["again"] > 0
+    system, exactly = make_system(S), {"primal_feasibility_tolerance": 1e-10}
+    for c in range(10):
+        program = module.bound_of(S, c, 0, 1)
+        cost = np.zeros(system.A.shape[1])
+        cost[program.columns] = program.costs
+        best = optimize.linprog(cost, A_eq=system.A, b_eq=system.b, options=exactly)
+        assert abs(found.upper[c, 0] / S.force_scale + best.fun) <= 3 * INTERVAL_GAP
 
 
 def test_bounds_agree_with_the_reference(small):
