@@ -110,7 +110,7 @@ class _Asked(NamedTuple):
         """Those of the numbers without a value and bound as close as they are to be."""
         none = np.inf, -np.inf
         known = [(k, *self.bounds.get(self.keys[k], none)) for k in numbers]
-        # A value below its bound is one of a state whose unbalance, small as it is, weighs too much.
+        # A value below its bound is of a state whose unbalance, small as it is, weighs too much.
         return [k for k, value, bound in known if not abs(value - bound) <= INTERVAL_GAP]
 
 
