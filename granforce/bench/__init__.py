@@ -18,6 +18,7 @@ from granforce.bench.packings import (
     compaction_frictions,
     compaction_growth,
     compaction_limit,
+    compaction_time_steps,
 )
 from granforce.bench.report import environment, note, table
 from granforce.bench.skips import skips
@@ -34,6 +35,7 @@ __all__ = [
     "compaction_frictions",
     "compaction_growth",
     "compaction_limit",
+    "compaction_time_steps",
     "contact_updates",
     "environment",
     "frames",
@@ -73,6 +75,10 @@ PARTS: Parts = {
     "compaction_limit": (
         compaction_limit,
         "Packings by how they are made: whether they have a limit",
+    ),
+    "compaction_time_steps": (
+        compaction_time_steps,
+        "Packings by the time step: what following every collision changes",
     ),
     "skips": (skips, "What skipping is worth"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),

@@ -82,6 +82,8 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "box mass 30": {"box_mass": 30.0},
 }
 LIMIT_STATES = 200  # of the walk for η2
+# Longest time steps down to where every collision is followed.
+FINE_STEPS = (0.1, 0.01, 0.001, 0.0001)
 
 
 def compaction_limit(
@@ -96,11 +98,28 @@ def compaction_limit(
     Means over seeds with their standard errors, "18.1 ± 0.9": packings have a limit where they
     agree.
     """
-    n = n or (60 if quick else 400)
-    seeds = seeds or (3 if quick else 10)
+    return _limit(n or (60 if quick else 400), frictions, seeds or (3 if quick else 10), SETTINGS)
+
+
+def compaction_time_steps(
+    quick: bool = True,
+    *,
+    n: int | None = None,
+    frictions: Sequence[float] = (0.1, 0.3, 0.5, 1.0, 3.0, 10.0),
+    seeds: int | None = None,
+) -> list[dict[str, Any]]:
+    """Rows as of `compaction_limit`, by μ and by the longest time step, down to FINE_STEPS."""
+    steps = FINE_STEPS[: 2 if quick else None]
+    settings = {f"Δt to {dt:g}": {"dt": dt, "max_steps": 10_000_000} for dt in steps}
+    return _limit(n or (40 if quick else 100), frictions, seeds or (3 if quick else 20), settings)
+
+
+def _limit(
+    n: int, frictions: Sequence[float], seeds: int, settings: dict[str, dict[str, Any]]
+) -> list[dict[str, Any]]:
     rows = []
     for mu in frictions:
-        for name, options in SETTINGS.items():
+        for name, options in settings.items():
             note(f"limit: N = {n}, μ = {mu:g}, {name}")
             made = [_extent(n, mu, seed, options) for seed in range(1, seeds + 1)]
             kept = [one for one in made if one]

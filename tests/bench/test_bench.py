@@ -235,7 +235,10 @@ def test_uniform_states_against_size_reach_what_was_asked_for():
 def test_the_limit_of_packings_tells_means_with_errors_by_settings():
     rows = bench.compaction_limit(True, n=20, frictions=(0.3,), seeds=2)
     assert [row["settings"] for row in rows] == list(packings.SETTINGS)
-    for row in rows:
+    steps = bench.compaction_time_steps(True, n=20, frictions=(0.3,), seeds=2)
+    assert [row["settings"] for row in steps] == ["Δt to 0.1", "Δt to 0.01"]
+    assert all(steps[0][key] == rows[0][key] for key in ("h", "exact_eta3", "eta2"))
+    for row in rows + steps:
         assert row["failed"] == 0
         for key in ("phi", "z", "h", "exact_eta3", "eta2", "unfinished", "cpu_seconds"):
             mean, error = map(float, row[key].split(" ± "))
