@@ -13,7 +13,7 @@ from granforce.records import Cancel, Cancelled, Floats, Progress
 from .geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from .replays import Replay
 
-Look = Mapping[str, Any]  # of `shades`
+Look = dict[str, Any]  # of `shades`
 Moment = tuple[int, int, float]
 
 SIDE = 480  # pixels

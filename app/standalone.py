@@ -16,6 +16,7 @@ from granforce.records import Floats
 
 from . import planes
 from .data import Cell, Library
+from .links import View
 from .replays import Replay, evenly
 from .views import explanation, still
 from .views.packing import exact_intervals, full_extent, legend
@@ -59,7 +60,7 @@ def html(
     replay: Replay,
     exact: xr.Dataset | None,
     *,
-    view: Mapping[str, Any],
+    view: View,
     link: str,
     command: str,
     source: str,
@@ -119,7 +120,7 @@ def html(
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         bokeh=Resources(mode="inline", components=["bokeh"]).render(),
-        legend=legend(still.Light(replay, exact, view, loads=loads)),
+        legend=legend(still.Light(replay, exact, view, loads=loads)),  # type: ignore[arg-type]  # has what is asked of it
         words=explanation.more(replay.summary),
         plots="".join(plots),
         script=script,

@@ -1,10 +1,12 @@
 """The page's address: a copy of it reopens the view, Back and Forward go through the views."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import param
 
 from ..links import VIEW
+from ..state import AppState
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 
 # Nobody goes back to the frame before, to the view of a moment ago, or to the other theme.
@@ -26,7 +28,7 @@ class Address(Scripted):
     _esm = module("address")
     _stylesheets: ClassVar = [FOLDER / "address.css"]
 
-    def __init__(self, state, **params):
+    def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(**params)
         self._state = state
         state.param.watch(self._tell, "selection")
@@ -34,10 +36,10 @@ class Address(Scripted):
             part.param.watch(self._tell, [name for name in VIEW if name in part.param])
         self._tell()
 
-    def _tell(self, *events):
+    def _tell(self, *events: Any) -> None:
         if self._state.cell is not None:
             self.query = f"?{self._state.link()}"
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """The visitor went back or forward to another view."""
         self._state.open(message["query"])

@@ -1,13 +1,19 @@
 """What pictures and files say about themselves: captions, and their names."""
 
+from collections.abc import Iterator
+from typing import Any
+
+from ..data import Cell
 from ..looks import WIDTHS
+from ..selection import Selection
+from ..state import AppState
 from .packing import colour_bar, colour_words
 
 GROUND = ("#ffffff", "#121212")  # by day, by night
 NAMED = 4  # known forces that a caption names
 
 
-def caption(state):
+def caption(state: AppState) -> dict[str, Any]:
     """What a picture says about itself: background, colour bar, scale and words."""
     pulled, looks = bool(state.hand.pulls), state.looks
     low, stops, high = colour_bar(state, pulled)
@@ -25,12 +31,12 @@ def caption(state):
     }
 
 
-def origin(cell):
+def origin(cell: Cell) -> str:
     """Where states come from, in all words that it takes to make them again."""
     return f"μ = {cell.mu:g}, {cell.series}"
 
 
-def known_words(state):
+def known_words(state: AppState) -> Iterator[str]:
     """What is known, in a line of a caption; none where nothing is."""
     number = state.replay.backbone
     told = [one.words(number[one.contact]) for one in state.knowledge.known]
@@ -39,7 +45,7 @@ def known_words(state):
         yield f"Known: {'; '.join(told[:NAMED])}{more}."
 
 
-def stem(selection):
+def stem(selection: Selection) -> str:
     """Name of a file without its ending."""
     if selection.imported:
         return f"granforce_{selection.packing['imported'][:8]}_mu{selection.mu:g}"

@@ -1,9 +1,13 @@
 """The picture of a photoelastic frame: grains, force chains with their errors, marks and scales."""
 
+from typing import Any
+
 import numpy as np
 from bokeh.models import ColorBar, ColumnDataSource, LinearColorMapper, Title
+from bokeh.plotting import figure as Figure
 
 from ..geometry import FULL_DEVIATION
+from ..photoelastic import Frame
 from .parts import figure
 from .style import BLUE, EDGE, GREY, ORANGE, SERIES, corner, hover, legend_above, ramp
 
@@ -19,10 +23,11 @@ AMBER = "#e69f00"  # suspects: a warning
 SCALE = "scale"  # tag of what is a scale
 QUIET = "#808080"  # scales, read by day and by night
 SAMPLES = (0.5, 1.0, 2.0)  # ⟨f_n⟩, of the scale of widths
+Layers = dict[str, list[Any]]  # {one of WORDS: renderers}
 STRIP = 0.08  # height of a line of scales below the grains, in widths of the frame
 
 
-def network(frame, **options):
+def network(frame: Frame, **options: Any) -> tuple[Figure, Layers]:
     """Figure of the frame, and {one of WORDS: renderers} of what it may show; options: of it."""
     name, title = f"frame{frame.report['frame']}", frame.source.split(": ")[-1]
     fig = figure(
@@ -33,12 +38,12 @@ def network(frame, **options):
     fig.name = "photoelastic_network"
     fig.title.text_font_size = "11px"
     _draw_grains(fig, frame)
-    layers = {name: [] for name in WORDS}
+    layers: Layers = {name: [] for name in WORDS}
     normal, measured = frame.inferred[:, 0], frame.measured[:, 0]
     strong = max(np.quantile(normal, STRONG), 1e-9)
     wide = WIDEST * frame.r.mean() / strong
 
-    def chains(layer, force, chosen, more=0.0, **options):
+    def chains(layer: str, force: Any, chosen: Any, more: Any = 0.0, **options: Any) -> Any:
         width = wide * (np.clip(np.nan_to_num(force), 0.0, strong) + more)
         drawn = fig.rect(
             "x", "y", "length", "width", "angle", line_color=None,
@@ -76,7 +81,7 @@ def network(frame, **options):
     return fig, layers
 
 
-def dress(fig, layers, shown, small=False):
+def dress(fig: Figure, layers: Layers, shown: str, small: bool = False) -> None:
     """Show one of WORDS in a figure of `network`; small: without what another beside it tells."""
     for name, drawn in layers.items():
         for one in drawn:
@@ -88,7 +93,7 @@ def dress(fig, layers, shown, small=False):
     fig.min_border_left = 5 if small else 56
 
 
-def _along(frame, force, width, chosen):
+def _along(frame: Frame, force: Any, width: Any, chosen: Any) -> dict[str, Any]:
     """Columns of the chosen contacts, as rectangles of these widths (N_c,)."""
     seen = chosen & (width > FAINT * WIDEST * frame.r.mean())
     here = np.flatnonzero(seen & np.isfinite(frame.lines).all(axis=(1, 2)))
@@ -101,7 +106,7 @@ def _along(frame, force, width, chosen):
     }  # fmt: skip
 
 
-def _draw_grains(fig, frame):
+def _draw_grains(fig: Figure, frame: Frame) -> None:
     x, y = frame.x.T
     kinds = (
         ("disks", ~(frame.at_wall | frame.left_open), EDGE, 0.18),
@@ -116,7 +121,7 @@ def _draw_grains(fig, frame):
             )  # fmt: skip
 
 
-def _mark(fig, frame):
+def _mark(fig: Figure, frame: Frame) -> None:
     """Suspects, contacts that carry for certain, and what was mended."""
     middle = frame.lines.mean(axis=1)
     for label, places, marker, colour in (
@@ -131,7 +136,7 @@ def _mark(fig, frame):
             )  # fmt: skip
 
 
-def _draw_scales(fig, frame, wide):
+def _draw_scales(fig: Figure, frame: Frame, wide: float) -> None:
     """Below the grains: how wide a force is, and how long a length; they zoom with the picture."""
     r = frame.r[:, None]
     (left, bottom), (right, _) = (frame.x - r).min(axis=0), (frame.x + r).max(axis=0)
@@ -155,7 +160,7 @@ def _draw_scales(fig, frame, wide):
         one.tags = [SCALE]
 
 
-def _round_length(most):
+def _round_length(most: float) -> float:
     """The largest of 1, 2, 5, 10, 20, … (or their tenths, …) up to this."""
     power = 10.0 ** np.floor(np.log10(most))
     return float(max(k * power for k in (1, 2, 5) if k * power <= most))

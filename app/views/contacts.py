@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import param
 
+from ..looks import Looks
 from .scripts import FOLDER, Scripted, module
 
 
@@ -15,6 +16,6 @@ class Contacts(Scripted):
     _esm = module("contacts")
     _stylesheets: ClassVar = [FOLDER / "contacts.css"]
 
-    def __init__(self, looks):
+    def __init__(self, looks: Looks) -> None:
         super().__init__(sizing_mode="stretch_width", dark=looks.dark)
         looks.param.watch(lambda event: self.param.update(dark=event.new), "dark")

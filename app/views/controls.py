@@ -1,5 +1,7 @@
 """The sidebar: which states to see, how to see them, and how to share them."""
 
+from typing import Any
+
 import panel as pn
 import panel_material_ui as pmui
 
@@ -10,7 +12,8 @@ from ..data import SOURCES
 from ..jobs import reading
 from ..limits import LIMITS, RANGES
 from ..looks import COLOURS, WIDTHS
-from ..selection import KINDS, SOLVERS, differing, select
+from ..selection import KINDS, SOLVERS, Selection, differing, select
+from ..state import AppState
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
@@ -30,11 +33,11 @@ AT_EDGE = """
 SAME = "the same μ"  # of a packing made with the friction of the ensemble
 
 
-def offered(state):
+def offered(state: AppState) -> dict[str, Any]:
     """Options and value of the precomputed results: each series with where it has states."""
     # The series on screen is among them even before the catalogue is read anew.
     on_screen = [] if state.cell is None else [state.cell]
-    series = {}
+    series: dict[str, set[float]] = {}
     for cell in [*state.catalogue, *on_screen]:
         series.setdefault(cell.series, set()).add(cell.mu)
     options = {f"{name} — {_frictions(sorted(found))}": name for name, found in series.items()}
@@ -43,13 +46,13 @@ def offered(state):
     return {"options": options, "value": state.cell.series if state.cell else ""}
 
 
-def _frictions(found):
+def _frictions(found: list[float]) -> str:
     if len(found) > 2:
         return f"{len(found)} μ from {found[0]:g} to {found[-1]:g}"
     return "μ = " + ", ".join(f"{mu:g}" for mu in found)
 
 
-def meaningful(state, labels, name):
+def meaningful(state: AppState, labels: dict[str, str], name: str) -> dict[str, str]:
     """Of what colour or width can show, what there is: a pinned state, known forces, or chosen."""
     pinned = state.looks.reference
     there = {"sign": pinned, "difference": pinned, "known": state.knowledge.known}
@@ -58,19 +61,19 @@ def meaningful(state, labels, name):
     return {key: words for key, words in labels.items() if there.get(key, True) or key == chosen}
 
 
-def differs(state):
+def differs(state: AppState) -> str:
     """What was asked for and is not on screen, in words."""
     return differing(state.selection, state.cell and state.cell.selection)
 
 
-def _swap(labels):
+def _swap(labels: dict[str, str]) -> dict[str, str]:
     return {label: name for name, label in labels.items()}
 
 
 class Controls:
     """Widgets for the state's selection and view; they follow what is on screen."""
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         self.state, self.looks, self.work = state, state.looks, state.work
         self._following = False
         self.mu = FrictionSlider(self._typed, **WIDE)
@@ -105,13 +108,13 @@ class Controls:
         self._follow()
         self._look()
 
-    def _number(self, label, start, end, step=1):
-        def refuse(line):
+    def _number(self, label: str, start: int, end: float, step: int = 1) -> NumberField:
+        def refuse(line: str) -> None:
             self.work.message = line
 
         return NumberField(refuse, label=label, start=start, end=end, step=step, **FIELD)
 
-    def panel(self):
+    def panel(self) -> list[Any]:
         """The widgets in order."""
         return [
             SceneList(**WIDE),
@@ -125,7 +128,7 @@ class Controls:
             ),
         ]
 
-    def _folded(self):
+    def _folded(self) -> Any:
         """What only those need who look for, or compute, something of their own."""
         look = pn.Column(
             self.colour,
@@ -148,7 +151,7 @@ class Controls:
         )
         return folded_away(LOOKS, look, MADE, made)
 
-    def _connect(self):
+    def _connect(self) -> None:
         state, looks = self.state, self.looks
         self.mu.param.watch(lambda event: self._ask(), "mu")
         for widget in (self.n, self.seed, self.packed, self.states, self.kind, self.relax):
@@ -176,18 +179,18 @@ class Controls:
         self.work.computation.param.watch(self._rest, "running")
         self._tell()
 
-    def _draw(self, hill):
+    def _draw(self, hill: list[tuple[float, float]]) -> None:
         self.mu.hill = hill
 
     # From the widgets
 
-    def _typed(self, text):
+    def _typed(self, text: str) -> None:
         try:
             self.mu.mu = friction(text.replace(",", "."))
         except InputError as error:
             self.work.message = str(error)
 
-    def _ask(self):
+    def _ask(self) -> None:
         """Select what the widgets say."""
         state = self.state
         if self._following or state.selection is None:
@@ -199,7 +202,7 @@ class Controls:
         if self.work.message:  # what was refused does not stay in its box
             self._follow()
 
-    def _selection(self):
+    def _selection(self) -> Selection:
         now, packing = self.state.selection, self.state.selection.packing
         own = self.packed.value.strip()
         packed_mu = None if own in ("", SAME) else friction(own)
@@ -215,13 +218,13 @@ class Controls:
         same = {name: packing[name] for name in packing if name not in ("n", "mu", "seed", "radii")}
         return made._replace(packing=made.packing | same)
 
-    def _choose(self, event):
+    def _choose(self, event: Any) -> None:
         if not self._following and event.new:
             self.state.choose(series=event.new)
 
     # From the state
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         """Widgets as the state has them."""
         state = self.state
         if state.selection is None:
@@ -244,17 +247,17 @@ class Controls:
         self._following = False
         self._rest()
 
-    def _command(self, *events):
+    def _command(self, *events: Any) -> None:
         if self.state.selection is not None:
             self.command.text = self.state.command
 
-    def _rest(self, *events):
+    def _rest(self, *events: Any) -> None:
         state = self.state
         self.go.visible = state.missing and not self.work.computation.running
         if state.missing:
             self.go.label = f"Compute {differs(state)}"
 
-    def _scale(self, event):
+    def _scale(self, event: Any) -> None:
         """Where colours are full and how wide chains are, as typed; empty: by itself."""
         name = "full" if event.obj is self.full else "stretch"
         text = event.new.strip().replace(",", ".")
@@ -270,7 +273,7 @@ class Controls:
             return
         self.looks.param.update({name: value})
 
-    def _look(self, *events):
+    def _look(self, *events: Any) -> None:
         for name, labels in (("colour", COLOURS), ("thickness", WIDTHS)):
             getattr(self, name).options = _swap(meaningful(self.state, labels, name))
         for name in ("colour", "thickness", "overlay"):
@@ -279,11 +282,11 @@ class Controls:
         self.full.value = "" if full is None else f"{full:g}"
         self.stretch.value = f"{self.looks.stretch:g}"
 
-    def _read(self, event):
+    def _read(self, event: Any) -> None:
         """What was read and closed may be told again."""
         if event.new:
             self.work.message = ""
 
-    def _tell(self, *events):
+    def _tell(self, *events: Any) -> None:
         message = self.work.message
         self.error.param.update(title=message, visible=bool(message), closed=False)

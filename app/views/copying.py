@@ -1,5 +1,7 @@
 """A button that copies a text, or the address of the page."""
 
+from typing import ClassVar
+
 import param
 
 from .scripts import Scripted, module
@@ -15,7 +17,7 @@ class CopyButton(Scripted):
     text = param.String()
 
     _esm = module("copying")
-    _stylesheets = (
+    _stylesheets: ClassVar = [
         """
         :host { display: block; }
         button {
@@ -25,5 +27,5 @@ class CopyButton(Scripted):
         }
         button:hover { background: rgba(128, 128, 128, 0.15); }
         button:focus-visible { outline: 2px solid #e8710a; }
-        """,
-    )
+        """
+    ]

@@ -1,9 +1,11 @@
 """A place to drop files on; their content stays in memory and is handed over when all are there."""
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import param
 
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 
 NAME_LENGTH = 120  # of a file's name, as shown in messages
@@ -21,14 +23,20 @@ class Dropper(Scripted):
 
     _esm = module("dropper")
     _stylesheets: ClassVar = [FOLDER / "dropper.css"]
+    _files: Any  # {name: content}; None once the drop was refused
 
-    def __init__(self, on_files, on_refusal, **params):
+    def __init__(
+        self,
+        on_files: Callable[[list[tuple[str, bytes]]], object],
+        on_refusal: Callable[[str], object],
+        **params: Any,
+    ) -> None:
         """on_refusal(line): told why a drop was refused."""
         super().__init__(**params)
         self._on_files, self._on_refusal = on_files, on_refusal
-        self._files, self._size = {}, 0  # {name: content}; None once the drop was refused
+        self._files, self._size = {}, 0
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """One message of the page: a beginning, a piece of a file, or the end."""
         # A page may have been altered: the limits hold here, whatever it sends.
         if "begin" in message:
@@ -40,7 +48,7 @@ class Dropper(Scripted):
         elif self._files is not None:
             self._take(message["name"][:NAME_LENGTH], message["data"])
 
-    def _take(self, name, data):
+    def _take(self, name: str, data: Any) -> None:
         if not isinstance(data, (bytes, bytearray, memoryview)):
             return self._refuse("what was sent is no file")
         self._size += memoryview(data).nbytes
@@ -51,7 +59,7 @@ class Dropper(Scripted):
         if len(self._files) > MOST_FILES:
             self._refuse(f"more than {MOST_FILES} files were sent")
 
-    def _refuse(self, why):
+    def _refuse(self, why: str) -> None:
         """Forget the drop, and whatever else of it is to come."""
         self._files = None
         self._on_refusal(f"{why}; nothing was read")

@@ -1,9 +1,12 @@
 """What the picture shows, in sentences with the numbers of the packing on screen."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import param
 
+from ..live import Summary
+from ..selection import Selection
+from ..state import AppState
 from .hints import term
 from .scripts import Scripted, module
 
@@ -19,14 +22,14 @@ summary:focus-visible, .term:focus-visible { outline: 2px solid #e8710a; outline
 """
 
 
-def lead(state):
+def lead(state: AppState) -> str:
     """The question that the picture answers, and what is seen, as HTML."""
     if state.work.moving and not state.selection.imported:
         return jamming(state.selection)
     return "" if state.seen is None else first(state.seen.summary, PULL)
 
 
-def first(summary, more=""):
+def first(summary: Summary, more: str = "") -> str:
     """What does not move, what is free, and what playing shows; more: what else can be done."""
     n, mu, free = summary["n"], summary["mu"], summary["dimension"]
     forces = (2 if mu > 0 else 1) * summary["contacts"]
@@ -49,7 +52,7 @@ def first(summary, more=""):
     return f"<h2>{question}</h2><p>{still}{given}{told}</p>"
 
 
-def rest(summary):
+def rest(summary: Summary) -> str:
     """Why there are many networks, how many, and what measures that."""
     forces, grains = 2 * summary["contacts"], summary["n"] - summary.get("rattlers", 0)
     free, mu = summary["dimension"], summary["mu"]
@@ -88,14 +91,14 @@ def rest(summary):
     )
 
 
-def _dependent(count):
+def _dependent(count: int) -> str:
     """In words, how many of the equations follow from the others."""
     if count < 1:
         return ""
     return f" (less {count} that follow from the others, as each force acts on two disks)"
 
 
-def jamming(selection):
+def jamming(selection: Selection) -> str:
     """What moves while a packing is made."""
     return (
         "<h2>These disks move until they jam.</h2>"
@@ -106,7 +109,7 @@ def jamming(selection):
     )
 
 
-def more(summary):
+def more(summary: Summary) -> str:
     """The longer part, to be opened, as HTML for a page without scripts of its own."""
     return f"<details><summary>{QUESTION}</summary>{rest(summary)}</details>"
 
@@ -121,11 +124,11 @@ class Foldout(Scripted):
     _stylesheets: ClassVar = [STYLE]
 
 
-def view(state):
+def view(state: AppState) -> Foldout:
     """The longer part of the explanation, below the packing."""
     made = Foldout(line=QUESTION, sizing_mode="stretch_width", margin=(4, 10))
 
-    def tell(*events):
+    def tell(*events: Any) -> None:
         if state.work.moving and not state.selection.imported:
             made.inside = ""
         elif state.seen is not None:

@@ -1,11 +1,16 @@
 """Share what is on screen: pictures, tables, datasets, the packing, the parameters."""
 
+from collections.abc import Callable
+from typing import Any
+
 import panel as pn
+import xarray as xr
 
 from .. import exports, movies, planes, standalone
 from ..compute import found_or_made
-from ..data import SOURCES
-from ..jobs import reading
+from ..data import SOURCES, Cell, Library
+from ..jobs import Job, reading
+from ..state import AppState
 from .captions import caption, known_words, origin, stem
 from .handover import Handover
 from .packing import exact_intervals, full_extent, gone, measured, pins
@@ -43,7 +48,7 @@ class View:
 
     name, title = "export", "Export"
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         self.state = state
         self.task, self.making = state.work.task(reading, told=False), state.work.task(told=False)
         self.buttons = Handover(self._asked, files=FILES, margin=(12, 10, 0, 10))
@@ -52,7 +57,7 @@ class View:
             task.param.watch(self._follow, "message")
         self.making.param.watch(self._rest, "running")
 
-    def panel(self):
+    def panel(self) -> pn.Column:
         """Buttons, and what they are for."""
         return pn.Column(
             self.buttons,
@@ -62,7 +67,7 @@ class View:
             sizing_mode="stretch_width",
         )
 
-    def _asked(self, key):
+    def _asked(self, key: str) -> None:
         state = self.state
         self.told.object = ""
         if state.replay is None:
@@ -76,12 +81,12 @@ class View:
         else:
             self.task.start(self._making(key, name), self.buttons.hand_over)
 
-    def _rest(self, event):
+    def _rest(self, event: Any) -> None:
         """What failed or was cancelled brings no file: its button rests, too."""
         if not event.new:
             self.buttons.rest()
 
-    def _long(self, key, stem):
+    def _long(self, key: str, stem: str) -> Callable[[Job], exports.File]:
         """Work that makes a file that takes a while: all states, a movie, the page."""
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
@@ -93,7 +98,7 @@ class View:
         told = {"link": state.link(), "command": state.command, "source": source}
         legend = {name: caption(state)[name] for name in ("ink", "bar", "lines")}
 
-        def work(job):
+        def work(job: Job) -> exports.File:
             if key in ("netcdf", "zarr"):
                 states = all_states(library, cell, job)
                 job.begin("making the file")
@@ -138,7 +143,7 @@ class View:
 
         return work
 
-    def _making(self, key, stem):
+    def _making(self, key: str, stem: str) -> Callable[[Job], exports.File]:
         """Work that makes a file of what is on screen now."""
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
@@ -146,7 +151,7 @@ class View:
         source, held = origin(cell), state.hand.held
         link, view = state.link(), state.view
 
-        def work(job):
+        def work(job: Job) -> exports.File:
             job.begin("making the file")
             if key == "csv":
                 columns = exports.contacts(replay, exact, frame, held)
@@ -163,12 +168,12 @@ class View:
 
         return work
 
-    def _follow(self, event):
+    def _follow(self, event: Any) -> None:
         if event.new:
             self.told.object = event.new
 
 
-def all_states(library, cell, job):
+def all_states(library: Library, cell: Cell, job: Job) -> xr.Dataset:
     """The dataset of a cell with all its states: those that were not kept are computed again."""
     if cell.params.get("keep") is None:
         return library.dataset(cell)

@@ -1,7 +1,10 @@
 """Packing and plots on screen as one figure, for print."""
 
+from typing import Any
+
 import panel as pn
 
+from ..state import AppState
 from .captions import caption, stem
 from .handover import Handover
 from .number import NumberField
@@ -15,13 +18,13 @@ As they are seen now, as lines and letters. From 120 mm on the plots are beside 
 """
 
 
-def panel(state):
+def panel(state: AppState) -> Any:
     """The width, and a button for each kind of file; the browser makes them, see figure.js."""
 
-    def refuse(line):
+    def refuse(line: str) -> None:
         state.work.message = line
 
-    def asked(kind):
+    def asked(kind: str) -> None:
         if state.replay is None:
             return buttons.rest()
         name = f"{stem(state.cell.selection)}_figure.{kind}"

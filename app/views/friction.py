@@ -1,10 +1,12 @@
 """Slider for the friction coefficient."""
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import param
 
 from ..data import LEAST_PLACE
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 
 MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
@@ -23,12 +25,12 @@ class FrictionSlider(Scripted):
     _esm = module("friction")
     _stylesheets: ClassVar = [FOLDER / "friction.css"]
 
-    def __init__(self, on_typed=None, **params):
+    def __init__(self, on_typed: Callable[[str], object] | None = None, **params: Any) -> None:
         """on_typed(text): what to do with a value that was typed, sensible or not."""
         super().__init__(**params)
         self._on_typed = on_typed
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         if self._on_typed is not None:
             self._on_typed(message["typed"])
             self._send_msg({"settled": True})

@@ -1,9 +1,12 @@
 """Buttons that hand files over: made when asked for, saved by the browser."""
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import param
 
+from ..exports import File
+from .messages import Message
 from .scripts import Scripted, module
 
 
@@ -35,15 +38,17 @@ class Handover(Scripted):
         """
     ]
 
-    def __init__(self, on_ask, **params):
+    def __init__(self, on_ask: Callable[[str], object], **params: Any) -> None:
         super().__init__(**params)
         self._on_ask = on_ask
 
-    def hand_over(self, file):
+    def hand_over(self, file: File) -> None:
         """Have the browser save an exports.File."""
         self._send_msg(file._asdict())
 
-    def hand_over_picture(self, name, caption, width=None):
+    def hand_over_picture(
+        self, name: str, caption: dict[str, Any], width: int | None = None
+    ) -> None:
         """Have the browser draw the packing as on screen (SVG, PNG), or record it (WebM), and save.
 
         caption: background, ink, bar {low, high, stops} and lines of words; width: in mm, of one
@@ -51,11 +56,11 @@ class Handover(Scripted):
         """
         self._send_msg({"name": name, "caption": caption} | ({"width": width} if width else {}))
 
-    def rest(self):
+    def rest(self) -> None:
         """No file comes for what was asked."""
         self._send_msg({"rest": True})
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         key = message["key"]
         if any(key in group for group in self.files.values()):
             self._on_ask(key)

@@ -58,12 +58,12 @@ LABELS = {
 }
 
 
-def labels():
+def labels() -> dict[str, str]:
     """{words on the page: key of the glossary}."""
     return {term.word: key for key, term in TERMS.items()} | LABELS
 
 
-def term(key, words=None):
+def term(key: str, words: str | None = None) -> str:
     """A word of the glossary as HTML, explained where it stands; words: how it is called there."""
     shown = escape(title(key) if words is None else words)
     return f'<span class="term" tabindex="0" data-term="{key}">{shown}</span>'

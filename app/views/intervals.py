@@ -1,16 +1,24 @@
 """Intervals of each contact's normal force (Fig. 3 of PRE 79, 052302); η1, η2, η3 as they grow."""
 
+from typing import Any
+
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
+from bokeh.plotting import figure as Figure
+
+from granforce.records import Integers
 
 from .. import live
-from ..looks import DRAWN, SCALES, SORTS
+from ..known import Narrowed
+from ..looks import DRAWN, SCALES, SORTS, Looks
+from ..replays import Replay
+from ..state import AppState
 from .contacts import Contacts
 from .hints import term
 from .known import Known
-from .packing import exact_intervals
+from .packing import Bounds, exact_intervals
 from .parts import MOVES, figure, folded_away, linked, note
 from .select import Select
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
@@ -51,7 +59,7 @@ class View:
 
     name, title = "intervals", "Intervals"
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         self.state, self.looks = state, state.looks
         self.bars = _source("bars", BARS)
         self.growth = _source("growth", ("state", *ETAS))
@@ -77,7 +85,7 @@ class View:
         self._connect()
         self._show()
 
-    def panel(self):
+    def panel(self) -> pn.Column:
         """Choices and bars; growth, to be opened."""
         wide = {"sizing_mode": "stretch_width", "margin": 0}
         choices = pn.FlexBox(*self.choices, sizing_mode="stretch_width")
@@ -93,7 +101,7 @@ class View:
             sizing_mode="stretch_width",
         )
 
-    def _connect(self):
+    def _connect(self) -> None:
         state = self.state
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
@@ -110,11 +118,11 @@ class View:
 
     # Contents
 
-    def _catch_up(self, event):
+    def _catch_up(self, event: Any) -> None:
         if event.new == self.name and self._stale:
             self._show()
 
-    def _show(self, *events):
+    def _show(self, *events: Any) -> None:
         """Take over contacts, exact intervals and the walk's length."""
         state, looks, replay = self.state, self.looks, self.state.seen
         self._stale = looks.tab != self.name
@@ -130,13 +138,13 @@ class View:
             self._show_growth(replay)
         self._mark()
 
-    def _offer(self, *events):
+    def _offer(self, *events: Any) -> None:
         """Exact intervals are to be asked for only where none are there or under way."""
         state = self.state
         self.exact.visible = state.replay is not None and state.exact_wanted
         self.exact_item.visible = state.possible is not None or state.work.arriving is not None
 
-    def _show_bars(self, replay, exact, of):
+    def _show_bars(self, replay: Replay, exact: Bounds, of: int) -> None:
         contacts = self.contacts
         original = replay.normal[0, contacts]
         unit = original if self.looks.scale == "own" else np.ones_like(original)
@@ -171,7 +179,7 @@ class View:
         self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
 
-    def _show_growth(self, replay):
+    def _show_growth(self, replay: Replay) -> None:
         grows = self.state.growing
         number = live.numbers(replay.summary) if grows else replay.number
         unseen = np.full(len(number), np.nan, dtype=np.float32)
@@ -192,15 +200,15 @@ class View:
 
     # Selection, linked with the packing
 
-    def _tapped(self, name, old, new):
+    def _tapped(self, name: str, old: Any, new: list[int]) -> None:
         if new:
             self.looks.contact = int(self.contacts[new[0]])
             self.bars.selected.indices = []
 
-    def _mark(self, *events):
+    def _mark(self, *events: Any) -> None:
         """Show where the selected contact stands."""
         looks = self.looks
-        marks = {"rank": [], "low": [], "high": []}
+        marks: dict[str, list[float]] = {"rank": [], "low": [], "high": []}
         if looks.contact is not None and self.state.seen is not None and looks.tab == self.name:
             at = np.flatnonzero(self.contacts == looks.contact)
             if len(at):
@@ -211,7 +219,7 @@ class View:
 
     # Figures
 
-    def _bars_figure(self):
+    def _bars_figure(self) -> Figure:
         fig = figure(
             "intervals",
             None,
@@ -283,7 +291,7 @@ class View:
         )
         return fig
 
-    def _growth_figure(self):
+    def _growth_figure(self) -> Figure:
         fig = figure(
             "eta_so_far",
             None,
@@ -308,7 +316,9 @@ class View:
         return fig
 
 
-def sorted_contacts(replay, exact, by, narrowed=None):
+def sorted_contacts(
+    replay: Replay, exact: Bounds, by: str, narrowed: Narrowed | None = None
+) -> Integers:
     """Positions of the contacts (N_c,), ascending in what `by`, one of looks.SORTS, names.
 
     narrowed: known.Narrowed; the STRONGEST whose interval it has shortened most, alone.
@@ -329,26 +339,26 @@ def sorted_contacts(replay, exact, by, narrowed=None):
     return np.argsort(value, kind="stable")
 
 
-def picked(order, most, named):
+def picked(order: Integers, most: int, named: list[int]) -> Integers:
     """Ranks (k,) of contacts to be drawn of an order: evenly spaced, at most so many, and named."""
     step = -(-len(order) // most)
     return np.union1d(np.arange(0, len(order), step), np.flatnonzero(np.isin(order, named)))
 
 
-def _top(replay, exact):
+def _top(replay: Replay, exact: Bounds) -> float:
     seen = float(replay.high[:, 0].max(initial=1))
     return 1.04 * max(seen, float(np.quantile(exact["high"], 0.995)) if exact else 0)
 
 
-def _source(name, columns):
+def _source(name: str, columns: tuple[str, ...]) -> ColumnDataSource:
     return ColumnDataSource({column: [] for column in columns}, name=name)
 
 
-def _select(label, labels, looks, name):
+def _select(label: str, labels: dict[str, str], looks: Looks, name: str) -> Select:
     options = {words: key for key, words in labels.items()}
     made = Select(label=label, options=options, value=getattr(looks, name), **SMALL)
     return linked(made, looks, name)
 
 
-def _set_range(axis, low, high):
+def _set_range(axis: Range1d, low: float, high: float) -> None:
     axis.update(start=low, end=high, reset_start=low, reset_end=high)

@@ -1,11 +1,16 @@
 """What is known above the intervals: chips, what it leaves open, which measurement comes next."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import param
 
+from granforce.records import Integers
+
+from ..known import Knowledge, Ranked
+from ..state import AppState
 from .hints import term
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
@@ -26,7 +31,7 @@ class Known(Scripted):
     _esm = module("known")
     _stylesheets: ClassVar = [FOLDER / "known.css"]
 
-    def __init__(self, state, **params):
+    def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", margin=0, **params)
         self._state = state
         state.param.watch(self._show, "seen")
@@ -36,7 +41,7 @@ class Known(Scripted):
             task.param.watch(self._show, "running")
         self._show()
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         knowledge = self._state.knowledge
         match message:
             case {"release": int(contact)}:
@@ -46,7 +51,7 @@ class Known(Scripted):
             case {"choose": int(contact)} if 0 <= contact < len(self._state.replay.backbone):
                 self._state.looks.contact = contact
 
-    def _show(self, *events):
+    def _show(self, *events: Any) -> None:
         state = self._state
         if state.replay is None:
             return
@@ -63,7 +68,7 @@ class Known(Scripted):
         )
 
 
-def words(knowledge, number):
+def words(knowledge: Knowledge, number: Integers) -> str:
     """What is known leaves so much open, as HTML."""
     narrowed, known = knowledge.narrowed, tuple(knowledge.known)
     if not known:
@@ -89,7 +94,7 @@ def words(knowledge, number):
     return told + " The states that play are of all of S; pulls keep what is known."
 
 
-def _ranks(best, number):
+def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
     rows = zip(best.contacts.tolist(), best.after, best.expected, strict=True)
     return [
         [c, f"contact {number[c]}: {_worth(best.before, after, expected)}"]
@@ -97,12 +102,12 @@ def _ranks(best, number):
     ]
 
 
-def _worth(before, after, expected):
+def _worth(before: float, after: float, expected: float) -> str:
     """What knowing a contact would tell."""
     if np.isnan(after) or np.isnan(before):
         return f"errors about {expected:.1%} smaller, by the states"
     return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"
 
 
-def _change(before, after):
+def _change(before: float, after: float) -> str:
     return f"{100 * (after / before - 1):+.0f} %".replace("-", "−") if before > 0 else "–"

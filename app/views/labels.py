@@ -1,9 +1,15 @@
 """Places for labels beside the points of a plot, such that all of them can be read."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+
+from granforce.records import Floats
 
 # Pixels between the axes of the smallest plot that has labels, and of a letter and a point.
 SMALLEST, LETTER, POINT = (270.0, 190.0), (6.0, 11.0), 4.0
+Box = tuple[float, float, float, float]  # left, top, right, bottom, in pixels
 # Where a label may stand beside its point.
 CORNERS = (
     (5, -4, "left", "bottom"),
@@ -13,7 +19,9 @@ CORNERS = (
 )
 
 
-def labels(x, y, words, span):
+def labels(
+    x: Floats, y: Floats, words: Sequence[str], span: tuple[float, float]
+) -> dict[str, list[Any]]:
     """Where labels stand beside points such that none collide, as columns of a text glyph.
 
     span: of what the axes show. In plots larger than the SMALLEST there is more room between them.
@@ -43,14 +51,23 @@ def labels(x, y, words, span):
     return {name: list(column) for name, column in zip(names, columns, strict=True)}
 
 
-def _box(px, py, right, down, align, baseline, width, height):
+def _box(
+    px: float,
+    py: float,
+    right: float,
+    down: float,
+    align: str,
+    baseline: str,
+    width: float,
+    height: float,
+) -> Box:
     """Pixels (left, top, right, bottom) of a label beside a point."""
     left = px + right - (width if align == "right" else 0)
     top = py + down - (height if baseline == "bottom" else 0)
     return left, top, left + width, top + height
 
 
-def _along(places):
+def _along(places: Floats) -> Floats:
     """Pixels of the line that joins points, close to each other."""
     if len(places) < 2:
         return places
@@ -58,15 +75,15 @@ def _along(places):
     return ((1 - part) * places[:-1] + part * places[1:]).reshape(-1, 2)
 
 
-def _ends(places):
+def _ends(places: Floats) -> Box:
     """The frame of a plot, whose axes go a twentieth beyond what they show."""
     room = 0.05 * np.array(SMALLEST)
     return (*(places.min(axis=0) - room), *(places.max(axis=0) + room))
 
 
-def _within(box, ends):
+def _within(box: Box, ends: Box) -> bool:
     return ends[0] <= box[0] and ends[1] <= box[1] and box[2] <= ends[2] and box[3] <= ends[3]
 
 
-def _meet(a, b):
+def _meet(a: Box, b: Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

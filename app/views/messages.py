@@ -5,11 +5,14 @@ for what says nothing but its name, a list ([int, float] of two, [float, ...] of
 of fields, an `Array` or, where the one who takes it looks for himself, any `object`.
 """
 
+from collections.abc import Mapping
 from numbers import Integral, Real
+from typing import Any
 
 import numpy as np
 
 Array = np.ndarray
+Message = dict[str, Any]
 
 LOADED = {"mu": float, "load": [float, ...]}  # a small scene under loads (3 N) on its disks
 
@@ -94,12 +97,12 @@ TO_BROWSER = {
 }
 
 
-def listed(messages, component, message):
+def listed(messages: Mapping[str, tuple[Message, ...]], component: str, message: Any) -> bool:
     """Whether FROM_BROWSER or TO_BROWSER has a component's message, field by field."""
     return any(fits(message, shape) for shape in messages.get(component, ()))
 
 
-def fits(value, shape):
+def fits(value: Any, shape: Any) -> bool:
     """Whether a value is of the shape of a message or field."""
     match shape:
         case dict():
@@ -114,7 +117,7 @@ def fits(value, shape):
             return value is shape
     if shape in (int, float):
         # Larger whole numbers than a browser has are no floats either.
-        kind = Integral if shape is int else Real
+        kind: Any = Integral if shape is int else Real
         whole = isinstance(value, int) and abs(value) > 2**53
         return isinstance(value, kind) and not isinstance(value, bool) and not whole
     return isinstance(value, shape)

@@ -1,6 +1,6 @@
 """My computations: what is in the visitor's own cache, to be opened, named or deleted."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import param
 
@@ -8,6 +8,8 @@ from granforce.records import InputError
 
 from .. import mine, names
 from ..jobs import reading
+from ..state import AppState
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 
 
@@ -19,21 +21,21 @@ class Mine(Scripted):
     _esm = module("mine")
     _stylesheets: ClassVar = [FOLDER / "mine.css"]
 
-    def __init__(self, state, **params):
+    def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", **params)
         self._state, self._task = state, state.work.task(reading)
         state.param.watch(self._list, ["catalogue", "cell"])
         self._list()
 
-    def _list(self, *events):
+    def _list(self, *events: Any) -> None:
         if self._state.library.cache is not None:
             self._task.start(lambda job: mine.rows(self._state.library), self._show)
 
-    def _show(self, rows):
+    def _show(self, rows: list[dict[str, Any]]) -> None:
         on_screen = self._state.cell and self._state.cell.name
         self.rows = [row | {"here": row["entry"] == on_screen} for row in rows]
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """The visitor opens, names or deletes one of the rows."""
         state, known = self._state, {row["entry"] for row in self.rows}
         match message:
@@ -50,5 +52,5 @@ class Mine(Scripted):
             case {"delete": str(entry)} if entry in known:
                 self._task.start(lambda job: mine.delete(state.library, entry), self._gone)
 
-    def _gone(self, nothing):
+    def _gone(self, nothing: None) -> None:
         self._state.refresh()

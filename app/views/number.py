@@ -1,9 +1,11 @@
 """A field for a whole number."""
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import param
 
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 
 
@@ -24,12 +26,12 @@ class NumberField(Scripted):
     _esm = module("number")
     _stylesheets: ClassVar = [FOLDER / "number.css"]
 
-    def __init__(self, on_wrong=None, **params):
+    def __init__(self, on_wrong: Callable[[str], object] | None = None, **params: Any) -> None:
         """on_wrong(line): told what is wrong with what was typed, if anything."""
         super().__init__(**params)
         self._on_wrong = on_wrong
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """Something was typed that is no whole number."""
         if self._on_wrong is not None:
             typed, within = message["typed"][:30], f"{self.start} to {self.end}"

@@ -1,17 +1,28 @@
 """The packing: the player, what it shares with the server, and the legend."""
 
+from typing import Any
+
 import numpy as np
 import panel as pn
+import xarray as xr
+
+from granforce.records import Floats
 
 from .. import live
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
-from ..looks import COLOURS, WIDTHS
+from ..known import Knowledge
+from ..looks import COLOURS, WIDTHS, Looks
+from ..planes import Plane
+from ..replays import Replay
+from ..state import AppState
 from . import explanation
 from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
 FOLLOWED = ("second", "tab", "views", "wide", "thickness", "full", "stretch", "overlay", "scale")
+
+Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
@@ -57,7 +68,7 @@ DOT = """<svg width="12" height="12" style="vertical-align:middle;margin-left:8p
 class PackingView:
     """Disks, chains and the player's buttons: the views `player` and, below it, `legend`."""
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         self.state = state
         self.looks = looks = state.looks
         self.player = Player(
@@ -101,16 +112,16 @@ class PackingView:
         self._pin()
         self._explain()
 
-    def _swing(self, event):
+    def _swing(self, event: Any) -> None:
         self.looks.between = None if event.new is None else tuple(event.new)
 
-    def _look_at(self, event):
+    def _look_at(self, event: Any) -> None:
         self.looks.zoom = None if event.new is None else tuple(event.new)
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         self.player.param.update({event.name: event.new for event in events})
 
-    def _show(self, *events):
+    def _show(self, *events: Any) -> None:
         """What belongs together comes in one message."""
         state, looks, replay = self.state, self.looks, self.state.seen
         if replay is None:
@@ -130,7 +141,7 @@ class PackingView:
             changes["free"] = replay.summary["dimension"]
         self.player.param.update(changes)
 
-    def _accompany(self, *events):
+    def _accompany(self, *events: Any) -> None:
         """Another packing, beside the one on screen."""
         twin = self.state.besides.twin
         if twin is None:
@@ -139,31 +150,31 @@ class PackingView:
             exact = exact_intervals(twin.exact, twin.replay)
             self.player.twin = frames(twin.replay) | {"exact": exact}
 
-    def _pin(self, *events):
+    def _pin(self, *events: Any) -> None:
         self.player.pins = pins(self.state.knowledge)
 
-    def _load(self, event):
+    def _load(self, event: Any) -> None:
         self.player.loads = event.new
 
-    def _project(self, event):
+    def _project(self, event: Any) -> None:
         """The plane of force space on screen: where networks lie in it that are no states."""
         self.player.plane = projection(event.new)
 
-    def _displace(self, event):
+    def _displace(self, event: Any) -> None:
         field = event.new
         flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
         self.player.displacement = flat
 
-    def _dress(self, event):
+    def _dress(self, event: Any) -> None:
         self.player.palettes = palettes(event.new)
 
-    def _explain(self, *events):
+    def _explain(self, *events: Any) -> None:
         pulled = self.player.pulled or bool(self.state.hand.pulls)
         self.legend.object = JAMMING if self.state.work.moving else legend(self.state, pulled)
         self.player.lead = explanation.lead(self.state)
 
 
-def pins(knowledge):
+def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
     """Contacts that are known, whether exactly, and those to measure next, the best first."""
     return {
         "contacts": [one.contact for one in knowledge.known],
@@ -172,7 +183,7 @@ def pins(knowledge):
     }
 
 
-def projection(plane):
+def projection(plane: Plane | None) -> dict[str, Any]:
     """A planes.Plane as the player takes it: axes of f_n and f_t, and what to take away."""
     if plane is None:
         return {}
@@ -182,7 +193,7 @@ def projection(plane):
     return columns | {"origin": [float(value) for value in plane.origin]}
 
 
-def exact_intervals(dataset, replay):
+def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
     """Exact intervals of f_n in ⟨f_n⟩, for the contacts on screen."""
     if dataset is None or not np.array_equal(dataset["backbone"].values, replay.backbone):
         return {}
@@ -192,7 +203,7 @@ def exact_intervals(dataset, replay):
     }
 
 
-def gone(knowledge, replay):
+def gone(knowledge: Knowledge, replay: Replay) -> Any:
     """Of ΔF_n (N_c,), by what is known, in ⟨f_n⟩; or None while nothing is."""
     narrowed = knowledge.narrowed
     if narrowed is None or len(narrowed.gone) != len(replay.backbone):
@@ -200,7 +211,7 @@ def gone(knowledge, replay):
     return narrowed.gone.astype(np.float32)
 
 
-def measured(state, replay):
+def measured(state: AppState, replay: Replay) -> dict[str, Any]:
     """Of an opened frame the measured f_n in ⟨f_n⟩ and how far off it is in σ; {} for others."""
     found = state.measured
     if found is None or state.selection is None or state.selection.packing != found.packing:
@@ -209,14 +220,14 @@ def measured(state, replay):
     return {"normal": normal.astype(np.float32), "off": off.astype(np.float32)}
 
 
-def normal_extent(replay, exact):
+def normal_extent(replay: Replay, exact: Bounds) -> Any:
     """ΔF_n (N_c,) in ⟨f_n⟩: exact where known, else of all states."""
     if exact:
         return exact["high"] - exact["low"]
     return replay.high[:, 0] - replay.low[:, 0]
 
 
-def full_extent(replay, exact, asked=None):
+def full_extent(replay: Replay, exact: Bounds, asked: float | None = None) -> float:
     """ΔF_n in ⟨f_n⟩ at which its colour is full, where no other was asked for."""
     if asked is not None:
         return asked
@@ -224,7 +235,7 @@ def full_extent(replay, exact, asked=None):
     return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
 
 
-def colour_bar(state, pulled):
+def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
@@ -244,18 +255,18 @@ def colour_bar(state, pulled):
     }[looks.colour]
 
 
-def colour_words(looks, pulled):
+def colour_words(looks: Looks, pulled: bool) -> str:
     """What colours mean just now."""
     return "change by what was pulled" if pulled else COLOURS[looks.colour]
 
 
-def _largest(loads, full):
+def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
         return "(being computed)"
     return f"{full or loads.max(initial=0):.2f} ⟨fₙ⟩"
 
 
-def legend(state, pulled=False):
+def legend(state: AppState, pulled: bool = False) -> str:
     """What width and colour mean just now, as HTML."""
     looks, replay = state.looks, state.seen
     if replay is None:
@@ -280,7 +291,7 @@ def legend(state, pulled=False):
     )
 
 
-def _marks(dark):
+def _marks(dark: bool) -> str:
     colours = palettes(dark)["scene"]
     strong = DOT.format(fill=colours["strong"], line="none", text="tenth with largest fₙ")
     loose = DOT.format(fill="none", line=colours["loose"], text="tenth with largest ΔFₙ")

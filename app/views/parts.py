@@ -1,12 +1,20 @@
 """What the tabs share: they compute only while they are seen, and their plots can be saved."""
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import panel as pn
 import panel_material_ui as pmui
+from bokeh.document import Document
 from bokeh.models import CustomAction, CustomJS, SaveTool
+from bokeh.plotting import figure as Figure
 from panel.io import document as panel_document
 from panel.io import unlocked
 from panel.reactive import Syncable
 
+from ..live import Summary
+from ..looks import Looks
+from ..state import AppState
 from .select import Select
 from .style import plot
 
@@ -73,7 +81,7 @@ prototype.watch = function (view, name, changed, state) {
 """
 
 
-def mend_late_views(document):
+def mend_late_views(document: Document) -> None:
     """Have the browser bear with what is told to it of views that it has not mounted yet.
 
     Plots that are not on the page yet are passed over where it lays the page out, those under
@@ -84,14 +92,14 @@ def mend_late_views(document):
     document.js_on_event("document_ready", *mended)
 
 
-def answer_with_lock():
+def answer_with_lock() -> None:
     """Have events of a browser answered while Bokeh's lock is held, as its changes are."""
     # Panel does without it where changes told just before still wait for their turn, and answers
     # them, too: Bokeh, through which plots are changed, refuses then, and all of it is lost.
-    Syncable._event_coroutine.lock = True
+    Syncable._event_coroutine.lock = True  # type: ignore[attr-defined]  # a mark on it
 
 
-def send_what_waits(document):
+def send_what_waits(document: Document) -> None:
     """Send messages that Panel keeps back although nothing holds them any more."""
     # One of its tasks, having sent its own, takes away the mark by which the next would know that
     # it has some to send; they would wait for the next change.
@@ -100,7 +108,7 @@ def send_what_waits(document):
         panel_document._dispatch_write_task(document, panel_document._dispatch_msgs, document)
 
 
-def together(function, **arguments):
+def together(function: Callable[..., object], **arguments: Any) -> None:
     """Call a function, and send all it changes on the page as one message, in its turn."""
     # Bokeh sends by itself what Panel does not hold, and that may overtake what waits in Panel's
     # queue: changes of a plot would reach a browser that has not got the plot yet.
@@ -115,7 +123,12 @@ class TabView:
     these.
     """
 
-    def __init__(self, state, *watched, looks=(), work=()):
+    name: str
+    update: Callable[[], None]
+
+    def __init__(
+        self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
+    ) -> None:
         self.state, self.looks = state, state.looks
         self._stale, self.left = True, False  # whether it was taken off the page
         state.param.watch(self._changed, [*watched])
@@ -123,27 +136,27 @@ class TabView:
         state.work.param.watch(self._changed, [*work])
 
     @property
-    def visible(self):
+    def visible(self) -> bool:
         """Whether the view's tab is on screen."""
         return not self.left and self.looks.shows(self.name)
 
-    def catch_up(self):
+    def catch_up(self) -> None:
         """Update if need be and if seen; to be called once when the view has been built."""
         if self._stale and self.visible:
             self._stale = False
             together(self.update)
 
-    def refresh(self, *events):
+    def refresh(self, *events: Any) -> None:
         """Update, now or when next seen."""
         self._stale = True
         self.catch_up()
 
-    def _changed(self, *events):
+    def _changed(self, *events: Any) -> None:
         self._stale |= any(event.name not in ("tab", "wide") for event in events)
         self.catch_up()
 
 
-def savable(fig, name):
+def savable(fig: Figure, name: str) -> Figure:
     """The figure with buttons that save it as PNG and as SVG under this name."""
     fig.add_tools(
         SaveTool(filename=name),
@@ -156,7 +169,7 @@ def savable(fig, name):
     return fig
 
 
-def saving(mark):
+def saving(mark: str) -> list[Any]:
     """A button each that saves the newest figure with this tag as PNG and as SVG, for all to see.
 
     Buttons outlive figures: a widget that leaves the page while it is still being drawn there ends
@@ -173,7 +186,7 @@ def saving(mark):
     return buttons
 
 
-def figure(name, title, x, y, **options):
+def figure(name: str, title: str | None, x: str, y: str, **options: Any) -> Figure:
     """A savable figure in the style of all others."""
     return savable(plot(title, x, y, **options), name)
 
@@ -188,7 +201,7 @@ CLAIMS = """
 """
 
 
-def note(text="", **options):
+def note(text: str = "", **options: Any) -> pn.pane.HTML:
     """Small print, as HTML."""
     return pn.pane.HTML(
         text, styles=NOTE, stylesheets=[CLAIMS], sizing_mode="stretch_width",
@@ -196,11 +209,13 @@ def note(text="", **options):
     )  # fmt: skip
 
 
-def of_replay(state, text, style, margin):
+def of_replay(
+    state: AppState, text: Callable[[Summary], str], style: str, margin: tuple[int, ...]
+) -> pn.pane.HTML:
     """HTML about the replay on screen, text(summary) of its numbers; empty while there is none."""
     pane = pn.pane.HTML(stylesheets=[style], sizing_mode="stretch_width", margin=margin)
 
-    def show(*events):
+    def show(*events: Any) -> None:
         pane.object = "" if state.replay is None else text(state.replay.summary)
 
     state.param.watch(show, "replay")
@@ -208,7 +223,7 @@ def of_replay(state, text, style, margin):
     return pane
 
 
-def choice(labels, value):
+def choice(labels: dict[str, str], value: str) -> Any:
     """Buttons of which one is pressed; labels {value: words}."""
     return pmui.RadioButtonGroup(
         options={words: key for key, words in labels.items()},
@@ -220,12 +235,12 @@ def choice(labels, value):
     )
 
 
-def chosen(labels, looks, name):
+def chosen(labels: dict[str, str], looks: Looks, name: str) -> Any:
     """A `choice` of the parameter of this name."""
     return linked(choice(labels, getattr(looks, name)), looks, name)
 
 
-def question(label, labels, looks, name):
+def question(label: str, labels: dict[str, str], looks: Looks, name: str) -> Select:
     """The same as a list under a label, for choices that are sentences."""
     options = {words: key for key, words in labels.items()}
     wide = {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
@@ -233,14 +248,14 @@ def question(label, labels, looks, name):
     return linked(made, looks, name)
 
 
-def linked(widget, looks, name):
+def linked(widget: Any, looks: Looks, name: str) -> Any:
     """A widget whose value is the parameter of this name."""
     widget.param.watch(lambda event: looks.param.update({name: event.new}), "value")
     looks.param.watch(lambda event: widget.param.update(value=event.new), name)
     return widget
 
 
-def folded_away(*titled):
+def folded_away(*titled: Any) -> Any:
     """Panels (title, panel, …) that are closed until they are opened."""
     pairs = list(zip(titled[::2], titled[1::2], strict=True))
     return pmui.Accordion(
@@ -253,6 +268,6 @@ def folded_away(*titled):
     )
 
 
-def folded(text):
+def folded(text: str) -> str:
     """HTML of what only those read who want to know more."""
     return f"<details><summary>How was this computed?</summary>{text}</details>"

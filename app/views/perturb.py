@@ -1,14 +1,22 @@
 """Push the disks of a contact apart: limit load, critical force, and how the packing gives way."""
 
 import html
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import BoxAnnotation, ColumnDataSource, TapTool
+from bokeh.plotting import figure as Figure
 
 from .. import perturbations
+from ..data import Cell, Library
+from ..jobs import Job
 from ..looks import PUSHES
+from ..perturbations import Loads, Pushed
+from ..replays import Replay
+from ..state import AppState
 from . import studied
 from .hints import term
 from .parts import PLAIN, TabView, figure, folded, note, question
@@ -48,6 +56,8 @@ EVERY = (
     "<b>The failure load of a contact</b> (limit load): the largest pair of forces that may push "
     "its two disks apart before no forces at all can hold the packing."
 )
+Said = tuple[str, list[Figure], str, str]  # text, plots, numbers and lead
+
 LONGEST_GUESS = 12  # characters
 UNIT = "Forces are in units of the mean normal force ⟨fₙ⟩."
 
@@ -57,7 +67,7 @@ class View(TabView):
 
     name, title = "perturb", "Push"
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", looks=["contact"])
         self.what = question("Question", PUSHES, self.looks, "pushing")
         self.strongest = pmui.Button(
@@ -76,7 +86,9 @@ class View(TabView):
         self.plots = pn.Column(sizing_mode="stretch_width")
         self.lead, self.told = note(), note()
         self.task = state.work.task(told=False)
-        self.loads = self.pushed = self._shown = None
+        self.loads: Loads | None = None
+        self.pushed: Any = None  # (Pushed, contact, Replay)
+        self._shown: Replay | None = None
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.what.param.watch(self.refresh, "value")
         self.animate.param.watch(self._animate, "value")
@@ -87,7 +99,7 @@ class View(TabView):
         self.looks.param.watch(self._animate, "tab")
         self.catch_up()
 
-    def panel(self):
+    def panel(self) -> pn.Column:
         """Choices, buttons, numbers and plot."""
         wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
@@ -101,7 +113,7 @@ class View(TabView):
             **wide,
         )
 
-    def update(self):
+    def update(self) -> None:
         """Show what is chosen; what is not known yet waits for a click, but for Fig. 2."""
         state, what, contact = self.state, self.what.value, self.looks.contact
         if state.replay is not self._shown:
@@ -124,27 +136,29 @@ class View(TabView):
         {"one": self._one, "all": self._all, "store": self._store}[what]()
         self._animate()
 
-    def _holds(self):
+    def _holds(self) -> bool:
         """Whether what was pushed is still the contact selected."""
         contact, replay = self.pushed[1:]
         return contact == self.looks.contact and replay is self.state.replay
 
-    def _say(self, text, plots=(), numbers="", lead=""):
+    def _say(
+        self, text: str, plots: Iterable[Figure] = (), numbers: str = "", lead: str = ""
+    ) -> None:
         self.lead.object, self.told.object, self.numbers.object = lead, text, numbers
         self.plots.objects = [
             pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0) for fig in plots
         ]
 
-    def _failed(self, event):
+    def _failed(self, event: Any) -> None:
         if event.new:
             self.told.object = event.new
 
     # One contact
 
-    def _take_strongest(self):
+    def _take_strongest(self) -> None:
         self.looks.contact = int(np.argmax(self.state.replay.normal[0]))
 
-    def _push(self):
+    def _push(self) -> None:
         state = self.state
         if self.what.value == "all":
             work = perturbations.limit_loads(state.library, state.cell)
@@ -156,12 +170,12 @@ class View(TabView):
         work = perturbations.push(state.library, state.cell, replay, contact)
         self.task.start(work, lambda found: self._gave_way(found, contact, replay))
 
-    def _gave_way(self, found, contact, replay):
+    def _gave_way(self, found: Pushed, contact: int, replay: Replay) -> None:
         if contact == self.looks.contact and replay is self.state.replay:
             self.pushed = found, contact, replay
             self.refresh()
 
-    def _one(self):
+    def _one(self) -> None:
         contact, replay = self.looks.contact, self.state.replay
         drawn = LEAD + SKETCH.format(colour=DOT)
         if contact is None:
@@ -203,7 +217,7 @@ class View(TabView):
             )
         self._say(UNIT + folded(text), [self._decay(pushed)], _tiles(tiles), lead)
 
-    def _decay(self, pushed):
+    def _decay(self, pushed: Pushed) -> Figure:
         """|u| of every grain against its distance from the contact, and its mean in shells."""
         fig = figure(
             "displacement", "How far the push reaches",
@@ -226,7 +240,7 @@ class View(TabView):
         corner(fig, "measured: the first motion")
         return fig
 
-    def _animate(self, *events):
+    def _animate(self, *events: Any) -> None:
         """The first motion goes to and fro on the packing while this tab is seen."""
         shown = self.visible and self.what.value == "one" and self.animate.value
         field = self.pushed[0].displacement if shown and self.pushed is not None else None
@@ -235,11 +249,11 @@ class View(TabView):
 
     # All contacts
 
-    def _loads_known(self, found):
+    def _loads_known(self, found: Loads) -> None:
         self.loads = found
         self.refresh()
 
-    def _all(self):
+    def _all(self) -> None:
         if self.loads is None:
             self._say(folded("One linear program for each contact."), lead=EVERY)
             return
@@ -279,28 +293,28 @@ class View(TabView):
         )
         self._say(folded(text), [fig], lead=lead)
 
-    def _tapped(self, name, old, new):
+    def _tapped(self, name: str, old: Any, new: list[int]) -> None:
         if new:
             self.looks.contact = int(new[0])
 
     # Over the store
 
-    def _store(self):
+    def _store(self) -> None:
         state = self.state
         self._say("")
         self.task.start(
             over_store(state.library, list(state.catalogue), state.cell), self._show_store
         )
 
-    def _show_store(self, found):
+    def _show_store(self, found: Said) -> None:
         if self.what.value == "store":
             self._say(*found)
 
 
-def over_store(library, cells, cell):
+def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job], Said]:
     """Work that draws Fig. 2 of the paper: the study, and all perturbed packings of the stores."""
 
-    def work(job):
+    def work(job: Job) -> Said:
         job.begin("reading the stores")
         found = perturbations.over_store(library, cells, cell)
         job.begin("drawing")
@@ -310,7 +324,7 @@ def over_store(library, cells, cell):
     return work
 
 
-def _fit(fig, pushed):
+def _fit(fig: Figure, pushed: Pushed) -> None:
     """The power law that was fitted, and over which range."""
     inner, outer = pushed.fit
     known = np.isfinite(pushed.profile) & (pushed.profile > 0)
@@ -325,11 +339,11 @@ def _fit(fig, pushed):
     fig.add_layout(BoxAnnotation(left=inner, right=outer, fill_alpha=0.1, fill_color="#808080"))
 
 
-def _tiles(tiles):
+def _tiles(tiles: list[tuple[str, str]]) -> str:
     return TILES.format("".join(TILE.format(_explained(name), name, v) for name, v in tiles))
 
 
-def _explained(name):
+def _explained(name: str) -> str:
     """Attributes by which a tile is explained where it stands."""
     key = EXPLAINED.get(name)
     return f' tabindex="0" data-term="{key}"' if key else ""

@@ -1,16 +1,22 @@
 """A photoelastic frame: measured against inferred forces, the network, and an honest account."""
 
 import html
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource
+from bokeh.plotting import figure as Figure
 
 from granforce.records import InputError
 
 from .. import photoelastic
 from ..exports import File
+from ..jobs import Task
+from ..photoelastic import Frame
+from ..uploads import Files
 from . import chains
 from .handover import Handover
 from .parts import choice, figure, note, saving, together
@@ -33,7 +39,14 @@ HALF = WIDE | {"styles": {"flex": "1 1 240px"}, "min_width": 240}  # of two, whe
 class Frames:
     """What there is to see of the frames in the files that were dropped, one at a time."""
 
-    def __init__(self, first, files, task, on_open, **options):
+    def __init__(
+        self,
+        first: Frame,
+        files: Files,
+        task: Task,
+        on_open: Callable[[Frame], object],
+        **options: Any,
+    ) -> None:
         """on_open(frame): the frame is wanted as a packing; options: of `photoelastic.infer`."""
         self.files, self.task, self.options = files, task, options
         self.known = {first.report["frame"]: first}
@@ -58,7 +71,7 @@ class Frames:
         self.compared = pn.pane.Bokeh(**WIDE)
         self._fill(first)
 
-    def panel(self):
+    def panel(self) -> list[Any]:
         """All of it, from above."""
         return [
             self.player,
@@ -73,7 +86,7 @@ class Frames:
             self.save,
         ]
 
-    def _turn(self, number):
+    def _turn(self, number: int) -> None:
         """Another frame: as it is known, or inferred first, while the player waits."""
         if number in self.known:
             self._show(self.known[number])
@@ -83,7 +96,7 @@ class Frames:
             work = photoelastic.infer(self.files, number=number, **self.options)
             self.task.start(work, self._came)
 
-    def _came(self, frame):
+    def _came(self, frame: Frame) -> None:
         self.known[frame.report["frame"]] = frame
         self._show(frame)
         if self.player.value not in self.known:  # turned on in the meantime
@@ -91,10 +104,10 @@ class Frames:
         else:
             self.player.direction = self.playing
 
-    def _show(self, frame):
+    def _show(self, frame: Frame) -> None:
         together(self._fill, frame=frame)
 
-    def _fill(self, frame):
+    def _fill(self, frame: Frame) -> None:
         self.frame = frame
         told = "".join(
             f"<p style='margin:5px 0'>{html.escape(line)}</p>"
@@ -108,12 +121,12 @@ class Frames:
         self.compared.object = compared(frame)
         self.stresses.object = stresses(frame)
 
-    def _panes(self):
+    def _panes(self) -> list[Any]:
         """What is chosen, in one picture or, side by side, in two: dressed before they are seen."""
         shown, one = self.choice.value, self.picture
         both = shown == "beside"
         chains.dress(one, self.layers, "inferred" if both else shown, small=both)
-        old = self.pictures[0] if len(self.pictures) else None
+        old: Any = self.pictures[0] if len(self.pictures) else None
         first = pn.pane.Bokeh(one, **HALF) if old is None or old.object is not one else old
         if not both:
             return [first]
@@ -121,10 +134,10 @@ class Frames:
         chains.dress(other, layers, "measured", small=True)
         return [first, pn.pane.Bokeh(other, **HALF)]
 
-    def _dress(self):
+    def _dress(self) -> None:
         self.pictures[:] = self._panes()
 
-    def _hand_over(self, key):
+    def _hand_over(self, key: str) -> None:
         name = f"frame{self.frame.report['frame']}.csv"
         try:
             self.save.hand_over(File(name, "text/csv", photoelastic.table(self.frame)))
@@ -138,7 +151,7 @@ to the disks held fixed. Then intervals, pulls and outlines tell what else balan
 """
 
 
-def found(report):
+def found(report: dict[str, Any]) -> str:
     """What was found, kind by kind and line by line, folded up."""
     if not report["findings"]:
         return ""
@@ -146,7 +159,7 @@ def found(report):
     return f"<details><summary>Line by line</summary><ul>{lines}</ul></details>"
 
 
-def compared(frame):
+def compared(frame: Frame) -> Figure:
     """Figure of inferred against measured forces, of the contacts that were measured."""
     fig = figure("photoelastic_forces", None, "measured / ⟨fₙ⟩", "inferred / ⟨fₙ⟩", height=340)
     seen = np.isfinite(frame.measured).all(axis=1)
@@ -174,10 +187,10 @@ def compared(frame):
     return fig
 
 
-def listed(frame):
+def listed(frame: Frame) -> str:
     """Suspects and certain contacts as sentences."""
 
-    def named(c):
+    def named(c: int) -> str:
         one, two = frame.ids[frame.ends[c]]
         return f"{one:g}–{two:g}" if two >= 0 else f"{one:g}–wall"
 
@@ -202,7 +215,7 @@ def listed(frame):
     return "".join(told)
 
 
-def stresses(frame):
+def stresses(frame: Frame) -> str:
     """The stress by region as a table, the top of the picture above."""
     side = round(len(frame.stress) ** 0.5)
     rows = []

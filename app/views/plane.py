@@ -1,16 +1,24 @@
 """Force space in a plane: the states' path, the state on screen, and the outline of S."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.core.properties import value
 from bokeh.models import ColumnDataSource, DataRange1d
+from bokeh.plotting import figure as Figure
 
 from granforce.records import InputError
 
 from .. import compute, live, planes
-from ..jobs import reading
+from ..data import Cell, Shown
+from ..jobs import Job, reading
 from ..looks import PLANES
+from ..planes import Outlined, Plane
+from ..replays import Replay
+from ..state import AppState
 from . import stresses
 from .hints import term
 from .parts import MOVES, TabView, figure, folded, note, question, together
@@ -23,6 +31,8 @@ CALLED = {"uniform": "uniformly sampled states", "walk": "walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "states of the walk (triangles)"}
 ENOUGH = 300  # states beside those shown, where they have to be computed
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
+
+Columns = dict[str, Any]  # of a ColumnDataSource
 
 WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
 
@@ -54,9 +64,9 @@ class View(TabView):
 
     name, title = "plane", "Force space"
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         super().__init__(state, "seen", looks=["contact", "second"], work=["fourfold"])
-        empty = {"x": [], "y": []}
+        empty: Columns = {"x": [], "y": []}
         self.path = ColumnDataSource(empty | {"state": []}, name="path")
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
         self.original, self.beside = ColumnDataSource(empty), ColumnDataSource(empty)
@@ -68,17 +78,19 @@ class View(TabView):
         self.planes = question("Shown", PLANES, self.looks, "axes")
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
-        self.others, self.other = state.work.task(), None  # who finds other states; their Replay
+        self.others = state.work.task()  # who finds other states
+        self.other: Replay | None = None  # of those
         self.also.param.watch(lambda event: together(self._fetch), "value")
         self.lead, self.told = note(), note()
         self.placing.param.watch(self._failed, "message")
         self.planes.param.watch(self._turn, "value")
         self.looks.param.watch(self._keep_first, "contact")
         self.task.param.watch(self._failed, "message")
-        self.shown = self.found = None
+        self.shown: tuple[Any, ...] | None = None
+        self.found: Outlined | None = None
         self.catch_up()
 
-    def panel(self):
+    def panel(self) -> pn.Column:
         """Choice of the plane, plot, and what it says."""
         return pn.Column(
             self.lead,
@@ -93,7 +105,7 @@ class View(TabView):
 
     # Contents
 
-    def update(self):
+    def update(self) -> None:
         """Place the states on screen in the plane, and have the outline looked up or computed."""
         state, replay = self.state, self.state.seen
         if replay is None:
@@ -117,14 +129,14 @@ class View(TabView):
             self._clear()
             self.told.object = str(error)
 
-    def _depends(self):
+    def _depends(self) -> tuple[Any, ...]:
         """What a plane of the kind chosen depends on, beside the states."""
         state, kind = self.state, self.planes.value
         if kind not in WHOLE:
             return self.looks.contact, self.looks.second
         return (state.work.fourfold,) if kind == "principal" and state.growing else ()
 
-    def _place(self, replay, kind):
+    def _place(self, replay: Replay, kind: str) -> None:
         """Have axes found that need a moment; of a walk under way from what there is of it."""
         state = self.state
         library, following = state.library, state.work.live if state.growing else None
@@ -135,21 +147,21 @@ class View(TabView):
             self.told.object = COMING
             return
 
-        def place(job):
+        def place(job: Job) -> Plane:
             if kind == "stress":
                 return planes.stress(library, selection, replay)
             return planes.principal(replay, states)
 
         self.placing.start(place, lambda plane: self._placed(replay, plane))
 
-    def _clear(self):
+    def _clear(self) -> None:
         """Nothing of another plane stays."""
         self.state.plane = None
         self.path.data = {"x": [], "y": [], "state": []}
         for source in (self.original, self.beside, self.here, self.inner, self.outer, self.cone):
             source.data = {"x": [], "y": []}
 
-    def _placed(self, replay, plane):
+    def _placed(self, replay: Replay, plane: Plane) -> None:
         state = self.state
         if state.seen is not replay:
             return
@@ -165,7 +177,7 @@ class View(TabView):
 
     # Uniform states beside the walk, or the walk beside them
 
-    def _look_beside(self):
+    def _look_beside(self) -> None:
         """Those of a store are shown; else the switch has them computed."""
         cell, self.other = self.state.cell, None
         if self.state.growing:
@@ -178,7 +190,7 @@ class View(TabView):
         elif found:
             self._fetch()
 
-    def _fetch(self, *events):
+    def _fetch(self, *events: Any) -> None:
         """Find or compute the other states, or take them away."""
         state, replay = self.state, self.state.replay
         self.others.cancel()
@@ -192,7 +204,7 @@ class View(TabView):
         wanted = own._replace(kind=kind, states=min(own.states, ENOUGH))
         work = compute.states(state.library, wanted) if found is None else _shown(state, found)
 
-        def done(shown):
+        def done(shown: Shown) -> None:
             if state.replay is replay:
                 self.other = shown.replay
                 self._show_beside()
@@ -201,7 +213,7 @@ class View(TabView):
 
         self.others.start(work, done)
 
-    def _show_beside(self):
+    def _show_beside(self) -> None:
         """The other states, in the plane on screen."""
         plane, replay = self.state.plane, self.state.replay
         if self.other is None or plane is None:
@@ -212,7 +224,7 @@ class View(TabView):
         if self.found is not None and self.found.plane is plane:
             self._tell(self.found)
 
-    def _components(self, replay):
+    def _components(self, replay: Replay) -> Plane:
         """The plane of one contact's forces, or of two contacts' normal forces."""
         contact = self.looks.contact
         if contact is None and self.planes.value == "pair":
@@ -226,7 +238,7 @@ class View(TabView):
             raise InputError("Now click a second contact in the packing; both are marked there.")
         return planes.components(replay, (other, 0), (contact, 0))
 
-    def _turn(self, event):
+    def _turn(self, event: Any) -> None:
         """Another kind of plane; a second contact belongs to one of them only."""
         if event.new != "pair":
             self.looks.second = None
@@ -234,12 +246,12 @@ class View(TabView):
             self.looks.contact = _loosest(self.state.replay)
         self.refresh()
 
-    def _keep_first(self, event):
+    def _keep_first(self, event: Any) -> None:
         """The last two contacts that were clicked span the plane."""
         if self.visible and self.planes.value == "pair" and event.new is not None:
             self.looks.second = event.old if event.old is not None else self.looks.second
 
-    def _show(self, replay, plane):
+    def _show(self, replay: Replay, plane: Plane) -> None:
         """Path, original and cone; the outline is to come."""
         self.state.plane = plane
         x, y = plane.path.T
@@ -256,7 +268,7 @@ class View(TabView):
         self.found = None
         self._show_beside()
 
-    def _path(self, replay, plane):
+    def _path(self, replay: Replay, plane: Plane) -> Columns:
         """Columns of the path; of a walk under way the player fills in the states as they come."""
         path, number = plane.path, replay.number
         if self.state.growing:
@@ -265,7 +277,7 @@ class View(TabView):
             path[0] = plane.path[0]
         return {"x": path[:, 0].copy(), "y": path[:, 1].copy(), "state": number.astype(np.int32)}
 
-    def _outlined(self, replay, found):
+    def _outlined(self, replay: Replay, found: Outlined) -> None:
         self._show(replay, found.plane)
         self.found = found
         for source, corners in ((self.inner, found.inner), (self.outer, found.outer)):
@@ -274,7 +286,7 @@ class View(TabView):
         self.cone.data = self._cone(found.plane, 1.05 * float(found.outer[:, 0].max()))
         self._tell(found)
 
-    def _tell(self, found):
+    def _tell(self, found: Outlined) -> None:
         """How much of the outline the states reach."""
         if found.plane.kind == planes.STRESS:
             self.told.object = stresses.told(found)
@@ -296,22 +308,22 @@ class View(TabView):
         self.told.object = words + "." + folded(HELP + share + COMPUTED.format(found=found))
 
     @property
-    def other_kind(self):
+    def other_kind(self) -> str:
         """Where the states beside come from."""
         return "walk" if self.state.cell.kind == "uniform" else "uniform"
 
-    def _cone(self, plane, reach):
+    def _cone(self, plane: Plane, reach: float) -> Columns:
         """Coulomb's cone of one contact, up to f_n = reach."""
         if len({contact for contact, _ in plane.components}) != 1:
             return {"x": [], "y": []}
         mu = self.state.seen.summary["mu"]
         return {"x": [reach, 0, reach], "y": [mu * reach, 0, -mu * reach]}
 
-    def _failed(self, event):
+    def _failed(self, event: Any) -> None:
         if event.new:
             self.told.object = event.new
 
-    def _figure(self):
+    def _figure(self) -> Figure:
         around = {"range_padding": 0.06, "only_visible": True}
         fig = figure(
             "force_space",
@@ -364,7 +376,7 @@ class View(TabView):
         return fig
 
 
-def _lead(free):
+def _lead(free: int) -> str:
     """What the plane shows of a space with so many dimensions."""
     flattened = crowded = ""
     if free > 2:
@@ -377,13 +389,13 @@ def _lead(free):
     return LEAD.format(flattened=flattened, crowded=crowded)
 
 
-def _of(replay):
+def _of(replay: Replay) -> str:
     """Of how many networks those on screen are a part."""
     summary = replay.summary
     return f" (of {summary['states']} networks)" if summary["kept"] < summary["states"] else ""
 
 
-def _variance(plane):
+def _variance(plane: Plane) -> str:
     """How much of the states' scatter goes along the axes, where that was asked of them."""
     if not np.isfinite(plane.share).all():
         return ""
@@ -391,11 +403,11 @@ def _variance(plane):
     return f", and {across:.0%} of their variance goes across, {up:.0%} upwards"
 
 
-def _shown(state, cell):
+def _shown(state: AppState, cell: Cell) -> Callable[[Job], Shown]:
     """Work that reads a cell."""
     return lambda job: state.library.shown(cell)
 
 
-def _loosest(replay):
+def _loosest(replay: Replay) -> int:
     """The contact whose normal force varied most."""
     return int(np.argmax(replay.high[:, 0] - replay.low[:, 0]))

@@ -1,12 +1,19 @@
 """The player: draws the packing and replays states in the browser; no server work per frame."""
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 import param
 
+from granforce.records import Floats
+
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
+from ..replays import Replay
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
+
+Heard = Callable[[Any], object] | None
 
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
@@ -65,18 +72,23 @@ class Player(Scripted):
 
     _esm = module("player")
     _stylesheets: ClassVar = [FOLDER / "player.css"]
+    on_digit: Heard
+    on_live: Heard
+    on_hand: Heard
+    on_wide: Heard
+    on_known: Heard
 
-    def __init__(self, **params):
+    def __init__(self, **params: Any) -> None:
         super().__init__(**params)
         self.on_digit = self.on_live = self.on_hand = self.on_wide = self.on_known = None
 
-    def hand_over(self, news):
+    def hand_over(self, news: Message) -> None:
         """Send something of what is being computed, or of what was pulled."""
         self._send_msg(news)
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """Digits pressed anywhere on the page; what the browser has painted of a computation."""
-        hear = {
+        hear: dict[str, Heard] = {
             "tab": self.on_digit,
             "hand": self.on_hand,
             "known": self.on_known,
@@ -84,11 +96,11 @@ class Player(Scripted):
             "live": self.on_live,
         }
         for name, part in message.items():
-            if hear[name] is not None:
-                hear[name](part)
+            if (listener := hear[name]) is not None:
+                listener(part)
 
 
-def frames(replay, room=0):
+def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
     """What the player needs of a Replay: flat arrays, frame after frame, and the geometry.
 
     room: frames that it grows to while it is being computed.
@@ -130,7 +142,7 @@ def frames(replay, room=0):
     }
 
 
-def _acceptance(attempts):
+def _acceptance(attempts: Floats) -> Floats:
     """Accepted states per attempt (F,) up to each frame; NaN for the original."""
     tried = np.append(np.nan, np.cumsum(attempts[1:]))
     # Where nothing was tried, since all forces are determined, nothing was accepted either.

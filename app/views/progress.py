@@ -1,9 +1,11 @@
 """How far tasks are, with a button that cancels; nothing is seen while they rest."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import param
 
+from ..jobs import Task
+from .messages import Message
 from .scripts import Scripted, module
 
 FOLLOWED = ("running", "fraction", "keeps")
@@ -57,7 +59,7 @@ class Progress(Scripted):
         """
     ]
 
-    def __init__(self, *tasks, titled=False):
+    def __init__(self, *tasks: Task, titled: bool = False) -> None:
         """titled: in the page's title bar, where it moves and covers nothing."""
         classes = ["titled"] if titled else []
         super().__init__(sizing_mode="stretch_width", margin=0, css_classes=classes)
@@ -67,17 +69,17 @@ class Progress(Scripted):
             task.param.watch(self._follow, [*FOLLOWED, "stage", "seconds_left"])
 
     @property
-    def _told(self):
+    def _told(self) -> Task:
         """The task that is told of."""
         return next((task for task in self._tasks if task.running), self._tasks[0])
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         if "cancel" in message:
             self._told.dismiss()
         if "stop" in message:
             self._told.stop()
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         task = self._told
         left = task.seconds_left
         words = task.stage + ("" if left is None else f" — about {_duration(left)} more")
@@ -85,5 +87,5 @@ class Progress(Scripted):
         self.param.update(words=words, **followed)
 
 
-def _duration(seconds):
+def _duration(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"

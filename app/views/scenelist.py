@@ -1,6 +1,6 @@
 """The list of scenes, first of the controls of large packings."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import param
 
@@ -20,5 +20,5 @@ class SceneList(Scripted):
     _esm = module("scenelist")
     _stylesheets: ClassVar = [FOLDER / "scenelist.css"]
 
-    def __init__(self, **params):
+    def __init__(self, **params: Any) -> None:
         super().__init__(titles=scenes.titles(), usual=SCENES[scenes.MANY].mu, **params)

@@ -1,11 +1,14 @@
 """The page's own components, and their scripts."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, ClassVar
 
+from bokeh.document import Document
 from panel.custom import JSComponent
 
-from .messages import FROM_BROWSER, TO_BROWSER, listed
+from .messages import FROM_BROWSER, TO_BROWSER, Message, listed
 
 FOLDER = Path(__file__).parent
 
@@ -15,7 +18,7 @@ IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+)\.js"$', re.M)
 EXPORT = re.compile(r"^export (?=(?:async )?(?:class|function|const) (\w+))", re.M)
 
 
-def module(name):
+def module(name: str) -> str:
     """One ES module of a script and of all that it imports, as text.
 
     A page that was saved has no server to import from; one that is asked for each script answers
@@ -23,13 +26,13 @@ def module(name):
     run old scripts beside new ones. Each script keeps its names to itself: it becomes a function
     that returns what it exports, after those that it imports.
     """
-    parts = {}
+    parts: dict[str, str] = {}
     _gather(name, parts, ())
     own = _bound(parts.pop(name))
     return "\n".join([*(_inside(*part) for part in parts.items()), own])
 
 
-def _gather(name, parts, way):
+def _gather(name: str, parts: dict[str, str], way: tuple[str, ...]) -> None:
     """Fill parts {name: text} in an order in which each comes after those that it imports."""
     if name in way:
         raise ValueError(f"scripts import each other: {' → '.join([*way, name])}")
@@ -41,13 +44,13 @@ def _gather(name, parts, way):
     parts[name] = text
 
 
-def _inside(name, text):
+def _inside(name: str, text: str) -> str:
     exported = ", ".join(EXPORT.findall(text))
     plain = EXPORT.sub("", _bound(text))
     return f"const ${name} = (() => {{\n{plain}\nreturn {{ {exported} }}\n}})()"
 
 
-def _bound(text):
+def _bound(text: str) -> str:
     return IMPORT.sub(r"const { \1 } = $\2", text)
 
 
@@ -58,19 +61,25 @@ class Scripted(JSComponent):
     took 0.2 s of the time until a page was complete, half of it before its first picture.
     """
 
-    def _get_properties(self, doc):
+    _stylesheets: ClassVar[list[Any]]  # text, or paths, which Panel reads
+    _heard: Callable[[Message], object]  # called with what FROM_BROWSER lists
+
+    def __init__(self, **params: Any) -> None:
+        super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
+
+    def _get_properties(self, doc: Document | None) -> dict[str, Any]:
         properties = super()._get_properties(doc)
         if not properties["dev"]:  # where scripts may change under the same name
             properties["bundle"] = type(self).__name__
         return properties
 
-    def _send_msg(self, data):
+    def _send_msg(self, data: Message) -> None:
         """Tell the script something that TO_BROWSER lists."""
         if not listed(TO_BROWSER, type(self).__name__, data):
             raise ValueError(f"no message of {type(self).__name__}: {', '.join(data)}")
         super()._send_msg(data)
 
-    def _handle_msg(self, data):
+    def _handle_msg(self, data: Any) -> None:
         """Hear what FROM_BROWSER lists: a page may have been altered, and send anything."""
         if listed(FROM_BROWSER, type(self).__name__, data):
             self._heard(data)

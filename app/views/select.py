@@ -14,7 +14,7 @@ class Select(Scripted):
     """
 
     label = param.String()
-    options: dict[str, str] = param.Dict(default={}, doc="{words: value}")
+    options = param.Dict(default={}, doc="{words: value}")
     value = param.String()
 
     _esm = module("select")

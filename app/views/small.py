@@ -1,7 +1,7 @@
 """A small scene and the whole of its S: drawn, cut and pulled in the browser; see small.js."""
 
 import base64
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import param
 
@@ -9,6 +9,8 @@ from granforce.packing import scenes as made
 from granforce.records import InputError, NotJammedError, UndecidedError
 
 from .. import scenes
+from ..jobs import Task
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 
 # Title, text, and what the scene shows, of the steps of the tour before those of large packings.
@@ -52,7 +54,7 @@ class Small(Scripted):
     _esm = module("small")
     _stylesheets: ClassVar = [FOLDER / "small.css"]
 
-    def __init__(self, asked, task, all_steps, **params):
+    def __init__(self, asked: scenes.Asked, task: Task, all_steps: int, **params: Any) -> None:
         """asked: scenes.Asked. task: a jobs.Task of the page, for scenes that take a while."""
         super().__init__(
             titles=scenes.titles(),
@@ -64,7 +66,7 @@ class Small(Scripted):
         task.param.watch(self._failed, "message")
         self._show(asked.scene, asked.mu, asked.built)
 
-    def _show(self, name, mu=None, built=""):
+    def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
         if name == scenes.MANY:  # has a page of its own
             return
         if name in ("six", "solid"):  # packed first
@@ -79,14 +81,14 @@ class Small(Scripted):
                 self.note = str(error)
                 self._show(name)
 
-    def _put(self, scene):
+    def _put(self, scene: dict[str, Any]) -> None:
         self.scene = scene
 
-    def _failed(self, event):
+    def _failed(self, event: Any) -> None:
         if event.new:
             self._send_msg({"error": event.new})
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """Another scene, another μ, or the question how it falls."""
         try:
             match message:
@@ -106,21 +108,21 @@ class Small(Scripted):
         except (InputError, NotJammedError, UndecidedError) as error:
             self._send_msg({"error": str(error)})
 
-    def _fall(self, mu, load):
+    def _fall(self, mu: float, load: list[float]) -> None:
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
             lambda job: scenes.falling(scenes.packing_of(name, mu, built), load).tolist(),
             lambda motion: self._send_msg({"fall": motion}),
         )
 
-    def _save(self, mu, load):
+    def _save(self, mu: float, load: list[float]) -> None:
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
             lambda job: scenes.file_of(scenes.packing_of(name, mu, built), load),
             lambda file: self._send_msg({"file": base64.b64encode(file).decode()}),
         )
 
-    def _measure(self, mu, load, plane):
+    def _measure(self, mu: float, load: list[float], plane: list[int]) -> None:
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
             lambda job: scenes.measured(scenes.packing_of(name, mu, built), load, plane),

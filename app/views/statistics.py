@@ -1,18 +1,26 @@
 """Statistics of the states on screen, and of all those in the stores that were made alike."""
 
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
+from typing import Any
 
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
+from bokeh.plotting import figure as Figure
 
 from .. import distributions
-from ..jobs import reading
+from ..data import Cell, Library
+from ..distributions import Row
+from ..jobs import Job, reading
 from ..looks import AXES, FIGURES
+from ..replays import Replay
+from ..state import AppState
 from . import studied
 from .packing import exact_intervals
 from .parts import TabView, chosen, figure, folded, folded_away, note, question
+from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
@@ -28,7 +36,7 @@ class View(TabView):
 
     name, title = "statistics", "Statistics"
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", "exact", "catalogue")
         self.what = question("Question", FIGURES, self.looks, "figure")
         self.scale = chosen(AXES, self.looks, "axis")
@@ -40,14 +48,14 @@ class View(TabView):
         self.task = state.work.task(reading)
         self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
         self.chosen = ColumnDataSource({"x": [], "y": []})
-        self._drawn = None  # what the plots are of
+        self._drawn: str | None = None  # what the plots are of
         self.what.param.watch(self._choose, "value")
         self.scale.param.watch(self.refresh, "value")
         self.task.param.watch(self._follow, ["running", "message"])
         self.looks.param.watch(self._mark, "contact")
         self.catch_up()
 
-    def panel(self):
+    def panel(self) -> pn.Column:
         """Choices, figure, and what it shows."""
         return pn.Column(
             pn.FlexBox(self.what, self.scale, sizing_mode="stretch_width"),
@@ -59,14 +67,14 @@ class View(TabView):
             sizing_mode="stretch_width",
         )
 
-    def _choose(self, event):
+    def _choose(self, event: Any) -> None:
         scale = SCALED.get(event.new, self.scale.value)
         if scale == self.scale.value:
             self.refresh()
         else:
             self.scale.value = scale  # which has it drawn
 
-    def update(self):
+    def update(self) -> None:
         """Draw the figure chosen: at once from the states on screen, or over μ in a thread."""
         state, what = self.state, self.what.value
         self.scale.visible = what in SCALED
@@ -88,10 +96,10 @@ class View(TabView):
         work = over_friction(state.library, cells, state.cell.mu, what, log)
         self.task.start(work, self._show)
 
-    def _show(self, found):
+    def _show(self, found: Drawn) -> None:
         self.state.work.piecewise(self._showing(found))
 
-    def _showing(self, found):
+    def _showing(self, found: Drawn) -> Iterator[None]:
         figures, self.lead.object, self.told.object = found
         for fig in figures:
             self._choosable(fig)
@@ -102,12 +110,12 @@ class View(TabView):
             for place, fig in zip(self.folded, figures[1:], strict=False):
                 place.objects = [_pane(fig)]
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         self.bar.visible = self.task.running and self.what.value in DRAWN
         if self.task.message:
             self.told.object = self.task.message
 
-    def _choosable(self, fig):
+    def _choosable(self, fig: Figure) -> None:
         """A tap on a point shows the states with its μ."""
         points = [r for r in fig.select(GlyphRenderer) if isinstance(r.glyph, Scatter)]
         if self.what.value == "extent" or not points:
@@ -124,13 +132,13 @@ class View(TabView):
             )  # fmt: skip
             fig.add_layout(here)
 
-    def _tapped(self, source, indices):
+    def _tapped(self, source: ColumnDataSource, indices: list[int]) -> None:
         if indices:
             self.state.choose(mu=float(source.data["x"][indices[0]]))
 
     # Of the states on screen
 
-    def _scatter(self, replay):
+    def _scatter(self, replay: Replay) -> tuple[Figure, str, str]:
         """ΔF_n against the original f_n, one point a contact: figure, lead and small print.
 
         A tap selects the contact.
@@ -168,12 +176,12 @@ class View(TabView):
             values.append(f"{self.state.exact['correlation'].item():.2f} of what is possible")
         return fig, EACH, folded(f"Correlation of fₙ with ΔFₙ: {', '.join(values)}.")
 
-    def _select(self, source, indices):
+    def _select(self, source: ColumnDataSource, indices: list[int]) -> None:
         if indices:
             self.looks.contact = int(indices[0])
             source.selected.indices = []
 
-    def _mark(self, *events):
+    def _mark(self, *events: Any) -> None:
         """A ring around the selected contact."""
         contact = self.looks.contact
         if self.what.value != "scatter" or not self.visible:
@@ -182,7 +190,7 @@ class View(TabView):
         x, y = ([], []) if none else ([float(v[contact])] for v in self._points)
         self.chosen.data = {"x": x, "y": y}
 
-    def _force(self, replay):
+    def _force(self, replay: Replay) -> tuple[Figure, str, str]:
         """P(f_n) of the original network and of all states shown: figure, lead and small print."""
         log = self.scale.value == "log"
         fig = figure(
@@ -223,14 +231,16 @@ class View(TabView):
         return fig, lead, folded(text)
 
 
-def _pane(fig):
+def _pane(fig: Figure) -> pn.pane.Bokeh:
     return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
 
 
-def over_friction(library, cells, mu, what, log):
+def over_friction(
+    library: Library, cells: Sequence[Cell], mu: float, what: str, log: bool
+) -> Callable[[Job], Drawn]:
     """Work that draws a figure of the paper from the cells: ([Bokeh figures], lead, caption)."""
 
-    def work(job):
+    def work(job: Job) -> Drawn:
         job.begin(f"reading {len(cells)} results and the finished study")
         rows = distributions.rows(cells)
         exact = distributions.exact_rows(library, cells)
@@ -241,15 +251,15 @@ def over_friction(library, cells, mu, what, log):
     return work
 
 
-def _indeterminacy(rows, exact, mu, log):
+def _indeterminacy(rows: list[Row], exact: list[Row], mu: float, log: bool) -> Drawn:
     return studied.indeterminacy(rows, exact, log)
 
 
-def _extents(rows, exact, mu, log):
+def _extents(rows: list[Row], exact: list[Row], mu: float, log: bool) -> Drawn:
     return studied.extents(distributions.groups(rows, mu), mu, log)
 
 
-def _correlations(rows, exact, mu, log):
+def _correlations(rows: list[Row], exact: list[Row], mu: float, log: bool) -> Drawn:
     return studied.correlations(rows, exact)
 
 

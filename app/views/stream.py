@@ -1,8 +1,14 @@
 """What is being computed, sent to one page's player as fast as its browser paints it."""
 
 from functools import partial
+from typing import Any
 
+from bokeh.document import Document
+
+from ..state import AppState
+from .messages import Message
 from .parts import together
+from .player import Player
 
 TICK_MS = 40  # how often it is looked for something new
 AHEAD = 2  # messages that the browser may have got and not yet painted
@@ -11,7 +17,7 @@ AHEAD = 2  # messages that the browser may have got and not yet painted
 class Stream:
     """Sends what a page's `state.follow()` has to show to its player; nothing to hidden tabs."""
 
-    def __init__(self, state, player, document=None):
+    def __init__(self, state: AppState, player: Player, document: Document | None = None) -> None:
         """document: on which the time is kept; without one, call `tick` yourself."""
         self.state, self.work, self.player = state, state.work, player
         self._document = document
@@ -23,7 +29,7 @@ class Stream:
         self.work.param.watch(self._show, "busy")
         self._follow()
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """The browser tells that it draws anew, what it has painted, and whether it is seen."""
         if "anew" in message:
             self._sent = self._painted = 0
@@ -32,10 +38,10 @@ class Stream:
         self._painted = message.get("painted", self._painted)
         self._awake = message.get("seen", self._awake)
 
-    def _show(self, *events):
+    def _show(self, *events: Any) -> None:
         self.player.asked = self.state.asked
 
-    def _follow(self, *events):
+    def _follow(self, *events: Any) -> None:
         self._show()
         self.player.live = self.work.live is not None
         ticking = self.player.live or self.work.arriving is not None
@@ -48,7 +54,7 @@ class Stream:
             self._document.remove_periodic_callback(self._ticking)
             self._ticking = None
 
-    def tick(self):
+    def tick(self) -> None:
         """Send what is new, if the browser waits for it."""
         following = self.state.follow()
         while following and self._awake and self._sent - self._painted < AHEAD:
@@ -63,4 +69,4 @@ class Stream:
             self._sent += 1
             self.player.hand_over(news | {"number": self._sent})
             if "states" in news:
-                self.work.fourfold = following.fourfold
+                self.work.fourfold = following.fourfold  # type: ignore[union-attr]  # no Arriving

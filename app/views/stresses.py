@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from ..planes import Outlined
 from .hints import term
 
 
-def told(found):
+def told(found: Outlined) -> str:
     """Of a planes.Outlined in the plane of stresses."""
     reach = np.hypot(*found.inner.T).max(initial=0.0)
     path = np.hypot(*found.plane.path.T)

@@ -2,13 +2,18 @@
 
 import html
 from collections import Counter
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from bokeh.models import ColumnDataSource, FixedTicker
+from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
+from granforce.records import Floats
 
 from .. import studied
+from ..distributions import Row
 from .hints import term
 from .labels import labels
 from .parts import figure
@@ -52,11 +57,13 @@ JUDGED = {
     "exact": "exact",
     "": "perturbed contacts",
 }
+Points = Sequence[tuple[float, float, float]]  # x, y and error
+Drawn = tuple[list[Figure], str, str]  # figures, lead and caption
 RINGS = f"open symbols: {term('store', 'precomputed results')} made like those on screen"
 STUDY = f"lines: means over the packings of {term('study', 'the study')}, bars their standard error"
 
 
-def claims(about):
+def claims(about: str) -> str:
     """The paper's claims and what was found, as HTML."""
     found = studied.claims(about)
     measured = [claim for claim in found if np.isfinite(claim["value"])]
@@ -74,25 +81,25 @@ def claims(about):
     return CLAIMS.format("".join(lines), rest) if found else ""
 
 
-def _with_interval(claim):
+def _with_interval(claim: dict[str, Any]) -> str:
     low, high = claim["low"], claim["high"]
     interval = f" ({low:.2g} … {high:.2g})" if np.isfinite([low, high]).all() else ""
     return f"{claim['value']:.2g}{interval}"
 
 
-def written(text):
+def written(text: str) -> str:
     """A text with its symbols as on the page."""
     return text.replace("F_n", "Fₙ").replace("f_n", "fₙ").replace("F_crit", "Fᶜʳⁱᵗ")
 
 
-def indeterminacy(own, exact, log):
+def indeterminacy(own: list[Row], exact: list[Row], log: bool) -> Drawn:
     """η1 against μ by the walk, z, all three η, and 0.15 η3 by all samplers: four figures."""
     kind = {"y_axis_type": "log" if log else "linear"}
     spread = _over_mu("spread", "how much a force scatters, in mean forces", 310, **kind)
     etas = _over_mu("indeterminacy", "how undetermined, η", 270, title=FOLDED[1], **kind)
     for fig, measures in ((spread, MEASURES[:1]), (etas, MEASURES)):
         for k, (name, label, factor) in enumerate(measures):
-            look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
+            look: dict[str, Any] = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
             _line(fig, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
         for k, (name, _, factor) in enumerate(measures):
             _own(fig, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
@@ -125,7 +132,7 @@ def indeterminacy(own, exact, log):
     return [spread, z, etas, seen], most_undetermined(own), text
 
 
-def most_undetermined(own):
+def most_undetermined(own: list[Row]) -> str:
     """Where η is largest, and why this page's symbols are not on the lines; empty without both."""
     walks = studied.rows("walk")
     if not walks or not own:
@@ -141,11 +148,11 @@ def most_undetermined(own):
     )
 
 
-def correlations(own, exact):
+def correlations(own: list[Row], exact: list[Row]) -> Drawn:
     """corr(f_n, ΔF_n) against μ."""
     fig = _over_mu("correlation", "correlation of fₙ and ΔFₙ", 380)
     for k, part in enumerate(("walk", "uniform", "exact")):
-        look = {"log": False, "colour": COLOURS[k], "marker": MARKERS[k]}
+        look: dict[str, Any] = {"log": False, "colour": COLOURS[k], "marker": MARKERS[k]}
         points = statistics.means(studied.rows(part), "correlation")
         _line(fig, points, SAMPLERS[part], dash="dashed" if part == "exact" else "solid", **look)
     known = [row for row in own if np.isfinite(row["correlation"])]
@@ -161,7 +168,7 @@ def correlations(own, exact):
     return [fig], strong_and_undetermined(), text
 
 
-def strong_and_undetermined():
+def strong_and_undetermined() -> str:
     """Between which values the walk's correlation lies, in words; empty without a study."""
     points = statistics.means(studied.rows("walk"), "correlation")
     if not points:
@@ -175,7 +182,7 @@ def strong_and_undetermined():
     )
 
 
-def extents(groups, mu, log):
+def extents(groups: dict[float, list[Floats]], mu: float, log: bool) -> Drawn:
     """P(ΔF_n) in ⟨f_n⟩ for some μ of the study, and of the packings on the page with this μ.
 
     groups: {μ: extents} of the packings on the page.
@@ -222,7 +229,7 @@ def extents(groups, mu, log):
     return [fig], lead, text
 
 
-def responses(own):
+def responses(own: list[Row]) -> Drawn:
     """⟨F_crit⟩ and α against η2, joined in order of μ: the study, and on top own rows."""
     table = studied.study()
     study = [] if table is None else table.answers()
@@ -259,11 +266,11 @@ def responses(own):
     return [force, alpha], lead, text
 
 
-def _pairs(rows, name):
+def _pairs(rows: list[Row], name: str) -> Points:
     return [(row["eta2"], row[name], 0.0) for row in rows if np.isfinite(row.get(name, np.nan))]
 
 
-def _against_eta2(fig, rows, lines):
+def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
     """Lines {name: label} against η2, and μ beside the points of the first."""
     drawn = []
     for k, (name, label) in enumerate(lines.items()):
@@ -287,7 +294,9 @@ def _against_eta2(fig, rows, lines):
     )  # fmt: skip
 
 
-def _over_mu(name, label, height, title=None, **options):
+def _over_mu(
+    name: str, label: str, height: int, title: str | None = None, **options: Any
+) -> Figure:
     fig = figure(name, title, "friction μ", label, height=height, x_axis_type="log", **options)
     fig.xaxis.ticker = FixedTicker(ticks=DECADES)
     fig.xaxis.major_label_overrides = {mu: f"{mu:g}" for mu in DECADES}
@@ -295,7 +304,17 @@ def _over_mu(name, label, height, title=None, **options):
     return fig
 
 
-def _line(fig, points, label, log, colour, marker="circle", dash="solid", zero=False, mu=None):
+def _line(
+    fig: Figure,
+    points: Points,
+    label: str,
+    log: bool,
+    colour: str,
+    marker: str = "circle",
+    dash: str = "solid",
+    zero: bool = False,
+    mu: Sequence[float] | None = None,
+) -> None:
     """A line with points and error bars; points (x, y, error); mu: of the points, if x is not."""
     x, y, error = _shown(points, log, zero)
     if not len(x):
@@ -311,7 +330,7 @@ def _line(fig, points, label, log, colour, marker="circle", dash="solid", zero=F
     fig.add_tools(hover([dots], at, (label, "@y{0.0000}")))
 
 
-def _own(fig, points, log, colour, marker="circle"):
+def _own(fig: Figure, points: Points, log: bool, colour: str, marker: str = "circle") -> None:
     """Rings around the page's own points, over everything."""
     x, y, _ = _shown(points, log, zero=fig.xaxis.axis_label != "friction μ")
     if len(x):
@@ -321,7 +340,7 @@ def _own(fig, points, log, colour, marker="circle"):
         )  # fmt: skip
 
 
-def _shown(points, log, zero=False):
+def _shown(points: Points, log: bool, zero: bool = False) -> Floats:
     """Columns of those points that the axes can show."""
     kept = [p for p in points if (zero or p[0] > 0) and (not log or p[1] > 1e-12)]
     return np.array(kept, dtype=float).reshape(-1, 3).T

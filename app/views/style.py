@@ -1,7 +1,9 @@
 """Colours and small helpers that the plots share."""
 
+from typing import Any
+
 from bokeh.models import CustomJS, HoverTool, Title
-from bokeh.plotting import figure
+from bokeh.plotting import figure as Figure
 
 # Blue and orange are told apart with every common colour blindness; the middle is grey, not white,
 # so that contacts without friction are seen on pale disks, by day and by night.
@@ -22,19 +24,19 @@ PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
 COLOURS = 33
 
 
-def ramp(*stops, count=COLOURS):
+def ramp(*stops: str, count: int = COLOURS) -> list[str]:
     """Colours "#rrggbb" along the stops, straight lines in between."""
     pieces = len(stops) - 1
     return [_mix(stops, k * pieces / (count - 1)) for k in range(count)]
 
 
-def _mix(stops, at):
+def _mix(stops: tuple[str, ...], at: float) -> str:
     k = min(int(at), len(stops) - 2)
     pairs = zip(bytes.fromhex(stops[k][1:]), bytes.fromhex(stops[k + 1][1:]), strict=True)
     return "#" + "".join(f"{round(a + (b - a) * (at - k)):02x}" for a, b in pairs)
 
 
-def palettes(dark):
+def palettes(dark: bool) -> dict[str, Any]:
     """Colours of the packing: of the chains by what they show, and of everything else in it."""
     diverging = ramp(BLUE, GREY, ORANGE)
     body, line = ((150, 172, 200), 0.5) if dark else ((139, 160, 187), 0.75)
@@ -67,11 +69,11 @@ def palettes(dark):
     }
 
 
-def _faded(colour, part):
+def _faded(colour: tuple[int, ...], part: float) -> str:
     return f"rgba({', '.join(map(str, colour))}, {min(1.0, part):.3f})"
 
 
-def plot(title, x, y, **options):
+def plot(title: str | None, x: str, y: str, **options: Any) -> Figure:
     """A figure that fills its width, titled and labelled, with a quiet toolbar."""
     settled = {
         "tools": "pan,wheel_zoom,box_zoom,reset",
@@ -80,7 +82,7 @@ def plot(title, x, y, **options):
         "min_border_left": 56,
         "min_border_right": 18,
     }
-    fig = figure(title=title, x_axis_label=x, y_axis_label=y, **settled | options)
+    fig = Figure(title=title, x_axis_label=x, y_axis_label=y, **settled | options)
     fig.toolbar.logo = None
     fig.toolbar.autohide = True
     if title:
@@ -90,20 +92,20 @@ def plot(title, x, y, **options):
     return fig
 
 
-def hover(renderers, *rows, **options):
+def hover(renderers: list[Any], *rows: tuple[str, str], **options: Any) -> HoverTool:
     """Show these (label, field) rows over the renderers."""
     # Beside the mouse: where it would snap to a bar, Bokeh 3.9 fails for want of the bar's sides.
     policy = {"point_policy": "follow_mouse"}
     return HoverTool(renderers=renderers, tooltips=list(rows), **policy, **options)
 
 
-def corner(fig, word):
+def corner(fig: Figure, word: str) -> None:
     """Say in a plot's upper right corner whether it shows exact, seen or measured values."""
     look = {"text_font_size": "11px", "text_font_style": "italic", "text_color": "#808080"}
     fig.add_layout(Title(text=word, align="right", **look), "above")
 
 
-def legend_above(fig, columns=4):
+def legend_above(fig: Figure, columns: int = 4) -> None:
     """A small legend above the plot, where no curve strikes it through."""
     legend = fig.legend[0]
     fig.center.remove(legend)

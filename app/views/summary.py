@@ -1,7 +1,12 @@
 """Numbers of the walk on screen, and what was left out or went wrong on the way."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import panel as pn
 
+from ..live import Summary
+from ..state import AppState
 from .explanation import Foldout
 from .hints import term
 from .parts import of_replay
@@ -45,7 +50,7 @@ MOST_R_HAT, LEAST_SIZE = 1.1, 100
 FLAG = '<div class="flag" role="note">⚠ {}</div>'
 
 
-def doubts(summary):
+def doubts(summary: Summary) -> Iterator[str]:
     """Sentences on what is not good enough to be relied on."""
     r_hat, size = summary.get("worst_r_hat"), summary.get("least_bulk_size")
     if r_hat is not None and r_hat > MOST_R_HAT:
@@ -60,19 +65,19 @@ def doubts(summary):
         )
 
 
-def numbers(summary):
+def numbers(summary: Summary) -> str:
     """How undetermined the forces are, and what speaks against that, as HTML."""
     flags = "".join(map(FLAG.format, doubts(summary)))
     return f'<p class="first">{finding(summary)}</p>{flags}'
 
 
-def checks(summary):
+def checks(summary: Summary) -> str:
     """The measures of that, what they stand on, and what was left out, as HTML."""
     style, rest = f"<style>{STYLE}</style>", f'<div class="rest">{left_out(summary)}</div>'
     return style + _tiles(TILES, summary) + _tiles(CHECKS, summary) + rest
 
 
-def finding(summary):
+def finding(summary: Summary) -> str:
     """What the numbers say, in one sentence."""
     if not summary["dimension"]:
         return "<b>How undetermined?</b> Not at all: balance leaves every force one value."
@@ -83,7 +88,7 @@ def finding(summary):
     )
 
 
-def _tiles(rows, summary):
+def _tiles(rows: tuple[tuple[str, ...], ...], summary: Summary) -> str:
     values = dict(summary)
     if summary.get("skipped"):
         values["acceptance"] = None  # nothing was tried
@@ -95,7 +100,7 @@ def _tiles(rows, summary):
     return f'<div class="tiles">{made}</div>'
 
 
-def _text(value, form):
+def _text(value: Any, form: str) -> str:
     return "–" if value is None else format(value, form)
 
 
@@ -110,7 +115,7 @@ LEFT_OUT = {
 }
 
 
-def left_out(summary):
+def left_out(summary: Summary) -> str:
     """One line on work that was skipped and attempts that failed, as HTML."""
     counts = [
         f"{summary[key]} {term(key_of_term, words)}"
@@ -128,11 +133,11 @@ def left_out(summary):
     return line
 
 
-def tiles(state, volume):
+def tiles(state: AppState, volume: Any) -> pn.Column:
     """The numbers of the replay on screen, its Volume, and what they stand on, to be opened."""
     folded = Foldout(line="In numbers", margin=(2, 12), styles={"flex": "1 0 110px"})
 
-    def tell(*events):
+    def tell(*events: Any) -> None:
         folded.inside = "" if state.replay is None else checks(state.replay.summary)
 
     state.param.watch(tell, "replay")
@@ -142,11 +147,11 @@ def tiles(state, volume):
     return pn.Column(shown, volume.tiles, last, sizing_mode="stretch_width")
 
 
-def of_which(state):
+def of_which(state: AppState) -> pn.pane.HTML:
     """Whose numbers and plots are pale, while others are asked for."""
     line = pn.pane.HTML(visible=False, sizing_mode="stretch_width", margin=(6, 12, 0, 12))
 
-    def tell(*events):
+    def tell(*events: Any) -> None:
         old = state.cell is not None and state.missing
         line.visible = old
         if old:

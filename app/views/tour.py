@@ -1,12 +1,14 @@
 """Six steps over the real page, for those who see it for the first time."""
 
 import re
-from typing import ClassVar
+from typing import Any, ClassVar
 from urllib.parse import parse_qsl
 
 import numpy as np
 import param
 
+from ..state import AppState
+from .messages import Message
 from .scripts import FOLDER, Scripted, module
 from .small import FIRST_STEPS
 
@@ -71,7 +73,7 @@ class Tour(Scripted):
     _esm = module("tour")
     _stylesheets: ClassVar = [FOLDER / "tour.css"]
 
-    def __init__(self, state, query="", **params):
+    def __init__(self, state: AppState, query: str = "", **params: Any) -> None:
         """query: of the address; `tour=2` opens the second step."""
         wanted = dict(parse_qsl(query.lstrip("?"))).get("tour", "")
         super().__init__(first=not query.lstrip("?"), **params)
@@ -81,29 +83,29 @@ class Tour(Scripted):
         if re.fullmatch("[1-6]", wanted):
             self._go(int(wanted))
 
-    def _tell(self, *events):
+    def _tell(self, *events: Any) -> None:
         replay = self._state.replay
         disks = "" if replay is None else replay.summary["n"]
         self.steps = [[title, text.format(n=disks), target] for title, text, target in STEPS]
         if self.step and not self._set_up:
             self._go(self.step)  # now that there is something to show
 
-    def _heard(self, message):
+    def _heard(self, message: Message) -> None:
         """The visitor goes to a step, or closes the tour (0)."""
         if 0 <= message["step"] <= len(STEPS):
             self._go(message["step"])
 
-    def _go(self, step):
+    def _go(self, step: int) -> None:
         self.step = step
         self._set_up = self._state.replay is not None
         if step and self._set_up:
             self._state.looks.param.update(**_shown(self._state, step))
 
 
-def _shown(state, step):
+def _shown(state: AppState, step: int) -> dict[str, Any]:
     """Looks with which the page shows what a step is about."""
     normal, extent = state.replay.normal, (state.replay.high - state.replay.low)[:, 0]
-    changes = {"between": None}
+    changes: dict[str, Any] = {"between": None}
     if step == 2 and len(normal) > 1:
         changes["between"] = (0, _farthest(normal))
     if step == 3:
@@ -115,6 +117,6 @@ def _shown(state, step):
     return changes
 
 
-def _farthest(normal):
+def _farthest(normal: Any) -> int:
     """The state that differs most from the original network."""
     return int(np.argmax(np.abs(normal - normal[0]).sum(axis=1)))

@@ -1,6 +1,7 @@
 """Bring your own packing: drop its files, see what it is, and look at it like any other."""
 
 import html
+from typing import Any
 
 import panel as pn
 import panel_material_ui as pmui
@@ -10,6 +11,7 @@ from granforce.records import InputError, friction, make_cell, positive
 from .. import photoelastic, uploads
 from ..limits import LIMITS, SHARED
 from ..selection import Selection
+from ..state import AppState
 from . import photoelastic as measured
 from .dropper import Dropper
 from .mine import Mine
@@ -46,9 +48,9 @@ class View:
 
     name, title = "upload", "Your packing"
 
-    def __init__(self, state):
+    def __init__(self, state: AppState) -> None:
         self.state = state
-        self.files = {}
+        self.files: uploads.Files = {}
         self.task = state.work.task(told=False)
         self.dropper = Dropper(
             self._dropped,
@@ -73,7 +75,7 @@ class View:
         self.task.param.watch(lambda event: self._refuse(event.new), "message")
         self._ask()
 
-    def panel(self):
+    def panel(self) -> pn.Column:
         """Where to drop, what is asked, and what came."""
         return pn.Column(
             self.dropper,
@@ -91,7 +93,7 @@ class View:
             sizing_mode="stretch_width",
         )
 
-    def _ask(self):
+    def _ask(self) -> None:
         """Show the fields that the files at hand need."""
         kind = uploads.family(self.files) if self.files else None
         self.mu.visible = kind in ("lammps", "table", "pegs", "solved")
@@ -99,7 +101,7 @@ class View:
         self.box.visible = self.pressure.visible = kind == "table"
         self.read.visible = self.mu.visible and not uploads.missing(self.files)
 
-    def _dropped(self, new):
+    def _dropped(self, new: list[tuple[str, bytes]]) -> None:
         self._refuse("")
         self._clear()  # what was dropped before
         try:
@@ -116,7 +118,7 @@ class View:
         if not absent:
             self._read()
 
-    def _read(self):
+    def _read(self) -> None:
         self._refuse("")
         try:
             options = self._options()
@@ -129,9 +131,11 @@ class View:
             return
         self.task.start(uploads.bring(self.state.library, self.files, **options), self._show)
 
-    def _options(self):
+    def _options(self) -> dict[str, Any]:
         kind = uploads.family(self.files)
-        options = {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
+        options: dict[str, Any] = (
+            {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
+        )
         if kind in ("pegs", "solved"):
             options |= {"reverse": self.reverse.value, "walls": self.walls.value or None}
         if kind == "table":
@@ -146,7 +150,7 @@ class View:
             options["pressure"] = positive(self.pressure.value, "the pressure")
         return options
 
-    def _show(self, brought, frame=None):
+    def _show(self, brought: uploads.Brought, frame: photoelastic.Frame | None = None) -> None:
         """Report, and put the packing on the page; its walk is computed at once."""
         rows = "".join(ROW.format(*map(html.escape, row)) for row in uploads.told(brought.report))
         self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
@@ -154,13 +158,13 @@ class View:
         mu = brought.params["mu"]
         self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
 
-    def _compare(self, frame):
+    def _compare(self, frame: photoelastic.Frame) -> None:
         """Measured beside inferred forces."""
         options = self._options()
         shown = measured.Frames(frame, dict(self.files), self.task, self._open, **options)
         self.frame[:] = shown.panel()
 
-    def _open(self, frame):
+    def _open(self, frame: photoelastic.Frame) -> None:
         """The frame as a packing like any other."""
         if self.task.running:
             return
@@ -170,9 +174,9 @@ class View:
             lambda brought: self._show(brought, frame),
         )
 
-    def _clear(self):
+    def _clear(self) -> None:
         self.report.object = ""
         self.frame[:] = []
 
-    def _refuse(self, line):
+    def _refuse(self, line: str) -> None:
         self.error.param.update(title=line, visible=bool(line))

@@ -1,9 +1,14 @@
 """A card beside η: how wide S is along each free dimension, by its volume."""
 
+from typing import Any
+
 import panel as pn
 import panel_material_ui as pmui
+import xarray as xr
 
 from .. import compute
+from ..data import Cell
+from ..state import AppState
 from .parts import PLAIN
 from .summary import STYLE, TILE
 
@@ -18,8 +23,9 @@ TILES = (
 class Volume:
     """The volume of all networks of the packing on screen, once known: `tiles`; else `measure`."""
 
-    def __init__(self, state):
-        self.state, self.work, self.found = state, state.work, None
+    def __init__(self, state: AppState) -> None:
+        self.state, self.work = state, state.work
+        self.found: xr.Dataset | None = None
         self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
         self.measure = pmui.Button(
             label="Measure the volume of all networks",
@@ -34,7 +40,7 @@ class Volume:
         self.work.measuring.param.watch(self._offer, "running")
         self._look()
 
-    def _look(self, *events):
+    def _look(self, *events: Any) -> None:
         """Whether a store has it already."""
         state, self.found = self.state, None
         self.work.measuring.cancel()
@@ -42,29 +48,29 @@ class Volume:
         if state.replay is not None and state.cell is not None:
             self.work.looking.start(compute.known_volume(state.library, state.cell), self._take)
 
-    def _measure(self):
+    def _measure(self) -> None:
         cell = self.state.cell
         if cell is not None:
             self.work.measuring.start(compute.volume(self.state.library, cell), self._take)
 
-    def _take(self, result):
+    def _take(self, result: tuple[Cell, xr.Dataset | None]) -> None:
         cell, found = result
         if cell == self.state.cell:
             self.found = found
             self._show()
 
-    def _show(self):
+    def _show(self) -> None:
         self.tiles.object = "" if self.found is None else text(self.found)
         self._offer()
 
-    def _offer(self, *events):
+    def _offer(self, *events: Any) -> None:
         replay = self.state.replay
         free = replay is not None and replay.summary["dimension"] > 0
         wanted = free and self.found is None and not self.work.measuring.running
         self.measure.visible = bool(wanted)
 
 
-def text(dataset):
+def text(dataset: xr.Dataset) -> str:
     """The tiles of a volume, as HTML."""
     tiles = "".join(
         TILE.format(name=name, value=format(dataset[key].item(), form), term=term, meaning="")
