@@ -228,7 +228,7 @@ class Task(param.Parameterized):
         """wake(function): call a function soon on the page's thread; without it, poll yourself."""
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
         self._pool, self._wake = pool, wake
-        self._job: Job | None = None
+        self.job: Job | None = None  # the one that is under way
         self._done: Callable[[Any], object] | None = None
         self._closed = False
 
@@ -243,19 +243,19 @@ class Task(param.Parameterized):
         if self._closed:
             return
         on_end = None if self._wake is None else partial(self._wake, self.poll)
-        self._job, self._done = Job(work, self._pool, on_end), done
+        self.job, self._done = Job(work, self._pool, on_end), done
         self.param.update(
-            running=True, stage=self._job.stage, fraction=None, seconds_left=None, keeps=False,
+            running=True, stage=self.job.stage, fraction=None, seconds_left=None, keeps=False,
             message="",
         )  # fmt: skip
 
     def poll(self) -> None:
         """Take over how far the job is; when it has ended, its result."""
-        job = self._job
+        job = self.job
         if job is None:
             return
         if not job.ended and job.cancelled() and not job.unwanted():
-            self._job = self._done = None  # it goes on for others
+            self.job = self._done = None  # it goes on for others
             self.param.update(running=False, message="")
             return
         if not job.ended:
@@ -266,7 +266,7 @@ class Task(param.Parameterized):
                 keeps=job.keeps and not job.cancelled(),
             )
             return
-        done, self._job, self._done = self._done, None, None
+        done, self.job, self._done = self._done, None, None
         # Told as one: at no moment is the work over and its result not yet there.
         with as_one(self):
             self.param.update(running=False, message=job.error)
@@ -279,8 +279,8 @@ class Task(param.Parameterized):
 
     def cancel(self) -> None:
         """Ask the job to end; its result is dropped."""
-        if self._job is not None:
-            self._job.cancel()
+        if self.job is not None:
+            self.job.cancel()
 
     def dismiss(self) -> None:
         """Cancel, as the visitor wishes; those who know what was there before bring it back."""
@@ -290,8 +290,8 @@ class Task(param.Parameterized):
 
     def stop(self) -> None:
         """Ask the job to end with the result that it has so far."""
-        if self._job is not None and self._job.keeps:
-            self._job.stop()
+        if self.job is not None and self.job.keeps:
+            self.job.stop()
 
     def close(self) -> None:
         """End the job, and begin no other: nobody is there any more."""

@@ -33,4 +33,4 @@ class FrictionSlider(Scripted):
     def _heard(self, message: Message) -> None:
         if self._on_typed is not None:
             self._on_typed(message["typed"])
-            self._send_msg({"settled": True})
+            self.tell({"settled": True})

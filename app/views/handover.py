@@ -44,7 +44,7 @@ class Handover(Scripted):
 
     def hand_over(self, file: File) -> None:
         """Have the browser save an exports.File."""
-        self._send_msg(file._asdict())
+        self.tell(file._asdict())
 
     def hand_over_picture(
         self, name: str, caption: dict[str, Any], width: int | None = None
@@ -54,11 +54,11 @@ class Handover(Scripted):
         caption: background, ink, bar {low, high, stops} and lines of words; width: in mm, of one
         figure with the plots that are seen (SVG, or PDF by printing).
         """
-        self._send_msg({"name": name, "caption": caption} | ({"width": width} if width else {}))
+        self.tell({"name": name, "caption": caption} | ({"width": width} if width else {}))
 
     def rest(self) -> None:
         """No file comes for what was asked."""
-        self._send_msg({"rest": True})
+        self.tell({"rest": True})
 
     def _heard(self, message: Message) -> None:
         key = message["key"]

@@ -84,7 +84,7 @@ class Player(Scripted):
 
     def hand_over(self, news: Message) -> None:
         """Send something of what is being computed, or of what was pulled."""
-        self._send_msg(news)
+        self.tell(news)
 
     def _heard(self, message: Message) -> None:
         """Digits pressed anywhere on the page; what the browser has painted of a computation."""

@@ -73,13 +73,16 @@ class Scripted(JSComponent):
             properties["bundle"] = type(self).__name__
         return properties
 
-    def _send_msg(self, data: Message) -> None:
-        """Tell the script something that TO_BROWSER lists."""
-        if not listed(TO_BROWSER, type(self).__name__, data):
-            raise ValueError(f"no message of {type(self).__name__}: {', '.join(data)}")
-        super()._send_msg(data)
+    def tell(self, message: Message) -> None:
+        """Tell the script something; ValueError for what TO_BROWSER does not list."""
+        if not listed(TO_BROWSER, type(self).__name__, message):
+            raise ValueError(f"no message of {type(self).__name__}: {', '.join(message)}")
+        self._send_msg(message)
+
+    def hear(self, message: Any) -> None:
+        """Take what the script says, if FROM_BROWSER lists it: a page may have been altered."""
+        if listed(FROM_BROWSER, type(self).__name__, message):
+            self._heard(message)
 
     def _handle_msg(self, data: Any) -> None:
-        """Hear what FROM_BROWSER lists: a page may have been altered, and send anything."""
-        if listed(FROM_BROWSER, type(self).__name__, data):
-            self._heard(data)
+        self.hear(data)

@@ -76,7 +76,7 @@ class Small(Scripted):
             self._put(scenes.drawn(name, mu, built))
         except (InputError, NotJammedError) as error:
             if self.scene:
-                self._send_msg({"error": str(error)})
+                self.tell({"error": str(error)})
             else:  # a link that cannot be: its page begins anew, and says why
                 self.note = str(error)
                 self._show(name)
@@ -86,7 +86,7 @@ class Small(Scripted):
 
     def _failed(self, event: Any) -> None:
         if event.new:
-            self._send_msg({"error": event.new})
+            self.tell({"error": event.new})
 
     def _heard(self, message: Message) -> None:
         """Another scene, another μ, or the question how it falls."""
@@ -106,25 +106,25 @@ class Small(Scripted):
                 case {"measure": of}:
                     self._measure(**of)
         except (InputError, NotJammedError, UndecidedError) as error:
-            self._send_msg({"error": str(error)})
+            self.tell({"error": str(error)})
 
     def _fall(self, mu: float, load: list[float]) -> None:
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
             lambda job: scenes.falling(scenes.packing_of(name, mu, built), load).tolist(),
-            lambda motion: self._send_msg({"fall": motion}),
+            lambda motion: self.tell({"fall": motion}),
         )
 
     def _save(self, mu: float, load: list[float]) -> None:
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
             lambda job: scenes.file_of(scenes.packing_of(name, mu, built), load),
-            lambda file: self._send_msg({"file": base64.b64encode(file).decode()}),
+            lambda file: self.tell({"file": base64.b64encode(file).decode()}),
         )
 
     def _measure(self, mu: float, load: list[float], plane: list[int]) -> None:
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
             lambda job: scenes.measured(scenes.packing_of(name, mu, built), load, plane),
-            lambda found: self._send_msg({"measured": found, "mu": mu, "plane": plane}),
+            lambda found: self.tell({"measured": found, "mu": mu, "plane": plane}),
         )

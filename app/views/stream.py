@@ -23,13 +23,13 @@ class Stream:
         self._document = document
         self._sent = self._painted = 0
         self._awake, self._ticking = False, None
-        player.on_live = self._heard
+        player.on_live = self.heard
         self.work.param.watch(self._follow, ["live", "arriving"])
         state.param.watch(self._show, ["missing", "selection", "cell"])
         self.work.param.watch(self._show, "busy")
         self._follow()
 
-    def _heard(self, message: Message) -> None:
+    def heard(self, message: Message) -> None:
         """The browser tells that it draws anew, what it has painted, and whether it is seen."""
         if "anew" in message:
             self._sent = self._painted = 0

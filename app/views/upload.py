@@ -161,11 +161,11 @@ class View:
     def _compare(self, frame: photoelastic.Frame) -> None:
         """Measured beside inferred forces."""
         options = self._options()
-        shown = measured.Frames(frame, dict(self.files), self.task, self._open, **options)
+        shown = measured.Frames(frame, dict(self.files), self.task, self.open, **options)
         self.frame[:] = shown.panel()
 
-    def _open(self, frame: photoelastic.Frame) -> None:
-        """The frame as a packing like any other."""
+    def open(self, frame: photoelastic.Frame) -> None:
+        """Put a frame on the page, as a packing like any other."""
         if self.task.running:
             return
         packing, source = frame.packing, f"{frame.source}, frame {frame.report['frame']}"

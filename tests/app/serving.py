@@ -22,8 +22,7 @@ CLOSED = ("--unused-session-lifetime", "10000", "--check-unused-sessions", "500"
 # The newest model of a name, as the page itself looks it up: what moves to another place is made
 # anew there, and for a moment there are two.
 MODEL = (
-    "(name => [...Bokeh.documents[0]._all_models.values()]"
-    ".findLast(model => model.name === name) ?? null)"
+    "(name => [...Bokeh.documents[0].all_models].findLast(model => model.name === name) ?? null)"
 )
 
 

@@ -480,7 +480,7 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
 
     task = state.work.computation
     state.ask(select(20, 0.05, 3, states=9), at_once=True)
-    task._job.stop()  # before there is a state: it ends with the first one
+    task.job.stop()  # before there is a state: it ends with the first one
     wait_for(state)
     assert state.selection.states == 1 and len(state.replay.normal) == 2
     assert state.cell.params["states"] == 1 and not state.missing
@@ -537,9 +537,9 @@ def test_what_is_refused_does_not_stay_in_its_box(state):
     from app.views.controls import Controls
 
     controls = Controls(state)
-    controls._typed("1e9")
+    controls.mu.hear({"typed": "1e9"})
     assert "friction" in state.work.message.lower() and controls.mu.mu == state.cell.mu
-    controls._typed("0,01")
+    controls.mu.hear({"typed": "0,01"})
     assert state.selection.mu == 0.01 and not state.work.message
     state.work.cancel()
 
@@ -548,7 +548,7 @@ def test_closing_the_page_ends_its_computation(state):
     from app.selection import select
 
     state.ask(select(200, 0.05, 3, states=100), at_once=True)
-    job = state.work.computation._job
+    job = state.work.computation.job
     while job.fraction is None:
         time.sleep(0.01)  # until it is under way
     state.work.close()
@@ -803,7 +803,7 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
     state.work.poll()
     assert progress.running and progress.fraction == 0.25
     assert progress.words == "counting — about 20 min more"
-    progress._handle_msg({"cancel": True})
+    progress.hear({"cancel": True})
     wait_for(state)
     assert not progress.running
 
@@ -957,7 +957,7 @@ def test_a_pool_survives_pages_that_are_gone(library):
 
     for task in tasks:
         task.start(work)
-    jobs = [task._job for task in tasks]
+    jobs = [task.job for task in tasks]
     assert begun.wait(10)
     state.work.close()
     assert all(job.wait(10) for job in jobs) and next_on(pool)

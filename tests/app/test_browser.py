@@ -596,7 +596,7 @@ def test_scripts_are_fetched_once_and_run_as_they_are(visit):
     assert any("panel-material-ui" in name for name in fetched)
     assert len(fetched) == len(set(fetched))
     own = page.evaluate(
-        """() => [...Bokeh.documents[0]._all_models.values()]
+        """() => [...Bokeh.documents[0].all_models]
         .filter((model) => model.esm).map((model) => [model.class_name, model.bundle])"""
     )
     assert {"Player", "FrictionSlider", "Tour"} <= {name for name, _ in own}

@@ -348,7 +348,7 @@ def test_two_contacts_are_chosen_in_the_packing_and_both_are_marked(visit):
     page.wait_for_function(f"() => {MODEL}('outer').get_column('x').length > 3")
     backbone = scene(page, "Array.from(scene.geometry.backbone)")
     axes = page.evaluate(
-        """() => [...Bokeh.documents[0]._all_models.values()]
+        """() => [...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "LinearAxis").map((m) => m.axis_label)"""
     )
     assert f"normal force fₙ of contact {backbone[a]}, in mean forces" in axes
@@ -363,12 +363,12 @@ def test_two_contacts_are_chosen_in_the_packing_and_both_are_marked(visit):
 def test_legends_lie_where_no_curve_goes(visit, tab):
     page = visit(f"?tab={tab}")
     page.wait_for_function(
-        """() => [...Bokeh.documents[0]._all_models.values()]
+        """() => [...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "Figure" &&
                 !m.properties.inner_width.is_unset && m.inner_width > 50).length >= 2"""
     )
     places = page.evaluate(
-        """() => [...Bokeh.documents[0]._all_models.values()]
+        """() => [...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "Figure" &&
                 !m.properties.inner_width.is_unset && m.inner_width > 50)
             .map((m) => [m.center, m.above].map(
@@ -382,12 +382,12 @@ def test_ticks_of_friction_stand_apart(visit):
     page = visit("?tab=statistics")
     page.get_by_text("Forces are least determined at friction").wait_for()
     page.wait_for_function(
-        "() => [...Bokeh.documents[0]._all_models.values()]"
+        "() => [...Bokeh.documents[0].all_models]"
         ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
     )
     ticks, width = page.evaluate(
         """() => {
-            const models = [...Bokeh.documents[0]._all_models.values()]
+            const models = [...Bokeh.documents[0].all_models]
             const fig = models.find((m) => m.type === "Figure" &&
                 m.below.some((axis) => axis.axis_label === "friction μ"))
             return [fig.below.find((axis) => axis.ticker).ticker.ticks.length, fig.inner_width]
@@ -433,7 +433,7 @@ def test_curves_of_the_shown_states_end_at_their_targets(visit):
     page.locator("input.scrub").fill(str(KEPT))
     ends = [column(page, "growth", name)[-1] for name in ("eta1", "eta2", "eta3")]
     targets = page.evaluate(
-        """() => [...Bokeh.documents[0]._all_models.values()]
+        """() => [...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "Span" && m.line_dash === "dashed" ||
                 m.type === "Span" && m.line_dash.length > 0).map((m) => m.location)"""
     )
@@ -446,7 +446,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     page.get_by_text("What the paper says, and what was found here").click()
     assert page.get_by_role("cell", name="reproduced").count() >= 5
     most = page.evaluate(
-        """() => Math.max(...[...Bokeh.documents[0]._all_models.values()]
+        """() => Math.max(...[...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "ColumnDataSource").map((m) => m.get_length() ?? 0))"""
     )
     assert most >= 15  # frictions of the study above 0
@@ -464,7 +464,7 @@ def test_plots_say_whether_they_show_exact_seen_or_measured_values(visit, tab, w
     page = visit(f"?tab={tab}")
     for line in words:
         page.wait_for_function(
-            """line => [...Bokeh.documents[0]._all_models.values()]
+            """line => [...Bokeh.documents[0].all_models]
                 .some((m) => m.type === "Title" && m.text === line)""",
             arg=line,
         )

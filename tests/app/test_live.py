@@ -27,17 +27,17 @@ class Browser:
         self.player = PackingView(state).player
         self.stream = Stream(state, self.player)
         self.player.hand_over = self._take
-        self.player._handle_msg({"live": {"anew": True, "seen": awake}})
+        self.player.hear({"live": {"anew": True, "seen": awake}})
 
     def _take(self, news):
         assert listed(TO_BROWSER, "Player", news), sorted(news)
         self.got.append(news)
         if self.awake:
-            self.player._handle_msg({"live": {"painted": news["number"]}})
+            self.player.hear({"live": {"painted": news["number"]}})
 
     def look(self, awake):
         self.awake = awake
-        self.player._handle_msg({"live": {"seen": awake}})
+        self.player.hear({"live": {"seen": awake}})
 
     def parts(self, name):
         return [news[name] for news in self.got if name in news]
@@ -174,17 +174,17 @@ def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, 
     second.ask(wanted, at_once=True)
     two.run(lambda: second.growing)
     walk = live.shared(live.Walking, wanted.parameters())
-    run, found = walk.run, walk._found
+    run, found = walk.run, len(walk.parts)
     leave(first.work)
     one.run(seconds=1)  # at once for who leaves
     assert not first.work.busy and not second.work.computation.message
-    two.run(lambda: walk._found > found + 20)
+    two.run(lambda: len(walk.parts) > found + 20)
     assert walk.run == run and second.work.computation.running  # not begun anew
     second.work.cancel()
     two.run(seconds=60)
-    found = walk._found
+    found = len(walk.parts)
     time.sleep(0.3)
-    assert not second.work.busy and walk._found <= found + 1  # nobody wants it any more
+    assert not second.work.busy and len(walk.parts) <= found + 1  # nobody wants it any more
 
 
 def test_while_it_is_compressed_the_words_say_that_it_moves(state):
@@ -200,7 +200,7 @@ def test_while_it_is_compressed_the_words_say_that_it_moves(state):
     browser.run()
 
 
-def test_a_picture_on_screen_is_soon_that_which_is_computed(monkeypatch):
+def test_a_picture_on_screen_is_soon_that_which_is_computed():
     """Who paints a little faster than pictures come is not behind for long, whatever came first."""
     seen, run, place = live.Compaction(), 0, 0
     for k in range(100):
@@ -270,7 +270,7 @@ def test_exact_bounds_are_seen_as_they_are_found(state, monkeypatch):
     assert state.work.arriving is not None and not browser.player.live
     browser.run()
     browser.stream.tick()
-    assert state.work.arriving is None and browser.stream._sent
+    assert state.work.arriving is None and browser.got
     seen = browser.parts("bounds")
     known = [np.isfinite(np.stack([part["low"], part["high"]])).sum(axis=1) for part in seen]
     assert np.all(np.diff(known, axis=0) >= 0) and known[0][1] < len(state.replay.backbone)
@@ -303,7 +303,7 @@ def test_pictures_are_kept_as_the_box_shrinks_and_as_time_goes(monkeypatch):
     assert seen.total == 3
 
 
-def test_who_is_far_behind_leaves_pictures_out_and_misses_none_of_the_newest(monkeypatch):
+def test_who_is_far_behind_leaves_pictures_out_and_misses_none_of_the_newest():
     seen = live.Compaction()
     for k in range(200):
         seen.add(Glimpse(10 * 0.99**k))

@@ -33,7 +33,7 @@ COMPONENTS = {
     )
 }  # fmt: skip
 # What a player's message is handed on to.
-PARTS = {"hand": Hand.heard, "known": Knowledge.heard, "live": stream.Stream._heard}
+PARTS = {"hand": Hand.heard, "known": Knowledge.heard, "live": stream.Stream.heard}
 # A call that tells the server something, up to the literal that it begins with.
 TELLING = re.compile(r"(?:\bask\(model, view, |\btell\(|\bsend_msg\()(?=\{|\w+ \? \{)")
 
@@ -148,7 +148,7 @@ def test_a_field_fits_its_shape_only(shape, good, bad):
 def test_what_no_list_has_is_neither_heard_nor_sent():
     field = number.NumberField(on_wrong=pytest.fail)
     for message in (None, 7, "typed", [], {"typed": 7}, {"typed": "x", "more": 1}, {"other": "x"}):
-        field._handle_msg(message)
+        field.hear(message)
     assert not listed(FROM_BROWSER, "Nobody", {"typed": "x"})
     with pytest.raises(ValueError, match="no message of NumberField: rest"):
-        field._send_msg({"rest": True})
+        field.tell({"rest": True})

@@ -25,16 +25,16 @@ def test_computations_are_listed_named_opened_and_deleted(computed, wait_for):
     assert newest["here"] and not older["here"] and newest["when"] >= older["when"]
     assert "3 states" in older["what"] and older["what"].startswith("μ = 0.3") and not older["name"]
     assert older["megabytes"] > 0
-    view._handle_msg({"call": [older["entry"], "  the  short\none "]})
+    view.hear({"call": [older["entry"], "  the  short\none "]})
     wait_for(state)
     called = {row["entry"]: row["name"] for row in view.rows}
     assert called == {newest["entry"]: "", older["entry"]: "the short one"}
-    view._handle_msg({"open": older["entry"]})
+    view.hear({"open": older["entry"]})
     wait_for(state)
     assert state.selection.states == 3
     for row in (older, newest):
         assert state.library.own.find("packing", n=DISKS, seed=2)  # as long as states need it
-        view._handle_msg({"delete": row["entry"]})
+        view.hear({"delete": row["entry"]})
         wait_for(state)
     assert not view.rows and not list(state.library.own)  # nothing of it is left
     assert names.names(state.library.own) == {}
@@ -47,8 +47,8 @@ def test_what_is_not_in_the_list_is_left_alone(computed, wait_for):
     before = sorted(state.library.own)
     packing = next(name for name in before if name.startswith("packing"))
     for entry in (packing, "../elsewhere", state.library.shipped.name("walk", {}, version=1)):
-        view._handle_msg({"delete": entry})
-        view._handle_msg({"call": [entry, "mine"]})
+        view.hear({"delete": entry})
+        view.hear({"call": [entry, "mine"]})
         wait_for(state)
     assert sorted(state.library.own) == before and names.names(state.library.own) == {}
     with pytest.raises(InputError, match="no more"):

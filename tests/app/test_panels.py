@@ -15,6 +15,7 @@ from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
 from PIL import Image
 from small_store import KEPT, STATES
+from visitor import drop, press
 
 import granforce as gf
 from app import distributions, exports, movies, perturbations, planes, standalone, studied, uploads
@@ -22,6 +23,7 @@ from app.views import labels
 from app.views import plane as plane_view
 from app.views import studied as drawn_study
 from app.views.controls import Controls
+from app.views.dropper import Dropper
 from app.views.style import palettes
 from granforce import measures
 from granforce.records import InputError
@@ -189,12 +191,14 @@ def test_tables_of_tilted_boxes_are_read(state, contacts):
     from app.views.upload import View
 
     packing = skewed(packed(30, 0.3))[0]
-    view = View(state)
+    view = View(opened(state))
     view.files = {"grains": ("g.txt", table(packing))}
     if contacts:
         view.files["joined"] = ("c.txt", table(packing, contacts=True))
     view.box.value = ", ".join(map(repr, [*packing.box.tolist(), packing.tilt]))
-    read = uploads.read(view.files, **view._options())
+    press(view.read)
+    settled(state, done=lambda: state.selection.imported or view.error.visible)
+    read = state.library.packing(state.selection.packing)
     assert read.tilt == packing.tilt and len(read.contacts.i) >= len(packing.contacts.i)
     for wrong, message in (
         ("30", "two sides"),
@@ -202,8 +206,8 @@ def test_tables_of_tilted_boxes_are_read(state, contacts):
         ("30 30 1 2", "two sides"),
     ):
         view.box.value = wrong
-        with pytest.raises(InputError, match=message):
-            view._options()
+        press(view.read)
+        assert message in view.error.title and not view.task.running
 
 
 def test_a_file_of_another_family_replaces_what_was_there():
@@ -262,15 +266,11 @@ def test_an_upload_is_kept_reported_and_shown(state):
     opened(state)
     view = View(state)
     both = dumps()
-    view.dropper._handle_msg({"begin": True})
-    view.dropper._handle_msg({"name": "a", "data": both["particles"][1]})
-    view.dropper._handle_msg({"end": True})
+    drop(view.dropper, [("a", both["particles"][1])])
     assert view.waiting.visible and "dump of the contacts" in view.waiting.title
     middle = len(both["contacts"][1]) // 2
-    view.dropper._handle_msg({"begin": True})
-    view.dropper._handle_msg({"name": "<b>c", "data": both["contacts"][1][:middle]})
-    view.dropper._handle_msg({"name": "<b>c", "data": both["contacts"][1][middle:]})
-    view.dropper._handle_msg({"end": True})
+    pieces = both["contacts"][1][:middle], both["contacts"][1][middle:]
+    drop(view.dropper, [("<b>c", piece) for piece in pieces])
     assert view.task.running and not view.waiting.visible
     settled(state, 120, lambda: state.cell is not None and state.cell.selection.imported)
     assert "604" in view.report.object and "&lt;b&gt;c" in view.report.object
@@ -282,7 +282,7 @@ def test_a_refused_upload_changes_nothing(state):
 
     before = opened(state).replay
     view = View(state)
-    view._dropped([("p.npz", npz(packed(30, 0.3))[:-80])])
+    drop(view.dropper, [("p.npz", npz(packed(30, 0.3))[:-80])])
     settled(state)
     assert view.error.visible and "NPZ archive" in view.error.title
     assert state.replay is before and not state.library.cache.find("packing")
@@ -293,11 +293,11 @@ def test_more_than_allowed_is_not_collected(state):
 
     view = View(opened(state))
     view.dropper.most = 1000
-    view.dropper._handle_msg({"begin": True})
+    view.dropper.hear({"begin": True})
     for _ in range(50):
-        view.dropper._handle_msg({"name": "x", "data": bytes(100)})
+        view.dropper.hear({"name": "x", "data": bytes(100)})
     assert not view.dropper._files
-    view.dropper._handle_msg({"end": True})
+    view.dropper.hear({"end": True})
     assert "nothing was read" in view.error.title and not view.files
 
 
@@ -313,23 +313,18 @@ def test_a_drop_of_nothing_but_names_is_not_collected(state, pieces, word):
     from app.views.upload import View
 
     view = View(opened(state))
-    view.dropper._handle_msg({"begin": True})
+    view.dropper.hear({"begin": True})
     for piece in pieces:
-        view.dropper._handle_msg(piece)
+        view.dropper.hear(piece)
     assert not view.dropper._files
-    view.dropper._handle_msg({"end": True})
+    view.dropper.hear({"end": True})
     assert word in view.error.title and "nothing was read" in view.error.title and not view.files
 
 
-def test_empty_pieces_take_no_memory(state):
-    from app.views.upload import View
-
-    view = View(opened(state))
-    view.dropper._handle_msg({"begin": True})
-    for _ in range(1000):
-        view.dropper._handle_msg({"name": "a" * 10_000, "data": b""})
-    ((name, content),) = view.dropper._files.items()
-    assert len(name) == 120 and content == b""
+def test_empty_pieces_take_no_memory():
+    taken = []
+    drop(Dropper(taken.append, pytest.fail, most=1000), [("a" * 10_000, b"")] * 1000)
+    assert taken == [[("a" * 120, b"")]]
 
 
 # Statistics
@@ -511,8 +506,8 @@ def test_every_button_hands_a_file_over(state):
     keys = [key for group in view.buttons.files.values() for key in group]
     for key in keys:
         handed = []
-        view.buttons._send_msg = handed.append
-        view.buttons._handle_msg({"key": key})
+        view.buttons.tell = handed.append
+        view.buttons.hear({"key": key})
         settled(state)
         assert all(listed(TO_BROWSER, "Handover", given) for given in handed), key
         (file,) = (given for given in handed if "name" in given)
@@ -526,7 +521,7 @@ def test_unknown_keys_are_ignored(state):
     from app.views.export import View
 
     view = View(opened(state))
-    view.buttons._handle_msg({"key": "../secret"})
+    view.buttons.hear({"key": "../secret"})
     assert not view.task.running
 
 
@@ -541,9 +536,9 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     view = View(state)
     assert view.strongest.visible and not view.push.visible
     assert "Click any contact" in view.told.object and "<svg" in view.lead.object
-    view._take_strongest()
+    press(view.strongest)
     assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and view.push.visible
-    view._push()
+    press(view.push)
     settled(state, done=lambda: view.pushed is not None)
     pushed = view.pushed[0]
     assert 0 < pushed.low <= pushed.high <= pushed.limit + 0.02
@@ -562,7 +557,7 @@ def test_the_field_moves_only_while_its_tab_is_seen(state):
     opened(state)
     state.looks.contact, state.looks.tab = 3, "perturb"
     view = View(state)
-    view._push()
+    press(view.push)
     settled(state, done=lambda: view.pushed is not None)
     field = state.displacement
     assert field is not None
@@ -583,11 +578,11 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     opened(state)
     state.looks.contact, state.looks.tab = 3, "perturb"
     view = View(state)
-    view._push()
+    press(view.push)
     settled(state, done=lambda: view.pushed is not None)
     view.what.value = "all"
     assert not view.plots.objects
-    view._push()
+    press(view.push)
     settled(state, done=lambda: view.loads is not None)
     assert view.loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
     view.plots.objects[0].object.renderers[0].data_source.selected.indices = [8]

@@ -58,7 +58,7 @@ def figure_of(page, source):
     """px per unit along x and y of the plot that shows a source."""
     return page.evaluate(
         """name => {
-            const models = [...Bokeh.documents[0]._all_models.values()]
+            const models = [...Bokeh.documents[0].all_models]
             const source = models.find((model) => model.name === name)
             const fig = models.find((model) => model.type === "Figure" &&
                 model.renderers.some((renderer) => renderer.data_source === source))
@@ -74,7 +74,7 @@ def drawn(page, number=1):
     """Wait until so many plots of the visible tab have been painted."""
     page.wait_for_function(
         """number => {
-            const figures = [...Bokeh.documents[0]._all_models.values()]
+            const figures = [...Bokeh.documents[0].all_models]
                 .filter((model) => model.type === "Figure" &&
                     !model.properties.inner_width.is_unset && model.inner_width > 50)
             return figures.length >= number
@@ -316,7 +316,7 @@ def test_plots_are_saved_as_svg(visit, tmp_path, tab, number):
         filled(page, "outer")
     # Toolbars are hidden until the pointer is on the plot; their buttons work all the same.
     save = """() => {
-        const models = [...Bokeh.documents[0]._all_models.values()]
+        const models = [...Bokeh.documents[0].all_models]
         const tool = models.find((m) => m.description === "Save as SVG")
         return tool.callback.execute(tool)
     }"""

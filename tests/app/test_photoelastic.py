@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from frames import NEWTON, file, frame
 from test_panels import opened, settled
+from visitor import drop
 
 import granforce as gf
 from app import photoelastic, uploads
@@ -39,7 +40,7 @@ def test_files_are_known_by_their_numbers():
 
 def dropped(state, new):
     view = View(state)
-    view._dropped(new)
+    drop(view.dropper, new)
     return view
 
 
@@ -165,7 +166,7 @@ def test_a_frame_is_opened_as_a_packing(state):
     """Chains are the inferred ones, and what walls do is held: S is bounded."""
     frame = made(60, missing=0.1, noise=0.05)
     view = View(state)
-    view._open(frame)
+    view.open(frame)
     settled(state, done=lambda: state.replay is not None and state.selection.imported)
     S = ensemble(frame.packing)
     assert frame.packing.r.max() == 1  # as chains of the page are drawn for

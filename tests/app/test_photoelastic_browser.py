@@ -11,8 +11,8 @@ ARTEFACTS = ROOT / "artefacts" / "photoelastic"
 NUMBERS = 1, 2, 3
 # Widths in pixels of the pictures of the frame that the browser shows.
 PICTURES = """() => {
-  const {_all_models, views_manager} = Bokeh.documents[0]
-  return [..._all_models.values()]
+  const {all_models, views_manager} = Bokeh.documents[0]
+  return [...all_models]
     .filter(model => model.name === "photoelastic_network" && views_manager.find_one(model))
     .map(model => model.properties.inner_width.is_unset ? 0 : model.inner_width)
 }"""
