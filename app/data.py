@@ -72,8 +72,16 @@ class Library:
     Shared by all visitors; its methods may be called from any thread.
     """
 
-    def __init__(self, shipped: str | Path | None = None, cache: str | Path | None = None) -> None:
-        """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache."""
+    def __init__(
+        self,
+        shipped: str | Path | None = None,
+        cache: str | Path | None = None,
+        kept: int = SHOWN_KEPT,
+    ) -> None:
+        """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache.
+
+        kept: cells in memory.
+        """
         self.notes: list[str] = []  # one line for each store that cannot be used
         shipped = shipped or os.environ.get(SHIPPED_VARIABLE) or SHIPPED
         self.shipped = self._open(shipped, readonly=True)
@@ -83,7 +91,7 @@ class Library:
         self._damaged: set[tuple[Path, str]] = set()  # the same of those that could not be read
         self._rows: dict[str, dict[str, Any]] = {}
         self._shown: OrderedDict[str, Shown] = OrderedDict()
-        self._lock = threading.Lock()
+        self._kept, self._lock = kept, threading.Lock()
 
     def _open(self, path: str | Path | None, readonly: bool) -> Store | None:
         try:
@@ -173,7 +181,7 @@ class Library:
         """Make this the newest of those kept."""
         with self._lock:
             self._shown[shown.cell.name] = shown
-            while len(self._shown) > SHOWN_KEPT:
+            while len(self._shown) > self._kept:
                 self._shown.popitem(last=False)
 
     def packing(self, params: Parameters) -> Packing:

@@ -11,7 +11,7 @@ from granforce.records import Floats, Integers, Packing
 
 from . import geometry
 
-FRAME_BYTES = 8e6  # of the frames that a page is sent; of more states, so many are left out evenly
+FRAME_BYTES = 8e6  # of the frames that a page is sent
 
 
 class Replay(NamedTuple):
@@ -37,8 +37,13 @@ class Replay(NamedTuple):
     summary: dict[str, Any]  # plain numbers of the states, by their names in the schema
 
 
-def make_replay(packing: Packing, dataset: xr.Dataset, mu: float) -> Replay:
-    """The Replay of a dataset of states on its packing; μ is that of the ensemble."""
+def make_replay(
+    packing: Packing, dataset: xr.Dataset, mu: float, most_bytes: float = FRAME_BYTES
+) -> Replay:
+    """The Replay of a dataset of states on its packing; μ is that of the ensemble.
+
+    most_bytes: of the frames; of more states so many are left out evenly.
+    """
     backbone = dataset["backbone"].values
     scale = float(dataset["force_scale"])
     summary: dict[str, Any] = {
@@ -46,7 +51,7 @@ def make_replay(packing: Packing, dataset: xr.Dataset, mu: float) -> Replay:
     }
     kept = dataset.sizes["state"]
     walked = int(summary["accepted"] + summary["skipped"]) if "accepted" in summary else kept
-    pick = evenly(kept, len(backbone), FRAME_BYTES)
+    pick = evenly(kept, len(backbone), most_bytes)
     frames: Any = np.concatenate([dataset["original"].values[None], dataset["states"].values[pick]])
     frames = (frames / scale).astype(np.float32)
     number = np.linspace(0, walked - 1, kept).astype(int)[pick] + 1

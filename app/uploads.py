@@ -12,7 +12,7 @@ from granforce.study.keys import Parameters
 
 from .data import Library
 from .jobs import Job
-from .limits import LIMITS
+from .limits import LIMITS, Limits
 from .names import call
 
 Files = dict[str, tuple[str, bytes]]  # {role: (name, content)}
@@ -101,7 +101,7 @@ def family(roles: Iterable[str]) -> str:
     return next(k for k, (_, needed, more) in FAMILIES.items() if set(roles) & {*needed, *more})
 
 
-def added(files: Files, new: Iterable[tuple[str, bytes]]) -> Files:
+def added(files: Files, new: Iterable[tuple[str, bytes]], limits: Limits = LIMITS) -> Files:
     """{role: (name, content)} of the files given before and new ones [(name, content), …].
 
     A new file replaces the one with its role, and all that belong to another family.
@@ -112,8 +112,8 @@ def added(files: Files, new: Iterable[tuple[str, bytes]]) -> Files:
         files = {k: v for k, v in files.items() if family([k]) == family([found])}
         files[found] = (name, content)
     size = sum(len(content) for _, content in files.values())
-    if size > LIMITS.upload * 1e6:
-        raise InputError(f"the files have {size / 1e6:.1f} MB; at most {LIMITS.upload} MB are read")
+    if size > limits.upload * 1e6:
+        raise InputError(f"the files have {size / 1e6:.1f} MB; at most {limits.upload} MB are read")
     return files
 
 
@@ -130,21 +130,22 @@ def read(
     box: tuple[float, float] | None = None,
     tilt: float = 0.0,
     pressure: float = 1.0,
+    limits: Limits = LIMITS,
 ) -> Packing:
     """The Packing in files {role: (name, content)}.
 
     mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, tilt and
     pressure: of a table. Raises InputError, naming file and line, for what cannot be used, and
-    beyond LIMITS.
+    beyond the limits.
     """
-    LIMITS.check(pressure=pressure)
+    limits.check(pressure=pressure)
     given = {part: opened(*file) for part, file in files.items()}
     if "npz" in files:
-        unpacked = UNPACKED * LIMITS.upload * 10**6
-        packing = importers.load_packing(given["npz"], unpacked=unpacked, most_grains=LIMITS.n)
+        unpacked = UNPACKED * limits.upload * 10**6
+        packing = importers.load_packing(given["npz"], unpacked=unpacked, most_grains=limits.n)
     elif "particles" in files:
         packing = importers.read_lammps(
-            given["particles"], given["contacts"], mu, most_grains=LIMITS.n
+            given["particles"], given["contacts"], mu, most_grains=limits.n
         )
     else:
         packing = importers.read_table(
@@ -154,9 +155,9 @@ def read(
             box=box,
             tilt=tilt,
             pressure=pressure,
-            most_grains=LIMITS.n,
+            most_grains=limits.n,
         )
-    LIMITS.check(mu=packing.mu)
+    limits.check(mu=packing.mu)
     return packing
 
 

@@ -170,15 +170,14 @@ def test_open_boxes_have_no_images(library):
     assert len(replay.disks.x) == DISKS and len(replay.links.contact) == replay.normal.shape[1]
 
 
-def test_frames_beyond_the_budget_are_left_out_and_counted(library, monkeypatch):
+def test_frames_beyond_the_budget_are_left_out_and_counted(library):
     from app import replays
     from app.views.summary import left_out
 
     cell = cell_at(library, 0.1)
     packing, dataset = library.packing(cell.params["packing"]), library.dataset(cell)
     whole = replays.make_replay(packing, dataset, cell.mu)
-    monkeypatch.setattr(replays, "FRAME_BYTES", 8 * 5 * whole.normal.shape[1])
-    short = replays.make_replay(packing, dataset, cell.mu)
+    short = replays.make_replay(packing, dataset, cell.mu, 8 * 5 * whole.normal.shape[1])
     assert len(short.number) == 6 and short.summary["kept"] == 5
     assert "Shown: 5 evenly spaced of 30" in left_out(short.summary)
     among = np.searchsorted(whole.number, short.number)
@@ -191,10 +190,10 @@ def test_table_has_a_row_for_each_mu(state):
     assert rows[1]["eta1"] > rows[0]["eta1"]
 
 
-def test_the_last_cells_are_kept_in_memory_and_no_more(library, monkeypatch):
-    from app import data
+def test_the_last_cells_are_kept_in_memory_and_no_more(shipped, tmp_path):
+    from app.data import Library
 
-    monkeypatch.setattr(data, "SHOWN_KEPT", 2)
+    library = Library(shipped, tmp_path / "cache.zarr", kept=2)
     cells = library.cells()
     for cell in cells:
         library.shown(cell)
@@ -555,25 +554,28 @@ def test_closing_the_page_ends_its_computation(state):
     assert job.wait(30) and job.result is None and job.error == ""
 
 
-def test_progress_grows_and_estimates_the_rest(state, wait_for, monkeypatch):
-    monkeypatch.setattr("app.state.EXACT_FOLLOW", 0)  # of the states alone
+def test_progress_grows_and_estimates_the_rest(state, wait_for):
     from app.selection import select
 
     fractions = []
-    state.work.computation.param.watch(lambda event: fractions.append(event.new), "fraction")
+
+    def note(event):
+        if state.missing:  # of the states alone: exact intervals follow
+            fractions.append(event.new)
+
+    state.work.computation.param.watch(note, "fraction")
     state.ask(select(DISKS, 0.2, 2, states=100), at_once=True)
     wait_for(state)
     known = [value for value in fractions if value is not None]
-    assert known == sorted(known) and all(0 <= value <= 1 for value in known)
+    assert known and known == sorted(known) and all(0 <= value <= 1 for value in known)
 
 
-def test_sizes_beyond_the_limits_are_refused(state, monkeypatch):
-    from app import state as module
-    from app.limits import Limits
+def test_sizes_beyond_the_limits_are_refused(state):
+    from app.limits import LIMITS
     from app.selection import select
 
-    monkeypatch.setattr(module, "LIMITS", Limits(n=50, states=10))
-    for asked, word in ((small(0.2, 11), "states"), (select(51, 0.2, 1, states=5), "N must lie")):
+    large = select(LIMITS.n + 1, 0.2, 1, states=5)
+    for asked, word in ((small(0.2, LIMITS.states + 1), "states"), (large, "N must lie")):
         state.ask(asked, at_once=True)
         assert not state.work.busy and word in state.work.message and "\n" not in state.work.message
 

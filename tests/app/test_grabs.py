@@ -131,12 +131,13 @@ def test_messages_that_make_no_sense_are_ignored(page, state):
     assert not page.told and not state.hand.pulls and not state.work.busy
 
 
-def test_the_pulls_of_a_page_are_limited(page, state, monkeypatch):
-    monkeypatch.setattr(grabs, "MOST_PULLS", 1)
+def test_the_pulls_of_a_page_are_limited(page, state):
     value = middle(page.hear(grab=4)["rail"])
-    page.hear(hold=[4, value])
-    page.hear(hold=[4, 0.99 * value])
-    assert len(state.hand.pulls) == 1 and "undo" in state.work.message
+    for k in range(grabs.MOST_PULLS):
+        page.hear(hold=[4, (1 - 0.001 * k) * value])
+    assert len(state.hand.pulls) == grabs.MOST_PULLS and not state.work.message
+    page.hear(hold=[4, 0.9 * value])
+    assert len(state.hand.pulls) == grabs.MOST_PULLS and "undo" in state.work.message
 
 
 @pytest.mark.parametrize("pair", [None, ((4, 0), (9, 0)), ((4, 0), (4, 1))])

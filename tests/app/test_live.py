@@ -320,20 +320,18 @@ def test_who_is_far_behind_leaves_pictures_out_and_misses_none_of_the_newest():
     assert seen.after(run, place)[2]["box"][0] == 7
 
 
-def test_old_pictures_are_dropped_beyond_a_limit(monkeypatch):
-    monkeypatch.setattr(live, "PICTURE_BYTES", 2000)
+def test_old_pictures_are_dropped_beyond_a_limit():
+    grains = int(live.PICTURE_BYTES / 8 / 12)  # of which eight pictures fit
     seen = live.Compaction()
     for k in range(50):
-        seen.add(Glimpse(10 * 0.99**k, 20))
+        seen.add(Glimpse(10 * 0.99**k, grains))
     _, place, picture = seen.after(0, 0)
     assert place > 40 and picture is not None
 
 
-def test_of_many_states_as_many_are_sent_as_a_page_can_hold(library, monkeypatch):
-    replay = library.shown(library.cells()[1]).replay
-    summary = replay.summary | {"states": 95}
-    monkeypatch.setattr(live, "FRAME_BYTES", 8 * replay.normal.shape[1] * 10)
-    numbers = live.numbers(summary)
+def test_of_many_states_as_many_are_sent_as_a_page_can_hold():
+    ten = int(live.FRAME_BYTES / 8 / 10)  # contacts, of which ten states fit
+    numbers = live.numbers({"states": 95, "contacts": ten})
     assert numbers[0] == 0 and numbers[1] == 1 and np.ptp(np.diff(numbers[1:])) == 0
     assert len(numbers) <= 11 and numbers[-1] <= 95
 

@@ -19,6 +19,7 @@ from visitor import drop, press
 
 import granforce as gf
 from app import distributions, exports, movies, perturbations, planes, standalone, studied, uploads
+from app.limits import Limits
 from app.views import labels
 from app.views import plane as plane_view
 from app.views import studied as drawn_study
@@ -245,19 +246,18 @@ def test_damaged_and_hostile_files_are_one_clear_line(state):
         assert "\n" not in str(told.value)
 
 
-def test_sizes_are_limited(monkeypatch):
+def test_sizes_are_limited():
     packing = packed(30, 0.3)
-    monkeypatch.setattr(uploads, "LIMITS", uploads.LIMITS._replace(n=20))
+    limits = Limits(n=20, upload=1)
     with pytest.raises(InputError, match="30 grains, where at most 20 are taken"):
-        uploads.read({"npz": ("p.npz", npz(packing))})
-    monkeypatch.setattr(uploads, "LIMITS", uploads.LIMITS._replace(upload=1))
+        uploads.read({"npz": ("p.npz", npz(packing))}, limits=limits)
     with pytest.raises(InputError, match="at most 1 MB"):
-        uploads.added({}, [("g.csv", b"x,y,r\n" + b"1,1,1\n" * 200_000)])
+        uploads.added({}, [("g.csv", b"x,y,r\n" + b"1,1,1\n" * 200_000)], limits)
     # Zeros pack a thousandfold: what counts is what they unpack to.
     large = io.BytesIO()
     np.savez_compressed(large, x=np.zeros((10**6, 2)))
     with pytest.raises(InputError, match="MB unpacked"):
-        uploads.read({"npz": ("zeros.npz", large.getvalue())})
+        uploads.read({"npz": ("zeros.npz", large.getvalue())}, limits=limits)
 
 
 def test_an_upload_is_kept_reported_and_shown(state):
@@ -430,9 +430,8 @@ def test_a_tap_on_a_mu_shows_its_states(state):
 # Export
 
 
-def test_a_movie_keeps_the_colours_that_its_first_network_has_not(state, monkeypatch):
+def test_a_movie_keeps_the_colours_that_its_first_network_has_not(state):
     replay = opened(state).replay
-    monkeypatch.setattr(movies, "FRAMES", 4)
     view = {"colour": "change", "thickness": "normal", "reference": 0, "dark": False}
     look = movies.shades(replay, {}, palettes(False), most=1.0, full=1e-3, **view)
     told = {"ink": "#000000", "bar": {"low": "less", "high": "more"}, "lines": ["width", "from"]}
@@ -600,16 +599,17 @@ def test_nothing_is_pushed_without_friction(state):
     assert not view.push.visible and "isostatic" in view.lead.object
 
 
-def test_figure_2_takes_what_the_stores_hold(state, monkeypatch):
+def test_figure_2_takes_what_the_stores_hold(state):
     from app.views.perturb import View
 
-    monkeypatch.setattr(perturbations, "ENOUGH_CONTACTS", 3)
     opened(state)
     library, cells = state.library, list(state.catalogue)
     assert perturbations.over_store(library, cells, state.cell) == []
     for cell in cells[1:]:
         library.lend_packing(cell.selection.packing)
-        params = kinds.PERTURBATION.parameters(cell.selection.packing, random=4)
+        params = kinds.PERTURBATION.parameters(
+            cell.selection.packing, random=perturbations.ENOUGH_CONTACTS
+        )
         study.get(library.cache, kinds.PERTURBATION, params)
     few = kinds.PERTURBATION.parameters(cells[1].selection.packing, contacts=[5])
     study.get(library.cache, kinds.PERTURBATION, few)
