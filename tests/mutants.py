@@ -1,5 +1,12 @@
 """Files with a few bytes changed, as damaged disks and careless hands leave them."""
 
+import io
+import warnings
+
+import numpy as np
+
+from granforce.records import InputError
+
 PIECES = [
     b"",
     b"0",
@@ -40,3 +47,26 @@ def mutant(contents, rng):
         elif rng.random() < 0.1:
             del content[at:]
     return [bytes(content) for content in changed]
+
+
+def refusals(contents, read, count, seed, whole=lambda found: None):
+    """How many of so many mutants of files were refused, in one line and without a warning.
+
+    read(*files): what is in them; whole(found): asserts of what is taken, as of the files
+    themselves, that it is whole.
+    """
+
+    def refused(contents):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                found = read(*map(io.BytesIO, contents))
+        except InputError as error:
+            assert str(error) and "\n" not in str(error)
+            return True
+        whole(found)
+        return False
+
+    assert not refused(contents)
+    rng = np.random.default_rng(seed)
+    return sum(refused(mutant(contents, rng)) for _ in range(count))

@@ -2,11 +2,11 @@
 
 import io
 import json
-import warnings
+from functools import partial
 
 import numpy as np
 import pytest
-from mutants import mutant
+from mutants import refusals
 from packings import packed
 
 from granforce.cli.parser import main
@@ -166,24 +166,16 @@ FILES = {
 }
 
 
+def whole(packing):
+    c = packing.contacts
+    assert all(np.isfinite(array).all() for array in (packing.x, packing.forces, *c))
+    assert np.all(packing.r > 0) and np.all(c.i != c.j)
+
+
 def mutants(kind, count, seed):
     """How many of so many mutants were refused."""
-    make, read = FILES[kind]
-    contents, rng, box = make(), np.random.default_rng(seed), packed(N, MU).box
-    refused = 0
-    for _ in range(count):
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                packing = read(*given(*mutant(contents, rng)), MU, box=box)
-        except InputError as error:
-            assert str(error) and "\n" not in str(error)
-            refused += 1
-            continue
-        c = packing.contacts
-        assert all(np.isfinite(array).all() for array in (packing.x, packing.forces, *c))
-        assert np.all(packing.r > 0) and np.all(c.i != c.j)
-    return refused
+    (make, read), box = FILES[kind], packed(N, MU).box
+    return refusals(make(), partial(read, mu=MU, box=box), count, seed, whole)
 
 
 @pytest.mark.parametrize("kind", FILES)
