@@ -2,13 +2,22 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 
 def heed():
-    """Ctrl-C ends what runs here; for a child of subprocess.Popen, as its preexec_fn."""
+    """Ctrl-C ends what runs here."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def heeding(*words, **options):
+    """Python begun with these words, which Ctrl-C ends; options: of subprocess.Popen."""
+    pipes = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+    command = [sys.executable, *words]
+    return subprocess.Popen(command, text=True, preexec_fn=heed, **pipes, **options)
 
 
 def computed(running):

@@ -125,3 +125,8 @@ def scene(page, expression):
     return page.locator(".scene").evaluate(
         f"element => {{ const {{scene}} = element; return {expression} }}"
     )
+
+
+def picture(page, name):
+    """What is seen of a page, as artefacts/NAME.png."""
+    page.screenshot(path=ROOT / "artefacts" / f"{name}.png")

@@ -1,10 +1,8 @@
 """In a browser: forces are held, intervals shrink, stresses."""
 
 import pytest
-from serving import MODEL, column, painted, scene
-from small_store import ROOT
+from serving import MODEL, column, painted, picture, scene
 
-ARTEFACTS = ROOT / "artefacts" / "known"
 PATIENCE = 60_000  # ms, on a busy machine
 
 pytestmark = pytest.mark.browser
@@ -32,11 +30,6 @@ def span(page, name):
     return sum(high) - sum(low)
 
 
-def picture(page, name):
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=ARTEFACTS / f"{name}.png")
-
-
 def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     page = visit()
     select(page, 4)
@@ -49,7 +42,7 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     page.locator("input.error").fill("0.2")
     page.locator("button.hold").click()
     chips(page, 2)
-    picture(page, "held")
+    picture(page, "known/held")
     page.wait_for_url("**known=4*~9*")
     page.reload()
     painted(page, PATIENCE)
@@ -74,7 +67,7 @@ def test_contacts_worth_measuring_are_numbered(visit):
     assert scene(page, "scene.hand.player.pins.pins.ranked.length") == 10
     page.locator(".ranked button").first.click()
     page.locator(".stage.chosen").wait_for()
-    picture(page, "next")
+    picture(page, "known/next")
 
 
 def test_a_contradiction_in_a_link_is_one_line(visit):
@@ -88,4 +81,4 @@ def test_the_plane_of_stresses(visit):
     page.get_by_role("combobox", name="Shown").select_option("stress")
     page.get_by_text("The pressure alone is held").wait_for()
     assert len(column(page, "outer", "x")) > 3
-    picture(page, "stresses")
+    picture(page, "known/stresses")

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from packings import reference, skewed
-from serving import MODEL, bars_drawn, column, how_it_is_made, laid_out, scene
-from small_store import KEPT, ROOT
+from serving import MODEL, bars_drawn, column, how_it_is_made, laid_out, picture, scene
+from small_store import KEPT
 
 from app import geometry
 
-ARTEFACTS = ROOT / "artefacts" / "live"
 PATIENCE = 60_000  # ms, on a busy machine
 WATCH = """e => {
     const {hand} = e.scene, {live} = hand.player, {hear} = live
@@ -80,11 +79,6 @@ def chain(page):
 
 def normal(page):
     return np.array(scene(page, "Array.from(scene.mixed.normal)"))
-
-
-def picture(page, name):
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=ARTEFACTS / f"{name}.png")
 
 
 # Seen while it is computed
@@ -240,7 +234,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(visit):
     assert before[contact] < during[contact] <= rail["upper"] + 1e-6
     assert np.abs(during - before).max() > 0 and np.all(during > -1e-6)
     assert "pulled to" in page.locator(".source").inner_text()
-    picture(page, "dragging")
+    picture(page, "live/dragging")
     page.mouse.up()
     page.wait_for_function("() => location.search.includes('pulls=')")
     assert normal(page)[contact] == pytest.approx(during[contact], abs=1e-5)
@@ -262,7 +256,7 @@ def test_at_the_end_of_the_rail_the_page_says_why(visit):
     until(page, "scene.hand.end === 1")
     page.get_by_text("held there by").wait_for()
     assert normal(page)[contact] == pytest.approx(scene(page, "scene.hand.rail.upper"), abs=1e-4)
-    picture(page, "end")
+    picture(page, "live/end")
     page.mouse.up()
 
 

@@ -1,13 +1,11 @@
 """What somebody stumbled over who saw the page for the first time, one test each."""
 
 import pytest
-from serving import MODEL, how_it_is_made, painted, scene
-from small_store import ROOT
+from serving import MODEL, how_it_is_made, painted, picture, scene
 
 from granforce.glossary import TERMS
 
 # Pictures to be looked at; ignored by git.
-ARTEFACTS = ROOT / "artefacts" / "newcomer"
 AT = "?mu=0.1&n=30&states=30&relax=nearest"
 
 pytestmark = pytest.mark.browser
@@ -20,11 +18,6 @@ COVERS = """(found) => {
     const main = all(document).find((e) => e.matches(".main-content")).getBoundingClientRect()
     return box.height > 0 && box.bottom > main.top && box.top < main.bottom
 }"""
-
-
-def picture(page, name):
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=ARTEFACTS / f"{name}.png")
 
 
 def shows(page, mu):
@@ -96,7 +89,7 @@ def test_progress_and_tour_cover_nothing(visit, cancelled, width, height):
     bar = computing(page)
     cancelled(page)
     assert not bar.evaluate(COVERS)
-    picture(page, f"computing-{width}")
+    picture(page, f"newcomer/computing-{width}")
 
 
 def test_on_a_narrow_page_there_is_room_below_the_text_for_what_is_computed(visit, cancelled):
@@ -116,7 +109,7 @@ def test_on_a_narrow_page_there_is_room_below_the_text_for_what_is_computed(visi
         }""",
         arg=height,
     )
-    picture(page, "computing-390")
+    picture(page, "newcomer/computing-390")
 
 
 # 6: the tour points at what it speaks of, as long as it does
@@ -137,7 +130,7 @@ def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height)
     page = visit(AT + "&tour=4", width, height)
     page.wait_for_function(f"() => {MODEL}('path_figure')")
     left, top, right, bottom = ring(page)
-    picture(page, f"tour-4-{width}")
+    picture(page, f"newcomer/tour-4-{width}")
     assert right - left > 0.25 * width and bottom - top > 100
     page.get_by_role("dialog").get_by_role("button", name="Next").click()
     page.get_by_role("dialog").get_by_text("8 of 9").wait_for()
@@ -152,7 +145,7 @@ def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height)
     )
     card = page.get_by_role("dialog").bounding_box()
     assert ring(page)[3] <= card["y"] or ring(page)[0] >= card["x"] + card["width"]
-    picture(page, f"tour-5-{width}")
+    picture(page, f"newcomer/tour-5-{width}")
     page.locator("input.typed").fill("1")  # what the step asks for can be done at once
     page.locator("input.typed").press("Enter")
     shows(page, 1)
@@ -193,7 +186,7 @@ def test_what_is_known_colours_the_chains_and_goes_into_pictures(visit):
     page.wait_for_function("e => e.scene.style.width.some((w) => w > 0)", arg=handle)
     page.wait_for_function("e => e.scene.style.bin[4] === 32", arg=handle)  # held: all of it
     page.get_by_text("colour: what is known").wait_for()
-    picture(page, "known")
+    picture(page, "newcomer/known")
     text = scene(
         page,
         'scene.picture({ background: "", ink: "", lines: [],'
@@ -219,7 +212,7 @@ def test_embedded_there_is_the_packing_with_its_player_alone(opening):
     page.wait_for_function(
         "e => e.scene.hand.player.replay.frame === 1", arg=page.locator(".scene").element_handle()
     )
-    picture(page, "embedded")
+    picture(page, "newcomer/embedded")
 
 
 # 11: all contacts as a table, and by keyboard

@@ -550,7 +550,8 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert f"{pushed.low:.2f}" in view.numbers.object and f"{pushed.low:.3f}" in view.told.object
 
 
-def test_the_field_moves_only_while_its_tab_is_seen(state):
+def pushed(state):
+    """The view of a push on a contact, with its result."""
     from app.views.perturb import View
 
     opened(state)
@@ -558,6 +559,11 @@ def test_the_field_moves_only_while_its_tab_is_seen(state):
     view = View(state)
     press(view.push)
     settled(state, done=lambda: view.pushed is not None)
+    return view
+
+
+def test_the_field_moves_only_while_its_tab_is_seen(state):
+    view = pushed(state)
     field = state.displacement
     assert field is not None
     state.looks.tab = "intervals"
@@ -572,13 +578,7 @@ def test_the_field_moves_only_while_its_tab_is_seen(state):
 
 
 def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
-    from app.views.perturb import View
-
-    opened(state)
-    state.looks.contact, state.looks.tab = 3, "perturb"
-    view = View(state)
-    press(view.push)
-    settled(state, done=lambda: view.pushed is not None)
+    view = pushed(state)
     view.what.value = "all"
     assert not view.plots.objects
     press(view.push)

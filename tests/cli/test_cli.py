@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from heeding import heed, until_it_computes
+from heeding import heed, heeding, until_it_computes
 
 import granforce as gf
 from granforce.cli import commands
@@ -328,14 +328,7 @@ def test_unknown_words_are_code_2(run, words):
 def test_interrupt_ends_quietly_and_keeps_what_is_finished(tmp_path):
     words = ["scan", "--mu", "0.3", "--seeds", "400", "-n", "20", "--states", "40"]
     words += ["--out", str(tmp_path / "s.zarr")]
-    running = subprocess.Popen(
-        [sys.executable, "-m", "granforce.cli", *words],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=heed,
-    )
+    running = heeding("-m", "granforce.cli", *words, start_new_session=True)
     deadline = time.time() + 120
     while not list((tmp_path / "s.zarr").glob("walk-*")) and time.time() < deadline:
         time.sleep(0.02)
@@ -396,13 +389,7 @@ command()
 
 def test_a_call_that_is_left_behind_does_not_abort_the_process():
     """C++ that returns to an interpreter that has ended does; so the process ends before it."""
-    running = subprocess.Popen(
-        [sys.executable, "-c", LONG_PROGRAM, "pack"],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        preexec_fn=heed,
-    )
+    running = heeding("-c", LONG_PROGRAM, "pack")
     assert running.stdout.readline() == "begun\n"
     until_it_computes(running)  # within the solver
     running.send_signal(signal.SIGINT)

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from heeding import heed
+from heeding import heeding
 
 from granforce import measures
 from granforce.cli.parser import main
@@ -363,14 +363,7 @@ def test_bad_words_are_one_line(tmp_path, capsys, words, told):
 
 def running_study(folder):
     words = [*WORDS[:-2], "--sizes", "12,14,16,18", "--out", str(folder)]
-    return subprocess.Popen(
-        [sys.executable, "-m", "granforce.cli", *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=heed,
-    )
+    return heeding("-m", "granforce.cli", *words, start_new_session=True)
 
 
 def wait_for(folder, pattern, count, running):

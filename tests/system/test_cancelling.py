@@ -6,14 +6,12 @@ No test measures a second: the work here would take hours (or for ever), and has
 import itertools
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 
 import numpy as np
 import pytest
-from heeding import heed, until_it_computes
+from heeding import heeding, until_it_computes
 from packings import packed
 from scipy import sparse
 
@@ -210,13 +208,7 @@ def test_ctrl_c_ends_a_kernel_in_the_main_thread():
         "print('begun', flush=True)\n"
         "gf.pack(40, 0.3, 0, sweeps=10**9, accuracy=1e-300)\n"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", script],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heed,
-    ) as child:
+    with heeding("-c", script) as child:
         try:
             assert child.stdout.readline() == "begun\n"
             until_it_computes(child)  # within the kernel
