@@ -17,7 +17,7 @@ from ..state import AppState
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
-from .parts import EXTRA, folded_away
+from .parts import EXTRA, by_words, folded_away
 from .scenelist import SceneList
 from .select import Select
 
@@ -66,10 +66,6 @@ def differs(state: AppState) -> str:
     return differing(state.selection, state.cell and state.cell.selection)
 
 
-def _swap(labels: dict[str, str]) -> dict[str, str]:
-    return {label: name for name, label in labels.items()}
-
-
 class Controls:
     """Widgets for the state's selection and view; they follow what is on screen."""
 
@@ -87,12 +83,12 @@ class Controls:
         self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
         self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
-        self.kind = Select(label="States from", options=_swap(kinds), **FIELD)
-        self.relax = Select(label="Relaxation", options=_swap(SOLVERS), **FIELD)
+        self.kind = Select(label="States from", options=by_words(kinds), **FIELD)
+        self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **FIELD)
         self.series = Select(label="Precomputed results", **FIELD)
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
-        self.colour = Select(label="Colour", options=_swap(COLOURS), **FIELD)
-        self.thickness = Select(label="Width", options=_swap(WIDTHS), **FIELD)
+        self.colour = Select(label="Colour", options=by_words(COLOURS), **FIELD)
+        self.thickness = Select(label="Width", options=by_words(WIDTHS), **FIELD)
         self.full = pmui.TextInput(label="Full colour, ⟨fₙ⟩", placeholder="by itself", **SMALL)
         self.stretch = pmui.TextInput(label="Width, times", **SMALL)
         self.overlay = pmui.Switch(
@@ -275,7 +271,7 @@ class Controls:
 
     def _look(self, *events: Any) -> None:
         for name, labels in (("colour", COLOURS), ("thickness", WIDTHS)):
-            getattr(self, name).options = _swap(meaningful(self.state, labels, name))
+            getattr(self, name).options = by_words(meaningful(self.state, labels, name))
         for name in ("colour", "thickness", "overlay"):
             getattr(self, name).value = getattr(self.looks, name)
         full = self.looks.full

@@ -12,15 +12,14 @@ from granforce.records import Integers
 
 from .. import live
 from ..known import Narrowed
-from ..looks import DRAWN, SCALES, SORTS, Looks
+from ..looks import DRAWN, SCALES, SORTS
 from ..replays import Replay
 from ..state import AppState
 from .contacts import Contacts
 from .hints import term
 from .known import Known
 from .packing import Bounds, exact_intervals
-from .parts import MOVES, figure, folded_away, linked, note
-from .select import Select
+from .parts import MOVES, figure, folded_away, note, question
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
@@ -70,9 +69,9 @@ class View:
         self.figure, self.growth_figure = self._bars_figure(), self._growth_figure()
         self.contacts = np.array([], dtype=int)
         self.choices = [
-            _select("Contacts", DRAWN, self.looks, "drawn"),
-            _select("Sorted by", SORTS, self.looks, "sort"),
-            _select("Scale", SCALES, self.looks, "scale"),
+            question("Contacts", DRAWN, self.looks, "drawn", **SMALL),
+            question("Sorted by", SORTS, self.looks, "sort", **SMALL),
+            question("Scale", SCALES, self.looks, "scale", **SMALL),
         ]
         self.exact = pmui.Button(
             label="Compute exact intervals",
@@ -352,12 +351,6 @@ def _top(replay: Replay, exact: Bounds) -> float:
 
 def _source(name: str, columns: tuple[str, ...]) -> ColumnDataSource:
     return ColumnDataSource({column: [] for column in columns}, name=name)
-
-
-def _select(label: str, labels: dict[str, str], looks: Looks, name: str) -> Select:
-    options = {words: key for key, words in labels.items()}
-    made = Select(label=label, options=options, value=getattr(looks, name), **SMALL)
-    return linked(made, looks, name)
 
 
 def _set_range(axis: Range1d, low: float, high: float) -> None:

@@ -125,6 +125,7 @@ class TabView:
 
     name: str
     update: Callable[[], None]
+    told: pn.pane.HTML  # where small print is
 
     def __init__(
         self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
@@ -150,6 +151,11 @@ class TabView:
         """Update, now or when next seen."""
         self._stale = True
         self.catch_up()
+
+    def failed(self, event: Any) -> None:
+        """Tell what went wrong in a task, the message of which is watched."""
+        if event.new:
+            self.told.object = event.new
 
     def _changed(self, *events: Any) -> None:
         self._stale |= any(event.name not in ("tab", "wide") for event in events)
@@ -223,10 +229,15 @@ def of_replay(
     return pane
 
 
+def by_words(labels: dict[str, str]) -> dict[str, str]:
+    """Labels {value: words} as a list takes them: {words: value}."""
+    return {words: value for value, words in labels.items()}
+
+
 def choice(labels: dict[str, str], value: str) -> Any:
     """Buttons of which one is pressed; labels {value: words}."""
     return pmui.RadioButtonGroup(
-        options={words: key for key, words in labels.items()},
+        options=by_words(labels),
         value=value,
         size="small",
         margin=(6, 8),
@@ -240,11 +251,10 @@ def chosen(labels: dict[str, str], looks: Looks, name: str) -> Any:
     return linked(choice(labels, getattr(looks, name)), looks, name)
 
 
-def question(label: str, labels: dict[str, str], looks: Looks, name: str) -> Select:
+def question(label: str, labels: dict[str, str], looks: Looks, name: str, **options: Any) -> Select:
     """The same as a list under a label, for choices that are sentences."""
-    options = {words: key for key, words in labels.items()}
-    wide = {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
-    made = Select(label=label, options=options, value=getattr(looks, name), **wide)
+    look = options or {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
+    made = Select(label=label, options=by_words(labels), value=getattr(looks, name), **look)
     return linked(made, looks, name)
 
 

@@ -94,7 +94,7 @@ class View(TabView):
         self.animate.param.watch(self._animate, "value")
         self.push.on_click(lambda event: self._push())
         self.strongest.on_click(lambda event: self._take_strongest())
-        self.task.param.watch(self._failed, "message")
+        self.task.param.watch(self.failed, "message")
         self.task.param.watch(lambda event: self.push.param.update(disabled=event.new), "running")
         self.looks.param.watch(self._animate, "tab")
         self.catch_up()
@@ -148,10 +148,6 @@ class View(TabView):
         self.plots.objects = [
             pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0) for fig in plots
         ]
-
-    def _failed(self, event: Any) -> None:
-        if event.new:
-            self.told.object = event.new
 
     # One contact
 

@@ -82,10 +82,10 @@ class View(TabView):
         self.other: Replay | None = None  # of those
         self.also.param.watch(lambda event: together(self._fetch), "value")
         self.lead, self.told = note(), note()
-        self.placing.param.watch(self._failed, "message")
+        self.placing.param.watch(self.failed, "message")
         self.planes.param.watch(self._turn, "value")
         self.looks.param.watch(self._keep_first, "contact")
-        self.task.param.watch(self._failed, "message")
+        self.task.param.watch(self.failed, "message")
         self.shown: tuple[Any, ...] | None = None
         self.found: Outlined | None = None
         self.catch_up()
@@ -318,10 +318,6 @@ class View(TabView):
             return {"x": [], "y": []}
         mu = self.state.seen.summary["mu"]
         return {"x": [reach, 0, reach], "y": [mu * reach, 0, -mu * reach]}
-
-    def _failed(self, event: Any) -> None:
-        if event.new:
-            self.told.object = event.new
 
     def _figure(self) -> Figure:
         around = {"range_padding": 0.06, "only_visible": True}

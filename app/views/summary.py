@@ -74,7 +74,7 @@ def numbers(summary: Summary) -> str:
 def checks(summary: Summary) -> str:
     """The measures of that, what they stand on, and what was left out, as HTML."""
     style, rest = f"<style>{STYLE}</style>", f'<div class="rest">{left_out(summary)}</div>'
-    return style + _tiles(TILES, summary) + _tiles(CHECKS, summary) + rest
+    return style + as_tiles(TILES, summary) + as_tiles(CHECKS, summary) + rest
 
 
 def finding(summary: Summary) -> str:
@@ -88,7 +88,8 @@ def finding(summary: Summary) -> str:
     )
 
 
-def _tiles(rows: tuple[tuple[str, ...], ...], summary: Summary) -> str:
+def as_tiles(rows: tuple[tuple[str, ...], ...], summary: Summary) -> str:
+    """Tiles of those numbers of a summary that it has, as HTML; rows: as TILES."""
     values = dict(summary)
     if summary.get("skipped"):
         values["acceptance"] = None  # nothing was tried

@@ -15,7 +15,7 @@ from ..state import AppState
 from . import photoelastic as measured
 from .dropper import Dropper
 from .mine import Mine
-from .parts import note
+from .parts import by_words, note
 from .progress import Progress
 from .select import Select
 
@@ -63,8 +63,7 @@ class View:
         self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
         self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
         self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
-        walls = {words: key for key, words in WALLS.items()}
-        self.walls = Select(label="Walls", options=walls, width=150, margin=(4, 8))
+        self.walls = Select(label="Walls", options=by_words(WALLS), width=150, margin=(4, 8))
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
         self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")

@@ -10,13 +10,13 @@ from .. import compute
 from ..data import Cell
 from ..state import AppState
 from .parts import PLAIN
-from .summary import STYLE, TILE
+from .summary import STYLE, as_tiles
 
-# Words, name in the dataset, form, and key of the glossary.
+# As summary.TILES, of names in the dataset.
 TILES = (
-    ("width of S", "extent", ".4f", "width"),
-    ("volume ln V", "log_volume", ".1f", "volume"),
-    ("error of ln V", "log_volume_error", ".2f", "volume"),
+    ("width of S", "extent", ".4f", "width", ""),
+    ("volume ln V", "log_volume", ".1f", "volume", ""),
+    ("error of ln V", "log_volume_error", ".2f", "volume", ""),
 )
 
 
@@ -72,8 +72,4 @@ class Volume:
 
 def text(dataset: xr.Dataset) -> str:
     """The tiles of a volume, as HTML."""
-    tiles = "".join(
-        TILE.format(name=name, value=format(dataset[key].item(), form), term=term, meaning="")
-        for name, key, form, term in TILES
-    )
-    return f'<div class="tiles">{tiles}</div>'
+    return as_tiles(TILES, {key: dataset[key].item() for _, key, *_ in TILES})
