@@ -442,8 +442,11 @@ def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(visit)
     until(page, "scene.hand.player.plots.layers.bars?.on")
     # A few times as it begins; then not in twenty frames.
     page.evaluate("() => { window.since = [-1, 0] }")
-    until(page, """(since[0] === painted || (since = [painted, scene.painted]))
-        && scene.painted > since[1] + 20""")
+    until(
+        page,
+        """(since[0] === painted || (since = [painted, scene.painted]))
+        && scene.painted > since[1] + 20""",
+    )
     before = page.evaluate("painted")
     page.locator("button.play").click()
     until(page, "!scene.hand.player.plots.layers.bars.on")
