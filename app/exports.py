@@ -89,7 +89,7 @@ def on_screen(replay: Replay, frame: int, held: Held | None) -> str:
     """Which network is on screen, in words."""
     if held is not None:
         return "Network: pulled by hand"
-    return f"Network: state {replay.number[frame]}" if frame else "Network: the original"
+    return f"Network {replay.number[frame]}" if frame else "Network as packed"
 
 
 def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:

@@ -6,7 +6,7 @@ import param
 
 # What colour, width and order can show: word in links → words on screen.
 COLOURS = {
-    "change": "change from the original",
+    "change": "change from the forces as packed",
     "mobilised": "mobilisation fₜ/(μ fₙ)",
     "extent": "length of the interval ΔFₙ",
     "sign": "sign of fₙ − pinned fₙ",
@@ -23,10 +23,10 @@ WIDTHS = {
     "measured": "measured fₙ",
 }
 SORTS = {
-    "original": "original fₙ",
-    "extent": "ΔFₙ of all states",
+    "original": "fₙ as packed",
+    "extent": "ΔFₙ of all networks",
     "exact": "exact ΔFₙ",
-    "position": "place of the original in its interval",
+    "position": "place as packed in its interval",
     "shortened": "how much what is known shortened it",
 }
 DRAWN = {"some": "a few dozen", "all": "all"}
@@ -50,7 +50,7 @@ PLANES = {
     "pair": "the normal forces of two contacts",
     "stress": "the stress that networks carry",
 }
-SCALES = {"mean": "mean force = 1", "own": "original force = 1"}
+SCALES = {"mean": "mean force = 1", "own": "force as packed = 1"}
 
 
 class Looks(param.Parameterized):

@@ -98,7 +98,7 @@ def _place_in(replay: Replay, moment: Moment, between: tuple[int, int] | None) -
     (a, b, part), states = moment, replay.summary["states"]
 
     def called(k: int) -> str:
-        return f"network {replay.number[k]} of {states}" if replay.number[k] else "original network"
+        return f"network {replay.number[k]} of {states}" if replay.number[k] else "as packed"
 
     if between is not None:
         return f"{part:.0%} of the way from {called(a)} to {called(b)}"

@@ -182,14 +182,12 @@ def _large(document: Document, query: str) -> Any:
     def parts() -> Iterator[None]:
         """What follows the packing."""
         if alone:
-            left.append(packing.legend)
             return
         controls = Controls(state)
         left.extend(
             [
                 controls.beside,
                 controls.error,
-                packing.legend,
                 explanation.view(state),
                 Address(state),
                 Hints(),

@@ -42,8 +42,8 @@ p {{ max-width: 68ch; font-size: 14px; line-height: 1.5; }}
 {bokeh}
 </head><body>
 <h1>{title}</h1>
-<main><div><div id="player"></div><div>{legend}</div>{words}</div><div>{plots}</div></main>
-<footer>Made with granforce. The same states in a terminal: <code>{command}</code><br>
+<main><div><div id="player"></div>{words}</div><div>{plots}</div></main>
+<footer>Made with granforce. The same networks in a terminal: <code>{command}</code><br>
 This view on a server of granforce: <code>?{link}</code><br>{left_out}</footer>
 {script}
 <script type="module">
@@ -97,6 +97,7 @@ def html(
         "palettes": palettes(False),
         "scales": SCALES,
         "lead": explanation.first(replay.summary),
+        "legend": legend(still.Light(replay, exact, view, loads=loads)),  # type: ignore[arg-type]  # has what is asked of it
         "source": source,
         "frame": frame,
         "between": between,
@@ -120,13 +121,12 @@ def html(
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         bokeh=Resources(mode="inline", components=["bokeh"]).render(),
-        legend=legend(still.Light(replay, exact, view, loads=loads)),  # type: ignore[arg-type]  # has what is asked of it
-        words=explanation.more(replay.summary),
+        words=explanation.more(replay),
         plots="".join(plots),
         script=script,
         command=escape(command),
         link=escape(link),
-        left_out=f"{left} of the states are left out, evenly, to keep this file small."
+        left_out=f"{left} of the networks are left out, evenly, to keep this file small."
         if left
         else "",
         style=_script((FOLDER / "player.css").read_text()),

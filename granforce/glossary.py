@@ -40,7 +40,7 @@ TERMS = {
         "rigid leave open which of the networks in S they carry.",
     ),
     "original": Term(
-        "original network",
+        "network as packed",
         "The forces that the packing came to rest with when it was compressed: one of all the "
         "networks that are possible.",
     ),
@@ -92,7 +92,7 @@ TERMS = {
     ),
     "extent": Term(
         "extent of a force",
-        "Largest less smallest fₙ of one contact: over all of S (exact), or over the states seen.",
+        "Largest less smallest fₙ of one contact: over all of S (exact), or over those seen.",
         "ΔFₙ",
     ),
     "eta1": Term(
@@ -134,12 +134,12 @@ TERMS = {
     ),
     "residual": Term(
         "residual",
-        "The largest force that is left unbalanced on any disk, in ⟨fₙ⟩: how exactly a state is "
+        "The largest force that is left unbalanced on any disk, in ⟨fₙ⟩: how exactly a network is "
         "in balance.",
     ),
     "distance": Term(
         "distance from the centre",
-        "How far this network is in force space from the mean of the states, in ⟨fₙ⟩.",
+        "How far this network is in force space from the mean of all networks shown, in ⟨fₙ⟩.",
     ),
     "accepted": Term(
         "accepted", "The part of the walk's attempts that ended in a network in balance."
@@ -193,8 +193,8 @@ TERMS = {
         "The contacts whose fₙ, once known, would leave the shortest intervals on average: chosen "
         "by how forces go together over uniform states, then put in order by exact bounds.",
     ),
-    "seen": Term("seen", "What the states passed so far had: always within what is possible."),
-    "now": Term("now", "The state on screen."),
+    "seen": Term("seen", "What the networks passed so far had: always within what is possible."),
+    "now": Term("now", "The network on screen."),
     "rattler": Term("rattler", "A loose disk that carries nothing; drawn pale, and left out."),
     "unloaded": Term(
         "unloaded contact", "Disks touch there, but no network in balance has a force there."
@@ -204,15 +204,15 @@ TERMS = {
         "Where a contact has no friction, no force acts along it: there is nothing to compute.",
     ),
     "determined": Term(
-        "states that could only be the same",
-        "Where balance leaves no force open, every state is the one there is: none was computed.",
+        "networks that could only be the same",
+        "Where balance leaves no force open, every network is the one there is: none was computed.",
     ),
     "held_components": Term(
         "forces that cannot vary", "The same in every network of S: there is nothing to sample."
     ),
     "dropped": Term(
-        "states on the way",
-        "The first states of a sample, which still depend on where it began, do not count.",
+        "networks on the way",
+        "The first networks of a sample, which still depend on where it began, do not count.",
     ),
     "failed": Term(
         "failed attempts",
@@ -256,16 +256,18 @@ TERMS = {
     ),
     # What colours, widths and orders show
     "change": Term(
-        "change from the original",
-        "Orange contacts carry more than in the original network, blue ones less.",
+        "change from the forces as packed",
+        "Orange contacts carry more than when the disks came to rest, blue ones less.",
     ),
-    "pinned": Term("pinned state", "A state that was marked, for others to be compared with it."),
+    "pinned": Term(
+        "pinned network", "A network that was marked, for others to be compared with it."
+    ),
     "sign": Term(
         "sign of fₙ − pinned fₙ",
-        "Orange contacts carry more than in the pinned state, blue ones less.",
+        "Orange contacts carry more than in the pinned network, blue ones less.",
     ),
     "difference": Term(
-        "|fₙ − pinned fₙ|", "By how much a contact's force differs from that in the pinned state."
+        "|fₙ − pinned fₙ|", "By how much a contact's force differs from that in the pinned network."
     ),
     "gone": Term(
         "what is known",
@@ -292,12 +294,12 @@ TERMS = {
     ),
     "place": Term(
         "place in its interval",
-        "Where the original force lies between the least and the largest possible.",
+        "Where the force as packed lies between the least and the largest possible.",
     ),
     # Views of force space
     "principal": Term(
         "principal axes",
-        "The shadow that S casts on the plane of the two directions along which the states vary "
+        "The shadow that S casts on the plane of the two directions along which the networks vary "
         "most; a shadow, not a section. The per cent at an axis are the part of their scatter "
         "(variance) that goes along it.",
     ),

@@ -37,12 +37,11 @@ function button(name, title, word = "") {
 
 const BUTTONS = `
   <div class="lead"></div>
-  <div class="source"></div>
   <div class="bar">
-    ${button("restart", "restart at the original network (Home)")}
-    ${button("back", "one state back (←)")}
+    ${button("restart", "restart with the forces as packed (Home)")}
+    ${button("back", "one network back (←)")}
     ${button("play", "space", "Play")}
-    ${button("step", "one state on (→)")}
+    ${button("step", "one network on (→)")}
     <label class="along">network <input class="scrub" type="range" min="0" value="0" step="1" aria-label="network"></label>
     <label title="speed, networks per second">speed <input class="speed" type="range" min="0" max="6" step="0.25" value="3"
       aria-label="speed"><span class="rate"></span></label>
@@ -50,7 +49,8 @@ const BUTTONS = `
   <div class="quiz" role="status"></div>
   <div class="read">
     <span>network <b class="state"></b></span>
-    <span class="differs">forces differ by <b class="apart"></b> of the mean from those the disks came to rest with</span>
+    <span class="differs">forces changed by <b class="apart"></b> of the mean force</span>
+    <span class="said"></span>
   </div>`
 // Over the packing, as they come and go with what is selected.
 const TOOLS = `
@@ -66,19 +66,22 @@ const VIEW = `
   ${button("whole", "the whole packing (double click)")}
   ${button("full", "full screen")}`
 const CLOSER = 0.7 // of the view, by a button
-const COMPARE = `
-  <details class="compare"><summary>Compare</summary>
+// What is closed until it is opened.
+const MORE = `<summary>More</summary>
+  <div class="game">Games:
+    ${button("predict", "three questions, each asked before the page shows the answer", "Predict, then look")}
+    ${button("differ", "two networks without colour: which lines differ most?", "Spot the difference")}
+  </div>
+  <div class="game">Compare:
     ${button("pin", "pin this network, to compare others with it", "Pin")}
     ${button("between", "between the pinned network and this one", "To and fro")}
     ${button("split", "the pinned network and this one; another μ then comes beside this one", "Side by side")}
-  </details>`
-const GAME = button("predict", "three questions, each asked before the page shows the answer", "Predict, then look") +
-  button("differ", "two networks without colour: which lines differ most?", "Spot the difference")
-const CHECKS = `<summary>Check this network</summary>
-  <div class="read">
+  </div>
+  <div class="game">Made: <span class="source"></span></div>
+  <div class="read">Check:
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
     <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
-    <span tabindex="0" data-term="distance">from the centre of the states <b class="distance"></b> ⟨fₙ⟩</span>
+    <span tabindex="0" data-term="distance">from the centre of all networks <b class="distance"></b> ⟨fₙ⟩</span>
     <span class="running">
       <span>of the <b class="played"></b> shown so far:</span>
       <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>
@@ -109,14 +112,12 @@ export class Buttons {
     tools.className = "bar tools"
     tools.innerHTML = TOOLS
     this.scenes.append(scene.root, view, tools)
-    const checks = document.createElement("details")
-    checks.className = "checks"
-    checks.innerHTML = CHECKS
-    checks.append(this.skips)
-    const game = document.createElement("div")
-    game.className = "game"
-    game.innerHTML = COMPARE + GAME
-    this.root.append(this.scenes, game, checks)
+    const legend = document.createElement("div"), more = document.createElement("details")
+    legend.className = "legend"
+    more.className = "extras"
+    more.innerHTML = MORE
+    more.append(this.skips)
+    this.root.append(this.scenes, legend, more)
     this.scene = scene
     const zoom = (factor) => () => scene.zoom(factor, scene.size / 2, scene.size / 2)
     const all = {
@@ -166,6 +167,9 @@ export class Buttons {
     this.root.classList.toggle("playing", playing)
   }
 
+  /** One line beside the number of the network, in place of how far it is changed; empty: none. */
+  say(words) { this.part("said").textContent = words }
+
   /** What was asked for and is not there yet lies over the old picture; empty: nothing was. */
   tellAsked(words) {
     this.asked.textContent = words
@@ -177,7 +181,7 @@ export class Buttons {
 
   /** Whether two networks are asked for, and whether they are there. */
   tellSplit(asked, there) {
-    if (asked) this.part("compare").open = true
+    if (asked) this.part("extras").open = true
     this.part("split").classList.toggle("on", asked)
     this.root.classList.toggle("two", there)
   }
@@ -187,7 +191,7 @@ export class Buttons {
     scrub.max = last
     scrub.step = swinging ? 0.01 : 1
     between.classList.toggle("on", swinging)
-    if (swinging) this.part("compare").open = true
+    if (swinging) this.part("extras").open = true
     between.disabled = !swinging && walk.number.length < 2
   }
 

@@ -56,7 +56,7 @@ export function render({ model, view }) {
     shown = found.slice(from, from + ROWS)
     part(".told").textContent = `${found.length} of ${all.length} contacts` +
       (found.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
-      `; forces in ⟨fₙ⟩; smallest and largest: ${on.exact ? "exact" : "of the states shown"}`
+      `; forces in ⟨fₙ⟩; smallest and largest: ${on.exact ? "exact" : "of the networks shown"}`
     const chosen = player().model.contact
     body.innerHTML = shown.map((c) => `<tr tabindex="0" data-contact="${c}" aria-selected="${c === chosen}">` +
       COLUMNS.map(([, read, write]) => `<td>${write(read(on, c), on, c)}</td>`).join("") + "</tr>").join("")

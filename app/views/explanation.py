@@ -2,16 +2,18 @@
 
 from typing import Any, ClassVar
 
+import numpy as np
 import param
 
 from ..live import Summary
+from ..replays import Replay
 from ..selection import Selection
 from ..state import AppState
 from .hints import term
 from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL = "; drag a line for your own"
+PULL = "; drag a line to pull on it"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
@@ -31,43 +33,38 @@ def lead(state: AppState) -> str:
 
 def first(summary: Summary, more: str = "") -> str:
     """What does not move, what is free, and what playing shows; more: what else can be done."""
-    n, mu, free = summary["n"], summary["mu"], summary["dimension"]
-    forces = (2 if mu > 0 else 1) * summary["contacts"]
-    loose = summary.get("rattlers", 0)
-    still = f"<b>These {n} disks never move.</b> "
-    carry = f"{n - loose} of them carry (pale ones are loose)" if loose else "All of them carry"
-    each = "two forces" if mu > 0 else "one force"
-    given = (
-        f"{carry}, with {each} at each of {summary['contacts']} contacts: {forces} unknowns, but "
-        f"only {forces - free} independent equations of balance. "
-    )
+    n, free = summary["n"], summary["dimension"]
     if free == 0:
-        question = "Same disks, same pressure: here the forces are fixed."
-        told = f"No number is left free: there is just one {term('network', 'force network')}."
-        told += " Choose some friction to see more." if mu == 0 else ""
+        found = f"These {n} disks never move, and the forces between them are fixed."
+        told = f"No number is free: there is just one {term('network', 'force network')}."
+        told += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
-        question = "Same disks, same pressure: why are the forces not fixed?"
+        found = f"These {n} disks never move, yet the forces between them can change."
         networks = term("network", "force networks")
         told = f"<b>{free} numbers are free.</b> Play shows {networks} that all balance{more}."
-    return f"<h2>{question}</h2><p>{still}{given}{told}</p>"
+    return f"<h2>{found}</h2><p>{told}</p>"
 
 
-def rest(summary: Summary) -> str:
-    """Why there are many networks, how many, and what measures that."""
-    forces, grains = 2 * summary["contacts"], summary["n"] - summary.get("rattlers", 0)
+def rest(replay: Replay) -> str:
+    """Why there are many networks, how many, what measures that, and what is drawn around them."""
+    summary = replay.summary
+    loose = summary.get("rattlers", 0)
+    forces, grains = 2 * summary["contacts"], summary["n"] - loose
     free, mu = summary["dimension"], summary["mu"]
+    carry = f"{grains} of the {summary['n']} disks carry (pale ones are loose)."
+    carry = carry if loose else f"All {grains} disks carry."
     if mu == 0:
         why = (
-            f"Without friction each of the {summary['contacts']} contacts carries one force, and "
-            "there are as many equations as forces: the forces are determined, h = 0. Choose some "
-            "friction to see more than one network."
+            f"{carry} Without friction each of the {summary['contacts']} contacts carries one "
+            "force, and there are as many equations as forces: the forces are determined, h = 0. "
+            "Choose some friction to see more than one network."
         )
     else:
         needed = forces - free
         why = (
-            f"Newton's laws require balance: two forces and a torque at each of {grains} disks "
-            f"that carry, and the pressure{_dependent(3 * grains + 1 - needed)}: {needed} "
-            f"equations. But {summary['contacts']} contacts carry {forces} forces, a {term('fn')} "
+            f"{carry} Newton's laws require balance: two forces and a torque at each of them, and "
+            f"the pressure{_dependent(3 * grains + 1 - needed)}: {needed} independent equations. "
+            f"But {summary['contacts']} contacts carry {forces} unknown forces, a {term('fn')} "
             f"and a {term('ft')} each: <b>h = {free}</b> numbers are left free ({term('h')}). "
             "That the forces are not determined by balance is called force indeterminacy. "
             f"{term('s')} is all that is left once no contact pulls (fₙ ≥ 0) and none slips "
@@ -76,7 +73,7 @@ def rest(summary: Summary) -> str:
     return (
         f"<p><b>Why not just one?</b> {why}</p>"
         f"<p><b>How undetermined?</b> {term('eta1')}: how much a contact's force scatters over the "
-        f"states. {term('eta2')}: how far apart two states are. {term('eta3')}: how long a "
+        f"networks. {term('eta2')}: how far apart two networks are. {term('eta3')}: how long a "
         "contact's interval of possible forces is. All are measured against the mean force: 0 "
         "means determined, 0.1 means uncertain by about a tenth.</p>"
         "<p><b>How friction matters.</b> Each μ has its own packing. More friction lets each "
@@ -84,11 +81,20 @@ def rest(summary: Summary) -> str:
         "rest with fewer contacts, so fewer forces are free. With little friction many directions "
         "are open, but narrow; with a lot of it few, but wide: the indeterminacy rises and "
         "then falls, and is largest around μ = 0.2 to 0.3.</p>"
-        f"<p><b>Where the states come from.</b> {term('walk')}: kick all forces at random, take "
+        f"<p><b>Where the networks come from.</b> {term('walk')}: kick all forces at random, take "
         f"the network in balance that is nearest to the kicked forces, go on from there. The "
         f"{term('original')} is the one it came to rest with. All this follows "
         f"{term('paper')}.</p>"
+        f"<p><b>Around the picture.</b> Dashed: the box{_sides(replay)}; disks outside it are "
+        "periodic copies of those inside.</p>"
     )
+
+
+def _sides(replay: Replay) -> str:
+    """How large and how tilted the box is, in words; nothing of a box without sides."""
+    sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
+    tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
+    return f" of {' × '.join(sides)} largest radii{tilted}" if sides else ""
 
 
 def _dependent(count: int) -> str:
@@ -109,9 +115,9 @@ def jamming(selection: Selection) -> str:
     )
 
 
-def more(summary: Summary) -> str:
+def more(replay: Replay) -> str:
     """The longer part, to be opened, as HTML for a page without scripts of its own."""
-    return f"<details><summary>{QUESTION}</summary>{rest(summary)}</details>"
+    return f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>"
 
 
 class Foldout(Scripted):
@@ -119,6 +125,7 @@ class Foldout(Scripted):
 
     line = param.String()
     inside = param.String(doc="HTML; empty where there is nothing to say")
+    open = param.Boolean()
 
     _esm = module("foldout")
     _stylesheets: ClassVar = [STYLE]
@@ -132,7 +139,7 @@ def view(state: AppState) -> Foldout:
         if state.work.moving and not state.selection.imported:
             made.inside = ""
         elif state.seen is not None:
-            made.inside = rest(state.seen.summary)
+            made.inside = rest(state.seen)
 
     state.param.watch(tell, "seen")
     state.work.param.watch(tell, "moving")

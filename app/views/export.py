@@ -34,7 +34,7 @@ HELP = """
 Pictures have a colour bar, a scale and a caption. Movies play from the first state to the last, or
 to and fro between two: WebM is recorded here at the player's speed, GIF is drawn for slides, at
 most 5 MB. The page as one file plays without a server and without a network.
-Contacts: one row each with disks, original and present forces, the range over the states and,
+Contacts: one row each with disks, forces as packed and now, the range over the networks and,
 where known, exact bounds; the file's first lines explain the columns. States: the packing, and
 <b>all</b> states with their measures, units and parameters; where only some were kept, all are
 computed again. Every plot is saved as PNG or SVG by the buttons above it. The address of the page

@@ -7,6 +7,7 @@ export function render({ model }) {
     inside.innerHTML = model.inside
     more.hidden = !model.inside
   }
+  more.addEventListener("toggle", () => { model.open = more.open })
   model.on("inside", tell)
   tell()
   return more

@@ -59,7 +59,7 @@ export class Grab {
     if (this.replay.position % 1) player.show(Math.round(this.replay.position))
     this.settle()
     player.plots.move(true)
-    const told = player.buttons.part("source")
+    const told = player.buttons.part("said")
     if (told.textContent !== FINDING) this.said = told.textContent
     told.textContent = FINDING
     return true
@@ -103,7 +103,7 @@ export class Grab {
 
   /** Where nothing came to be pulled, tell what was told before. */
   unsay() {
-    const told = this.player.buttons.part("source")
+    const told = this.player.buttons.part("said")
     if (told.textContent === FINDING) told.textContent = this.said
   }
 
@@ -142,7 +142,7 @@ export class Grab {
     if (this.replay) this.replay.held = null
     this.settle()
     this.player.tellHeld(false)
-    this.player.buttons.part("source").textContent = this.player.model.source
+    this.player.say("")
     this.player.again()
   }
 
@@ -256,7 +256,7 @@ export class Grab {
       words += `, its ${end > 0 ? "largest" : "least"}: held there by ${opened.length} contacts that opened ` +
         `and ${sliding.length} that came to slide`
     } else words += "; orange carries more than before, blue less"
-    this.player.buttons.part("source").textContent = words
+    this.player.say(words)
   }
 
   // In the intervals

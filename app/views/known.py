@@ -91,7 +91,7 @@ def words(knowledge: Knowledge, number: Integers) -> str:
     if order:
         most = ", ".join(f"{number[c]} (by {short[c]:.2f} ⟨fₙ⟩)" for c in order)
         told += f" Shortened most: contacts {most}."
-    return told + " The states that play are of all of S; pulls keep what is known."
+    return told + " The networks that play are of all of S; pulls keep what is known."
 
 
 def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
@@ -105,7 +105,7 @@ def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
 def _worth(before: float, after: float, expected: float) -> str:
     """What knowing a contact would tell."""
     if np.isnan(after) or np.isnan(before):
-        return f"errors about {expected:.1%} smaller, by the states"
+        return f"errors about {expected:.1%} smaller, by the networks"
     return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"
 
 

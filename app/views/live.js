@@ -134,8 +134,8 @@ export class Live {
     this.pictures++
     this.player.tellAsked()
     const unbalance = picture.unbalance > 0 ? `, unbalance ${picture.unbalance.toPrecision(1)} ⟨fₙ⟩` : ""
-    buttons.part("source").textContent = `Compressing ${picture.radius.length} disks at μ = ` +
-      `${Number(picture.mu.toPrecision(4))}: packing fraction φ = ${picture.fraction.toFixed(4)}${unbalance}`
+    buttons.say(`Compressing ${picture.radius.length} disks at μ = ` +
+      `${Number(picture.mu.toPrecision(4))}: packing fraction φ = ${picture.fraction.toFixed(4)}${unbalance}`)
   }
 
   /** The moving packing is finished or given up; the view that it was seen in, or null. */

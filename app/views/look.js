@@ -101,7 +101,7 @@ export class Look {
       ["fₙ / ⟨fₙ⟩", n.toFixed(3)],
       ["fₜ / ⟨fₙ⟩", t.toFixed(3)],
       ["fₜ/(μ fₙ)", this.mobilised(n, t)?.toFixed(2) ?? "–"],
-      ["original fₙ", walk.normal[c].toFixed(3)],
+      ["fₙ as packed", walk.normal[c].toFixed(3)],
     ]
     if (seen) rows.push(["fₙ seen", told(low[c], high[c])])
     if (exact) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import panel as pn
 import xarray as xr
 
 from granforce.records import Floats
@@ -40,33 +39,31 @@ EXPLAINED = {
     "measured": "measured",
 }
 LEGEND = """
-<div style="display:flex;flex-wrap:wrap;gap:3px 20px;align-items:center;font-size:12px">
- <span tabindex="0" data-term="{width_term}">width: {width}
-  <svg width="56" height="12" style="vertical-align:middle"><polygon points="0,5.5 56,0 56,12 0,6.5"
-   fill="currentColor" fill-opacity="0.65"/></svg>
-   {widest:.3g} ⟨fₙ⟩ as wide as the largest disk</span>
- <span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
- {marks}
- <span tabindex="0" data-term="rattler">pale disks: loose; dashed: the box{sides};
-  disks outside are periodic copies</span>
-</div>
+<span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
+<span tabindex="0" data-term="{width_term}">width: {width}
+ <svg width="40" height="12"><polygon points="0,5.5 40,0 40,12 0,6.5"
+  fill="currentColor" fill-opacity="0.65"/></svg>
+ {widest:.3g} ⟨fₙ⟩ as wide as the largest disk</span>
+<span tabindex="0" data-term="rattler">pale disks: loose</span>
+{marks}
 """
 JAMMING = """
-<div style="display:flex;flex-wrap:wrap;gap:3px 20px;font-size:12px">
- <span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
- <span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
- <span>pale disks: touch nothing; dashed: the box, which shrinks; disks outside
-  are periodic copies</span>
-</div>
+<span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
+<span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
+<span>pale disks: touch nothing; dashed: the box, which shrinks; disks outside
+ are periodic copies</span>
 """
-BAR = """{low} <span style="display:inline-block;width:96px;height:10px;vertical-align:middle;
- border-radius:2px;background:linear-gradient(90deg,{stops})"></span> {high}"""
-DOT = """<svg width="12" height="12" style="vertical-align:middle;margin-left:8px">
+BAR = (
+    """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
+)
+# What the legend says in place of the words to choose by.
+DEFINED = {"change": "change from the forces the disks came to rest with"}
+DOT = """<svg width="12" height="12">
  <circle cx="6" cy="6" r="4" fill="{fill}" stroke="{line}" stroke-width="1.5"/></svg> {text}"""
 
 
 class PackingView:
-    """Disks, chains and the player's buttons: the views `player` and, below it, `legend`."""
+    """Disks, chains, their legend, and the player's buttons: the view `player`."""
 
     def __init__(self, state: AppState) -> None:
         self.state = state
@@ -80,7 +77,6 @@ class PackingView:
             source=state.source,
             busy=state.work.busy,
         )
-        self.legend = pn.pane.HTML(sizing_mode="stretch_width", margin=(2, 10))
         for name in SHARED:
             self.player.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
         self._shown = None
@@ -170,8 +166,10 @@ class PackingView:
 
     def _explain(self, *events: Any) -> None:
         pulled = self.player.pulled or bool(self.state.hand.pulls)
-        self.legend.object = JAMMING if self.state.work.moving else legend(self.state, pulled)
-        self.player.lead = explanation.lead(self.state)
+        self.player.param.update(
+            legend=JAMMING if self.state.work.moving else legend(self.state, pulled),
+            lead=explanation.lead(self.state),
+        )
 
 
 def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
@@ -277,17 +275,14 @@ def legend(state: AppState, pulled: bool = False) -> str:
         bar = "(none at μ = 0)"
     if looks.colour == "known" and not pulled and state.knowledge.narrowed is None:
         bar = "(nothing is known: select a contact and press H)"
-    sides = [f"{side:.2f}" for side in replay.box if np.isfinite(side)]
-    tilted = f", tilted by {replay.tilt:.2f}".replace("-", "−") if replay.tilt else ""
     return LEGEND.format(
         width=WIDTHS[looks.thickness],
         widest=2 / (CHAIN_WIDTH * looks.stretch),
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=colour_words(looks, pulled),
+        colour=DEFINED.get(None if pulled else looks.colour, colour_words(looks, pulled)),
         bar=bar,
         marks=_marks(looks.dark) if looks.overlay else "",
-        sides=f" of {' × '.join(sides)} largest radii{tilted}" if sides else "",
     )
 
 

@@ -255,7 +255,7 @@ class View(TabView):
             return
         replay, loads = self.state.replay, self.loads
         fig = figure(
-            "limit_loads", None, "its normal force fₙ in the original network, in mean forces",
+            "limit_loads", None, "its normal force fₙ as packed, in mean forces",
             "failure load of a contact, in mean forces", height=380,
         )  # fmt: skip
         source = ColumnDataSource(

@@ -26,9 +26,9 @@ from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
 
 # What is offered beside states of a kind, and what the others are called.
-ALSO = {"walk": "also show uniformly sampled states", "uniform": "also show the walk"}
-CALLED = {"uniform": "uniformly sampled states", "walk": "walk"}
-MARKED = {"uniform": "uniform ones (triangles)", "walk": "states of the walk (triangles)"}
+ALSO = {"walk": "also show uniformly sampled networks", "uniform": "also show the walk"}
+CALLED = {"uniform": "uniformly sampled networks", "walk": "walk"}
+MARKED = {"uniform": "uniform ones (triangles)", "walk": "networks of the walk (triangles)"}
 ENOUGH = 300  # states beside those shown, where they have to be computed
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
 
@@ -36,8 +36,8 @@ Columns = dict[str, Any]  # of a ColumnDataSource
 
 WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
 
-COMING = "The states come as they are found; the first few tell how to look at them."
-GROWS = "The states come as they are found; the exact outline of S follows."
+COMING = "The networks come as they are found; the first few tell how to look at them."
+GROWS = "The networks come as they are found; the exact outline of S follows."
 
 COMPUTED = (
     " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
@@ -355,7 +355,7 @@ class View(TabView):
         )
         fig.scatter(
             "x", "y", source=self.original, marker="diamond", size=15, color=ORIGINAL,
-            line_color="#333333", legend_label="original",
+            line_color="#333333", legend_label="as packed",
         )  # fmt: skip
         here = fig.scatter(
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
@@ -368,7 +368,7 @@ class View(TabView):
         (self.marks,) = (item for item in fig.legend[0].items if item.label == value("beside"))
         self.marks.visible = False
         corner(fig, "outline: exact; dots: found at random")
-        fig.add_tools(hover([states], ("state", "@state"), ("at", "@x{0.00}, @y{0.00}")))
+        fig.add_tools(hover([states], ("network", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
 
 

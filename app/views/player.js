@@ -91,7 +91,7 @@ class Player {
     this.plots.colours = plain(plain(model.palettes).plots)
     this.select()
     this.buttons.tellTrack(this.replay)
-    this.buttons.part("source").textContent = model.source
+    this.buttons.say("")
     this.tellAsked()
     scene.show(this.replay.walk)
     if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
@@ -223,7 +223,8 @@ class Player {
     this.buttons.tellPlaying(this.playing)
     if (!replay) return
     this.resting = null
-    if (!this.playing) {
+    if (this.playing) this.say("")
+    else {
       this.settle(replay)
       model.frame = replay.frame
       this.paintPlots()
@@ -342,8 +343,8 @@ class Player {
     this.say(told.join("; "))
   }
 
-  /** One line in place of where the states come from. */
-  say(words) { this.buttons.part("source").textContent = words }
+  /** One line beside the number of the network. */
+  say(words) { this.buttons.say(words) }
 
   /** Take the selected contact's force for known, as it is on screen; known, let it go. */
   hold({ mixed }) {
@@ -371,7 +372,8 @@ class Player {
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
       lead: () => { buttons.part("lead").innerHTML = model.lead },
-      source: () => { buttons.part("source").textContent = model.source },
+      legend: () => { buttons.part("legend").innerHTML = model.legend },
+      source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
       asked: () => this.tellAsked(),
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
       busy: () => buttons.root.classList.toggle("busy", model.busy),
@@ -426,7 +428,7 @@ export function render({ model, view }) {
   model.on("remove", () => {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
-  for (const name of ["lead", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
+  for (const name of ["lead", "legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
   openMoving(player)
   closeSidebar(page, view)
   return player.buttons.root

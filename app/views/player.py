@@ -45,6 +45,7 @@ class Player(Scripted):
     live = param.Boolean(doc="whether something is being computed that can be seen")
     asked = param.String(doc="what was asked for and is not on screen, in words")
     lead = param.String(doc="HTML: the question, and what is seen, in sentences")
+    legend = param.String(doc="HTML: what colour and width show")
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
     pulled = param.Boolean(doc="whether a network is on screen that was pulled; told by the page")

@@ -75,8 +75,8 @@ export class PointHand {
   }
 
   describe(x, y) {
-    this.hand.player.buttons.part("source").textContent = `The point in force space pulled to ` +
-      `(${x.toFixed(2)}, ${y.toFixed(2)}) ⟨fₙ⟩; orange carries more than before, blue less`
+    this.hand.player.say(`The point in force space pulled to ` +
+      `(${x.toFixed(2)}, ${y.toFixed(2)}) ⟨fₙ⟩; orange carries more than before, blue less`)
   }
 }
 

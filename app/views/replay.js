@@ -106,8 +106,8 @@ export class Replay {
   get place() {
     if (this.held) return "pulled"
     const { walk, frame } = this, [a, b, portion] = this.spot
-    const name = (k) => (k ? `state ${walk.number[k]}` : "the original")
+    const name = (k) => (k ? `network ${walk.number[k]}` : "that as packed")
     if (this.swinging) return `${Math.round(100 * portion)} % of the way from ${name(a)} to ${name(b)}`
-    return frame ? `${walk.number[frame]} of ${walk.states}` : "original"
+    return frame ? `${walk.number[frame]} of ${walk.states}` : "as packed"
   }
 }

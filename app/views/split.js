@@ -64,7 +64,7 @@ export class Split {
       captions[0].textContent = `${of(other.walk)}: ${other.place}`
       captions[1].textContent = live.moves ? "being compressed" : of(walk)
     } else {
-      captions[0].textContent = frame ? `pinned: state ${walk.number[frame]}` : "pinned: the original"
+      captions[0].textContent = frame ? `pinned: network ${walk.number[frame]}` : "pinned: as packed"
       captions[1].textContent = "now"
     }
   }

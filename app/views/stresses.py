@@ -14,6 +14,6 @@ def told(found: Outlined) -> str:
         f"Shaded: every {term('stress', 'stress')} that these contacts can carry at this pressure, "
         f"exactly ({found.programs} linear programs, {found.seconds:.1f} s). The farther from "
         f"(0, 0), the more shear: at most <b>{reach:.3f}</b> of the pressure, certainly not above "
-        f"{reach + found.gap:.3f}; the original network carries {path[0]:.3f}, the "
-        f"{len(path) - 1} states shown up to {path[1:].max():.3f}. The pressure alone is held."
+        f"{reach + found.gap:.3f}; the network as packed carries {path[0]:.3f}, the "
+        f"{len(path) - 1} networks shown up to {path[1:].max():.3f}. The pressure alone is held."
     )

@@ -56,12 +56,12 @@ def doubts(summary: Summary) -> Iterator[str]:
     if r_hat is not None and r_hat > MOST_R_HAT:
         yield (
             f"The chains have not mixed: R̂ = {r_hat:.2f} for the worst component, more than "
-            f"{MOST_R_HAT:g}. Ask for more states before relying on these numbers."
+            f"{MOST_R_HAT:g}. Ask for more networks before relying on these numbers."
         )
     if size is not None and size < LEAST_SIZE:
         yield (
-            f"The worst component is worth {size:.0f} independent states only, fewer than "
-            f"{LEAST_SIZE}: its errors are large. Ask for more states."
+            f"The worst component is worth {size:.0f} independent networks only, fewer than "
+            f"{LEAST_SIZE}: its errors are large. Ask for more networks."
         )
 
 
@@ -110,9 +110,9 @@ LEFT_OUT = {
     "rattlers": ("rattler", "loose disks"),
     "unloaded_contacts": ("unloaded", "contacts without force"),
     "tangential_unknowns": ("no_friction", "forces along contacts"),
-    "skipped": ("determined", "states that could only be the same"),
+    "skipped": ("determined", "networks that could only be the same"),
     "held": ("held_components", "forces that cannot vary"),
-    "dropped": ("dropped", "states on the way to the sample"),
+    "dropped": ("dropped", "networks on the way to the sample"),
 }
 
 
@@ -130,13 +130,15 @@ def left_out(summary: Summary) -> str:
             f"{summary['unconverged']} not finished."
         )
     if summary["kept"] < summary["states"]:
-        line += f" Shown: {summary['kept']} evenly spaced of {summary['states']} states."
+        line += f" Shown: {summary['kept']} evenly spaced of {summary['states']} networks."
     return line
 
 
 def tiles(state: AppState, volume: Any) -> pn.Column:
     """The numbers of the replay on screen, its Volume, and what they stand on, to be opened."""
-    folded = Foldout(line="In numbers", margin=(2, 12), styles={"flex": "1 0 110px"})
+    folded = Foldout(line="In numbers", sizing_mode="stretch_width", margin=(2, 12))
+    within = pn.Column(volume.tiles, volume.measure, visible=False, sizing_mode="stretch_width")
+    folded.link(within, open="visible")
 
     def tell(*events: Any) -> None:
         folded.inside = "" if state.replay is None else checks(state.replay.summary)
@@ -144,8 +146,7 @@ def tiles(state: AppState, volume: Any) -> pn.Column:
     state.param.watch(tell, "replay")
     tell()
     shown = of_replay(state, numbers, STYLE, margin=(0, 10))
-    last = pn.FlexBox(folded, volume.measure, sizing_mode="stretch_width")
-    return pn.Column(shown, volume.tiles, last, sizing_mode="stretch_width")
+    return pn.Column(shown, folded, within, sizing_mode="stretch_width")
 
 
 def of_which(state: AppState) -> pn.pane.HTML:

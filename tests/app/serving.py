@@ -77,10 +77,10 @@ def looks(page):
     return _opened(page, "Colours and widths of lines")
 
 
-def compare(page):
-    """Open what compares networks; the page."""
-    if page.locator(".compare:not([open])").count():
-        page.locator(".compare summary").click()
+def more(page):
+    """Open what compares and checks networks, and plays with them; the page."""
+    if page.locator(".extras:not([open])").count():
+        page.locator(".extras summary").click()
     return page
 
 

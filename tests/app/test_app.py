@@ -527,9 +527,9 @@ def test_the_legend_says_what_colours_mean_in_the_hand(state):
     from app.views.packing import PackingView
 
     view = PackingView(state)
-    assert "change from the original" in view.legend.object
+    assert "change from the forces the disks came to rest with" in view.player.legend
     view.player.pulled = True
-    assert "change by what was pulled" in view.legend.object
+    assert "change by what was pulled" in view.player.legend
 
 
 def test_what_is_refused_does_not_stay_in_its_box(state):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import MANY, MODEL, column, compare, how_it_is_made, looks, painted, scene, serve
+from serving import MANY, MODEL, column, how_it_is_made, looks, more, painted, scene, serve
 from small_store import DISKS, KEPT, ROOT
 
 from granforce import measures
@@ -88,7 +88,7 @@ def page(shared):
     if shared.locator("button.between.on").count():
         shared.locator("button.between").click()
     shared.locator("button.restart").click()
-    compare(shared).locator("button.pin").click()
+    more(shared).locator("button.pin").click()
     scene(shared, "(scene.selected !== null && scene.onSelect(null), scene.reset())")
     shared.mouse.move(5, 5)
     shared.wait_for_function(
@@ -433,7 +433,7 @@ def test_step_back_and_restart(page):
     page.locator("button.back").click()
     page.locator("button.restart").click()
     assert normal() == start
-    assert page.locator("b.state").inner_text() == "original"
+    assert page.locator("b.state").inner_text() == "as packed"
 
 
 def test_keys_play_step_and_change_tabs(page):
@@ -445,7 +445,7 @@ def test_keys_play_step_and_change_tabs(page):
     first = state.inner_text()
     assert first.endswith(" of 30")
     page.keyboard.press("Home")
-    assert state.inner_text() == "original"
+    assert state.inner_text() == "as packed"
     page.keyboard.press(" ")
     page.locator(".stage.playing").wait_for()
     page.keyboard.press(" ")
@@ -504,7 +504,7 @@ def test_intervals_grow_with_the_walk_and_shrink_on_the_way_back(page):
 
 def test_to_and_fro_between_the_pinned_state_and_this_one(page):
     page.locator("input.scrub").fill("3")
-    compare(page).locator("button.pin").click()
+    more(page).locator("button.pin").click()
     page.locator("input.scrub").fill("9")
     page.locator("button.between").click()
     page.wait_for_function("() => location.search.includes('between=3-9')")
@@ -554,7 +554,7 @@ def test_states_computed_while_the_page_is_on_its_way_are_shown(chromium, addres
         arg=page.locator(".scene").element_handle(),
         timeout=20_000,
     )
-    assert "5 networks" in page.locator(".source").inner_text()
+    assert "5 networks" in page.locator(".source").text_content()
     context.close()
     assert not problems
 

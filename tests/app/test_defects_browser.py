@@ -182,7 +182,7 @@ def test_an_error_bar_below_0_holds_nothing(visit):
     page.keyboard.press("n")
     page.locator("input.error").fill("-1")
     page.locator("button.hold").click()
-    page.locator(".source").get_by_text("An error bar is a number from 0 on").wait_for()
+    page.locator(".said").get_by_text("An error bar is a number from 0 on").wait_for()
     assert "known=" not in page.url
     page.locator("input.error").fill("0.1")
     page.locator("button.hold").click()
@@ -243,7 +243,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     files = [lammps / f"lammps_n400_mu0.3.{part}.dump" for part in ("particles", "contacts")]
     page.locator("input[type=file]").set_input_files(files)
     searched(page, "packing=")
-    page.locator(".source", has_text="lammps_n400").wait_for()
+    page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
     assert how_it_is_made(page).get_by_role("spinbutton", name="Disks N").input_value() == "400"
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
 
@@ -262,7 +262,7 @@ def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
     clicked.click()
     page.keyboard.press("ArrowRight")
     state = page.locator("b.state")
-    page.wait_for_function("e => e.textContent !== 'original'", arg=state.element_handle())
+    page.wait_for_function("e => e.textContent !== 'as packed'", arg=state.element_handle())
     page.keyboard.press(" ")
     page.locator(".stage.playing").wait_for()
     page.keyboard.press(" ")

@@ -106,7 +106,7 @@ def test_to_and_fro_between_two_states_has_a_track_of_two(run):
         }""",
         walk=WALK,
     )
-    where = "25 % of the way from the original to state 3"
+    where = "25 % of the way from that as packed to network 3"
     assert found == [0, False, where, (0.75 * NORMAL[0] + 0.25 * NORMAL[3]).tolist()]
 
 
@@ -303,7 +303,7 @@ HAND = """
     const source = {}, said = []
     const player = {
         scene: { size: 600 }, model: { scale: "mean" }, look: {}, replay: new Replay(walk, null),
-        buttons: { part: () => source }, tellHeld() {}, paint() {}, paintPlots() {},
+        buttons: { part: () => source }, say() {}, tellHeld() {}, paint() {}, paintPlots() {},
         plots: { projected: ({ normal }) => [...normal], move() {} },
     }
     player.replay.go(1)

@@ -195,6 +195,6 @@ def test_the_table_of_contacts_holds_what_was_pulled(page, state):
     assert table["f_n"][4] == pytest.approx(value * replay.force_scale)
     assert "pulled" in on_screen(replay, state.looks.frame, state.hand.held)
     page.hear(undo=True)
-    assert state.hand.held is None and "original" in on_screen(
+    assert state.hand.held is None and "as packed" in on_screen(
         replay, state.looks.frame, state.hand.held
     )

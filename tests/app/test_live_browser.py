@@ -173,7 +173,7 @@ def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
     until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
     states = scene(page, "scene.geometry.states")
     page.wait_for_function(f"() => location.search.includes('states={states}')")
-    assert f"{states} networks" in page.locator(".source").inner_text()
+    assert f"{states} networks" in page.locator(".source").text_content()
     assert page.locator(".stage.pale").count() == 0
 
 
@@ -233,7 +233,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(visit):
     during = normal(page)
     assert before[contact] < during[contact] <= rail["upper"] + 1e-6
     assert np.abs(during - before).max() > 0 and np.all(during > -1e-6)
-    assert "pulled to" in page.locator(".source").inner_text()
+    assert "pulled to" in page.locator(".said").inner_text()
     picture(page, "live/dragging")
     page.mouse.up()
     page.wait_for_function("() => location.search.includes('pulls=')")
@@ -364,10 +364,10 @@ def test_a_finger_pulls_the_selected_contact(visit):
 def test_a_grip_without_a_pull_leaves_what_is_told(visit):
     """Let go before its rail is there, a contact is only selected."""
     page = visit()
-    before = page.locator(".source").inner_text()
+    before = page.locator(".said").inner_text()
     told = page.locator(".scene").evaluate(
         """(e, contact) => {
-            const {hand} = e.scene, source = hand.player.buttons.part("source")
+            const {hand} = e.scene, source = hand.player.buttons.part("said")
             hand.take(contact, () => 0)
             const told = source.textContent
             hand.leave()
@@ -375,7 +375,7 @@ def test_a_grip_without_a_pull_leaves_what_is_told(visit):
         }""",
         chain(page)[0],
     )
-    assert "Finding" in told and page.locator(".source").inner_text() == before
+    assert "Finding" in told and page.locator(".said").inner_text() == before
 
 
 def test_playing_on_lets_go(visit):

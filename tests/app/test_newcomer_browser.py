@@ -1,7 +1,7 @@
 """What somebody stumbled over who saw the page for the first time, one test each."""
 
 import pytest
-from serving import MODEL, how_it_is_made, painted, picture, scene
+from serving import MODEL, how_it_is_made, more, painted, picture, scene
 
 from granforce.glossary import TERMS
 
@@ -167,7 +167,7 @@ def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height)
 )
 def test_words_that_were_not_understood_are_explained(visit, where, term):
     page = visit(AT + "&frame=5")
-    page.locator(".checks summary").click()
+    more(page)
     page.get_by_text("In numbers").click()
     page.locator(where).first.hover()
     tip = page.get_by_role("tooltip").filter(visible=True)
@@ -246,7 +246,7 @@ def test_contacts_are_chosen_by_keyboard_and_found_in_a_table(visit):
 
 
 def test_the_difference_of_two_networks_is_spotted(visit):
-    page = visit(AT)
+    page = more(visit(AT))
     page.get_by_role("button", name="Spot the difference").click()
     game, told = "scene.hand.player.difference", page.locator(".quiz")
     told.get_by_text("Click the 5 lines that differ most").wait_for()
@@ -280,7 +280,29 @@ def test_questions_are_asked_before_the_page_shows_the_answers(visit):
     page.wait_for_function("() => /tab=statistics/.test(location.search)")
     told.get_by_role("button", name="Done").click()
     told.wait_for(state="hidden")
-    page.get_by_role("button", name="Predict, then look").click()
+    more(page).get_by_role("button", name="Predict, then look").click()
     told.get_by_role("button", name="No, others balance as well").click()
     told.get_by_text("numbers are left free").wait_for()
     page.locator(".stage.playing").wait_for()
+
+
+# 12: at first there is the picture, and little around it
+
+
+def test_what_compares_and_checks_is_closed_until_it_is_opened_or_a_link_shows_it(visit):
+    page = visit(AT)
+    tools = page.locator(".extras button, .extras .source, .skips")
+    assert tools.count() == 7 and tools.filter(visible=True).count() == 0
+    more(page)
+    assert tools.filter(visible=True).count() == 7
+    page = visit(AT + "&split=1")
+    page.locator("button.split").filter(visible=True).wait_for()
+
+
+def test_the_volume_is_measured_among_the_numbers(visit):
+    page = visit(AT)
+    measure = page.get_by_role("button", name="Measure the volume")
+    page.get_by_text("In numbers").click()
+    measure.wait_for()
+    page.get_by_text("In numbers").click()
+    measure.wait_for(state="hidden")

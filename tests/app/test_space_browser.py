@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from serving import MODEL, bars_drawn, column, compare, laid_out, scene
+from serving import MODEL, bars_drawn, column, laid_out, more, scene
 from test_live_browser import ask, normal, pulled, until
 
 # The outermost element of force space that is ever made pale.
@@ -68,7 +68,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     )
     during = normal(page)
     assert np.abs(during - before).max() > 1e-3 and during.min() > -1e-6
-    assert "point in force space pulled" in page.locator(".source").inner_text()
+    assert "point in force space pulled" in page.locator(".said").inner_text()
     # beyond the outline it stays on it
     page.mouse.move(u + 5000, v)
     until(page, "scene.hand.spot.at[0] < 1e3")
@@ -124,7 +124,7 @@ def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
 
 def test_two_networks_side_by_side_with_one_player(visit):
     page = visit("?frame=3&reference=1")
-    compare(page).locator("button.split").click()
+    more(page).locator("button.split").click()
     page.wait_for_function("() => location.search.includes('split=1')")
     until(page, "scene.hand.player.split.twin.painted > 0 && scene.hand.player.split.on")
     boxes = [page.locator(f".{name}").bounding_box() for name in ("twin", "scene")]
@@ -144,10 +144,10 @@ def test_two_networks_side_by_side_with_one_player(visit):
     page.locator("button.step").click()
     until(page, "scene.hand.player.replay.frame === 4")
     assert scene(page, widths) == pinned
-    compare(page).locator("button.pin").click()
+    more(page).locator("button.pin").click()
     page.wait_for_function("() => location.search.includes('reference=4')")
     until(page, f"scene.hand.player.split.twin.style.width.some((v, k) => v !== {pinned}[k])")
-    compare(page).locator("button.split").click()
+    more(page).locator("button.split").click()
     until(page, "!scene.hand.player.split.on")
     assert page.locator(".twin").is_hidden()
 
@@ -159,7 +159,7 @@ def widths(page, of):
 def test_another_mu_comes_beside_the_packing_of_the_first(visit):
     """Both keep their own packing; one player, one view, and a link that opens the same."""
     page, twin = visit(), "scene.hand.player.split.twin"
-    compare(page).locator("button.split").click()
+    more(page).locator("button.split").click()
     until(page, f"scene.hand.player.split.on && {twin}.painted > 0")
     ask(page, "1")
     page.wait_for_function("() => /split=1&beside=0.1/.test(location.search)")
@@ -190,7 +190,7 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
         until(at, f"{part.format('scene')} < 0.45")
         assert scene(at, part.format(twin)) == pytest.approx(scene(at, part.format("scene")))
     # pinned, a state of this packing is beside it again
-    compare(page).locator("button.pin").click()
+    more(page).locator("button.pin").click()
     page.wait_for_function("() => !location.search.includes('beside')")
     until(page, f"{twin}.geometry.mu === 1 && scene.hand.player.split.other === null")
     assert page.locator(".twin .caption").inner_text() == "pinned: state 1"

@@ -53,7 +53,7 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
     alone.goto(path.as_uri())
     painted(alone, PATIENCE)
     assert scene(alone, "Array.from(scene.mixed.normal)") == pytest.approx(normal, abs=1e-6)
-    assert alone.locator("b.state").inner_text() != "original"  # the state that was on screen
+    assert alone.locator("b.state").inner_text() != "as packed"  # the state that was on screen
     alone.locator("button.restart").click()
     before = column(alone, "bars", "now"), column(alone, "here", "x")
     alone.locator("button.step").click()
