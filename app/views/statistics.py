@@ -58,10 +58,11 @@ class View(TabView):
     def panel(self) -> pn.Column:
         """Choices, figure, and what it shows."""
         return pn.Column(
-            pn.FlexBox(self.what, self.scale, sizing_mode="stretch_width"),
+            self.what,
             self.bar,
             self.lead,
             self.plots,
+            self.scale,
             self.more,
             self.told,
             sizing_mode="stretch_width",
@@ -93,7 +94,7 @@ class View(TabView):
             return
         log = self.scale.value == "log"
         cells = distributions.alike(state.catalogue, state.cell) or [state.cell]
-        work = over_friction(state.library, cells, state.cell.mu, what, log)
+        work = over_friction(state.library, cells, state.cell, what, log)
         self.task.start(work, self._show)
 
     def _show(self, found: Drawn) -> None:
@@ -116,7 +117,7 @@ class View(TabView):
             self.told.object = self.task.message
 
     def _choosable(self, fig: Figure) -> None:
-        """A tap on a point shows the states with its μ."""
+        """A tap on a point shows such a packing, made first if there is none."""
         points = [r for r in fig.select(GlyphRenderer) if isinstance(r.glyph, Scatter)]
         if self.what.value == "extent" or not points:
             return
@@ -135,6 +136,8 @@ class View(TabView):
     def _tapped(self, source: ColumnDataSource, indices: list[int]) -> None:
         if indices:
             self.state.choose(mu=float(source.data["x"][indices[0]]))
+            if self.state.missing:
+                self.state.compute()
 
     # Of the states on screen
 
@@ -147,10 +150,10 @@ class View(TabView):
         seen = (replay.high - replay.low)[:, 0]
         exact = exact_intervals(self.state.exact, replay)
         fig = figure(
-            "extent_against_force", None, "normal force fₙ in the original network, in mean forces",
+            "extent_against_force", None, "normal force fₙ as packed, in mean forces",
             "length ΔFₙ of its interval, in mean forces", height=380,
         )  # fmt: skip
-        layers = [("seen in the states", seen, DARK, 4.5)]
+        layers = [("seen in the networks", seen, DARK, 4.5)]
         if exact:
             layers.insert(0, ("possible (exact)", exact["high"] - exact["low"], PALE, 6))
         for label, extent, colour, size in layers:
@@ -170,7 +173,7 @@ class View(TabView):
         self._points = original, seen
         self._mark()
         legend_above(fig)
-        corner(fig, "exact pale, seen dark" if exact else "seen by the states")
+        corner(fig, "exact pale, seen dark" if exact else "seen by the networks")
         values = [f"{replay.summary['correlation']:.2f} of what was seen"]
         if exact:
             values.append(f"{self.state.exact['correlation'].item():.2f} of what is possible")
@@ -199,15 +202,15 @@ class View(TabView):
             y_axis_type="log" if log else "linear",
         )  # fmt: skip
         several = len(replay.normal) > 1
-        layers = [("original", replay.normal[0], ORIGINAL)]
+        layers = [("as packed", replay.normal[0], ORIGINAL)]
         if several:
-            layers.insert(0, ("states", replay.normal[1:], DARK))
+            layers.insert(0, ("networks", replay.normal[1:], DARK))
         largest = min(LARGEST, float(replay.normal.max()))
         for label, values, colour in layers:
             edges, density = distributions.histogram(values, largest=largest)
             height = np.where(density > 0, density, np.nan) if log else density
             middle = (edges[1:] + edges[:-1]) / 2
-            if label == "states":
+            if label == "networks":
                 fig.quad(
                     left=edges[:-1], right=edges[1:], top=height,
                     bottom=np.nanmin(height) / 2 if log else 0,
@@ -217,15 +220,15 @@ class View(TabView):
                 fig.line(middle, height, color=colour, line_width=2, legend_label=label)
                 fig.scatter(middle, height, color=colour, size=5)
         legend_above(fig)
-        corner(fig, "measured: of the states shown")
+        corner(fig, "measured: of the networks shown")
         beyond, weak = np.mean(replay.normal > LARGEST), np.mean(replay.normal < 1)
         lead = (
             f"<b>{weak:.0%} of the forces are smaller than the mean force</b>, the largest "
-            f"{replay.normal.max():.1f} times as large. Yellow: the original network; pale: all "
+            f"{replay.normal.max():.1f} times as large. Yellow: the network as packed; pale: all "
             "networks shown."
         )
         text = (
-            f"{len(replay.normal) - 1} states of {replay.normal.shape[1]} contacts; "
+            f"{len(replay.normal) - 1} networks of {replay.normal.shape[1]} contacts; "
             f"{beyond:.2%} of the forces lie beyond the axis."
         )
         return fig, lead, folded(text)
@@ -236,30 +239,33 @@ def _pane(fig: Figure) -> pn.pane.Bokeh:
 
 
 def over_friction(
-    library: Library, cells: Sequence[Cell], mu: float, what: str, log: bool
+    library: Library, cells: Sequence[Cell], cell: Cell, what: str, log: bool
 ) -> Callable[[Job], Drawn]:
-    """Work that draws a figure of the paper from the cells: ([Bokeh figures], lead, caption)."""
+    """Work that draws a figure of the paper from the cells: ([Bokeh figures], lead, caption).
+
+    cell: that on screen, one of them.
+    """
 
     def work(job: Job) -> Drawn:
         job.begin(f"reading {len(cells)} results and the finished study")
         rows = distributions.rows(cells)
         exact = distributions.exact_rows(library, cells)
         job.begin("drawing")
-        drawn, lead, text = DRAWN[what](rows, exact, mu, log)
+        drawn, lead, text = DRAWN[what](rows, exact, rows[cells.index(cell)], log)
         return drawn, lead, folded(text) + studied.claims(what)
 
     return work
 
 
-def _indeterminacy(rows: list[Row], exact: list[Row], mu: float, log: bool) -> Drawn:
-    return studied.indeterminacy(rows, exact, log)
+def _indeterminacy(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
+    return studied.indeterminacy(rows, exact, here, log)
 
 
-def _extents(rows: list[Row], exact: list[Row], mu: float, log: bool) -> Drawn:
-    return studied.extents(distributions.groups(rows, mu), mu, log)
+def _extents(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
+    return studied.extents(distributions.groups(rows, here["mu"]), here["mu"], log)
 
 
-def _correlations(rows: list[Row], exact: list[Row], mu: float, log: bool) -> Drawn:
+def _correlations(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
     return studied.correlations(rows, exact)
 
 

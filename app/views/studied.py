@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, FixedTicker
+from bokeh.models import ColumnDataSource, DataRange1d, FixedTicker, Label
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
@@ -17,7 +17,7 @@ from ..distributions import Row
 from .hints import term
 from .labels import labels
 from .parts import figure
-from .style import SERIES, corner, hover, legend_above
+from .style import DOT, SERIES, corner, hover, legend_above
 
 MEASURES = (
     ("eta1", "spread η1", 1.0),
@@ -32,7 +32,10 @@ SAMPLERS = {
     "exact": "exact",
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
-OWN = "on this page"
+OWN, HERE = "on this page", "this packing"
+PEAK = "forces least determined here"
+RISES = "friction gives\neach force room"
+FALLS = "but leaves\nfewer contacts"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
@@ -52,8 +55,8 @@ VERDICTS = {"reproduced": "✓", "differs": "≈", "not reproduced": "✗"}
 JUDGED = {
     "gauss_seidel": f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, to 10⁻³",
     "gauss_seidel_1e-4": f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, to 10⁻⁴",
-    "nearest": "walk to nearest states",
-    "uniform": "uniform states",
+    "nearest": "walk to nearest networks",
+    "uniform": "uniform networks",
     "exact": "exact",
     "": "perturbed contacts",
 }
@@ -92,17 +95,25 @@ def written(text: str) -> str:
     return text.replace("F_n", "Fₙ").replace("f_n", "fₙ").replace("F_crit", "Fᶜʳⁱᵗ")
 
 
-def indeterminacy(own: list[Row], exact: list[Row], log: bool) -> Drawn:
-    """η1 against μ by the walk, z, all three η, and 0.15 η3 by all samplers: four figures."""
+def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
+    """η1 against μ by the walk, z, all three η, and 0.15 η3 by all samplers: four figures.
+
+    here: of the rows `own` that of the packing on screen.
+    """
     kind = {"y_axis_type": "log" if log else "linear"}
-    spread = _over_mu("spread", "how much a force scatters, in mean forces", 310, **kind)
+    walks = studied.rows("walk")
+    spread = _over_mu("spread", "how much a force scatters, in mean forces", 330, **kind)
+    found = statistics.means(walks, "eta1")
+    _line(spread, found, f"mean of {_packings(walks)} packings", log, COLOURS[0])
+    _own(spread, [(here["mu"], here["eta1"], 0.0)], log, DOT, label=HERE)
+    _peak(spread, found)
     etas = _over_mu("indeterminacy", "how undetermined, η", 270, title=FOLDED[1], **kind)
-    for fig, measures in ((spread, MEASURES[:1]), (etas, MEASURES)):
-        for k, (name, label, factor) in enumerate(measures):
-            look: dict[str, Any] = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
-            _line(fig, statistics.means(studied.rows("walk"), name, factor=factor), label, **look)
-        for k, (name, _, factor) in enumerate(measures):
-            _own(fig, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
+    for k, (name, label, factor) in enumerate(MEASURES):
+        look: dict[str, Any] = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
+        _line(etas, statistics.means(walks, name, factor=factor), label, **look)
+    for k, (name, _, factor) in enumerate(MEASURES):
+        _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
+    for fig in (spread, etas):
         corner(fig, "measured: in networks found at random")
         legend_above(fig)
     seen = _over_mu("samplers", "0.15 × range η3", 270, title=FOLDED[2], **kind)
@@ -120,32 +131,64 @@ def indeterminacy(own: list[Row], exact: list[Row], log: bool) -> Drawn:
     legend_above(seen, 3)
     z.legend.visible = False
     text = (
-        f"How undetermined the forces are, against friction: {term('eta1')}, {term('eta2')}, "
+        f"{_averaged(walks, own)}How undetermined the forces are, against friction: {term('eta1')}, {term('eta2')}, "
         f"{term('eta3', '0.15 η3')}; {STUDY}; {RINGS}. Friction "
         "widens what each contact may carry, but a packing made with more of it has fewer contacts "
         "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ "
-        "has its own packing. A tap on a point shows the states of that μ, or asks for them. Found "
+        "has its own packing. Found "
         f"in several ways: 0.15 η3 of the {term('walk', 'random walk')}, of the "
-        f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')} to two unbalances, of states "
+        f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')} to two unbalances, of networks "
         f"{term('uniform')}, and {term('exact', 'exact')}."
     )
-    return [spread, z, etas, seen], most_undetermined(own), text
+    return [spread, z, etas, seen], most_undetermined(found), text
 
 
-def most_undetermined(own: list[Row]) -> str:
-    """Where η is largest, and why this page's symbols are not on the lines; empty without both."""
-    walks = studied.rows("walk")
+def most_undetermined(points: Points) -> str:
+    """At which friction of (μ, η, error) η is largest, in words; empty without any."""
+    if not points:
+        return ""
+    peak = max(points, key=lambda point: point[1])[0]
+    return (
+        f"<b>Forces are least determined at friction {peak:g}.</b> Click a point to see such a "
+        "packing."
+    )
+
+
+def _averaged(walks: list[Row], own: list[Row]) -> str:
+    """Over how many packings the first figure's points are means, in a sentence or two."""
     if not walks or not own:
         return ""
-    peak = max(statistics.means(walks, "eta1"), key=lambda point: point[1])[0]
-    many, few = (max(Counter(row["mu"] for row in part).values()) for part in (walks, own))
     return (
-        f"<b>Forces are least determined at friction {peak:g}.</b> More friction allows more "
-        "forces on the same disks, but disks packed with more friction have fewer contacts. Each "
-        "point: by how much a contact's force scatters over the networks of a packing. "
-        f"Filled: means over {many} packings; open: over {few} computed on this page "
-        "(packings differ). Grey: the friction on screen."
+        "Each point: by how much a contact's force scatters over the networks of a packing, as "
+        f"mean over {_packings(walks)} packings; open symbols: over {_packings(own)} computed on "
+        "this page, which need not lie on the line, as packings differ. Grey: the friction on "
+        "screen. "
     )
+
+
+def _packings(rows: list[Row]) -> int:
+    """How many packings there are at a friction, at most."""
+    return max(Counter(row["mu"] for row in rows).values(), default=0)
+
+
+def _peak(fig: Figure, points: Points) -> None:
+    """Mark the largest of the points (μ, η, error), and say why it lies between the ends."""
+    if not points:
+        return
+    x, y, error = max(points, key=lambda point: point[1])
+    fig.y_range = DataRange1d(end=1.25 * (y + error))  # room for what is written
+    told = (
+        (x, y + error, PEAK, "right", 30, DOT, "peak"),
+        (points[1][0], 0.45 * y, RISES, "left", 0, "#808080", "rises"),
+        (points[-1][0], 0.12 * y, FALLS, "right", 0, "#808080", "falls"),
+    )
+    for at, up, text, align, beside, colour, name in told:
+        fig.add_layout(
+            Label(
+                x=at, y=up, text=text, x_offset=beside, y_offset=6, text_align=align,
+                text_font_size="12px", text_color=colour, name=name,
+            )
+        )  # fmt: skip
 
 
 def correlations(own: list[Row], exact: list[Row]) -> Drawn:
@@ -162,7 +205,7 @@ def correlations(own: list[Row], exact: list[Row]) -> Drawn:
     corner(fig, "dashed exact, others measured")
     text = (
         "Whether strong contacts are the undetermined ones: correlation over contacts of the "
-        f"{term('original', 'original')} fₙ with the extent {term('extent', 'ΔFₙ')}; {STUDY}; "
+        f"fₙ {term('original', 'as packed')} with the extent {term('extent', 'ΔFₙ')}; {STUDY}; "
         f"{RINGS}."
     )
     return [fig], strong_and_undetermined(), text
@@ -330,13 +373,15 @@ def _line(
     fig.add_tools(hover([dots], at, (label, "@y{0.0000}")))
 
 
-def _own(fig: Figure, points: Points, log: bool, colour: str, marker: str = "circle") -> None:
+def _own(
+    fig: Figure, points: Points, log: bool, colour: str, marker: str = "circle", label: str = OWN
+) -> None:
     """Rings around the page's own points, over everything."""
     x, y, _ = _shown(points, log, zero=fig.xaxis.axis_label != "friction μ")
     if len(x):
         fig.scatter(
             x, y, size=12, marker=marker, fill_alpha=0, line_color=colour, line_width=2.2,
-            legend_label=OWN,
+            legend_label=label,
         )  # fmt: skip
 
 

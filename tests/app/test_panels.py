@@ -10,7 +10,7 @@ import xarray as xr
 import zarr
 from bokeh.document import Document
 from bokeh.io.doc import patch_curdoc
-from bokeh.models import CustomJS
+from bokeh.models import CustomJS, Scatter
 from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
 from PIL import Image
@@ -27,6 +27,7 @@ from app.views.controls import Controls
 from app.views.dropper import Dropper
 from app.views.style import palettes
 from granforce import measures
+from granforce.measures import statistics
 from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -399,6 +400,31 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     most = max(studied.hill(), key=lambda point: point[1])[0]
     assert f"at friction {most:g}" in view.lead.object or what != "eta"
     assert view.lead.object  # what to look for
+
+
+def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
+    from app.views.statistics import View
+
+    opened(state)
+    state.looks.tab = "statistics"
+    view = View(state)
+    settled(state)
+    fig = view.plots.objects[0].object
+    means = statistics.means(studied.rows("walk"), "eta1")
+    most = max(means, key=lambda point: point[1])
+    (peak,) = fig.select(name="peak")
+    assert peak.text == "forces least determined here" and peak.x == most[0]
+    assert f"at friction {most[0]:g}" in view.lead.object and "Click a point" in view.lead.object
+    line, here = (r for r in fig.renderers if isinstance(r.glyph, Scatter))
+    assert list(here.data_source.data["x"]) == [0.1]
+    assert fig.legend[0].items[-1].label.value == "this packing"
+    points = line.data_source
+    points.selected.indices = [list(points.data["x"]).index(1)]
+    settled(state)
+    assert state.cell.mu == 1 and not state.missing  # the store has it
+    points.selected.indices = [list(points.data["x"]).index(0.3)]
+    assert state.selection.mu == 0.3 and state.work.computation.running
+    state.work.cancel()
 
 
 def test_a_tap_on_a_point_selects_its_contact(state):

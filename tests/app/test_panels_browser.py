@@ -150,7 +150,7 @@ def test_statistics_are_drawn_one_after_another(visit):
         ARTEFACTS.mkdir(parents=True, exist_ok=True)
         page.screenshot(path=ARTEFACTS / f"statistics-{what}.png")
     page.get_by_text("How was this computed?").click()
-    page.get_by_text("A tap on a point shows the states of that μ").wait_for()
+    page.get_by_text("by how much a contact's force scatters").wait_for()
 
 
 def test_statistics_by_night_on_a_narrow_screen(visit):
@@ -187,7 +187,7 @@ def test_dumps_are_dropped_reported_and_shown(visit):
     page.get_by_text("Now drop the dump of the contacts").wait_for()
     page.locator("input[type=file]").set_input_files(files[1:])
     page.get_by_text("dimension h of S").wait_for()
-    page.locator(".source", has_text="lammps_n400").wait_for()
+    page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
     page.wait_for_function("() => /packing=/.test(location.search)")
 
 
@@ -197,7 +197,7 @@ def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
     gf.save_packing(packing, tmp_path / "tilted.npz")
     page = visit("?tab=upload")
     page.locator("input[type=file]").set_input_files(tmp_path / "tilted.npz")
-    page.locator(".source", has_text="tilted").wait_for()
+    page.locator(".source", has_text="tilted").wait_for(state="attached")
     page.wait_for_function(
         "e => e.scene.geometry.tilt !== 0", arg=page.locator(".scene").element_handle()
     )
