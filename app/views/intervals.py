@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
+from bokeh.models import ColumnDataSource, GlyphRenderer, Range1d, Span, TapTool
 from bokeh.plotting import figure as Figure
 
 from granforce.records import Integers
@@ -31,6 +31,14 @@ BARS += ("whole_low", "whole_high")  # exact intervals without what is known
 # Widths of what was possible before, is possible, and was seen, in that of one contact, and size
 # of dots, px; of few bars, and of many.
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
+# What one bar says, and at which part of the axis, from its least force to its largest; and where.
+KEY = {
+    "least possible": 0.55,
+    "seen so far": 0.68,
+    "now": 0.77,
+    "largest possible": 0.93,
+}
+KEY_AT = 2.5
 ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
 ETAS = ("eta1", "eta2", "eta3")
 SMALL = {"width": 146, "margin": (6, 2, 2, 8)}
@@ -38,16 +46,14 @@ SMALL = {"width": 146, "margin": (6, 2, 2, 8)}
 
 GROWS = "How many networks does it take?"
 LEAD = (
-    "<b>How far can each force go?</b> Each bar is one contact, from the smallest to the largest "
-    "normal force that it can have while every disk stays in balance. Dark: how far the networks "
-    "shown so far went; chance rarely goes to the ends. Drag a dot, the force now: all others "
-    "follow, and a line in the packing lights up."
+    "<b>How far can each force go?</b> Each bar is one contact. Drag a dot: all other forces "
+    "follow."
 )
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
 Pale: every force that a contact can have in any network in balance
-({term("exact", "possible")}); dark: what the states passed so far had; yellow: in the
-{term("original")}; dots: in the state on screen. Curves: η of the states passed so far (of η3,
-{term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
+({term("exact", "possible")}); dark: what the networks passed so far had: chance rarely goes to the
+ends; yellow: in the {term("original")}; dots: in the network on screen. Curves: η of the networks
+passed so far (of η3, {term("eta3", "0.15 of it")}), and where it ends (dashed). Where forces are
 {term("known", "known")}, the faintest part of a bar is what was possible without that knowledge.
 Click a bar to find its contact in the packing.
 </details>"""
@@ -63,6 +69,8 @@ class View:
         self.bars = _source("bars", BARS)
         self.growth = _source("growth", ("state", *ETAS))
         self.chosen = _source("chosen", ("rank", "low", "high"))
+        self.example = _source("example", ("rank", "low", "high", "seen_low", "seen_high", "now"))
+        self.words = _source("words", ("rank", "at", "words"))
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
         ]
@@ -90,8 +98,8 @@ class View:
         choices = pn.FlexBox(*self.choices, sizing_mode="stretch_width")
         return pn.Column(
             note(LEAD),
-            choices,
             pn.pane.Bokeh(self.figure, **wide),
+            choices,
             self.exact,  # below, as the plot must not move when the button goes
             Known(self.state),
             self.told,
@@ -153,7 +161,8 @@ class View:
         if exact and self.state.knowledge.narrowed is not None:
             before = exact_intervals(self.state.knowledge.narrowed.before, replay)
             whole = before["low"][contacts], before["high"][contacts]
-        *widths, size = FEW if len(contacts) <= APART else MANY
+        few = len(contacts) <= APART
+        *widths, size = FEW if few else MANY
         for renderer, width in zip(self.layers, widths, strict=True):
             renderer.glyph.width = width
         self.dots.glyph.size = size
@@ -174,9 +183,22 @@ class View:
         if self.state.growing:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
+        self._show_key(top, few and bool(exact) and self.looks.sort == "original")
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
         self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
+
+    def _show_key(self, top: float, shown: bool) -> None:
+        """One bar that says what it shows, up to a part of the axis; only where it hides none."""
+        for part in self.key:
+            part.visible = shown
+        heights = [level * top for level in KEY.values()]
+        low, _, now, high = heights
+        self.example.data = {
+            "rank": [KEY_AT], "low": [low], "high": [high], "now": [now],
+            "seen_low": [0.7 * low + 0.3 * high], "seen_high": [0.3 * low + 0.7 * high],
+        }  # fmt: skip
+        self.words.data = {"rank": [KEY_AT] * len(KEY), "at": heights, "words": list(KEY)}
 
     def _show_growth(self, replay: Replay) -> None:
         grows = self.state.growing
@@ -247,7 +269,7 @@ class View:
             **bar,
         )
         seen = fig.vbar(
-            bottom="low", top="high", width=1, fill_color=DARK, legend_label="seen so far", **bar
+            bottom="low", top="high", width=1, fill_color=DARK, legend_label="seen", **bar
         )
         seen.name = "seen"  # see layer.js
         self.layers = self.whole, exact, seen
@@ -259,7 +281,7 @@ class View:
             source=self.bars,
             color=ORIGINAL,
             line_width=1.5,
-            legend_label="original",
+            legend_label="as packed",
         )
         self.dots = dots = fig.scatter(
             "rank",
@@ -272,6 +294,7 @@ class View:
         )
         for moving in (seen, line, dots):
             moving.tags = MOVES
+        self.key = self._key(fig)
         fig.name = "bars_figure"
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         self.whole_item, self.exact_item = fig.legend[0].items[:2]
@@ -282,7 +305,7 @@ class View:
                 [seen, exact],
                 ("contact", "@contact"),
                 ("now", "@now{0.000}"),
-                ("original", "@original{0.000}"),
+                ("as packed", "@original{0.000}"),
                 ("seen", "@low{0.000} … @high{0.000}"),
                 ("possible", "@exact_low{0.000} … @exact_high{0.000}"),
             ),
@@ -290,11 +313,23 @@ class View:
         )
         return fig
 
+    def _key(self, fig: Figure) -> tuple[GlyphRenderer, ...]:
+        """A bar with words beside it, and none of a contact."""
+        bar: dict[str, Any] = {"x": "rank", "source": self.example, "line_color": None}
+        pale = fig.vbar(bottom="low", top="high", width=FEW[1], fill_color=PALE, **bar)
+        dark = fig.vbar(bottom="seen_low", top="seen_high", width=FEW[2], fill_color=DARK, **bar)
+        dot = fig.scatter("rank", "now", source=self.example, color=DOT, size=FEW[3])
+        words = fig.text(
+            "rank", "at", "words", source=self.words, x_offset=12, text_baseline="middle",
+            text_font_size="12px", text_color="#808080", name="key",
+        )  # fmt: skip
+        return pale, dark, dot, words
+
     def _growth_figure(self) -> Figure:
         fig = figure(
             "eta_so_far",
             None,
-            "states shown so far",
+            "networks shown so far",
             "how undetermined, η",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1, name="growth_range"),
@@ -311,7 +346,7 @@ class View:
         for span in self.finals:
             fig.add_layout(span)
         legend_above(fig)
-        corner(fig, "seen so far; dashed: in all states shown")
+        corner(fig, "seen so far; dashed: in all networks shown")
         return fig
 
 

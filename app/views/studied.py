@@ -131,8 +131,8 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     legend_above(seen, 3)
     z.legend.visible = False
     text = (
-        f"{_averaged(walks, own)}How undetermined the forces are, against friction: {term('eta1')}, {term('eta2')}, "
-        f"{term('eta3', '0.15 η3')}; {STUDY}; {RINGS}. Friction "
+        f"{_averaged(walks, own)}How undetermined the forces are, against friction: "
+        f"{term('eta1')}, {term('eta2')}, {term('eta3', '0.15 η3')}; {STUDY}; {RINGS}. Friction "
         "widens what each contact may carry, but a packing made with more of it has fewer contacts "
         "(z falls from 4 to 3), so fewer forces are free: η rises and then falls. Each μ "
         "has its own packing. Found "

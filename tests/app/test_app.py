@@ -523,6 +523,24 @@ def test_possible_is_in_the_legend_only_where_it_is_drawn(state, wait_for):
     assert view.exact_item.visible and view.exact_item.label.value == "possible"
 
 
+def test_one_bar_says_what_it_shows_where_it_hides_none(state, wait_for):
+    from app.views.intervals import KEY, View
+
+    view = View(state)
+    assert not view.key[-1].visible  # no exact intervals yet
+    state.compute_exact()
+    wait_for(state)
+    assert all(part.visible for part in view.key) and view.words.data["words"] == list(KEY)
+    column, (least, *_, largest) = view.bars.data, view.words.data["at"]
+    near = column["rank"] <= len(column["rank"]) / 3
+    assert 0 < least < largest < view.figure.y_range.end
+    assert np.mean(column["exact_high"][near] < least) > 0.5
+    state.looks.sort = "extent"
+    assert not any(part.visible for part in view.key)
+    state.looks.sort = "original"
+    assert all(part.visible for part in view.key)
+
+
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
     from app.views.packing import PackingView
 
