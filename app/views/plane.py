@@ -21,7 +21,7 @@ from ..replays import Replay
 from ..state import AppState
 from . import stresses
 from .hints import term
-from .parts import MOVES, TabView, figure, folded, note, question, together
+from .parts import MOVES, PLAIN, TabView, figure, folded, note, question, together
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
 
@@ -46,14 +46,21 @@ COMPUTED = (
 )
 
 # No taller than the window leaves room for, where it has all of its width.
-WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 230px))"}
+WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 390px))"}
 
 LEAD = (
     "<b>Every network of forces that holds these disks lies in the shaded area S</b>{flattened}. "
-    "Each dot is one network, a thin line leads to the one found next. The red dot is the one on "
-    "screen: drag it, and the forces in the packing follow.{crowded}"
+    "Drag the red dot, or sweep it: the forces in the packing follow."
 )
+CROWDED = (
+    ": networks found at random differ in all {free} directions, and go only a little way along "
+    "these two"
+)
+# The point goes along an axis by itself, see point.js.
+SWEEPS = {"Sweep across ↔": 0, "Sweep up and down ↕": 1}
+SWEEP = 'button.document.get_model_by_name("player").player.hand.spot.sweep(axis)'
 HELP = (
+    "A thin line leads from each network to the one found next. "
     f"Shown is the shadow ({term('principal', 'projection')}) that {term('s')} casts on a plane, "
     f"not a section: the shaded {term('outline')} holds all of it."
 )
@@ -82,6 +89,7 @@ class View(TabView):
         self.other: Replay | None = None  # of those
         self.also.param.watch(lambda event: together(self._fetch), "value")
         self.lead, self.told = note(), note()
+        self.sweeps = [_sweep(label, axis) for label, axis in SWEEPS.items()]
         self.placing.param.watch(self.failed, "message")
         self.planes.param.watch(self._turn, "value")
         self.looks.param.watch(self._keep_first, "contact")
@@ -96,6 +104,7 @@ class View(TabView):
             self.lead,
             self.planes,
             pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0, styles=WHOLLY_SEEN),
+            pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
             Progress(self.task),
             self.told,
             self.also,
@@ -110,7 +119,12 @@ class View(TabView):
         state, replay = self.state, self.state.seen
         if replay is None:
             return
-        self.lead.object = _lead(replay.summary["dimension"])
+        free = replay.summary["dimension"]
+        self.lead.object = LEAD.format(
+            flattened=f", a shadow of {free} dimensions" if free > 2 else ""
+        )
+        for button in self.sweeps:
+            button.visible = free > 0 and not state.growing
         wanted = replay, self.planes.value, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
@@ -295,16 +309,18 @@ class View(TabView):
         part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
-        words = (
-            f"The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of its width, "
-            f"{part[1]:.0%} of its height; "
-            f"<b>{inner:.0%} of them lie in its inner half</b>"
-        )
+        free = self.state.replay.summary["dimension"]
+        words = f"<b>{inner:.0%} of the dots lie in the inner half of S</b>"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
             words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
-        share = f" The dots fill {area:.1%} of its area{_variance(found.plane)}."
+        words += CROWDED.format(free=free) if free >= MANY else ""
+        share = (
+            f" The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of its width, "
+            f"{part[1]:.0%} of its height, and fill {area:.1%} of its area"
+            f"{_variance(found.plane)}."
+        )
         self.told.object = words + "." + folded(HELP + share + COMPUTED.format(found=found))
 
     @property
@@ -372,17 +388,13 @@ class View(TabView):
         return fig
 
 
-def _lead(free: int) -> str:
-    """What the plane shows of a space with so many dimensions."""
-    flattened = crowded = ""
-    if free > 2:
-        flattened = f", of which this is a shadow: of {free} dimensions two are seen"
-    if free >= MANY:
-        crowded = (
-            f" Networks found at random differ in all {free} directions, and go only a little way "
-            "along these two."
-        )
-    return LEAD.format(flattened=flattened, crowded=crowded)
+def _sweep(label: str, axis: int) -> pmui.Button:
+    """A button by which the point goes along an axis and back; pressed again, it stops."""
+    button = pmui.Button(
+        label=label, variant="outlined", color="default", sx=PLAIN, size="small", margin=(4, 6)
+    )
+    button.js_on_click(args={"button": button, "axis": axis}, code=SWEEP)
+    return button
 
 
 def _of(replay: Replay) -> str:
