@@ -8,7 +8,8 @@ const TICKS = 70 // pixels between two numbers of an axis, at least
 export function drawSegment(space) {
   const { context: g, body, look, easel } = space
   const ends = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = ends[0][1]
-  drawAxis(space, y0, Math.min(easel.high - 46, y0 + 80))
+  const index = axisForce(body, look.contact)
+  if (index !== null) drawAxis(space, index, Math.min(easel.high - 46, y0 + 80))
   g.strokeStyle = look.cold
   g.lineWidth = 7
   g.lineCap = "butt"
@@ -31,15 +32,17 @@ export function drawSegment(space) {
   }
 }
 
-/** Below a line at y0, at y: the axis of a force, with its values where the line ends and at the point. */
-function drawAxis(space, y0, y) {
-  const { context: g, body, look, easel } = space, index = axisForce(body, look.contact)
-  if (index === null) return
-  const slope = body.axes[0][index], rest = body.origin[index], [left, right] = [24, easel.wide - 24]
-  const place = (v) => space.px([(space.sign * (v - rest)) / slope, 0])[0]
+/** Below S, at y: the axis of a force that grows across, with its least, present and largest value. */
+export function drawAxis(space, index, y) {
+  const { context: g, body, look, easel } = space, rest = body.origin[index], [left, right] = [24, easel.wide - 24]
+  const change = (u) => body.axes.reduce((sum, axis, k) => sum + u[k] * axis[index], 0)
+  const slope = change(space.moving(body.u, 1, 0)) - change(body.u) // by a step across
+  const place = (v) => space.px([(v - rest) / slope, 0])[0]
   const pixels = Math.abs(place(1) - place(0)), step = nice(TICKS / pixels)
-  const marked = [...body.corners.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
-    .map(([u, colour]) => [u[0] * slope + rest, colour]).map(([v, colour]) => ({ v, x: place(v), colour }))
+  const sorted = [...body.corners].sort((a, b) => change(a.u) - change(b.u)), ends = [sorted[0], sorted.at(-1)]
+  const marked = [...ends.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
+    .map(([u, colour]) => ({ v: change(u) + rest, place: space.px(space.flat(u)), colour }))
+    .map((mark) => ({ ...mark, x: mark.place[0] }))
   g.strokeStyle = look.edge
   g.lineWidth = 1
   g.beginPath()
@@ -57,24 +60,24 @@ function drawAxis(space, y0, y) {
   for (const [x, text] of ticks) space.write(x, y + 14, text, look.ink, 11)
   g.lineWidth = 1
   g.setLineDash([2, 4])
-  for (const { x, colour } of marked) {
+  for (const { x, place: [, above], colour } of marked) {
     g.strokeStyle = colour
     g.beginPath()
-    g.moveTo(x, y0)
+    g.moveTo(x, above)
     g.lineTo(x, y)
     g.stroke()
   }
   g.setLineDash([])
   marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) space.write(x, y + 14, number(v), colour, 12) })
   const name = forceName(body.scene, index)
-  space.write(easel.wide / 2, y + 33, slope * space.sign > 0 ? `${name} →` : `← ${name}`, look.ink)
+  space.write(easel.wide / 2, y + 33, slope > 0 ? `${name} →` : `← ${name}`, look.ink)
 }
 
 /** Which way a line is drawn: the force on its axis becomes larger to the right. */
 export function signOf(body) { return body.h === 1 ? Math.sign(body.axes[0][axisForce(body, null)]) || 1 : 1 }
 
 /** Of a line, the force on its axis: that of this contact if it changes, else the one that changes most. */
-function axisForce(body, contact) {
+export function axisForce(body, contact) {
   const axis = body.axes[0], most = (part) => {
     const size = Array.from({ length: body.count }, (_, c) => Math.abs(axis[2 * c + part])), c = size.findIndex((v) => v > 0.999 * Math.max(...size)) // the first of equals
     return size[c] > 1e-9 ? 2 * c + part : null

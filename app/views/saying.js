@@ -111,9 +111,14 @@ export function sentence(body, mu, now) {
   if (h > 3) return `${h} free numbers: infinitely many sets of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many sets. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
-  const grips = body.sides.some((side) => stopping(body, side) === AT_BOTH["about to slide up"])
-    ? " Where friction points down, the walls grip the disk as if it had been pressed in." : ""
+  const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
   return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}${grips}`
+}
+
+/** Whether friction on a disk between two walls, and nothing else, points down at both, as it can only there. */
+function gripped(body) {
+  const { scene } = body, F = body.forces(), between = body.sides.find((side) => stopping(body, side) === AT_BOTH["about to slide up"])
+  return between?.stops.every(([c]) => -F[2 * c + 1] * scene.normal[2 * c] < -1e-9)
 }
 
 /** Why S is empty: which disks and walls give way in the motion that proves it, and which friction would do. */

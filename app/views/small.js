@@ -24,14 +24,14 @@ export function render({ model, view }) {
   root.innerHTML = desk(MOST_MU)
   const parts = {}, told = {}
   const part = (name) => (parts[name] ??= root.querySelector(`.${name}`))
-  const now = { contact: null, disk: null, side: null, contacts: new Set(), fall: null, enough: null, filled: false, path: [], undo: [] }
+  const now = { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, filled: false, path: [], undo: [] }
   let body = null, mu = model.scene.mu, chosenMu = false, waiting = 0, asleep = 0, returning = false
 
   const gone = goneBanner(view, "What is in the page still moves.")
   root.prepend(gone)
   const builder = new Builder(part("own"), (built) => ask(model, view, { built, mu }))
   const arrows = new Arrows(part("packing"), heard), space = new Space(part("space"), heard)
-  const going = new Going(part("play"), (path) => { now.path = path; soon() })
+  const going = new Going(part("play"), (path) => { now.path = path; say(); soon() })
   const pushed = new Push(), bars = new Bars(part("bars")), planes = [...part("plane").querySelectorAll("select")]
   const tour = new TourCard(root, model.steps, model.all, (does) => {
     if (does.mu !== undefined) setMu(does.mu)
@@ -55,11 +55,14 @@ export function render({ model, view }) {
       arrows.own = body.scene.name === "own" ? part("packing").clientWidth : 0
       arrows.wide = part("packing").clientWidth
     }
-    arrows.draw(look)
+    arrows.draw({ ...look, contacts: lit() })
     if (space.draw(body, look, now.path)) soon()
     root.painted = (root.painted ?? 0) + 1
-    if (!going.frame || root.painted % 2) bars.draw(body, now.contacts, now.bounds) // numbers on a walk: every second frame
+    if (!going.frame || root.painted % 2) bars.draw(body, lit(), now.bounds) // numbers on a walk: every second frame
   }
+
+  /** Contacts that light up among disks and bars: those looked at, and those the point is read by. */
+  const lit = () => new Set([...now.contacts, ...now.read])
 
   const soon = () => { waiting ||= requestAnimationFrame(paint) }
 
@@ -92,13 +95,15 @@ export function render({ model, view }) {
       if (what === "select" && given && !given.loose) remember()
       now.side = null
     }
+    if (what === "point") Object.assign(now, { side: null, read: given, contacts: new Set(now.contact === null ? [] : [now.contact]) })
     if (what === "side") {
+      now.read = []
       now.side = given ? given.corners.join() : null
       now.contacts = new Set(given ? given.stops.map(([c]) => c) : now.contact === null ? [] : [now.contact])
     }
     if (what === "begin") remember()
-    if (what === "go") { going.pause(); body.goTo(given) }
-    if (what === "pull") { going.pause(); body.pull(given.contact, given.normal, given.tangential) }
+    if (what === "go") { going.pause(); body.goTo(given); say() }
+    if (what === "pull") { going.pause(); body.pull(given.contact, given.normal, given.tangential); say() }
     if (what === "press") return press(given)
     if (what === "carry") carry(given)
     if (what === "release" && builds()) builder.release()
@@ -118,7 +123,7 @@ export function render({ model, view }) {
 
   function undo() {
     const u = now.undo.pop()
-    if (u) { going.pause(); body.goTo(u) }
+    if (u) { going.pause(); body.goTo(u); say() }
     part("undo").disabled = !now.undo.length
     soon()
   }
@@ -193,7 +198,7 @@ export function render({ model, view }) {
     part("lesson").hidden = scene.name !== "groove"
     part("board").classList.toggle("reading", part("lesson").open && scene.name === "groove")
     if (!scene.i) return void tell("says", "The disks are being pressed together …")
-    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null })
+    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null })
     pushes(false)
     going.pause()
     mu = scene.mu
@@ -356,6 +361,8 @@ export function render({ model, view }) {
     if (row) { choose(Number(row.dataset.contact)); soon() }
   })
 
+  part("bars").addEventListener("pointerleave", () => { if (!now.chosen) { choose(null); soon() } })
+
   /** The disk and S as they are, for white paper: nothing chosen, and with words that can be read at their size. */
   function pictures() {
     const look = { ...colours(false), ...now, contact: null, disk: null, side: null, contacts: new Set(), dots: 0 }
@@ -394,6 +401,7 @@ export function render({ model, view }) {
       now.chosen = true
       remember()
       body.pull(contact, F[2 * contact] + push, F[2 * contact + 1])
+      say()
     } else if ((key === "n" || key === "N") && pushed.on) {
       now.disk = ((now.disk ?? -1) + 1) % body.scene.r.length
     } else if (key === "n" || key === "N") {

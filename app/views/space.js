@@ -2,14 +2,15 @@
 // the network on screen as a point in it. With more dimensions, its shadow.
 
 import { distance, dot, solve } from "./body.js"
-import { drawCompass, drawName } from "./compass.js"
+import { drawCompass, drawName, readBy, turnedTo } from "./compass.js"
 import { Easel } from "./easel.js"
-import { drawSegment, signOf } from "./line.js"
+import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
 import { drawInterval, drawShadow } from "./shadow.js"
 
 const TURN = 0.008 // radians a pixel
 // Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
 const BESIDE = [[46, 46], [95, 46], [140, 50], [30, 30], [60, 64]]
+const FLOOR = 46
 const ON = 34 // pixels of an arrow where S goes on without an end
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
@@ -52,12 +53,34 @@ export class Space {
   flat(u) {
     const { body } = this
     if (body.h > 3) return this.onAxes.map(({ row, rest }) => dot(row, u) + rest)
-    if (body.h < 3) return [this.sign * (u[0] ?? 0), u[1] ?? 0, 0]
+    if (body.h === 2) return [...this.lie.rows.map((row) => dot(row, u)), 0]
+    if (body.h < 2) return [this.sign * (u[0] ?? 0), 0, 0]
     return this.view.map((row) => dot(row, u))
   }
 
   /** Which way a line is drawn. */
   get sign() { return signOf(this.body) }
+
+  /** How a polygon lies: the contacts it is read by, and the axes of its picture; found once, as no friction shall turn it. */
+  get lie() {
+    const { body } = this
+    if (this.own?.of !== body.axes) {
+      const read = body.empty ? [] : readBy(body)
+      this.own = { of: body.empty ? null : body.axes, read, rows: turnedTo(body, read) }
+    }
+    return this.own
+  }
+
+  /** Contacts by whose normal forces the point is read: of the axis below S, and of the arrow beside it. */
+  get read() {
+    const { body } = this
+    if (body.h === 2) return this.lie.read
+    const force = body.h === 1 ? axisForce(body, null) : null
+    return force === null ? [] : [force >> 1]
+  }
+
+  /** Pixels below S for its axis; a line leaves enough by itself. */
+  get floor() { return this.body.h === 2 && this.read.length ? FLOOR : 0 }
 
   /** Both forces of the shadow, as rows of u: found once, as many points are drawn. */
   get onAxes() {
@@ -78,13 +101,14 @@ export class Space {
       const part = solve(M, [dx, dy]) ?? [dx / (M[0][0] || 1), 0]
       return u.map((v, k) => v + part[0] * a[k] + part[1] * b[k])
     }
-    if (body.h < 3) return u.map((v, k) => v + [this.sign * dx, dy][k])
+    if (body.h === 2) return u.map((v, k) => v + dx * this.lie.rows[0][k] + dy * this.lie.rows[1][k])
+    if (body.h < 2) return u.map((v) => v + this.sign * dx)
     return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
   }
 
   /** Half the width and height that S may take, which leaves room for words. */
   get room() {
-    const { wide: w, high: h } = this.easel, [x, y] = BESIDE[Math.min(this.body.h, 4)]
+    const w = this.easel.wide, h = this.easel.high - this.floor, [x, y] = BESIDE[Math.min(this.body.h, 4)]
     return [w / 2 - Math.min(x, 0.33 * w), h / 2 - Math.min(y, 0.2 * h)]
   }
 
@@ -99,7 +123,7 @@ export class Space {
 
   px([x, y]) {
     const { wide: w, high: h } = this.easel, { unit } = this
-    return [w / 2 + (x - this.centre[0]) * unit, h / 2 - (y - this.centre[1]) * unit]
+    return [w / 2 + (x - this.centre[0]) * unit, (h - this.floor) / 2 - (y - this.centre[1]) * unit]
   }
 
   /** The part of the plane that is seen follows S, so that it is seen to grow: not all the time. */
@@ -160,10 +184,11 @@ export class Space {
     g.lineJoin = "round" // no spikes where sides meet
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
+    const axis = body.h === 2 ? this.read[0] : null // whose interval is there
     if (body.h === 1) drawSegment(this)
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) this.drawSolid()
-    if (body.whole && body.h > 1 && look.contact !== null) drawInterval(this, look.contact)
+    if (body.whole && body.h > 1 && look.contact !== null && look.contact !== axis) drawInterval(this, look.contact)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
     g.beginPath()
@@ -252,6 +277,7 @@ export class Space {
     const { context: g, body, look } = this, { corners } = body
     const middle = this.px(this.flat(body.middle))
     const places = corners.map(({ u }) => this.px(this.flat(u)))
+    if (this.floor) drawAxis(this, 2 * this.read[0], this.easel.high - FLOOR + 6)
     const order = [...places.keys()].sort((a, b) =>
       Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
     g.beginPath()
@@ -277,11 +303,12 @@ export class Space {
       const out = Math.sign(normal[0] * (x - middle[0]) + normal[1] * (y - middle[1])) || 1, [ux, uy] = normal.map((v) => v * out)
       const text = side.cap ? "no end this way" : this.told("words", side)
       g.font = "13px sans-serif"
-      const upright = Math.abs(uy) < 0.64 // words beside it, in short lines
+      // Words beside it, in short lines, where they could not be read along it, or are longer than it is.
+      const upright = Math.abs(uy) < 0.64 || (Math.abs(ux) > 0.5 && 0.6 * g.measureText(text).width > long)
       const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
       const words = short ? text : text.replace(/ (at|between) /, "\n$1 ").replace(upright ? /^(disk \d+) / : /^$/, "$1\n")
       const on = side.cap ? ON : 0
-      if (long > 14 || lit) this.besides(x + on * ux, y + on * uy, ux, uy, words, lit)
+      if (long > 14 || lit) this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright)
       this.labels.push({ side, a, b, reach: 14 })
     }
     if (places.length < 3) return // a line among two dimensions
@@ -289,24 +316,31 @@ export class Space {
     drawCompass(this, places)
   }
 
-  /** Words outside a side at (x, y), u its normal: along it where they can be read so, else beside it. */
-  besides(x, y, ux, uy, text, lit) {
+  /** Words outside a side at (x, y), u its normal: along it, or beside it. */
+  besides(x, y, ux, uy, text, lit, along) {
     const { context: g, look } = this, lines = text.split("\n"), high = 12 + 7 * (lines.length - 1)
-    const wide = Math.max(...lines.map((line) => g.measureText(line).width)), along = Math.abs(uy) >= 0.64
+    const wide = Math.max(...lines.map((line) => g.measureText(line).width))
     const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
-    if (!this.free(at, along ? wide * Math.abs(uy) : wide, along ? wide * Math.abs(ux) + high : 2 * high) && !lit) return
+    const angle = along ? Math.atan(-ux / uy) : 0
+    if (!this.free(at, wide, 16 * lines.length, angle) && !lit) return
     if (!along) at[0] = Math.min(Math.max(at[0], wide / 2 + 4), this.easel.wide - wide / 2 - 4)
     g.save()
     g.translate(...at)
-    if (along) g.rotate(Math.atan(-ux / uy))
+    g.rotate(angle)
     this.write(0, 0, text, lit ? look.hand : look.ink, 13, "middle")
     g.restore()
   }
 
-  /** Whether nothing is written yet where these words shall be; then they have their place. */
-  free([x, y], wide, high) {
-    if (this.taken.some((t) => Math.abs(t.x - x) < 0.48 * (t.wide + wide) && Math.abs(t.y - y) < 0.45 * (t.high + high))) return false
-    this.taken.push({ x, y, wide, high })
+  /** Whether nothing is written yet where these words shall be, at this angle; then they have their place. */
+  free([x, y], wide, high, angle = 0) {
+    const count = Math.max(1, Math.round(wide / high)), [cos, sin] = [Math.cos(angle), Math.sin(angle)] // squares, about
+    const parts = Array.from({ length: count }, (_, k) => {
+      const along = wide * ((k + 0.5) / count - 0.5), part = wide / count
+      return { x: x + along * cos, y: y + along * sin, wide: part * cos + high * Math.abs(sin), high: part * Math.abs(sin) + high * cos }
+    })
+    const meets = (a, b) => Math.abs(a.x - b.x) < 0.48 * (a.wide + b.wide) && Math.abs(a.y - b.y) < 0.48 * (a.high + b.high)
+    if (parts.some((a) => this.taken.some((b) => meets(a, b)))) return false
+    this.taken.push(...parts)
     return true
   }
 
@@ -354,6 +388,7 @@ export class Space {
     this.canvas.setPointerCapture(event.pointerId)
     this.held = { turns: body.h === 3 && !near, px, py, u: [...body.u] }
     this.told("begin")
+    this.told("point", this.read)
     if (!near && body.h !== 3) { // the point comes to the hand
       this.held = { px: x, py: y, u: [...body.u] }
       this.moved(px, py)
@@ -364,7 +399,10 @@ export class Space {
   moved(px, py) {
     const { body, held } = this
     if (!body || body.empty) return
-    if (!held) return this.told("side", this.sideAt(px, py))
+    if (!held) {
+      const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 14
+      return near ? this.told("point", this.read) : this.told("side", this.sideAt(px, py))
+    }
     if (held.turns) {
       this.turn((px - held.px) * TURN, (py - held.py) * TURN)
       Object.assign(held, { px, py })

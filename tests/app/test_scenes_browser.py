@@ -167,9 +167,10 @@ def test_hover_lights_the_contact_and_keys_go_through_s(look):
     stops = "small.space.labels[0].side.stops.map(stop => stop[0])"
     until(page, f"[...small.now.contacts].join() === {stops}.join()")
     desk(page).locator("canvas.space").focus()
-    u = ask(page, "[...small.body.u]")
+    place = "small.space.flat(small.body.u)"
+    x, y, _ = ask(page, place)
     page.keyboard.press("ArrowRight")
-    assert ask(page, "small.body.u[0]") > u[0]
+    assert ask(page, f"{place}[0]") > x and ask(page, f"{place}[1]") == pytest.approx(y)
     page.keyboard.press("n")
     assert ask(page, "small.now.contact") == 0
     force = ask(page, "small.body.forces()[0]")
@@ -177,6 +178,55 @@ def test_hover_lights_the_contact_and_keys_go_through_s(look):
     assert ask(page, "small.body.forces()[0]") > force
     page.keyboard.press("Escape")
     assert ask(page, "small.now.contact") is None
+
+
+@pytest.mark.parametrize("query", ["?scene=box", "?scene=box&mu=0.55", "?scene=six"])
+def test_a_polygon_lies_on_the_axis_of_a_force(look, query):
+    """Turned and reflected, not stretched; one force grows to the right, another one upwards."""
+    page = look(query)
+    contact, other = ask(page, "small.space.read")
+    flat = np.array(ask(page, "[[0, 0], [1, 0], [0, 1]].map(u => small.space.flat(u))"))[:, :2]
+    turned = flat[1:] - flat[0]
+    np.testing.assert_allclose(turned @ turned.T, np.eye(2), atol=1e-12)
+    axes = np.array(ask(page, "small.body.axes.map(axis => [...axis])"))
+    slope = axes[:, 2 * contact] @ turned
+    assert slope[0] > 0 and slope[1] == pytest.approx(0, abs=1e-12)
+    assert (axes[:, 2 * other] @ turned)[1] > 0
+    lie = ask(page, "small.space.read")
+    desk(page).get_by_role("slider", name="friction μ").fill("0.4")
+    until(page, "small.body.mu === 0.4")
+    assert ask(page, "small.space.read") == lie  # no friction turns it
+
+
+def test_what_is_pointed_at_lights_up_everywhere(look):
+    """The point: the forces it is read by; a bar: its contact; nothing else, and not for long."""
+    page = look("?scene=box")
+    box = desk(page).locator("canvas.space").bounding_box()
+    lit = "[...small.now.contacts, ...small.now.read].sort().join()"
+    x, y = ask(page, "small.space.px(small.space.flat(small.body.u))")
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    until(page, f"{lit} === [...small.space.read].sort().join()")
+    rows = desk(page).locator(".bars > .lit")
+    assert rows.count() == 2
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    until(page, f"{lit} === ''")
+    desk(page).locator(".bars > div").nth(2).hover()
+    until(page, f"{lit} === '2'")
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    until(page, f"{lit} === ''")
+
+
+def test_the_walls_grip_the_disk_only_while_friction_points_down(look):
+    page = look("?scene=groove&mu=0.5")
+    grips = desk(page).get_by_text("the walls grip the disk")
+    desk(page).locator("canvas.space").focus()
+    for key, holds in (("ArrowRight", True), ("ArrowLeft", False)):
+        for _ in range(70):
+            page.keyboard.press(key)
+        # Friction on the disk at the left wall: up where it is positive, see the lesson.
+        up = ask(page, "small.arrows.ends()[0].across[1] * small.body.forces()[1]")
+        assert (up < 0) == holds
+        assert grips.count() == holds
 
 
 def test_the_forces_on_a_disk_close(look):
@@ -456,7 +506,7 @@ def test_a_scene_is_built_and_pushed_by_keyboard(look):
     page.keyboard.press("ArrowRight")
     assert ask(page, "[small.pushed.disk, small.body.load[6]]") == [2, pytest.approx(0.02)]
     assert "limit load" in desk(page).locator(".says").inner_text()
-    for _ in range(40):
+    for _ in range(70):
         page.keyboard.press("ArrowRight")
     until(page, "small.body.empty")
 
