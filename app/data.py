@@ -269,6 +269,12 @@ def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | 
     return nearest_cell([cell for cell in cells if cell.series == fullest], OPENING_MU)
 
 
+def with_states(cells: Sequence[Cell], wanted: Selection) -> Selection:
+    """The wanted Selection with the largest number of states that a cell has; or as it was."""
+    found = [c.selection for c in cells if c.selection._replace(states=wanted.states).names(wanted)]
+    return max(found, key=lambda selection: selection.states, default=wanted)
+
+
 LEAST_PLACE = -3.5  # stands for μ = 0
 
 

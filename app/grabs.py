@@ -175,8 +175,8 @@ class Hand(param.Parameterized):
         self._made, self._base = made, base
         self.held = made[-1][1] if made else None
         if refusal:
-            self.work.message = refusal
             self.pulls = [pull for pull, _ in made]
+            self.work.message = refusal  # which those who see the pulls go would take away
             return
         if ready is not None:
             self.tell(ready)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from urllib.parse import parse_qs
 
 import numpy as np
 import param
@@ -11,7 +12,7 @@ from granforce.records import InputError
 
 from . import known, perturbations
 from .beside import Beside
-from .data import Cell, Library, Shown, best_cell, nearest_cell
+from .data import Cell, Library, Shown, best_cell, nearest_cell, with_states
 from .grabs import Hand
 from .jobs import Job, as_one
 from .known import Knowledge
@@ -24,6 +25,8 @@ from .selection import Selection, brief, command, link, read_link
 from .work import Work
 
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
+# What is looked at by a visitor's choice, not by what plays or is zoomed.
+CHOSEN = {*Looks.param} - {"frame", "zoom", "dark"}
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
 
@@ -70,7 +73,15 @@ class AppState(param.Parameterized):
         self.param.watch(self._need_loads, "replay")
         self.looks.param.watch(self._need_loads, ["colour", "thickness"])
         self.work.computation.param.watch(self._bring_back, "dismissed")
+        # What was refused is told until something else is done.
+        self.param.watch(self._forget, "cell")
+        self.knowledge.param.watch(self._forget, "known")
+        self.hand.param.watch(self._forget, "pulls")
+        self.looks.param.watch(self._forget, [name for name in CHOSEN if name in VIEW])
         self.open(query)
+
+    def _forget(self, *events: Any) -> None:
+        self.work.message = ""
 
     # What is on screen
 
@@ -78,12 +89,15 @@ class AppState(param.Parameterized):
         """Show what a link selects, computing it if need be, or what is best to begin with."""
         try:
             wanted, told = read_link(query)
+            self.work.message = ""
         except InputError as error:
             wanted, told = None, {}
             self.work.message = str(error)
         view = read_view(told, self._viewed)
         self.looks.dark = view.get("dark", self.looks.dark)  # before there is anything to be seen
-        self._look_up(wanted, self._as_new() | view)
+        self._look_up(
+            wanted, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
+        )
 
     def _as_new(self) -> View:
         """What a new page shows, but for the theme: what a link does not name."""
@@ -180,14 +194,18 @@ class AppState(param.Parameterized):
                 if self.library.shown_in_memory(near) is None
             )
 
-    def _look_up(self, wanted: Selection | None, view: View) -> None:
+    def _look_up(self, wanted: Selection | None, view: View, counted: bool) -> None:
+        """counted: whether so many states are wanted; else those that a store has will do."""
         library = self.library
+
+        def meant(cells: list[Cell]) -> Selection | None:
+            return wanted if wanted is None or counted else with_states(cells, wanted)
 
         def read(job: Job) -> tuple[list[Cell], Shown | None, str]:
             damage = ""
             while True:
                 cells = library.cells()
-                cell = best_cell(cells, wanted)
+                cell = best_cell(cells, meant(cells))
                 try:
                     return cells, cell and library.shown(cell), damage
                 except InputError as error:
@@ -197,17 +215,19 @@ class AppState(param.Parameterized):
 
         def done(found: tuple[list[Cell], Shown | None, str]) -> None:
             cells, shown, damage = found
-            self.work.message = damage or self.work.message
+            message, asked = damage or self.work.message, meant(cells)
             self._list(cells)
             self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
             if shown is not None:
                 self._show(shown, view)
-            if wanted is not None and (shown is None or not shown.cell.selection.names(wanted)):
-                self._ask(wanted, at_once=True)
+            if asked is not None and (shown is None or not shown.cell.selection.names(asked)):
+                self._ask(asked, at_once=True)
+            self.work.message = self.work.message or message
 
-        at_hand = best_cell(library.catalogue, wanted)
+        wished = meant(library.catalogue)
+        at_hand = best_cell(library.catalogue, wished)
         shown = at_hand and library.shown_in_memory(at_hand)
-        if shown and (wanted is None or shown.cell.selection.names(wanted)):
+        if shown and (wished is None or shown.cell.selection.names(wished)):
             done((library.catalogue, shown, ""))  # the first picture needs no thread
             self.refresh()
         else:

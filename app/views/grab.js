@@ -110,8 +110,8 @@ export class Grab {
   /** A key moves the force of the selected contact. */
   nudge(sign) {
     const { contact } = this.player.model
-    if (contact === null || contact === undefined) return this.player.say(UNCHOSEN)
-    if (this.player.pins.has(contact)) return this.player.say(KNOWN)
+    if (contact === null || contact === undefined) return this.player.say(UNCHOSEN, true)
+    if (this.player.pins.has(contact)) return this.player.say(KNOWN, true)
     this.grip = null
     if (this.contact !== contact) {
       this.steps = 0

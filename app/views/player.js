@@ -343,16 +343,22 @@ class Player {
     this.say(told.join("; "))
   }
 
-  /** One line beside the number of the network. */
-  say(words) { this.buttons.say(words) }
+  /** One line beside the number of the network; refused: until something else is done. */
+  say(words, refused = false) {
+    this.refused = refused
+    this.buttons.say(words)
+  }
+
+  /** Something was done. */
+  recover() { if (this.refused) this.say("") }
 
   /** Take the selected contact's force for known, as it is on screen; known, let it go. */
   hold({ mixed }) {
     const { contact } = this.model, { error } = this.buttons
-    if (contact === null || contact === undefined) return this.say(UNCHOSEN)
+    if (contact === null || contact === undefined) return this.say(UNCHOSEN, true)
     if (this.grows || !this.scene.hand) return
     const known = this.pins.has(contact)
-    if (!known && Number.isNaN(error)) return this.say(NO_ERROR)
+    if (!known && Number.isNaN(error)) return this.say(NO_ERROR, true)
     this.tell({ known: known ? { release: contact } : { hold: [contact, mixed.normal[contact], error] } })
   }
 
@@ -391,8 +397,8 @@ class Player {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
-      pins: loaded(() => scene.drawMarks(this.look.style)),
-      contact: loaded(() => { this.difference.guess(model.contact); this.predict.guess(model.contact); this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
+      pins: loaded(() => { this.recover(); scene.drawMarks(this.look.style) }),
+      contact: loaded(() => { this.recover(); this.difference.guess(model.contact); this.predict.guess(model.contact); this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
       second: loaded(() => { this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
     }
   }

@@ -370,6 +370,58 @@ def test_stored_states_are_found_whatever_was_kept_of_them(state, wait_for):
     assert state.cell.mu == 1 and not state.missing
 
 
+def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library, wait_for):
+    """Whether the catalogue was read before or is read only now; a number that is named is kept."""
+    from app.state import AppState
+
+    link = f"?mu=1&n={DISKS}&relax=nearest"
+    for _ in range(2):
+        state = AppState(library, query=link)
+        wait_for(state)
+        assert state.cell.mu == 1 and len(state.replay.number) == KEPT + 1 and not state.missing
+        assert not state.work.computation.running and state.selection.states == STATES
+    state = AppState(library, query=f"{link}&states=9")
+    while state.selection is None or state.work.reader.running:
+        state.work.poll()
+    assert state.missing and state.selection.states == 9
+    state.work.close()
+
+
+@pytest.mark.parametrize("done", ["another mu", "a force known", "a pull undone", "a look", "Back"])
+def test_a_refusal_is_told_until_something_succeeds(state, wait_for, done):
+    if done == "a pull undone":
+        state.hand.pulls = [(3, float(state.replay.normal[0, 3]))]
+        wait_for(state)
+    state.ask(small(0.2, 10**9), at_once=True)
+    state.looks.zoom = (1.0, 1.0, 2.0)  # which is looked at
+    assert "states" in state.work.message
+    if done == "another mu":
+        state.choose(mu=1)
+    elif done == "a force known":
+        state.knowledge.hold(3, float(state.replay.normal[0, 3]))
+    elif done == "a pull undone":
+        state.hand.undo()
+    elif done == "a look":
+        state.looks.colour = "extent"
+    else:
+        state.open("?scene=many")
+    wait_for(state)
+    assert state.work.message == ""
+
+
+def test_what_was_wrong_with_a_link_is_told_on_the_page_that_opens(library, wait_for):
+    from app.state import AppState
+
+    state = AppState(library, query="?mu=-1&tab=export")
+    wait_for(state)
+    assert state.cell is not None and "friction" in state.work.message
+    too_many = f"?mu=1&n={DISKS}&states={10**9}&tab=export&colour=extent"
+    state = AppState(library, query=too_many)
+    wait_for(state)
+    assert state.cell is not None and state.looks.colour == "extent"
+    assert "states" in state.work.message
+
+
 def test_states_in_no_store_are_missing_until_computed(state, wait_for):
     before = state.replay
     state.ask(small(0.3))
