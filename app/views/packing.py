@@ -280,7 +280,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
         widest=2 / (CHAIN_WIDTH * looks.stretch),
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=DEFINED.get(None if pulled else looks.colour, colour_words(looks, pulled)),
+        colour=DEFINED.get("" if pulled else looks.colour, colour_words(looks, pulled)),
         bar=bar,
         marks=_marks(looks.dark) if looks.overlay else "",
     )

@@ -34,13 +34,19 @@ EXPLAINED = {  # words on tiles → keys of the glossary
     "limit load": "limit_load",
 }
 TILES = '<div style="display:flex;flex-wrap:wrap;gap:6px">{}</div>'
-SKETCH = """<svg viewBox="0 0 300 92" width="300" height="92" role="img"
- aria-label="two disks that touch, with an arrow on each, away from the other" fill="none"
- stroke="currentColor" style="display:block;margin:6px 0 2px">
- <g fill="rgba(139,160,187,0.35)" stroke="#8fa1b5" stroke-width="1.5">
- <circle cx="112" cy="46" r="38"/><circle cx="188" cy="46" r="38"/></g>
+SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
+ aria-label="two disks that touch, with an arrow on each, away from the other, held by pale disks
+ around them" fill="none" stroke="currentColor" style="display:block;margin:6px 0 2px">
+ <g fill="rgba(139,160,187,0.14)" stroke="#8fa1b5" stroke-opacity="0.5">
+ <circle cx="54.3" cy="51.4" r="34"/><circle cx="65.5" cy="115.6" r="31"/>
+ <circle cx="160" cy="20.8" r="29"/><circle cx="160" cy="132.4" r="30"/>
+ <circle cx="265.7" cy="51.4" r="34"/><circle cx="254.5" cy="115.6" r="31"/></g>
+ <g fill="rgba(139,160,187,0.45)" stroke="#8fa1b5" stroke-width="1.5">
+ <circle cx="122" cy="76" r="38"/><circle cx="198" cy="76" r="38"/></g>
  <g stroke="{colour}" stroke-width="4" stroke-linecap="round">
- <path d="M106 46H20M32 36L20 46L32 56M194 46H280M268 36L280 46L268 56"/></g>
+ <path d="M116 76H58M70 66L58 76L70 86M204 76H262M250 66L262 76L250 86"/></g>
+ <g fill="currentColor" stroke="none" font-size="11" opacity="0.75" text-anchor="middle">
+ <text x="40" y="46">holds</text><text x="280" y="46">holds</text></g>
 </svg>"""
 LEAD = (
     "<b>Two growing forces push the two disks of a contact apart</b>, along the line through "
