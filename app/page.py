@@ -98,8 +98,8 @@ GONE_MS = (
 
 # The tabs: name in links → title, module of app.views whose `View(state)` fills it when first seen.
 TABS = {
-    "intervals": "Intervals",
-    "statistics": "Statistics",
+    "intervals": "How far?",
+    "statistics": "Friction",
     "plane": "Force space",  # the third: see TAB_LESS
     "perturb": "Push",
     "upload": "Your packing",

@@ -52,7 +52,7 @@ LABELS = {
     "Which force to measure next?": "informative",
     "Push": "push",
     "Force space": "s",
-    "Intervals": "exact",
+    "How far?": "exact",
     "limit load": "limit_load",
     "what limit loads are": "limit_load",
 }

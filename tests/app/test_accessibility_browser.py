@@ -8,8 +8,8 @@ axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 PATIENCE = 60_000  # ms, on a busy machine
 GRAVE = ("serious", "critical")
 TABS = {
-    "intervals": "Intervals",
-    "statistics": "Statistics",
+    "intervals": "How far?",
+    "statistics": "Friction",
     "plane": "Force space",
     "perturb": "Push",
     "upload": "Your packing",

@@ -97,11 +97,11 @@ def test_back_and_forward_restore_views_and_copied_links(visit):
     ask_for_mu(page, 1)
     shows(page, 1)
     searched(page, "mu=1&")
-    page.get_by_role("tab", name="Statistics").click()
+    page.get_by_role("tab", name="Friction").click()
     searched(page, "tab=statistics")
     page.go_back()
     page.wait_for_function("() => !location.search.includes('tab=')")
-    page.locator("[role=tab][aria-selected=true]", has_text="Intervals").wait_for()
+    page.locator("[role=tab][aria-selected=true]", has_text="How far?").wait_for()
     page.go_back()
     shows(page, 0.1)
     searched(page, "mu=0.1&")
@@ -112,7 +112,7 @@ def test_back_and_forward_restore_views_and_copied_links(visit):
     shows(page, 1)
     searched(page, "mu=1&")
     page.go_forward()
-    page.locator("[role=tab][aria-selected=true]", has_text="Statistics").wait_for()
+    page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
 
 
 def test_steps_of_the_player_are_not_gone_back_to(visit):
@@ -255,7 +255,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
 def test_space_and_arrows_play_whatever_was_clicked(visit, focused):
     page = looks(visit("?tab=statistics" if focused == "toggle" else ""))
     clicked = {
-        "tab": page.get_by_role("tab", name="Intervals"),
+        "tab": page.get_by_role("tab", name="How far?"),
         "toggle": page.get_by_role("button", name="logarithmic", exact=True),
         "switch": page.get_by_label("Strong and undetermined contacts"),
     }[focused]
@@ -400,7 +400,7 @@ def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, folder):
     page = visit("?tab=perturb&contact=5")
     page.get_by_role("button", name="Push", exact=True).click()
     page.get_by_text("the packing gives way:").wait_for()
-    page.get_by_role("tab", name="Statistics").click()
+    page.get_by_role("tab", name="Friction").click()
     page.get_by_text("Forces are least determined at friction").wait_for()
     assert "already known" not in (folder / "log").read_text()
 

@@ -490,7 +490,7 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
 @pytest.mark.parametrize("width, height", [(1280, 800), (1440, 900), (1536, 864), (1700, 900)])
 def test_the_tabs_are_beside_a_packing_that_the_window_holds(visit, width, height):
     page = visit("", width, height)
-    first, last = (page.get_by_role("tab", name=name) for name in ("Intervals", "Export"))
+    first, last = (page.get_by_role("tab", name=name) for name in ("How far?", "Export"))
     last.wait_for()
     packing = page.locator(".scene").first.bounding_box()
     assert first.bounding_box()["x"] > packing["x"] + 0.9 * packing["width"]

@@ -341,7 +341,7 @@ def test_closed_pages_are_forgotten(chromium, shipped, tmp_path):
             pages.append(chromium.new_page())
             pages[-1].goto(url + MANY)
             painted(pages[-1], PATIENCE)
-        for tab in ("Statistics", "Force space", "Push", "Your packing", "Export"):
+        for tab in ("Friction", "Force space", "Push", "Your packing", "Export"):
             pages[0].get_by_role("tab", name=tab).click()
             pages[0].wait_for_timeout(500)
         wait_for([3])
