@@ -39,7 +39,8 @@ export class Arrows {
     this.body = body
     this.easel.measure()
     const mean = body.sumAt(body.u) / body.count
-    this.forceUnit = (0.75 * Math.max(...body.scene.r)) / (Math.max(Math.abs(mean), 1e-6) || 1)
+    const size = (body.scene.box[0] ? Math.min : Math.max)(...body.scene.r) // many arrows are short ones
+    this.forceUnit = (0.75 * size) / (Math.max(Math.abs(mean), 1e-6) || 1)
     if (same) return // where it is built, nothing moves but what the hand moves
     const { scene } = body, { x, r, walls, box } = scene
     const xs = [], ys = []

@@ -34,7 +34,8 @@ export function render({ model, view }) {
   const going = new Going(part("play"), (path) => { now.path = path; say(); soon() })
   const pushed = new Push(), bars = new Bars(part("bars")), planes = [...part("plane").querySelectorAll("select")]
   const tour = new TourCard(root, model.steps, model.all, (does) => {
-    if (does.mu !== undefined) setMu(does.mu)
+    if (does.scene !== body?.scene.name) ask(model, view, { scene: does.scene, ...(does.mu === undefined ? {} : { mu: does.mu }) })
+    else if (does.mu !== undefined) setMu(does.mu)
     Object.assign(part("card").style, { background: colours().paper, color: colours().ink })
   }, () => leave("many", "&tour=1"))
 

@@ -20,21 +20,28 @@ FIRST_STEPS = (
         "A disk of weight 1 lies in a groove. Each wall presses on it and rubs: four forces. But "
         "there are only three equations: nothing sideways, nothing up or down, no turning. One "
         "number stays free: the forces are not determined, although nothing moves.",
-        {"mu": 0.5},
+        {"scene": "groove", "mu": 0.5},
     ),
     (
         "Every way to hold it, at once",
         "The line is S: each of its points is one set of forces that holds the disk. Drag the "
         "point, or an arrow: the forces change and stay in balance. S ends where a force meets the "
         "edge of its wedge, the friction cone: there the disk is about to slide.",
-        {"mu": 0.5},
+        {"scene": "groove", "mu": 0.5},
     ),
     (
         "What friction does",
         "Drag the friction μ. At μ = 0 the wedges are closed, and S is one point. More friction "
         "opens the wedges, and S grows. At μ = 1, as steep as the walls, it has no end any more: "
-        "the disk has jammed itself. Next: 400 disks, and the same thing.",
-        {"mu": 0.8, "see": "strip"},
+        "the disk has jammed itself.",
+        {"scene": "groove", "mu": 0.8, "see": "strip"},
+    ),
+    (
+        "More disks, more free numbers",
+        "Thirteen disks pressed together from all sides leave eight numbers free: S has eight "
+        "dimensions, of which only a shadow can be drawn, on two of the forces. Drag the point, or "
+        "an arrow: all forces follow. Next: 400 disks, with hundreds of free numbers.",
+        {"scene": "thirteen"},
     ),
 )
 
@@ -69,7 +76,7 @@ class Small(Scripted):
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
         if name == scenes.MANY:  # has a page of its own
             return
-        if name in ("six", "solid"):  # packed first
+        if name in made.SCENES and made.SCENES[name].packed:
             self._task.start(lambda job: scenes.drawn(name, mu), self._put)
             return
         try:

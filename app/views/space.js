@@ -71,9 +71,10 @@ export class Space {
     return this.own
   }
 
-  /** Contacts by whose normal forces the point is read: of the axis below S, and of the arrow beside it. */
+  /** Contacts by whose forces the point is read: of the axis below S, and of the arrow or axis beside it. */
   get read() {
     const { body } = this
+    if (body.h > 3) return this.shadow.map((force) => force >> 1)
     if (body.h === 2) return this.lie.read
     const force = body.h === 1 ? axisForce(body, null) : null
     return force === null ? [] : [force >> 1]

@@ -115,10 +115,10 @@ export function render({ model, view }) {
     requestAnimationFrame(() => encircle(found, title, step, tall))
   }
 
-  /** Before the first step are those of the groove, on a page of their own. */
+  /** Before the first step are those of small scenes, on a page of their own. */
   function earlier() {
     if (model.step > 1) go(model.step - 1)
-    else window.location.assign(`?scene=groove&tour=${model.before}`)
+    else window.location.assign(`?scene=${model.scene}&tour=${model.before}`)
   }
 
   part(".begin").addEventListener("click", () => go(1))

@@ -68,6 +68,7 @@ class Tour(Scripted):
     step = param.Integer(default=0, doc="1 … 6 while the tour is on, else 0")
     steps = param.List(doc="title, text and target of each step")
     before = param.Integer(default=len(FIRST_STEPS), doc="steps of the tour on the page before")
+    scene = param.String(default=FIRST_STEPS[-1][2]["scene"], doc="of the last of these")
     first = param.Boolean(doc="whether the page was opened without a view to show")
 
     _esm = module("tour")

@@ -31,7 +31,7 @@ def add_pack(commands: Commands) -> None:
         "--scene",
         metavar="NAME",
         help="a small scene in place of a packing made from a gas: groove, box, pyramid, press, "
-        "leaning, column, six, solid or many; of the other options, it takes --mu alone",
+        "leaning, six, solid, column, thirteen or many; of the other options, it takes --mu alone",
     )
     add_packing(command)
     add_store(command)

@@ -40,8 +40,7 @@ SNAPPED = 1e-9
 # Radius of the grain behind a place where a wall is touched, relative to the disk's; of a wall that
 # presses, relative to the largest disk's.
 STUD = 0.25
-# Friction at which the six disks are pressed together, and how many seeds are tried.
-PACKED_AT, MOST_SEEDS = 0.5, 100
+MOST_SEEDS = 100  # tried for a packing with the dimensions that a scene is to have
 
 
 class Sketch(NamedTuple):
@@ -58,6 +57,7 @@ class _Scene(NamedTuple):
     title: str  # on screen
     mu: float  # unless another is asked for
     make: Callable[..., Sketch | Packing]  # make(mu, **options) gives a Sketch, or a Packing
+    packed: bool = False  # whether its disks are pressed together first, which takes a while
 
 
 def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
@@ -307,30 +307,41 @@ def _column(mu: float, disks: int = 10, angle: float = 30.0) -> Sketch:
     return _resting(x, [[0, height, 0, 0], [0, 0, width, 0], [width, 0, width, height]])
 
 
-def _six(mu: float, dimension: int = 2) -> Packing:
-    """Six disks in a periodic box, pressed at PACKED_AT: the first seed with that many of h."""
+def _pressed(mu: float, disks: int, packed_mu: float, dimension: int) -> Packing:
+    """So many disks pressed together in a periodic box: the first seed with that many of h."""
     for seed in range(1, MOST_SEEDS):
         try:
-            made = pack(6, mu=PACKED_AT, seed=seed)
+            made = pack(disks, mu=packed_mu, seed=seed)
             if ensemble(made).dimension == dimension:
-                return made._replace(mu=mu, info=made.info | {"packed_mu": PACKED_AT})
+                return made._replace(mu=mu, info=made.info | {"packed_mu": packed_mu})
         except (NotJammedError, UndecidedError):
             continue
-    raise InputError(f"no six disks of {MOST_SEEDS} seeds have h = {dimension}")
+    raise InputError(f"no {disks} disks of {MOST_SEEDS} seeds have h = {dimension}")
 
 
 def _many(mu: float) -> Packing:
     return pack(400, mu=mu, seed=1)
 
 
+# In order of their size, as lists have them.
 SCENES = {
     "groove": _Scene("One disk in a groove", 0.5, _groove),
     "box": _Scene("Two disks in a box", 0.3, _box),
     "pyramid": _Scene("Three disks as a pyramid", 0.4, _pyramid),
     "press": _Scene("Three disks under a press", 0.4, _press),
     "leaning": _Scene("A pyramid against a wall", 0.4, _leaning),
+    "six": _Scene(
+        "Six disks under pressure", 0.5,
+        partial(_pressed, disks=6, packed_mu=0.5, dimension=2), packed=True,
+    ),
+    "solid": _Scene(
+        "Six disks, S a solid body", 0.5,
+        partial(_pressed, disks=6, packed_mu=0.5, dimension=3), packed=True,
+    ),
     "column": _Scene("Ten disks in a column", 0.3, _column),
-    "six": _Scene("Six disks under pressure", 0.5, _six),
-    "solid": _Scene("Six disks, S a solid body", 0.5, partial(_six, dimension=3)),
+    "thirteen": _Scene(
+        "Thirteen disks under pressure", 0.3,
+        partial(_pressed, disks=13, packed_mu=0.3, dimension=8), packed=True,
+    ),
     "many": _Scene("400 disks under pressure", 0.1, _many),
-}
+}  # fmt: skip

@@ -133,7 +133,7 @@ def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height)
     picture(page, f"newcomer/tour-4-{width}")
     assert right - left > 0.25 * width and bottom - top > 100
     page.get_by_role("dialog").get_by_role("button", name="Next").click()
-    page.get_by_role("dialog").get_by_text("8 of 9").wait_for()
+    page.get_by_role("dialog").get_by_text("9 of 10").wait_for()
     slider = page.locator(".friction")
     slider.wait_for()
     page.wait_for_function(

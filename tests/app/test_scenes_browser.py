@@ -62,19 +62,23 @@ def test_scenes_fit_on_every_screen(look, name, width, height):
     page.screenshot(path=ARTEFACTS / f"{name}-{width}.png")
 
 
-def test_the_first_visit_begins_with_the_groove_and_goes_on_to_400_disks(look):
+def test_the_first_visit_goes_on_from_one_disk_over_thirteen_to_400(look):
     page = look(first=True)
     card = page.get_by_role("dialog")
-    for step in (1, 2, 3):
-        card.get_by_text(f"{step} of 9").wait_for()
+    for step, scene in ((1, "groove"), (2, "groove"), (3, "groove"), (4, "thirteen")):
+        card.get_by_text(f"{step} of 10").wait_for()
+        until(page, f"small.body.scene.name === '{scene}'")
         box = card.bounding_box()  # above what it speaks of, not over it
         assert box["y"] + box["height"] <= page.locator("canvas.packing").bounding_box()["y"]
         card.get_by_role("button", name="Next").click()
     painted(page, PATIENCE)
-    page.get_by_role("dialog").get_by_text("4 of 9").wait_for()
+    page.get_by_role("dialog").get_by_text("5 of 10").wait_for()
     page.get_by_role("dialog").get_by_role("button", name="Back").click()
     drawn(page)
-    page.get_by_role("dialog").get_by_text("3 of 9").wait_for()
+    page.get_by_role("dialog").get_by_text("4 of 10").wait_for()
+    page.get_by_role("dialog").get_by_role("button", name="Back").click()
+    until(page, "small.body.scene.name === 'groove' && small.mu === 0.8")
+    page.get_by_role("dialog").get_by_text("3 of 10").wait_for()
 
 
 @pytest.mark.parametrize(
@@ -330,6 +334,27 @@ def test_a_column_has_a_shadow_and_exact_bounds(look):
     )
     forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
     assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-9
+
+
+def test_thirteen_disks_have_a_shadow_whose_two_forces_light_up(look):
+    page = look("?scene=thirteen")
+    assert ask(page, "small.body.h") == 8
+    until(page, "small.now.bounds && !small.space.outline.stale")
+    S = gf.ensemble(gf.scene("thirteen"))
+    exact = gf.intervals(S)
+    np.testing.assert_allclose(
+        np.array(ask(page, "small.now.bounds")),
+        np.column_stack([exact.lower[:, 0], exact.upper[:, 0]]), atol=1e-6,
+    )  # fmt: skip
+    box = desk(page).locator("canvas.space").bounding_box()
+    x, y = ask(page, "small.space.px(small.space.flat(small.body.u))")
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x + 30, box["y"] + y - 20, steps=4)
+    page.mouse.up()
+    assert ask(page, "small.now.read") == [0, 1] == ask(page, "small.space.read")
+    forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
+    assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-6
 
 
 def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):

@@ -40,7 +40,7 @@ def test_every_scene_of_the_library_is_on_the_list():
 
 
 @pytest.mark.parametrize(
-    "name", ["groove", "box", "pyramid", "press", "leaning", "column", "solid"]
+    "name", ["groove", "box", "pyramid", "press", "leaning", "solid", "column", "thirteen"]
 )
 def test_forces_less_equations_is_free(name):
     drawn = scenes.drawn(name)

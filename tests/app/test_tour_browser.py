@@ -6,13 +6,14 @@ import pytest
 from serving import MANY, how_it_is_made, painted, scene
 from small_store import ROOT
 
+from app.views.small import FIRST_STEPS
 from granforce.glossary import TERMS
 
 # Pictures to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "tour"
 PATIENCE = 60_000  # ms, on a busy machine
 STEPS = 6
-BEFORE = 3  # steps on the page of the groove
+BEFORE = len(FIRST_STEPS)  # steps on the pages of small scenes
 
 pytestmark = pytest.mark.browser
 

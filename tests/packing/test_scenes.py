@@ -197,13 +197,19 @@ def test_the_walls_of_a_column_carry_what_janssen_allows(mu):
     assert S.dimension == 10
 
 
-def test_six_disks_in_a_box_have_two_dimensions_and_three():
-    for name, h in (("six", 2), ("solid", 3)):
+def test_disks_under_pressure_have_as_many_dimensions_as_is_said():
+    for name, disks, h in (("six", 6, 2), ("solid", 6, 3), ("thirteen", 13, 8)):
         packing = gf.scene(name)
         S = gf.ensemble(packing)
-        assert (len(packing.r), S.dimension, len(gf.body(S).axes)) == (6, h, h)
-        assert S.admits(S.original)
+        assert (len(packing.r), S.dimension) == (disks, h)
+        assert h > 3 or len(gf.body(S).axes) == h
+        assert S.admits(S.original) and SCENES[name].packed
         assert gf.scene(name, 0.4).x.tolist() == packing.x.tolist()  # μ moves no disk
+
+
+def test_scenes_are_listed_in_order_of_their_size():
+    disks = [gf.scene(name).info.get("disks", len(gf.scene(name).r)) for name in SCENES]
+    assert disks == sorted(disks)
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "many"])
