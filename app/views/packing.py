@@ -238,7 +238,7 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = f"{full:.3g} ⟨fₙ⟩ less", diverging, f"{full:.3g} ⟨fₙ⟩ more"
+    change = "less", diverging, f"{full:.3g} ⟨fₙ⟩ more"  # as much less
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)

@@ -33,9 +33,9 @@ export function render({ model, view }) {
   const arrows = new Arrows(part("packing"), heard), space = new Space(part("space"), heard)
   const going = new Going(part("play"), (path) => { now.path = path; say(); soon() })
   const pushed = new Push(), bars = new Bars(part("bars")), planes = [...part("plane").querySelectorAll("select")]
-  const tour = new TourCard(root, model.steps, model.all, (does) => {
-    if (does.scene !== body?.scene.name) ask(model, view, { scene: does.scene, ...(does.mu === undefined ? {} : { mu: does.mu }) })
-    else if (does.mu !== undefined) setMu(does.mu)
+  const tour = new TourCard(root, model.steps, model.all, ({ scene, mu: at }) => {
+    if (scene !== body?.scene.name) ask(model, view, at === undefined ? { scene } : { scene, mu: at })
+    else if (at !== undefined) setMu(at)
     Object.assign(part("card").style, { background: colours().paper, color: colours().ink })
   }, () => leave("many", "&tour=1"))
 
