@@ -201,7 +201,9 @@ def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
     page.wait_for_function(
         "e => e.scene.geometry.tilt !== 0", arg=page.locator(".scene").element_handle()
     )
-    page.get_by_text(f"tilted by {packing.tilt:.2f}".replace("-", "−")).first.wait_for()
+    page.get_by_text(f"tilted by {packing.tilt:.2f}".replace("-", "−")).first.wait_for(
+        state="attached"
+    )
     corners = page.locator(".scene").evaluate(
         """({scene}) => {
             const corners = [], context = {
