@@ -43,7 +43,7 @@ LEGEND = """
 <span tabindex="0" data-term="{width_term}">width: {width}
  <svg width="40" height="12"><polygon points="0,5.5 40,0 40,12 0,6.5"
   fill="currentColor" fill-opacity="0.65"/></svg>
- {widest:.3g} ⟨fₙ⟩ as wide as the largest disk</span>
+ {widest:.3g} × the mean ⟨fₙ⟩: as wide as the largest disk</span>
 <span tabindex="0" data-term="rattler">pale disks: loose</span>
 {marks}
 """

@@ -51,7 +51,7 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
 LEAD = (
     "<b>Two growing forces push the two disks of a contact apart</b>, along the line through "
     "their centres, while their neighbours hold them, until no forces can balance any more and the "
-    "packing gives way. With how many times the mean force?"
+    "packing gives way. Guess: how many times the mean force does it take?"
 )
 HINT = "Click any contact in the packing, or take the strongest one."
 ISOSTATIC = (

@@ -121,7 +121,7 @@ class View(TabView):
             return
         free = replay.summary["dimension"]
         self.lead.object = LEAD.format(
-            flattened=f", a shadow of {free} dimensions" if free > 2 else ""
+            flattened=f", the flat shadow of a shape of {free} dimensions" if free > 2 else ""
         )
         for button in self.sweeps:
             button.visible = free > 0 and not state.growing
@@ -383,7 +383,7 @@ class View(TabView):
         legend_above(fig, 5)
         (self.marks,) = (item for item in fig.legend[0].items if item.label == value("beside"))
         self.marks.visible = False
-        corner(fig, "outline: exact; dots: found at random")
+        corner(fig, "outline: exact; dots: found at random; lines: one after another")
         fig.add_tools(hover([states], ("network", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
 

@@ -88,8 +88,8 @@ export function pictured(body) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
-  return h > 3 ? `one shadow of S, which has ${h} dimensions; its outline is exact`
-    : `${S} ${["", "a line", "a polygon; points far apart are very different sets of forces", "a body; drag beside the point to turn it"][h]}`
+  return h > 3 ? `all pairs of values that these two forces can have: one shadow of S, which has ${h} dimensions; dots: found at random`
+    : `${S} ${["", "a line", "a polygon", "a body; drag beside the point to turn it"][h]}`
 }
 
 /** The sentence over a scene. */

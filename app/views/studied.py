@@ -33,7 +33,7 @@ SAMPLERS = {
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
-PEAK = "forces least determined here"
+PEAK = "forces are freest here"
 RISES = "friction gives\neach force room"
 FALLS = "but leaves\nfewer contacts"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
@@ -42,8 +42,8 @@ SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 # Titles of the figures of indeterminacy after the first, which are closed at first.
 FOLDED = (
     "Why it falls again: with more friction, packings have fewer contacts",
-    "Measured in three ways",
-    "Found in several ways",
+    "Three measures of that freedom",
+    "Networks found in other ways",
 )
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
 CLAIMS = """<details><summary>What the paper says, and what was found here</summary>
@@ -149,8 +149,9 @@ def most_undetermined(points: Points) -> str:
         return ""
     peak = max(points, key=lambda point: point[1])[0]
     return (
-        f"<b>Forces are least determined at friction {peak:g}.</b> Click a point to see such a "
-        "packing."
+        f"<b>Forces are freest at friction {peak:g}.</b> On the same disks, more friction allows "
+        "more forces; but each friction here has its own packing, and more friction leaves it "
+        "fewer contacts. Click a point to see such a packing."
     )
 
 
@@ -178,7 +179,7 @@ def _peak(fig: Figure, points: Points) -> None:
     x, y, error = max(points, key=lambda point: point[1])
     fig.y_range = DataRange1d(end=1.25 * (y + error))  # room for what is written
     told = (
-        (x, y + error, PEAK, "right", 30, DOT, "peak"),
+        (x, y + error, PEAK, "center", 0, DOT, "peak"),
         (points[1][0], 0.45 * y, RISES, "left", 0, "#808080", "rises"),
         (points[-1][0], 0.12 * y, FALLS, "right", 0, "#808080", "falls"),
     )

@@ -80,11 +80,12 @@ def checks(summary: Summary) -> str:
 def finding(summary: Summary) -> str:
     """What the numbers say, in one sentence."""
     if not summary["dimension"]:
-        return "<b>How undetermined?</b> Not at all: balance leaves every force one value."
+        return "<b>How free are the forces?</b> Not at all: balance leaves every force one value."
     networks = "one network" if summary["states"] == 1 else f"{summary['states']} networks"
     return (
-        f"<b>How undetermined?</b> Over {networks} found at random a contact's force scatters by "
-        f"<b>{100 * summary['eta1']:.2g} %</b> of the mean force."
+        f"<b>How free are the forces?</b> Over {networks} found at random a contact's force "
+        f"scatters by <b>{100 * summary['eta1']:.2g} %</b> of the mean force. One that is pulled on "
+        "purpose can go much farther, as all others give way a little."
     )
 
 

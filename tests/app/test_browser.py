@@ -249,7 +249,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     assert c >= 0 and width == pytest.approx(2 * 0.23 * force, rel=1e-5)
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
     page.get_by_text("0.2 ⟨fₙ⟩ more").wait_for()
-    page.get_by_text("4.35 ⟨fₙ⟩ as wide as the largest disk").wait_for()
+    page.get_by_text("4.35 × the mean ⟨fₙ⟩: as wide as the largest disk").wait_for()
     page.locator("input.typed").fill("1")  # another μ
     page.locator("input.typed").press("Enter")
     page.wait_for_function("() => location.search.includes('mu=1&')")

@@ -380,7 +380,7 @@ def test_legends_lie_where_no_curve_goes(visit, tab):
 
 def test_ticks_of_friction_stand_apart(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("Forces are least determined at friction").wait_for()
+    page.get_by_text("Forces are freest at friction").wait_for()
     page.wait_for_function(
         "() => [...Bokeh.documents[0].all_models]"
         ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
@@ -401,7 +401,7 @@ def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, folder):
     page.get_by_role("button", name="Push", exact=True).click()
     page.get_by_text("the packing gives way:").wait_for()
     page.get_by_role("tab", name="Friction").click()
-    page.get_by_text("Forces are least determined at friction").wait_for()
+    page.get_by_text("Forces are freest at friction").wait_for()
     assert "already known" not in (folder / "log").read_text()
 
 
@@ -418,9 +418,9 @@ def test_the_report_goes_when_another_file_is_dropped(visit):
 
 def test_nothing_old_stands_under_a_new_statistic(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("Forces are least determined at friction").wait_for()
+    page.get_by_text("Forces are freest at friction").wait_for()
     page.get_by_role("combobox", name="Question").select_option("correlation")
-    page.get_by_text("Forces are least determined at friction").wait_for(state="detached")
+    page.get_by_text("Forces are freest at friction").wait_for(state="detached")
     page.get_by_text("the correlation lies between").wait_for()
 
 
@@ -442,7 +442,7 @@ def test_curves_of_the_shown_states_end_at_their_targets(visit):
 
 def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("Forces are least determined at friction").wait_for()
+    page.get_by_text("Forces are freest at friction").wait_for()
     page.get_by_text("What the paper says, and what was found here").click()
     assert page.get_by_role("cell", name="reproduced").count() >= 5
     most = page.evaluate(
@@ -455,8 +455,8 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
 @pytest.mark.parametrize(
     "tab, words",
     [
-        ("intervals", ("pale bars: exact",)),
-        ("plane", ("outline: exact; dots: found at random",)),
+        ("intervals", ("pale: all that is possible, exactly",)),
+        ("plane", ("outline: exact; dots: found at random; lines: one after another",)),
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],
 )

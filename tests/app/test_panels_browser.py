@@ -136,13 +136,13 @@ def test_one_contact_in_its_cone(visit):
 def test_statistics_are_drawn_one_after_another(visit):
     page = visit("?tab=statistics")
     drawn(page, 2)
-    page.get_by_text("Forces are least determined at friction").wait_for()
+    page.get_by_text("Forces are freest at friction").wait_for()
     for what, text in (
         ("extent", "one contact's force differs by"),
         ("correlation", "the correlation lies between"),
         ("scatter", "Each dot is one contact"),
         ("force", "of the forces are smaller than the mean force"),
-        ("eta", "Forces are least determined at friction"),
+        ("eta", "Forces are freest at friction"),
     ):
         page.get_by_role("combobox", name="Question").select_option(what)
         page.get_by_text(text).wait_for()
