@@ -84,8 +84,8 @@ def finding(summary: Summary) -> str:
     networks = "one network" if summary["states"] == 1 else f"{summary['states']} networks"
     return (
         f"<b>How free are the forces?</b> Over {networks} found at random a contact's force "
-        f"scatters by <b>{100 * summary['eta1']:.2g} %</b> of the mean force. One that is pulled on "
-        "purpose can go much farther, as all others give way a little."
+        f"scatters by <b>{100 * summary['eta1']:.2g} %</b> of the mean force. One that is pulled "
+        "on purpose can go much farther, as all others give way a little."
     )
 
 
