@@ -53,7 +53,10 @@ class Selection(NamedTuple):
         mu = friction(mu)
         if self.imported or not self.same_mu:
             return self._replace(mu=mu)
-        return self._replace(mu=mu, packing=self.packing | {"mu": mu})
+        made = kinds.PACKING.parameters(
+            self.packing["n"], mu, self.packing["seed"], **_unusual(self.packing)
+        )
+        return self._replace(mu=mu, packing=made)
 
     def parameters(self) -> Parameters:
         """Parameters of the walk or sample, as its kind names it."""

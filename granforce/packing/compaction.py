@@ -49,6 +49,10 @@ INITIAL_FRACTION = 0.5
 CHECK_EVERY = 25
 NEARLY_BALANCED, NEARLY_BALANCED_AT_LARGE = 0.003, 0.01
 LARGE = 1.0
+# Longest time step, and most sweeps in it. From LARGE on steps of 0.1 end in packings that hang on
+# how long was swept; with 0.03 and less they do not, and a quarter of the sweeps are enough.
+LONGEST, SWEEPS = 0.1, 600
+LONGEST_AT_LARGE, SWEEPS_AT_LARGE = 0.03, 150
 # Up to this μ a packing is finished like a frictionless one, from which its geometry differs by
 # order μ: contact dynamics takes ever longer to reach rest there.
 NEARLY_FRICTIONLESS = 1e-4
@@ -94,9 +98,9 @@ def pack(
     *,
     radii: str | npt.ArrayLike = "uniform:0.5,1",
     pressure: float = 1.0,
-    dt: float = 0.1,
+    dt: float | None = None,
     box_mass: float = 100.0,
-    sweeps: int = 600,
+    sweeps: int | None = None,
     accuracy: float = 0.01,
     box: str = "square",
     max_steps: int = 100_000,
@@ -110,7 +114,8 @@ def pack(
     pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
     radius, P0 and the mass density; dt is the longest step, taken while no grain that carries moves
     farther than STRIDE. accuracy: largest velocity by which a step may breach the laws of Signorini
-    and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step. box:
+    and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step; how dt
+    and sweeps are chosen by default, see `default_steps`. box:
     "square", or "isotropic", whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and
     σ_xy = 0: jammed against shear too.
     progress(steps done, None) is called now and then, as nobody knows how many it takes, and
@@ -131,6 +136,7 @@ def pack(
     pressure = moderate(pressure, "pressure")
     if int(n) != n or n < 3:
         raise InputError(f"a packing needs at least 3 disks, got {n}")
+    dt, sweeps = default_steps(mu, dt, sweeps)
     for name, value in (("dt", dt), ("box_mass", box_mass), ("accuracy", accuracy)):
         positive(value, name)
     if sweeps < 1 or max_steps < 1:
@@ -194,6 +200,15 @@ def _check_neighbours(packing: Packing) -> None:
             f"{len(packing.r)} disks are too few for a periodic box: two of them touch through "
             "both sides of it; take more disks, or another seed"
         )
+
+
+def default_steps(mu: float, dt: float | None, sweeps: int | None) -> tuple[float, int]:
+    """The longest time step Δt and the most sweeps in it, each by μ where it is None.
+
+    0.1 and 600; 0.03 and 150 from μ = 1 on.
+    """
+    usual = (LONGEST, SWEEPS) if mu < LARGE else (LONGEST_AT_LARGE, SWEEPS_AT_LARGE)
+    return usual[0] if dt is None else dt, usual[1] if sweeps is None else sweeps
 
 
 def check_box(box: str) -> str:

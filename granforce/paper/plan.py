@@ -50,9 +50,9 @@ HARDEST, HARDEST_STATES = ("sweeps_1e-6", 1e-6), 200
 RISE, LONGER = 0.1, 4
 # What else packings are made with.
 PREPARED = {
-    "prepared_dt_0.2": {"dt": 0.2},
-    "prepared_dt_0.05": {"dt": 0.05},
-    "prepared_accuracy_0.003": {"accuracy": 0.003, "sweeps": 2400},
+    "prepared_dt_0.1": {"dt": 0.1, "sweeps": 600},
+    "prepared_dt_0.01": {"dt": 0.01},
+    "prepared_accuracy_0.003": {"accuracy": 0.003, "sweeps": 600},
 }
 
 

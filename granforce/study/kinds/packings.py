@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.packing.compaction import Glimpse, check_box, draw_radii, pack
+from granforce.packing.compaction import Glimpse, check_box, default_steps, draw_radii, pack
 from granforce.records import InputError, Packing, Progress, friction, positive, random_seed, whole
 from granforce.study import slices
 from granforce.study.cells import PACKING_VERSION, Kind, get, save
@@ -32,9 +32,9 @@ def _packing_parameters(
     *,
     radii: Any = "uniform:0.5,1",
     pressure: float = 1.0,
-    dt: float = 0.1,
+    dt: float | None = None,
     box_mass: float = 100.0,
-    sweeps: int = 600,
+    sweeps: int | None = None,
     accuracy: float = 0.01,
     box: str = "square",
 ) -> Parameters:
@@ -47,9 +47,11 @@ def _packing_parameters(
         raise InputError(f"a packing needs at least 3 disks, got {n!s:.40}")
     check_memory(DISK_BYTES * n, f"a packing of {n!s:.40} disks")
     drawn = draw_radii(radii, n, np.random.default_rng(0))
+    mu = friction(mu)
+    dt, sweeps = default_steps(mu, dt, sweeps)
     return {
         "n": n,
-        "mu": friction(mu),
+        "mu": mu,
         "seed": random_seed(seed),
         "radii": radii if isinstance(radii, str) else drawn.tolist(),
         "pressure": positive(pressure, "pressure"),
