@@ -78,7 +78,7 @@ PARTS: Parts = {
     ),
     "compaction_time_steps": (
         compaction_time_steps,
-        "Packings by the time step: what following every collision changes",
+        "Packings by time step and sweeps: whether they hang on either",
     ),
     "skips": (skips, "What skipping is worth"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
