@@ -7,7 +7,14 @@ from packings import packed
 from granforce.forces.balance import stress_of
 from granforce.forces.ensemble import ensemble
 from granforce.packing.closing import _strained, _stretch, cell_of, margin
-from granforce.packing.compaction import WATCH_EVERY, _dilute_gas, _leant_back, draw_radii, pack
+from granforce.packing.compaction import (
+    WATCH_EVERY,
+    _dilute_gas,
+    _leant_back,
+    default_steps,
+    draw_radii,
+    pack,
+)
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import Cancelled, Cell, InputError, NotJammedError
 from granforce.tolerances import APART, CLOSED, LARGEST_FRICTION
@@ -263,3 +270,11 @@ def test_a_cell_that_leans_back_keeps_its_lattice(rng):
     np.testing.assert_allclose(
         back.shift @ cell_of(back).vectors, shift @ cell_of(motion).vectors, atol=1e-12
     )
+
+
+def test_steps_by_friction_unless_something_else_is_asked_for():
+    assert default_steps(0.99, None, None) == (0.1, 600)
+    assert default_steps(1.0, None, None) == (0.03, 150)
+    assert default_steps(10.0, 0.1, 600) == (0.1, 600)
+    made, asked = pack(30, 1.0, 1), pack(30, 1.0, 1, dt=0.03, sweeps=150)
+    assert np.array_equal(made.forces, asked.forces) and made.info["dt"] == 0.03

@@ -137,9 +137,17 @@ NO_FRICTION = [-1, np.nan, np.inf, "much"]
     "name, given, options",
     [
         (kinds.PACKING.parameters, (20, 0.3, 1), {"pressure": NOT_POSITIVE}),
-        (kinds.PACKING.parameters, (20, 0.3, 1), {"dt": NOT_POSITIVE}),
+        (
+            kinds.PACKING.parameters,
+            (20, 0.3, 1),
+            {"dt": [bad for bad in NOT_POSITIVE if bad is not None]},
+        ),
         (kinds.PACKING.parameters, (20, 0.3, 1), {"box_mass": NOT_POSITIVE}),
-        (kinds.PACKING.parameters, (20, 0.3, 1), {"sweeps": NOT_WHOLE}),
+        (
+            kinds.PACKING.parameters,
+            (20, 0.3, 1),
+            {"sweeps": [bad for bad in NOT_WHOLE if bad is not None]},
+        ),
         (kinds.PACKING.parameters, (20, 0.3, 1), {"radii": ["uniform:nan,1", [1.0] * 19, None]}),
         (kinds.PACKING.parameters, (20, 0.3, 1), {"radii": [[np.nan] * 20, [0.0] * 20]}),
         (kinds.PACKING.parameters, (20, 0.3), {"seed": NOT_A_SEED}),
