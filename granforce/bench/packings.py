@@ -77,7 +77,7 @@ def compaction_growth(
 # How packings may be made otherwise: none of it may change what they are in the mean.
 SETTINGS: dict[str, dict[str, Any]] = {
     "default": {},
-    "Δt to 0.01": {"dt": 0.01, "sweeps": 600},
+    "Δt to 0.05": {"dt": 0.05},
     "accuracy 0.003": {"accuracy": 0.003, "sweeps": 2400},
     "box mass 30": {"box_mass": 30.0},
 }
