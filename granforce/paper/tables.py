@@ -267,6 +267,7 @@ def save(table: Table, path: str | Path) -> None:
     store = open_store(path)
     dataset = _dataset(table)
     store.clear("study")
+    store.clear("packing")  # those of an older table, made otherwise, would be found first
     digest = hashlib.sha256(json.dumps(table.rows).encode()).hexdigest()[:16]
     single = ("sample_normal", "sample_least", "sample_extent")
     store.save(

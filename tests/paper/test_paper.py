@@ -181,9 +181,13 @@ def test_rows_are_the_numbers_of_their_cells(done):
 def test_a_table_survives_its_store(done, tmp_path):
     table = tables.reduce(done / "cells.zarr", TINY)
     tables.save(table, tmp_path / "study.zarr")
-    tables.save(table, tmp_path / "study.zarr")  # again: replaced, not doubled
     store = open_store(tmp_path / "study.zarr")
+    ((k, packing), *_) = table.packings.items()
+    named = table.rows[k]["n"], table.rows[k]["mu"], table.rows[k]["seed"]
+    kinds.keep_packing(store, kinds.PACKING.parameters(*named, dt=0.5), packing)
+    tables.save(table, tmp_path / "study.zarr")  # again: replaced, not doubled
     assert len(store.find("study")) == 1
+    assert len(store.find("packing")) == len(table.packings)  # none that was made otherwise
     assert all(verdict.ok for verdict in store.verify())
     found = tables.load(tmp_path / "study.zarr")
     known = [{name: value for name, value in row.items() if value == value} for row in table.rows]
