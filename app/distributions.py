@@ -15,7 +15,7 @@ from granforce.study.cells import entry_name
 from granforce.study.store import Store
 
 from .data import Cell, Library, readable
-from .selection import Selection
+from .selection import Selection, unusual
 
 MEASURES = ("eta1", "eta2", "eta3", "coordination", "dimension", "packing_fraction")
 CORRELATIONS = ("correlation", "correlation_low", "correlation_high")
@@ -35,7 +35,9 @@ def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
 
 def _kin(selection: Selection) -> tuple[Any, ...]:
     """What is the same for all cells of one statistic."""
-    packing = {k: v for k, v in selection.packing.items() if k not in ("seed", "mu")}
+    made = selection.packing
+    packing = {name: made.get(name) for name in ("imported", "n", "version")}
+    packing |= {} if selection.imported else unusual(made)
     own_mu = None if selection.same_mu else selection.packing["mu"]
     relax = selection.relax if selection.kind == "walk" else ""
     return packing, own_mu, selection.kind, relax, selection.states

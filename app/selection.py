@@ -54,7 +54,7 @@ class Selection(NamedTuple):
         if self.imported or not self.same_mu:
             return self._replace(mu=mu)
         made = kinds.PACKING.parameters(
-            self.packing["n"], mu, self.packing["seed"], **_unusual(self.packing)
+            self.packing["n"], mu, self.packing["seed"], **unusual(self.packing)
         )
         return self._replace(mu=mu, packing=made)
 
@@ -134,7 +134,8 @@ def select(
     return Selection(packing, mu, **others)
 
 
-def _unusual(packing: Parameters) -> Parameters:
+def unusual(packing: Parameters) -> Parameters:
+    """What a packing is made with, where that is not what is usual at its μ."""
     usual = kinds.PACKING.parameters(packing["n"], packing["mu"], packing["seed"])
     return {name: packing[name] for name in OPTIONS if packing.get(name) != usual.get(name)}
 
@@ -151,7 +152,7 @@ def series(
         words = [f"{called or 'imported'} {packing['imported'][:8]}"]
     else:
         words = [f"N = {packing['n']}", f"seed {packing['seed']}"]
-        words += [f"{name} {value}" for name, value in _unusual(packing).items()]
+        words += [f"{name} {value}" for name, value in unusual(packing).items()]
         if not selection.same_mu:
             words.append(f"packed at μ = {packing['mu']:g}")
     words.append(f"{selection.states} states")
@@ -189,7 +190,7 @@ def of_packing(selection: Selection) -> list[Any]:
         words = ["--packing", "PACKING.npz"]
     else:
         words = ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
-        for name, value in _unusual(packing).items():
+        for name, value in unusual(packing).items():
             words += [f"--{WORDS.get(name, name.replace('_', '-'))}", value]
     if not selection.same_mu:
         words += ["--ensemble-mu", f"{selection.mu:.9g}"]
@@ -202,7 +203,7 @@ def link(selection: Selection, view: dict[str, Any]) -> str:
     if selection.imported:
         given = {"packing": packing["imported"]}
     else:
-        given = {"n": packing["n"], "seed": packing["seed"], **_unusual(packing)}
+        given = {"n": packing["n"], "seed": packing["seed"], **unusual(packing)}
     given["mu"] = f"{selection.mu:.9g}"
     if not selection.same_mu:
         given["packed"] = f"{packing['mu']:.9g}"

@@ -12,7 +12,7 @@ from ..data import SOURCES
 from ..jobs import reading
 from ..limits import LIMITS, RANGES
 from ..looks import COLOURS, WIDTHS
-from ..selection import KINDS, SOLVERS, Selection, differing, select
+from ..selection import KINDS, SOLVERS, Selection, differing, select, unusual
 from ..state import AppState
 from .copying import CopyButton
 from .friction import FrictionSlider
@@ -211,7 +211,7 @@ class Controls:
         if now.imported:
             return now._replace(mu=friction(self.mu.mu), **details)
         made = select(self.n.value, self.mu.mu, self.seed.value, packed_mu, **details)
-        same = {name: packing[name] for name in packing if name not in ("n", "mu", "seed", "radii")}
+        same = {name: value for name, value in unusual(packing).items() if name != "radii"}
         return made._replace(packing=made.packing | same)
 
     def _choose(self, event: Any) -> None:

@@ -105,7 +105,7 @@ VIEW = (
         (SELECTION, "", "this link names an unknown source of states"),
         (SELECTION[:10], "", "this link cannot be read: a packing of 9"),
         (("sweeps",), "mu=0.2&n=30&states=3&seed=14&", "the number of sweeps must lie between"),
-        (VIEW, "mu=0.1&n=30&states=30&relax=nearest&", "μ = 0.1, 30 disks"),
+        (VIEW, "mu=0.1&n=30&states=30&relax=nearest&", "These 30 disks never move"),
     ],
     ids=["every parameter", "every number", "sweeps", "every choice of the view"],
 )

@@ -160,7 +160,7 @@ def test_two_networks_side_by_side_with_one_player(visit):
     boxes = [page.locator(f".{name}").bounding_box() for name in ("twin", "scene")]
     assert boxes[0]["width"] == pytest.approx(boxes[1]["width"], abs=1)
     assert boxes[0]["y"] == boxes[1]["y"] and boxes[0]["x"] < boxes[1]["x"]
-    assert "state" in page.locator(".twin .caption").inner_text()
+    assert "network" in page.locator(".twin .caption").inner_text()
     widths = "Array.from(scene.hand.player.split.twin.style.width)"
     pinned, contacts = scene(page, widths), scene(page, "scene.geometry.contacts")
     normals = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(-1, contacts)
