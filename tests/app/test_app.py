@@ -596,14 +596,12 @@ def test_one_bar_says_what_it_shows_where_it_hides_none(state, wait_for):
 def test_another_friction_is_packed_as_is_usual_there(state):
     from app.views.controls import Controls
 
-    controls = Controls(state)
-    controls.mu.mu = 1.0
-    usual = kinds.PACKING.parameters(DISKS, 1.0, 1)
-    assert (
-        state.selection.packing == usual
-        and usual["dt"] != state.catalogue[0].selection.packing["dt"]
-    )
-    assert state.catalogue[0].selection.at(1.0).packing == usual
+    controls, usual = Controls(state), kinds.PACKING.parameters(DISKS, 2.0, 1)
+    first = state.cell.selection
+    assert usual["dt"] != first.packing["dt"] and first.at(2.0).packing == usual
+    controls.mu.mu = 2.0  # which no store has
+    assert state.selection.packing == usual
+    state.work.cancel()
 
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
