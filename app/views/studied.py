@@ -167,9 +167,11 @@ def _averaged(walks: list[Row], own: list[Row]) -> str:
     )
 
 
-def _packings(rows: list[Row]) -> int:
-    """How many packings there are at a friction, at most."""
-    return max(Counter(row["mu"] for row in rows).values(), default=0)
+def _packings(rows: list[Row]) -> str:
+    """How many packings there are at a friction: "10 to 30"."""
+    counts = Counter(row["mu"] for row in rows).values()
+    least, most = min(counts, default=0), max(counts, default=0)
+    return str(most) if least == most else f"{least} to {most}"
 
 
 def _peak(fig: Figure, points: Points) -> None:
