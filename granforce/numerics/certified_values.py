@@ -190,7 +190,7 @@ class Solver:
                 least = max(before[1], bound[k])
                 bounds[key] = _nearer(before[0], attained[k], least), least
                 self.found(key, *bounds[key])
-                if points is not None and (key not in points or attained[k] < before[0]):
+                if points is not None and (key not in points or bounds[key][0] != before[0]):
                     points[key] = outcome.y
                 self.counts["iterations"] += outcome.steps
                 if self.seen and outcome.loaded < 0 and np.isfinite(attained[k]):

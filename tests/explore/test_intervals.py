@@ -95,6 +95,10 @@ def test_values_below_their_bounds_are_solved_again():
     assert found.converged
     assert found.counts["again"] > 0
     system, exactly = make_system(S), {"primal_feasibility_tolerance": 1e-10}
+    tasks, points = [module.bound_of(S, c, 0, 1) for c in range(len(S.index))], {}
+    values = certified_values.Solver(system).solve(range(len(tasks)), tasks, points)
+    for c, task in enumerate(tasks):  # each value is that of its state
+        assert abs(task.costs @ points[c][task.columns] - values[c][0]) < 1e-12
     for c in range(10):
         program = module.bound_of(S, c, 0, 1)
         cost = np.zeros(system.A.shape[1])
