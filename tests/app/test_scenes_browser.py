@@ -322,16 +322,20 @@ def test_another_scene_is_chosen_from_the_list(look):
     page.get_by_role("combobox", name="Scene").first.wait_for()
 
 
+def bounds_are_exact(page, name, tolerance):
+    """The ensemble of a scene, whose bounds the page has as the library finds them."""
+    S = gf.ensemble(gf.scene(name))
+    exact = gf.intervals(S)
+    seen, bounds = ask(page, "small.now.bounds"), [exact.lower[:, 0], exact.upper[:, 0]]
+    np.testing.assert_allclose(np.array(seen), np.column_stack(bounds), atol=tolerance)
+    return S
+
+
 def test_a_column_has_a_shadow_and_exact_bounds(look):
     page = look("?scene=column")
     assert ask(page, "small.body.h") == 10
     until(page, "small.now.bounds")
-    S = gf.ensemble(gf.scene("column"))
-    exact = gf.intervals(S)
-    seen = np.array(ask(page, "small.now.bounds"))
-    np.testing.assert_allclose(
-        seen, np.column_stack([exact.lower[:, 0], exact.upper[:, 0]]), atol=1e-7
-    )
+    S = bounds_are_exact(page, "column", 1e-7)
     forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
     assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-9
 
@@ -340,12 +344,7 @@ def test_thirteen_disks_have_a_shadow_whose_two_forces_light_up(look):
     page = look("?scene=thirteen")
     assert ask(page, "small.body.h") == 8
     until(page, "small.now.bounds && !small.space.outline.stale")
-    S = gf.ensemble(gf.scene("thirteen"))
-    exact = gf.intervals(S)
-    np.testing.assert_allclose(
-        np.array(ask(page, "small.now.bounds")),
-        np.column_stack([exact.lower[:, 0], exact.upper[:, 0]]), atol=1e-6,
-    )  # fmt: skip
+    S = bounds_are_exact(page, "thirteen", 1e-6)
     box = desk(page).locator("canvas.space").bounding_box()
     x, y = ask(page, "small.space.px(small.space.flat(small.body.u))")
     page.mouse.move(box["x"] + x, box["y"] + y)
