@@ -30,7 +30,8 @@ _lock = threading.Lock()
 
 def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
     """Cells of other packings and μ made like this one: seed and friction may differ."""
-    return [other for other in cells if _kin(other.selection) == _kin(cell.selection)]
+    kin = _kin(cell.selection)
+    return [other for other in cells if _kin(other.selection) == kin]
 
 
 def _kin(selection: Selection) -> tuple[Any, ...]:

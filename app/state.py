@@ -25,8 +25,8 @@ from .selection import Selection, brief, command, link, read_link
 from .work import Work
 
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
-# What is looked at by a visitor's choice, not by what plays or is zoomed.
-CHOSEN = {*Looks.param} - {"frame", "zoom", "dark"}
+# What of Looks changes as it plays or is zoomed, not by a visitor's choice of what to see.
+PASSING = ("frame", "zoom", "dark")
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
 
@@ -77,7 +77,8 @@ class AppState(param.Parameterized):
         self.param.watch(self._forget, "cell")
         self.knowledge.param.watch(self._forget, "known")
         self.hand.param.watch(self._forget, "pulls")
-        self.looks.param.watch(self._forget, [name for name in CHOSEN if name in VIEW])
+        chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
+        self.looks.param.watch(self._forget, chosen)
         self.open(query)
 
     def _forget(self, *events: Any) -> None:

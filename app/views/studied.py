@@ -181,14 +181,14 @@ def _peak(fig: Figure, points: Points) -> None:
     x, y, error = max(points, key=lambda point: point[1])
     fig.y_range = DataRange1d(end=1.25 * (y + error))  # room for what is written
     told = (
-        (x, y + error, PEAK, "center", 0, DOT, "peak"),
-        (points[1][0], 0.45 * y, RISES, "left", 0, "#808080", "rises"),
-        (points[-1][0], 0.12 * y, FALLS, "right", 0, "#808080", "falls"),
+        (x, y + error, PEAK, "center", DOT, "peak"),
+        (points[1][0], 0.45 * y, RISES, "left", "#808080", "rises"),
+        (points[-1][0], 0.12 * y, FALLS, "right", "#808080", "falls"),
     )
-    for at, up, text, align, beside, colour, name in told:
+    for at, up, text, align, colour, name in told:
         fig.add_layout(
             Label(
-                x=at, y=up, text=text, x_offset=beside, y_offset=6, text_align=align,
+                x=at, y=up, text=text, y_offset=6, text_align=align,
                 text_font_size="12px", text_color=colour, name=name,
             )
         )  # fmt: skip

@@ -114,10 +114,9 @@ def pack(
     pressure: P0. dt, box_mass (M_λ): time step and inertia of the box in units of the largest
     radius, P0 and the mass density; dt is the longest step, taken while no grain that carries moves
     farther than STRIDE. accuracy: largest velocity by which a step may breach the laws of Signorini
-    and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step; how dt
-    and sweeps are chosen by default, see `default_steps`. box:
-    "square", or "isotropic", whose sides and tilt follow the stress until σ_xx = σ_yy = P0 and
-    σ_xy = 0: jammed against shear too.
+    and Coulomb, relative to the fastest grain that carries; sweeps: at most, in a step. dt and
+    sweeps by default: `default_steps`. box: "square", or "isotropic", whose sides and tilt follow
+    the stress until σ_xx = σ_yy = P0 and σ_xy = 0: jammed against shear too.
     progress(steps done, None) is called now and then, as nobody knows how many it takes, and
     watch(Glimpse) at least every WATCH_EVERY steps; neither changes a bit of the result. cancel()
     returning True raises Cancelled.
