@@ -31,6 +31,7 @@ CALLED = {"uniform": "uniformly sampled networks", "walk": "walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "networks of the walk (triangles)"}
 ENOUGH = 300  # states beside those shown, where they have to be computed
 MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
+MOSTLY = 0.75  # part of the dots in the inner half, from which on they keep to the middle
 
 Columns = dict[str, Any]  # of a ColumnDataSource
 
@@ -315,7 +316,7 @@ class View(TabView):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
             words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
-        words += CROWDED.format(free=free) if free >= MANY else ""
+        words += CROWDED.format(free=free) if free >= MANY and inner > MOSTLY else ""
         share = (
             f" The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of its width, "
             f"{part[1]:.0%} of its height, and fill {area:.1%} of its area"
