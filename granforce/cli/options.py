@@ -70,11 +70,11 @@ def add_packing(command: argparse.ArgumentParser, several: bool = False) -> None
     )
     group.add_argument("--pressure", type=float, default=1.0, help="pressure P0 (default 1)")
     group.add_argument(
-        "--dt", type=float, help="longest time step (default 0.1; 0.03 from μ = 1 on)"
+        "--dt", type=float, help="longest time step (default 0.1; 0.03 from μ = 0.2 on)"
     )
     group.add_argument("--box-mass", type=float, default=100.0, help="box inertia (default 100)")
     group.add_argument(
-        "--sweeps", type=int, help="most sweeps per step (default 600; 150 from μ = 1 on)"
+        "--sweeps", type=int, help="most sweeps per step (default 600; 150 from μ = 0.2 on)"
     )
     group.add_argument(
         "--step-accuracy",

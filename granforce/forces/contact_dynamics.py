@@ -165,6 +165,7 @@ class Pace(NamedTuple):
     longest: float
     stride: float  # largest displacement of a grain that carries, in a step, that Δt grows up to
     sweeps: int  # at most, in a step
+    settling: int  # the last so many of them correct by LEAST_RELAXATION only
     accuracy: float  # largest breach of the contact laws that ends a step, of the fastest grain
 
 
@@ -239,16 +240,21 @@ def _step(motion, mu, pressure, pace, counters, stop):
 def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, stop):
     """Sweep until the breach is small enough; returns λ.
 
-    Where it does not get there, the step takes the forces that breached least on the way: from
-    μ = 1 on a few contacts go on opening and closing, and where sweeps happen to end is worse.
+    Where it does not get there, the step takes the forces that breached least on the way: at large
+    μ a few contacts go on opening and closing, and where sweeps happen to end is worse. Sweeps that
+    over-correct move slow modes soonest, but keep those contacts going; what is left settles in the
+    last, cautious ones. Otherwise the jitter shakes the packing and it comes to rest far later.
     """
     count = force.shape[0]
-    order, factor = np.arange(count), motion.pace[1]
+    order, factor, lasting = np.arange(count), motion.pace[1], motion.pace[1]
     cautious = max(LEAST_RELAXATION, 1.6 - mu)
     _scale(problem, factor)
     best, best_force, best_velocity, best_dilation = np.inf, force, velocity, dilation
     least, looks, breach = np.inf, 0, np.inf
     for done in range(1, pace.sweeps + 1):
+        if done > pace.sweeps - pace.settling and factor > LEAST_RELAXATION:
+            _scale(problem, LEAST_RELAXATION / factor)
+            factor = LEAST_RELAXATION
         dilation, _, _ = sweep(problem, order, mu, force, velocity, dilation, ONE)
         counters[SWEEPS] += 1
         counters[UPDATES] += count
@@ -268,10 +274,11 @@ def _swept(motion, problem, mu, pace, force, velocity, dilation, dt, counters, s
         elif looks >= STALLED and factor > cautious:
             _scale(problem, CAUTION)
             factor, least, looks = CAUTION * factor, breach, 0
+            lasting = factor
     else:
         counters[UNFINISHED] += 1
         force[:], velocity[:], dilation = best_force, best_velocity, best_dilation
-    motion.pace[1] = min(COURAGE * factor, MOST_RELAXATION)
+    motion.pace[1] = min(COURAGE * lasting, MOST_RELAXATION)
     return dilation
 
 

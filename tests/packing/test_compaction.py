@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from packings import packed
 
+from granforce.forces import contact_dynamics as dynamics
 from granforce.forces.balance import stress_of
 from granforce.forces.ensemble import ensemble
 from granforce.packing.closing import _strained, _stretch, cell_of, margin
 from granforce.packing.compaction import (
     WATCH_EVERY,
+    _advance,
     _dilute_gas,
     _leant_back,
     default_steps,
@@ -272,9 +274,26 @@ def test_a_cell_that_leans_back_keeps_its_lattice(rng):
     )
 
 
+def unfinished(settling):
+    """How many of 600 steps at μ = 1 end before they are accurate."""
+    rng = np.random.default_rng(1)
+    motion = _dilute_gas(rng.uniform(0.5, 1.0, 100), rng, 1)
+    motion.pace[:] = 0.003, dynamics.MOST_RELAXATION
+    pace = dynamics.Pace(100.0, 0.003, 0.03, 0.02, 150, settling, 0.01)
+    counters, work = np.zeros(4, np.int64), {"list_rebuilds": 0}
+    for _ in range(24):
+        motion, _, _ = _advance(motion, 1.0, pace, counters, work)
+    assert counters[dynamics.STEPS] == 600
+    return counters[dynamics.UNFINISHED]
+
+
+def test_steps_that_settle_end_accurate_far_more_often():
+    assert unfinished(0) > 5 * unfinished(30) > 0
+
+
 def test_steps_by_friction_unless_something_else_is_asked_for():
-    assert default_steps(0.99, None, None) == (0.1, 600)
-    assert default_steps(1.0, None, None) == (0.03, 150)
+    assert default_steps(0.19, None, None) == (0.1, 600)
+    assert default_steps(0.2, None, None) == (0.03, 150)
     assert default_steps(10.0, 0.1, 600) == (0.1, 600)
     made, asked = pack(30, 1.0, 1), pack(30, 1.0, 1, dt=0.03, sweeps=150)
     assert np.array_equal(made.forces, asked.forces) and made.info["dt"] == 0.03

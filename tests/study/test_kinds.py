@@ -13,24 +13,24 @@ from granforce.study.store import open_store
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 REFERENCE = Path(__file__).parents[1] / "reference"
-MADE = PACKING.parameters(20, 0.3, 1)
+MADE = PACKING.parameters(20, 0.1, 1)
 
 MEASURED = Measurement(np.array([3, 5]), np.ones((2, 2)), np.full((2, 2), 0.1))
 
-# What entries are called since packings are of version 2, which all others name by its parameters.
+# What entries are called since packings are of version 3, which all others name by its parameters.
 NAMES = {
-    "packing": ((20, 0.3, 1), {}, "packing-3c3ac184b19c7316871e"),
-    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-3dfdb3e08245c4a4177f"),
-    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-916bfa05e07a00d21c6a"),
-    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-d79dd8d44272c6bb98e8"),
-    "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-de32c56fd368c6cf4b57"),
-    "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-3ff80f68e2bcddd7973d"),
-    "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-206d82c2cc6ef70e5c5f"),
-    "stress": ((MADE,), {"angles": 16}, "stress-f12d55576c08fad59c46"),
-    "perturbation": ((MADE,), {"random": 4}, "perturbation-ce3dd457b9d89fd71e8c"),
-    "informative": ((MADE,), {"k": 5}, "informative-3f546a071f56de0980bf"),
-    "volume": ((MADE, 0.1), {}, "volume-286fb21e52e73e87f25a"),
-    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-198bc3d0422097038cb6"),
+    "packing": ((20, 0.1, 1), {}, "packing-12c7f8f02ab91bbde4d3"),
+    "walk": ((MADE, 6), {"keep": 3, "relax": "nearest"}, "walk-f4fe65b4d703afc02a54"),
+    "uniform": ((MADE, 60, 2), {"effective": 30, "chains": 2}, "uniform-39cd235b496047c8cd3f"),
+    "inference": ((MADE, MEASURED, 60), {"keep": 5}, "inference-26eb952a24cf8b6b8ce3"),
+    "intervals": ((MADE,), {"slice_": (0.1, 0.9, 0, 1)}, "intervals-666e4a02c810c45555ec"),
+    "limit_loads": ((MADE,), {"mu": 0.5, "contacts": [7, 3]}, "limit_loads-ca68105dd530951ae1cc"),
+    "outline": ((MADE,), {"components": [(5, 0), (5, 1)]}, "outline-02865708845af1c17a83"),
+    "stress": ((MADE,), {"angles": 16}, "stress-3512a90cf7b8903289cb"),
+    "perturbation": ((MADE,), {"random": 4}, "perturbation-573b5b962d80e1671697"),
+    "informative": ((MADE,), {"k": 5}, "informative-f2399b76b46223a00f41"),
+    "volume": ((MADE, 0.1), {}, "volume-4daacff9a6dfcaba76e5"),
+    "perturbed_contact": ((MADE, 5), {}, "perturbed_contact-055332c2090ac401ec79"),
 }
 
 
@@ -94,12 +94,17 @@ def test_keys_do_not_change(name, tmp_path):
     assert study.entry_name(open_store(tmp_path / "s"), KINDS[name], parameters) == expected
 
 
+def test_packings_whose_steps_settle_are_another_version():
+    older, newer = (PACKING.parameters(20, mu, 1, dt=0.1, sweeps=600) for mu in (0.19, 0.2))
+    assert (older["version"], newer["version"]) == (3, 4)
+
+
 def test_a_kind_is_called_by_its_name():
     assert all(kind.name == name for name, kind in KINDS.items())
 
 
 def test_a_box_of_free_shape_names_another_packing(tmp_path):
-    assert PACKING.parameters(20, 0.3, 1, box="square") == MADE
+    assert PACKING.parameters(20, 0.1, 1, box="square") == MADE
     asked = PACKING.parameters(20, 0.3, 7, box="isotropic")
     assert asked == PACKING.parameters(20, 0.3, 7) | {"box": "isotropic"}
     store = open_store(tmp_path / "s")
