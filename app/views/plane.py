@@ -42,16 +42,13 @@ GROWS = "The networks come as they are found; the exact outline of S follows."
 
 COMPUTED = (
     " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
-    "it is known to {found.gap:.1g} ⟨fₙ⟩. The inner half is the outline shrunk to half its lengths "
-    "about its middle."
+    "it is known to {found.gap:.1g} of the mean force. The inner half is the outline shrunk to "
+    "half its lengths about its middle."
 )
 
-# No taller than the window leaves room for, where it has all of its width.
-WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 390px))"}
-
 LEAD = (
-    "<b>Every network of forces that holds these disks lies in the shaded area S</b>{flattened}. "
-    "Drag the red dot, or sweep it: the forces in the packing follow."
+    "<b>Each dot is one network of forces; S holds all that there are</b>{flattened}. "
+    "Drag the red dot, or sweep it: orange lines grow, blue ones shrink."
 )
 CROWDED = (
     ": networks found at random differ in all {free} directions, and go only a little way along "
@@ -104,7 +101,7 @@ class View(TabView):
         return pn.Column(
             self.lead,
             self.planes,
-            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0, styles=WHOLLY_SEEN),
+            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
             pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
             Progress(self.task),
             self.told,
@@ -345,7 +342,7 @@ class View(TabView):
             "",
             x_range=DataRange1d(**around),
             y_range=DataRange1d(**around),
-            aspect_ratio=1.08,
+            aspect_ratio=1.3,  # with what is said below it, no taller than a window
             sizing_mode="scale_width",
             match_aspect=True,
         )

@@ -102,7 +102,7 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     """
     kind = {"y_axis_type": "log" if log else "linear"}
     walks = studied.rows("walk")
-    spread = _over_mu("spread", "how much a force scatters, in mean forces", 330, **kind)
+    spread = _over_mu("spread", "how much a force scatters (mean force = 1)", 330, **kind)
     found = statistics.means(walks, "eta1")
     _line(spread, found, f"mean of {_packings(walks)} packings", log, COLOURS[0])
     _own(spread, [(here["mu"], here["eta1"], 0.0)], log, DOT, label=HERE)
@@ -149,9 +149,9 @@ def most_undetermined(points: Points) -> str:
         return ""
     peak = max(points, key=lambda point: point[1])[0]
     return (
-        f"<b>Forces are freest at friction {peak:g}.</b> On the same disks, more friction allows "
-        "more forces; but each friction here has its own packing, and more friction leaves it "
-        "fewer contacts. Click a point to see such a packing."
+        f"<b>Forces are freest at friction {peak:g}.</b> More friction leaves every "
+        "force more room, but disks packed with more friction come to rest on fewer contacts. "
+        "Click a point to see such a packing."
     )
 
 

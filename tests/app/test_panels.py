@@ -560,7 +560,7 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     state.looks.tab = "perturb"
     view = View(state)
     assert view.strongest.visible and not view.push.visible
-    assert "Click any contact" in view.told.object and "<svg" in view.lead.object
+    assert "Click a line" in view.told.object and "<svg" in view.lead.object
     assert view.lead.object.count("<circle") == 8  # two that are pushed, and those around them
     press(view.strongest)
     assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and view.push.visible
