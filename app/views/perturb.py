@@ -53,8 +53,8 @@ LEAD = (
     "until no forces can balance any more and the packing gives way."
 )
 HINT = (
-    "Click a line in the packing, or take the strongest one. Then guess, in mean forces, how hard "
-    "a push its two disks withstand, and see."
+    "Click a line in the packing, or take the strongest one. Then guess how many times "
+    "the average force it takes, and see."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "

@@ -47,12 +47,12 @@ COMPUTED = (
 )
 
 LEAD = (
-    "<b>Each dot is one network of forces; S holds all that there are</b>{flattened}. "
-    "Drag the red dot, or sweep it: orange lines grow, blue ones shrink."
+    "<b>Each dot is one whole picture like that of the packing; S holds all that can be</b>"
+    "{flattened}. Drag the red dot, or sweep it: orange lines grow, blue ones shrink."
 )
 CROWDED = (
-    ": networks found at random differ in all {free} directions, and go only a little way along "
-    "these two"
+    ". To go far in one direction, many forces have to conspire, and chance hardly ever makes "
+    "them: it has {free} directions to go"
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = {"Sweep across ↔": 0, "Sweep up and down ↕": 1}

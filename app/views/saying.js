@@ -96,7 +96,7 @@ export function pictured(body) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
-  return h > 3 ? `all pairs of values that these two forces can have; dots: sets of forces found at random`
+  return h > 3 ? `all pairs of values that these two forces can have; dots: found at random, as chance seldom gets to the rim`
     : `${S} ${["", "a line", "a polygon; its axes are two of the forces", "a body; drag beside the point to turn it"][h]}`
 }
 
@@ -121,7 +121,8 @@ export function sentence(body, mu, now) {
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
   const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
-  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}${grips}${wedged}`
+  const limit = `${["", "an end", "a side", "a face"][h]}: there a contact is about to slip or to open`
+  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 
 /** Whether a normal force can be more than all disks weigh. */

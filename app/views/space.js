@@ -213,7 +213,7 @@ export class Space {
     g.font = "13px sans-serif"
     const wide = g.measureText("drag me ↘").width + 12
     const ways = [["↙ drag me", 1, -1], ["drag me ↘", -1, -1], ["↖ drag me", 1, 1], ["drag me ↗", -1, 1]]
-    const places = [20, 48, 76].flatMap((off) => ways.map(([words, a, b]) => [x + a * (off / 2 + wide / 2), y + b * off, words]))
+    const places = [20, 30].flatMap((off) => ways.map(([words, a, b]) => [x + a * (off / 2 + wide / 2), y + b * off, words]))
     const [px, py, words] = places.find(([a, b]) => this.free([a, b], wide, 21)) ?? places[0]
     g.fillStyle = look.hand
     g.fillRect(px - wide / 2, py - 11, wide, 21)
