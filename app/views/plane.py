@@ -308,7 +308,7 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
-        words = f"<b>{inner:.0%} of the dots lie in the inner half of S</b>"
+        words = f"<b>{inner:.0%} of the dots lie in the inner half of S</b>, less than half as far out as the outline"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
