@@ -41,7 +41,7 @@ class Statement(NamedTuple):
     def words(self, number: int) -> str:
         """It in words, with the contact's number in the packing."""
         bar = f" ± {self.error:.3g}" if self.error else ""
-        return f"contact {number}: fₙ = {self.value:.3f}{bar} ⟨fₙ⟩"
+        return f"contact {number}: fₙ = {self.value:.3f}{bar} × the mean force"
 
 
 class Narrowed(NamedTuple):
@@ -228,13 +228,13 @@ class Knowledge(param.Parameterized):
         width = high - low
         if width < DETERMINED:
             raise InputError(
-                f"fₙ of contact {number} is {low:.3f} ⟨fₙ⟩ in every network that is left: "
-                "to hold it would tell nothing new"
+                f"fₙ of contact {number} is {low:.3f} × the mean force in every network that is "
+                "left: to hold it would tell nothing new"
             )
         if not low - INWARD * width <= value <= high + INWARD * width:
             raise InputError(
-                f"fₙ of contact {number} is {value:.3f} ⟨fₙ⟩ on screen, but what is known leaves "
-                f"{low:.3f} to {high:.3f}: pull it there first, or let another force go"
+                f"fₙ of contact {number} is {value:.3f} × the mean force on screen, but what is "
+                f"known leaves {low:.3f} to {high:.3f}: pull it there first, or let another go"
             )
         inside = np.clip(value, low + INWARD * width, high - INWARD * width)
         return Statement(contact, _rounded(inside))

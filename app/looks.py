@@ -40,7 +40,7 @@ FIGURES = {
 }
 AXES = {"linear": "linear", "log": "logarithmic"}
 PUSHES = {
-    "one": "How hard can one contact be pushed?",
+    "one": "How hard can two touching disks be pushed apart?",
     "all": "Which contacts bear most?",
     "store": "Are undetermined packings weaker?",
 }

@@ -110,8 +110,8 @@ def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
     if plane.kind == STRESS:
         return "pressed more across than up: (σₓₓ − σᵧᵧ) / 2P", "sheared: σₓᵧ / P"
     return (
-        "mix of forces that varies most, in mean forces",
-        "mix of forces that varies second most",
+        "the direction in which networks differ most, in mean forces",
+        "the second such direction",
     )
 
 

@@ -235,8 +235,17 @@ export class Arrows {
       return
     }
     const force = [0, 1].map((k) => normal * inward[k] + tangential * across[k])
-    this.arrow(px, py, force, lit ? look.hand : slides ? look.warm : look.cold, lit ? 3.5 : 2.5)
+    if (body.scene.r.length === 1 && body.count <= NAMED) { // what its numbers tell: both parts
+      g.globalAlpha = 0.45
+      this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
+      this.arrow(px, py, across.map((v) => v * tangential), look.cold, 1.5)
+      g.globalAlpha = 1
+    }
+    this.arrow(px, py, force, lit ? look.hand : slides ? look.warm : this.axisColour(contact) ?? look.cold, lit || this.axisColour(contact) ? 3.5 : 2.5)
   }
+
+  /** The colour of a contact whose force S is drawn by. */
+  axisColour(contact) { return this.look.axes?.get(2 * contact) ?? this.look.axes?.get(2 * contact + 1) }
 
   arrow(px, py, force, colour, thick) {
     const { context: g } = this, unit = this.unit * this.forceUnit

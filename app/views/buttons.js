@@ -57,8 +57,8 @@ const TOOLS = `
   ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
   <span class="knowing">
     ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
-    <label title="error bar of a force that is held, in mean forces ⟨fₙ⟩; 0: held exactly">±
-      <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in ⟨fₙ⟩"></label>
+    <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
+      <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
   </span>`
 const VIEW = `
   ${button("closer", "zoom in (wheel, pinch)")}
@@ -79,9 +79,9 @@ const MORE = `<summary>More</summary>
   </div>
   <div class="game">Made: <span class="source"></span></div>
   <div class="read">Check:
-    <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> ⟨fₙ⟩</span>
+    <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
     <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
-    <span tabindex="0" data-term="distance">from the centre of all networks <b class="distance"></b> ⟨fₙ⟩</span>
+    <span tabindex="0" data-term="distance">from the centre of all networks <b class="distance"></b> mean forces</span>
     <span class="running">
       <span>of the <b class="played"></b> shown so far:</span>
       <span tabindex="0" data-term="eta1">spread <b class="eta1"></b></span>

@@ -23,7 +23,7 @@ export function render({ model, view }) {
   root.innerHTML = `<summary>All contacts as a table</summary>
     <div class="filters">
       <label>number of contact or disk <input class="find" inputmode="numeric"></label>
-      <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> ⟨fₙ⟩</label>
+      <label>fₙ at least <input class="least" type="number" step="0.1" min="0"> × the mean force</label>
     </div>
     <p class="told" role="status"></p>
     <div class="frame"><table><thead><tr></tr></thead><tbody></tbody></table></div>`
@@ -56,7 +56,7 @@ export function render({ model, view }) {
     shown = found.slice(from, from + ROWS)
     part(".told").textContent = `${found.length} of ${all.length} contacts` +
       (found.length > ROWS ? `, the first ${ROWS} of them are shown` : "") +
-      `; forces in ⟨fₙ⟩; smallest and largest: ${on.exact ? "exact" : "of the networks shown"}`
+      `; forces in mean forces; smallest and largest: ${on.exact ? "exact" : "of the networks shown"}`
     const chosen = player().model.contact
     body.innerHTML = shown.map((c) => `<tr tabindex="0" data-contact="${c}" aria-selected="${c === chosen}">` +
       COLUMNS.map(([, read, write]) => `<td>${write(read(on, c), on, c)}</td>`).join("") + "</tr>").join("")

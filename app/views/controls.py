@@ -89,7 +89,9 @@ class Controls:
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
         self.colour = Select(label="Colour", options=by_words(COLOURS), **FIELD)
         self.thickness = Select(label="Width", options=by_words(WIDTHS), **FIELD)
-        self.full = pmui.TextInput(label="Full colour, ⟨fₙ⟩", placeholder="by itself", **SMALL)
+        self.full = pmui.TextInput(
+            label="Full colour, in mean forces", placeholder="by itself", **SMALL
+        )
         self.stretch = pmui.TextInput(label="Width, times", **SMALL)
         self.overlay = pmui.Switch(
             label="Strong and undetermined contacts", value=self.looks.overlay, margin=(2, 10)

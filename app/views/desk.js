@@ -3,7 +3,7 @@
 /** Its HTML; most: μ at the end of the slider. */
 export function desk(most) {
   return `
-    <p class="whole">Disks at rest can often be held by many different sets of forces. S is the set of them all. On the same disks, more friction allows more of them.</p>
+    <p class="whole">The same disks, at rest, can be held by many different sets of forces.</p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${most}" step="0.005" aria-label="friction μ">

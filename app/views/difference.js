@@ -44,7 +44,7 @@ export class Difference {
   guess(contact) {
     if (!this.on || contact === null || contact === undefined) return
     const by = this.change[contact], left = () => this.wanted.size - this.found.size
-    const told = `This line carries ${Math.abs(by).toFixed(2)} ⟨fₙ⟩ ${by > 0 ? "more" : "less"} at the right`
+    const told = `This line carries ${Math.abs(by).toFixed(2)} × the mean force ${by > 0 ? "more" : "less"} at the right`
     const already = this.found.has(contact)
     if (this.wanted.has(contact)) this.found.add(contact)
     if (!left()) return this.end(`${told}. That was the last one: now colours show where the two differ.`)

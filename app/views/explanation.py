@@ -13,7 +13,7 @@ from .hints import term
 from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL = "; drag a line to pull on it"
+PULL = "; drag a line to change its force"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
@@ -41,7 +41,9 @@ def first(summary: Summary, more: str = "") -> str:
     else:
         found = f"These {n} disks never move, yet the forces between them can change."
         networks = term("network", "force networks")
-        told = f"<b>{free} numbers are free.</b> Play shows {networks} that all balance{more}."
+        forces = 2 * summary["contacts"]
+        told = f"<b>{forces} unknown forces − {forces - free} equations = {free} free numbers.</b> "
+        told += f"Play shows {networks} that all balance{more}."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

@@ -60,7 +60,7 @@ export function render({ model, view }) {
     if (!(most > 0)) return
     const points = model.hill.map(([mu, eta]) =>
       `${100 * (place(mu, model.least) - model.least) / (model.most - model.least)},${HILL * (1 - eta / most)}`)
-    part("hill").innerHTML = `<span>how free the forces are: η</span>
+    part("hill").innerHTML = `<span>how free the forces are</span>
       <svg viewBox="0 0 100 ${HILL}" preserveAspectRatio="none" aria-hidden="true">
       <polygon points="0,${HILL} ${points.join(" ")} 100,${HILL}"/></svg>`
   }

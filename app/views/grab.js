@@ -55,6 +55,7 @@ export class Grab {
     const { player } = this
     if (!this.replay || player.live.moves || player.grows || this.spot.active) return false
     player.follows = false
+    player.took = true
     if (player.playing) player.play(false)
     if (this.replay.position % 1) player.show(Math.round(this.replay.position))
     this.settle()
@@ -249,7 +250,7 @@ export class Grab {
 
   describe(contact, value) {
     const { walk } = this.replay, { rail, end } = this
-    let words = `Contact ${walk.backbone[contact]} pulled to fₙ = ${value.toFixed(3)} ⟨fₙ⟩`
+    let words = `Contact ${walk.backbone[contact]} pulled to ${value.toFixed(3)} × the mean force`
     if (rail) words += ` of ${rail.lower.toFixed(3)} … ${rail.upper.toFixed(3)}`
     if (rail && end) {
       const { opened, sliding } = this.holding

@@ -46,7 +46,7 @@ LABELS = {
     "Are strong contacts the less determined ones?": "correlation",
     "Which contacts are least determined?": "correlation",
     "How many forces are large?": "fn",
-    "How hard can one contact be pushed?": "push",
+    "How hard can two touching disks be pushed apart?": "push",
     "Which contacts bear most?": "limit_load",
     "Are undetermined packings weaker?": "critical_force",
     "Which force to measure next?": "informative",

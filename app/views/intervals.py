@@ -35,7 +35,7 @@ FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
 KEY = {
     "least possible": 0.55,
     "seen so far": 0.68,
-    "now": 0.77,
+    "now; drag it up or down": 0.77,
     "largest possible": 0.93,
 }
 KEY_AT = 2.5

@@ -82,14 +82,14 @@ def words(knowledge: Knowledge, number: Integers) -> str:
     free = f"<b>{h} → {less}</b>" if less < h else f"stay <b>{h}</b> (an error bar fixes no number)"
     told = (
         f"{term('h', 'Free dimensions')} {free}; a contact's {term('exact', 'possible')} fₙ spans "
-        f"<b>{mean:.3f} → {left:.3f} ⟨fₙ⟩</b> on average ({_change(mean, left)}); "
+        f"<b>{mean:.3f} → {left:.3f} × the mean force</b> on average ({_change(mean, left)}); "
         f"{narrowed.carrying} of {len(narrowed.shortened)} contacts "
         f"{term('carrying', 'carry for certain')}."
     )
     short = narrowed.shortened
     order = [c for c in np.argsort(-short)[:STRONGEST] if short[c] > 0.005]
     if order:
-        most = ", ".join(f"{number[c]} (by {short[c]:.2f} ⟨fₙ⟩)" for c in order)
+        most = ", ".join(f"{number[c]} (by {short[c]:.2f})" for c in order)
         told += f" Shortened most: contacts {most}."
     return told + " The networks that play are of all of S; pulls keep what is known."
 

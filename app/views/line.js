@@ -1,4 +1,4 @@
-// S where it is a line: with what stops it at its ends, and below it the axis of a force.
+// S where it is a line: with what stops it at its ends; and axes of forces, below S and beside it.
 
 import { forceName, number } from "./saying.js"
 
@@ -32,45 +32,60 @@ export function drawSegment(space) {
   }
 }
 
-/** Below S, at y: the axis of a force that grows across, with its least, present and largest value. */
-export function drawAxis(space, index, y) {
-  const { context: g, body, look, easel } = space, rest = body.origin[index], [left, right] = [24, easel.wide - 24]
+/** The axis of a force with its least, present and largest value: across S, at y below it, or up (d = 1), at x beside it. */
+export function drawAxis(space, index, at, d = 0) {
+  const { context: g, body, look, easel } = space, rest = body.origin[index]
+  const ends = d ? [easel.high - space.floor, 10] : [24 + space.aside, easel.wide - 24]
   const change = (u) => body.axes.reduce((sum, axis, k) => sum + u[k] * axis[index], 0)
-  const slope = change(space.moving(body.u, 1, 0)) - change(body.u) // by a step across
-  const place = (v) => space.px([(v - rest) / slope, 0])[0]
-  const pixels = Math.abs(place(1) - place(0)), step = nice(TICKS / pixels)
-  const sorted = [...body.corners].sort((a, b) => change(a.u) - change(b.u)), ends = [sorted[0], sorted.at(-1)]
-  const marked = [...ends.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
+  const slope = change(space.moving(body.u, 1 - d, d)) - change(body.u) // by a step along the axis
+  const place = (v) => space.px(d ? [0, (v - rest) / slope] : [(v - rest) / slope, 0])[d]
+  const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
+  const sorted = [...body.corners].sort((a, b) => change(a.u) - change(b.u)), extreme = [sorted[0], sorted.at(-1)]
+  const marked = [...extreme.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
     .map(([u, colour]) => ({ v: change(u) + rest, place: space.px(space.flat(u)), colour }))
-    .map((mark) => ({ ...mark, x: mark.place[0] }))
-  g.strokeStyle = look.edge
+    .map((mark) => ({ ...mark, x: mark.place[d] }))
+  const own = look.axes?.get(index) ?? look.edge // a colour of its own, as its arrows have it
+  const stroke = (x, from, to) => { g.moveTo(...(d ? [from, x] : [x, from])); g.lineTo(...(d ? [to, x] : [x, to])) }
+  const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
+  g.strokeStyle = own
   g.lineWidth = 1
   g.beginPath()
-  g.moveTo(left, y)
-  g.lineTo(right, y)
-  const free = (x, k = marked.length) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > 40)
-  const ticks = [], [first, last] = [left, right].map((x) => (x - place(0)) / (place(1) - place(0)) / step).sort((a, b) => a - b)
+  g.moveTo(...(d ? [at, ends[0]] : [ends[0], at]))
+  g.lineTo(...(d ? [at, ends[1]] : [ends[1], at]))
+  const free = (x, k = marked.length) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > (d ? 16 : 40))
+  const ticks = [], [first, last] = ends.map((x) => (x - place(0)) / (place(1) - place(0)) / step).sort((a, b) => a - b)
   for (let k = Math.ceil(index % 2 ? first : Math.max(first, 0)); k <= last; k++) { // no normal force is below 0
     const x = place(k * step)
-    g.moveTo(x, y - 4)
-    g.lineTo(x, y + 4)
+    stroke(x, at - 4, at + 4)
     if (free(x)) ticks.push([x, String(Number((k * step).toPrecision(6)))])
   }
   g.stroke()
-  for (const [x, text] of ticks) space.write(x, y + 14, text, look.ink, 11)
+  for (const [x, text] of ticks) write(x, text, look.ink, 11)
   g.lineWidth = 1
   g.setLineDash([2, 4])
-  for (const { x, place: [, above], colour } of marked) {
+  for (const { x, place: there, colour } of marked) {
     g.strokeStyle = colour
     g.beginPath()
-    g.moveTo(x, above)
-    g.lineTo(x, y)
+    stroke(x, there[1 - d], at)
     g.stroke()
   }
   g.setLineDash([])
-  marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) space.write(x, y + 14, number(v), colour, 12) })
-  const name = forceName(body.scene, index)
-  space.write(easel.wide / 2, y + 33, slope > 0 ? `${name} →` : `← ${name}`, look.ink)
+  marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) write(x, number(v), colour, 12) })
+  const name = forceName(body.scene, index), words = slope > 0 ? `${name} →` : `← ${name}`
+  nameAxis(space, words, own === look.edge ? look.ink : own, d ? null : at + 33)
+}
+
+/** The name of an axis: below it, at y, or along the left edge. */
+export function nameAxis(space, words, colour, y) {
+  const { context: g, easel: { wide, high } } = space
+  if (y !== null) return space.write((wide + space.aside) / 2, y, words, colour)
+  g.save()
+  g.translate(14, (high - space.floor) / 2)
+  g.rotate(-Math.PI / 2)
+  g.font = "13px sans-serif"
+  const short = g.measureText(words).width > high - space.floor ? words.replace(/\w+ force (on )?/, "") : words
+  space.write(0, 0, short, colour, 13, "middle")
+  g.restore()
 }
 
 /** Which way a line is drawn: the force on its axis becomes larger to the right. */

@@ -98,8 +98,8 @@ export class Look {
     const told = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
     const rows = [
       ["contact", `${walk.backbone[c]} (disks ${walk.i[k]} – ${walk.j[k]})`],
-      ["fₙ / ⟨fₙ⟩", n.toFixed(3)],
-      ["fₜ / ⟨fₙ⟩", t.toFixed(3)],
+      ["normal force fₙ, mean = 1", n.toFixed(3)],
+      ["tangential force fₜ", t.toFixed(3)],
       ["fₜ/(μ fₙ)", this.mobilised(n, t)?.toFixed(2) ?? "–"],
       ["fₙ as packed", walk.normal[c].toFixed(3)],
     ]

@@ -7,7 +7,7 @@ const AGAIN_MS = 700 // rest at the end
 export function openMoving(player) {
   const { model, buttons } = player
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) return
-  if (model.frame || model.between || model.predict) return // a link that shows one moment
+  if (model.frame || model.between || model.predict || player.pushes) return // a link that shows one moment
   buttons.part("speed").value = SLOW
   buttons.tellRate()
   const again = setInterval(() => {

@@ -43,7 +43,7 @@ LEGEND = """
 <span tabindex="0" data-term="{width_term}">width: {width}
  <svg width="40" height="12"><polygon points="0,5.5 40,0 40,12 0,6.5"
   fill="currentColor" fill-opacity="0.65"/></svg>
- {widest:.3g} × the mean ⟨fₙ⟩: as wide as the largest disk</span>
+ {widest:.3g} × mean</span>
 <span tabindex="0" data-term="rattler">pale disks: loose</span>
 {marks}
 """
@@ -238,13 +238,13 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = "less", diverging, f"{full:.3g} ⟨fₙ⟩ more"  # as much less
+    change = "less", diverging, f"more by {full:.3g} × mean"  # as much less
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)
     return {
         "mobilised": ("slips one way −1", diverging, "1 the other way"),
-        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), f"{most:.2f} ⟨fₙ⟩"),
+        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), f"{most:.2f} × the mean force"),
         "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
         "change": change,
         "deviation": (f"{FULL_DEVIATION:g} σ less", diverging, f"{FULL_DEVIATION:g} σ more"),
@@ -261,7 +261,7 @@ def colour_words(looks: Looks, pulled: bool) -> str:
 def _largest(loads: Floats | None, full: float | None) -> str:
     if loads is None:
         return "(being computed)"
-    return f"{full or loads.max(initial=0):.2f} ⟨fₙ⟩"
+    return f"{full or loads.max(initial=0):.2f} × the mean force"
 
 
 def legend(state: AppState, pulled: bool = False) -> str:

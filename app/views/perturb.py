@@ -49,11 +49,13 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <text x="40" y="46">holds</text><text x="280" y="46">holds</text></g>
 </svg>"""
 LEAD = (
-    "<b>Two growing forces push the two disks of a contact apart</b>, along the line through "
-    "their centres, while their neighbours hold them, until no forces can balance any more and the "
-    "packing gives way. Guess: how many times the mean force does it take?"
+    "<b>Two growing forces push two touching disks apart</b> while their neighbours hold them, "
+    "until no forces can balance any more and the packing gives way."
 )
-HINT = "Click any contact in the packing, or take the strongest one."
+HINT = (
+    "Click a line in the packing, or take the strongest one. Then guess how many times "
+    "the average force it takes, and see."
+)
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
     "needs (it is isostatic)."
@@ -65,7 +67,7 @@ EVERY = (
 Said = tuple[str, list[Figure], str, str]  # text, plots, numbers and lead
 
 LONGEST_GUESS = 12  # characters
-UNIT = "Forces are in units of the mean normal force ⟨fₙ⟩."
+UNIT = "Forces are in units of the mean normal force."
 
 
 class View(TabView):
@@ -205,7 +207,7 @@ class View(TabView):
         text = (
             f"The {term('critical_force', 'critical force')} of contact "
             f"{replay.backbone[contact]}, with which the packing gives way, lies between "
-            f"{pushed.low:.3f} and {pushed.high:.3f} ⟨fₙ⟩; it is never above the "
+            f"{pushed.low:.3f} and {pushed.high:.3f} × the mean force; it is never above the "
             f"{term('limit_load', 'limit load')}, beyond which no network in balance exists. "
             "|u| is how far a disk moves first, against the root mean square over all disks."
         )
@@ -291,7 +293,7 @@ class View(TabView):
         )
         text = (
             f"{EVERY} One linear program for each of {len(loads.load)} contacts, certified to "
-            f"{loads.gap:.0e} ⟨fₙ⟩, in {loads.seconds:.1f} s."
+            f"{loads.gap:.0e} of the mean force, in {loads.seconds:.1f} s."
         )
         self._say(folded(text), [fig], lead=lead)
 

@@ -42,20 +42,17 @@ GROWS = "The networks come as they are found; the exact outline of S follows."
 
 COMPUTED = (
     " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
-    "it is known to {found.gap:.1g} ⟨fₙ⟩. The inner half is the outline shrunk to half its lengths "
-    "about its middle."
+    "it is known to {found.gap:.1g} of the mean force. The inner half is the outline shrunk to "
+    "half its lengths about its middle."
 )
-
-# No taller than the window leaves room for, where it has all of its width.
-WHOLLY_SEEN = {"max-width": "max(300px, calc(100dvh - 390px))"}
 
 LEAD = (
-    "<b>Every network of forces that holds these disks lies in the shaded area S</b>{flattened}. "
-    "Drag the red dot, or sweep it: the forces in the packing follow."
+    "<b>Each dot is one whole picture like that of the packing; S holds all that can be</b>"
+    "{flattened}. Drag the red dot, or sweep it: orange lines grow, blue ones shrink."
 )
 CROWDED = (
-    ": networks found at random differ in all {free} directions, and go only a little way along "
-    "these two"
+    ". To go far in one direction, many forces have to conspire, and chance hardly ever makes "
+    "them: it has {free} directions to go"
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = {"Sweep across ↔": 0, "Sweep up and down ↕": 1}
@@ -104,7 +101,7 @@ class View(TabView):
         return pn.Column(
             self.lead,
             self.planes,
-            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0, styles=WHOLLY_SEEN),
+            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
             pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
             Progress(self.task),
             self.told,
@@ -311,7 +308,7 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
-        words = f"<b>{inner:.0%} of the dots lie in the inner half of S</b>"
+        words = f"<b>{inner:.0%} of the dots lie in the inner half of S</b>, less than half as far out as the outline"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
@@ -345,7 +342,7 @@ class View(TabView):
             "",
             x_range=DataRange1d(**around),
             y_range=DataRange1d(**around),
-            aspect_ratio=1.08,
+            aspect_ratio=1.3,  # with what is said below it, no taller than a window
             sizing_mode="scale_width",
             match_aspect=True,
         )

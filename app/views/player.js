@@ -5,6 +5,7 @@ import { ask, knownThere } from "./ask.js"
 import { Buttons } from "./buttons.js"
 import { Difference } from "./difference.js"
 import { Grab, UNCHOSEN } from "./grab.js"
+import { Invitation } from "./invite.js"
 import { CATCH_UP, extend, Live, roomy } from "./live.js"
 import { Look } from "./look.js"
 import { plain } from "./plain.js"
@@ -53,7 +54,9 @@ class Player {
     this.pins = new Pins(model)
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
+    this.invite = new Invitation(this.scene)
     this.scene.onMarks = (context, scene) => {
+      this.invite.place(this.replay?.mixed, this.inviting, this.pushes)
       this.pins.draw(context, scene)
       this.hand.draw(context, scene)
       this.difference.draw(context, scene)
@@ -70,6 +73,15 @@ class Player {
       forces: (grain) => this.look.forcesOn(grain, this.replay.mixed),
     }
   }
+
+  /** Whether nothing was dragged yet, and a line can be. */
+  get inviting() {
+    const { model, live, difference, predict } = this
+    return !(this.took && !this.pushes) && this.replay !== null && !live.moves && (model.contact ?? null) === null && !difference.on && !predict.shown
+  }
+
+  /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
+  get pushes() { return this.model.tab === "perturb" }
 
   // What is on screen
 
@@ -101,7 +113,7 @@ class Player {
     this.live.glide(view)
     this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
     this.follows = walk.room > 0 || (this.follows && place !== null)
-    if (playing || walk.room) requestAnimationFrame(() => this.play(true))
+    if ((playing || walk.room) && !this.pushes) requestAnimationFrame(() => this.play(true))
     else if (this.model.predict) this.predict.ask() // of a link
   }
 
@@ -377,6 +389,7 @@ class Player {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
+      tab: loaded((replay) => { if (this.pushes && this.playing && this.resting === null) this.pause(replay) }),
       lead: () => { buttons.part("lead").innerHTML = model.lead },
       legend: () => { buttons.part("legend").innerHTML = model.legend },
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },

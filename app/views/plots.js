@@ -106,14 +106,15 @@ export class Plots {
     if (end > axis?.end) axis.end = end
   }
 
-  showBars(bars, { walk, mixed, seen, low, high }, scale) {
+  showBars(bars, { walk, mixed, seen, low, high, held }, scale) {
     const column = (name) => bars.get_column(name)
     const at = column("at"), bottom = column("low"), top = column("high"), now = column("now")
     for (let k = 0; k < now.length; k++) {
       const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
       now[k] = mixed.normal[c] / unit
-      bottom[k] = seen ? low[c] / unit : now[k]
-      top[k] = seen ? high[c] / unit : now[k]
+      // On the way to a network that was not seen yet it is beyond those that were; so is what is pulled.
+      bottom[k] = seen ? (held ? low[c] / unit : Math.min(low[c] / unit, now[k])) : now[k]
+      top[k] = seen ? (held ? high[c] / unit : Math.max(high[c] / unit, now[k])) : now[k]
     }
     this.changed(bars, "bars")
   }

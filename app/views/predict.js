@@ -22,8 +22,8 @@ const ASKED = [
       const rank = order.indexOf(contact) + 1, [widest] = order
       player.model.contact = widest
       player.model.colour = "extent"
-      const told = `Contact ${walk.backbone[contact]} can change by ${extent[contact].toFixed(2)} ⟨fₙ⟩` +
-        `${exact ? "" : " or more"}, place ${rank} of ${order.length}. The widest, ${extent[widest].toFixed(2)} ⟨fₙ⟩, ` +
+      const told = `Contact ${walk.backbone[contact]} can change by ${extent[contact].toFixed(2)} × the mean force` +
+        `${exact ? "" : " or more"}, place ${rank} of ${order.length}. The widest, ${extent[widest].toFixed(2)} × the mean force, ` +
         "is marked; colours now show how far each can go. Thick lines are not always the least certain."
       return [rank <= Math.ceil(order.length / 10), told]
     },

@@ -41,13 +41,21 @@ function way(scene, contact, what) {
 }
 
 /** What is drawn of the disks, in this scene. */
-export function legend({ scene, empty, load }) {
+export function legend(body) {
+  const { scene, h, empty, load } = body
   if (empty && !scene.idle) return "orange: the motion in which they give way; grey: weight and other loads"
   const pulled = load.some((v, k) => k < 3 * scene.r.length && v), pressed = scene.pressing.length > 0
   const weights = Array.from(scene.r, (_, d) => Math.hypot(load[3 * d], load[3 * d + 1]))
   const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
-  return `blue: contact forces; wedge: where friction lets them point, tangential ≤ μ × normal${loads ? `; grey: ${loads}` : ""}; orange: at the limit`
+  const axes = h === 2 || h > 3 ? "; green, violet: on the axes" : ""
+  return `blue: contact forces${axes}; wedge: where friction lets them point${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
+}
+
+/** Whether friction is at its limit at some contact. */
+function slips(body) {
+  const { scene, mu } = body, F = body.forces()
+  return Array.from(scene.i).some((_, c) => F[2 * c] > 1e-9 && mu > 0 && mu * F[2 * c] - Math.abs(F[2 * c + 1]) < 1e-6 * Math.max(1, F[2 * c]))
 }
 
 /** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
@@ -69,7 +77,7 @@ function equationsOf({ grains, r, pressing, box, equations }) {
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
   const said = "no force sideways, none up or down, and no turning, of every disk"
   if (whole !== equations) return [said, ""]
-  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `${said}; two of these follow from the others, as a shift of all disks changes nothing; one more for the pressure`]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `${said}, less two that follow from the others; one more for the pressure`]
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
 }
 
@@ -79,7 +87,7 @@ export function special({ scene }) {
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
   const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
-  return `There are no walls: the dashed square repeats on all sides, and pale disks are copies of the same ${scene.r.length}. What leaves it on one side comes in on the other, forces too. It is pressed together from all sides, with pressure ${Number(scene.pressure.toPrecision(3))}; there is no weight. It was packed at μ = ${scene.packed}.${rattles}`
+  return `No walls and no weight: the dashed square repeats on all sides (pale disks are copies of the same ${scene.r.length}) and is pressed together with pressure ${Number(scene.pressure.toPrecision(3))}. It was packed at μ = ${scene.packed}.${rattles}`
 }
 
 /** What the picture of S is. */
@@ -88,8 +96,8 @@ export function pictured(body) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
-  return h > 3 ? `all pairs of values that these two forces can have: one shadow of S, which has ${h} dimensions; dots: found at random`
-    : `${S} ${["", "a line", "a polygon", "a body; drag beside the point to turn it"][h]}`
+  return h > 3 ? `all pairs of values that these two forces can have; dots: found at random; chance seldom gets to the rim`
+    : `${S} ${["", "a line", "a polygon; its axes are two of the forces", "a body; drag beside the point to turn it"][h]}`
 }
 
 /** The sentence over a scene. */
@@ -108,11 +116,19 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `${h} free numbers: infinitely many sets of forces hold these disks. What is drawn is one shadow of S, on two of the forces: each of its points stands for many sets. Drag the point or an arrow: all forces follow, and everything stays in balance.`
+  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw: you see one shadow of S, on two of the forces. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
-  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point, or an arrow.${determined}${grips}`
+  const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
+  const limit = `${["", "an end", "a side", "a face"][h]}: there a contact is about to slip or to open`
+  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
+}
+
+/** Whether a normal force can be more than all disks weigh. */
+function wedges(body) {
+  const { load, r } = body.scene, weight = Array.from(r).reduce((sum, _, d) => sum + Math.hypot(load[3 * d], load[3 * d + 1]), 0)
+  return weight > 0 && Array.from({ length: body.count }, (_, c) => body.interval(2 * c)[1]).some((most) => most > 1.5 * weight)
 }
 
 /** Whether friction on a disk between two walls, and nothing else, points down at both, as it can only there. */

@@ -1,6 +1,7 @@
 // Shadows of S: on one axis, the exact interval of a force, and on two above three dimensions.
 
 import { dot } from "./body.js"
+import { nameAxis } from "./line.js"
 
 /** The exact interval of a contact's f_n: the shadow of S on that axis. */
 export function drawInterval(space, contact) {
@@ -13,7 +14,7 @@ export function drawInterval(space, contact) {
   const from = space.flat(m), side = [dy / flat, -dx / flat]
   const below = side[1] > 0 ? side.map((v) => -v) : side
   const reach = Math.max(...body.corners.map(({ u }) => { const p = space.flat(u); return dot([p[0] - from[0], p[1] - from[1]], below) }))
-  const off = reach + Math.max(0.14 * space.half, (body.h === 2 ? 46 : 0) / space.unit) // beyond the words at the sides
+  const off = reach + 0.14 * space.half
   const foot = (u) => {
     const s = dot(along, u.map((v, k) => v - m[k]))
     return [from[0] + s * dx + off * below[0], from[1] + s * dy + off * below[1]]
@@ -65,11 +66,5 @@ export function drawShadow(space) {
   const ends = [0, 1].map((k) => { const all = space.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
   for (const v of ends[0]) space.write(space.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)
   for (const v of ends[1]) space.write(52, space.px([0, v])[1], v.toFixed(2), look.cold, 11)
-  const [a, b] = space.shadow.map((k) => space.told("name", k))
-  space.write(w / 2, h - 16, `→ ${a}`, look.ink)
-  g.save()
-  g.translate(15, h / 2)
-  g.rotate(-Math.PI / 2)
-  space.write(0, 0, `→ ${b}`, look.ink, 13, "middle")
-  g.restore()
+  space.shadow.forEach((force, d) => nameAxis(space, `${space.told("name", force)} →`, look.axes?.get(force) ?? look.ink, d ? null : h - 16))
 }

@@ -24,7 +24,7 @@ export function render({ model, view }) {
   root.innerHTML = desk(MOST_MU)
   const parts = {}, told = {}
   const part = (name) => (parts[name] ??= root.querySelector(`.${name}`))
-  const now = { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, filled: false, path: [], undo: [] }
+  const now = { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, filled: false, path: [], undo: [], fresh: true }
   let body = null, mu = model.scene.mu, chosenMu = false, waiting = 0, asleep = 0, returning = false
 
   const gone = goneBanner(view, "What is in the page still moves.")
@@ -50,7 +50,8 @@ export function render({ model, view }) {
     if (!body || !root.isConnected) return
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = builds() && root.getRootNode().activeElement === part("packing") ? builder.cursor : null
-    const look = { ...colours(), ...now, wall, cursor, dots: now.filled && space.dots.length }
+    const dressed = colours(), axes = new Map(space.body?.h > 1 ? space.axed.map((force, k) => [force, [dressed.across, dressed.up][k]]) : [])
+    const look = { ...dressed, ...now, wall, cursor, axes, dots: now.filled && space.dots.length }
     if (body.scene !== arrows.body?.scene || arrows.wide !== part("packing").clientWidth) {
       arrows.fit(body, body.scene.name === "own" && arrows.own === part("packing").clientWidth)
       arrows.own = body.scene.name === "own" ? part("packing").clientWidth : 0
@@ -103,6 +104,7 @@ export function render({ model, view }) {
       now.contacts = new Set(given ? given.stops.map(([c]) => c) : now.contact === null ? [] : [now.contact])
     }
     if (what === "begin") remember()
+    if (what === "go" || what === "pull") now.fresh = false
     if (what === "go") { going.pause(); body.goTo(given); say() }
     if (what === "pull") { going.pause(); body.pull(given.contact, given.normal, given.tangential); say() }
     if (what === "press") return press(given)
@@ -199,7 +201,7 @@ export function render({ model, view }) {
     part("lesson").hidden = scene.name !== "groove"
     part("board").classList.toggle("reading", part("lesson").open && scene.name === "groove")
     if (!scene.i) return void tell("says", "The disks are being pressed together …")
-    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null })
+    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null, fresh: true })
     pushes(false)
     going.pause()
     mu = scene.mu
@@ -366,7 +368,7 @@ export function render({ model, view }) {
 
   /** The disk and S as they are, for white paper: nothing chosen, and with words that can be read at their size. */
   function pictures() {
-    const look = { ...colours(false), ...now, contact: null, disk: null, side: null, contacts: new Set(), dots: 0 }
+    const look = { ...colours(false), ...now, contact: null, disk: null, side: null, contacts: new Set(), dots: 0, fresh: false }
     return [Arrows, Space].map((Picture) => {
       const canvas = root.appendChild(document.createElement("canvas"))
       canvas.style.cssText = "position: absolute; visibility: hidden; width: 400px; height: 230px; border: 0"

@@ -1,16 +1,16 @@
-// S of a small scene in its true shape: a segment, a polygon, or a body that turns in the hand, with
-// the network on screen as a point in it. With more dimensions, its shadow.
+// S of a small scene: a segment, a polygon over two of the forces, or a body in its true shape that
+// turns in the hand, with the network on screen as a point in it. With more dimensions, its shadow.
 
 import { distance, dot, solve } from "./body.js"
-import { drawCompass, drawName, readBy, turnedTo } from "./compass.js"
 import { Easel } from "./easel.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
+import { drawName, readBy } from "./reading.js"
 import { drawInterval, drawShadow } from "./shadow.js"
 
 const TURN = 0.008 // radians a pixel
 // Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
-const BESIDE = [[46, 46], [95, 46], [140, 50], [30, 30], [60, 64]]
-const FLOOR = 46
+const BESIDE = [[46, 46], [95, 46], [110, 50], [30, 30], [60, 64]]
+const FLOOR = 46, ASIDE = 72 // of a polygon, for its axes
 const ON = 34 // pixels of an arrow where S goes on without an end
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
@@ -53,7 +53,7 @@ export class Space {
   flat(u) {
     const { body } = this
     if (body.h > 3) return this.onAxes.map(({ row, rest }) => dot(row, u) + rest)
-    if (body.h === 2) return [...this.lie.rows.map((row) => dot(row, u)), 0]
+    if (body.h === 2) return this.axed.length ? this.onAxes.map(({ row }) => dot(row, u)) : u
     if (body.h < 2) return [this.sign * (u[0] ?? 0), 0, 0]
     return this.view.map((row) => dot(row, u))
   }
@@ -61,34 +61,37 @@ export class Space {
   /** Which way a line is drawn. */
   get sign() { return signOf(this.body) }
 
-  /** How a polygon lies: the contacts it is read by, and the axes of its picture; found once, as no friction shall turn it. */
-  get lie() {
+  /** The two forces that S is drawn by, 2 c for f_n of contact c, 2 c + 1 for f_t; none where it is drawn as it is. */
+  get axed() {
     const { body } = this
-    if (this.own?.of !== body.axes) {
-      const read = body.empty ? [] : readBy(body)
-      this.own = { of: body.empty ? null : body.axes, read, rows: turnedTo(body, read) }
-    }
-    return this.own
+    if (body.h > 3) return this.shadow
+    if (body.h !== 2) return []
+    // Found once, as no friction shall turn the picture.
+    if (this.own?.of !== body.axes) this.own = { of: body.empty ? null : body.axes, forces: body.empty ? [] : readBy(body).map((c) => 2 * c) }
+    return this.own.forces
   }
 
-  /** Contacts by whose forces the point is read: of the axis below S, and of the arrow or axis beside it. */
+  /** Contacts by whose forces the point is read: of the axis below S, and of the one beside it. */
   get read() {
     const { body } = this
-    if (body.h > 3) return this.shadow.map((force) => force >> 1)
-    if (body.h === 2) return this.lie.read
+    if (body.h > 1) return this.axed.map((force) => force >> 1)
     const force = body.h === 1 ? axisForce(body, null) : null
     return force === null ? [] : [force >> 1]
   }
 
-  /** Pixels below S for its axis; a line leaves enough by itself. */
-  get floor() { return this.body.h === 2 && this.read.length ? FLOOR : 0 }
+  /** Whether S is a polygon over two forces. */
+  get over() { return this.body.h === 2 && this.axed.length > 0 }
 
-  /** Both forces of the shadow, as rows of u: found once, as many points are drawn. */
+  /** Pixels below S and left of it for its axes; a line leaves enough by itself. */
+  get floor() { return this.over ? FLOOR : 0 }
+  get aside() { return this.over ? ASIDE : 0 }
+
+  /** Both forces that S is drawn by, as rows of u: found once, as many points are drawn. */
   get onAxes() {
-    const { body, shadow, axes } = this
-    if (axes?.body !== body || axes.origin !== body.origin || axes.shadow.join() !== shadow.join()) {
-      const rows = shadow.map((k) => ({ row: body.axes.map((axis) => axis[k]), rest: body.origin[k] }))
-      this.axes = { body, origin: body.origin, shadow, rows }
+    const { body, axed, axes } = this
+    if (axes?.of !== body.axes || axes.origin !== body.origin || axes.axed.join() !== axed.join()) {
+      const rows = axed.map((k) => ({ row: body.axes.map((axis) => axis[k]), rest: body.origin[k] }))
+      this.axes = { of: body.axes, origin: body.origin, axed, rows }
     }
     return this.axes.rows
   }
@@ -96,20 +99,19 @@ export class Space {
   /** u whose place moves by so much in the plane of the screen. */
   moving(u, dx, dy) {
     const { body } = this
-    if (body.h > 3) {
-      const row = (k) => body.axes.map((axis) => axis[k])
-      const [a, b] = this.shadow.map(row), M = [[dot(a, a), dot(a, b)], [dot(a, b), dot(b, b)]]
+    if (this.axed.length) {
+      const [a, b] = this.onAxes.map(({ row }) => row), M = [[dot(a, a), dot(a, b)], [dot(a, b), dot(b, b)]]
       const part = solve(M, [dx, dy]) ?? [dx / (M[0][0] || 1), 0]
       return u.map((v, k) => v + part[0] * a[k] + part[1] * b[k])
     }
-    if (body.h === 2) return u.map((v, k) => v + dx * this.lie.rows[0][k] + dy * this.lie.rows[1][k])
+    if (body.h === 2) return u.map((v, k) => v + [dx, dy][k])
     if (body.h < 2) return u.map((v) => v + this.sign * dx)
     return u.map((v, k) => v + dx * this.view[0][k] + dy * this.view[1][k])
   }
 
   /** Half the width and height that S may take, which leaves room for words. */
   get room() {
-    const w = this.easel.wide, h = this.easel.high - this.floor, [x, y] = BESIDE[Math.min(this.body.h, 4)]
+    const w = this.easel.wide - this.aside, h = this.easel.high - this.floor, [x, y] = BESIDE[Math.min(this.body.h, 4)]
     return [w / 2 - Math.min(x, 0.33 * w), h / 2 - Math.min(y, 0.2 * h)]
   }
 
@@ -124,7 +126,7 @@ export class Space {
 
   px([x, y]) {
     const { wide: w, high: h } = this.easel, { unit } = this
-    return [w / 2 + (x - this.centre[0]) * unit, (h - this.floor) / 2 - (y - this.centre[1]) * unit]
+    return [(w + this.aside) / 2 + (x - this.centre[0]) * unit, (h - this.floor) / 2 - (y - this.centre[1]) * unit]
   }
 
   /** The part of the plane that is seen follows S, so that it is seen to grow: not all the time. */
@@ -173,6 +175,7 @@ export class Space {
     this.body = body
     this.look = look
     this.labels = []
+    this.taken = [] // by words: those of the longest sides of a polygon come first
     this.easel.measure()
     const moves = !body.scene.idle && !body.empty && this.frame(this.sceneDrawn !== body.scene)
     this.easel.begin(look.paper, this.standing(), () => {
@@ -185,11 +188,10 @@ export class Space {
     g.lineJoin = "round" // no spikes where sides meet
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
-    const axis = body.h === 2 ? this.read[0] : null // whose interval is there
     if (body.h === 1) drawSegment(this)
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) this.drawSolid()
-    if (body.whole && body.h > 1 && look.contact !== null && look.contact !== axis) drawInterval(this, look.contact)
+    if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
     g.beginPath()
@@ -199,8 +201,26 @@ export class Space {
     g.strokeStyle = look.paper
     g.lineWidth = 2
     g.stroke()
-    if (!body.h || (body.whole && body.corners.length === 1)) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
+    const determined = !body.h || (body.whole && body.corners.length === 1)
+    if (determined) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
+    else if (look.fresh) this.invite(x, y)
     return moves
+  }
+
+  /** The first gesture, pointed out. */
+  invite(x, y) {
+    const { context: g, look } = this
+    g.font = "13px sans-serif"
+    const wide = g.measureText("drag me ↘").width + 12
+    const ways = [["↙ drag me", 1, -1], ["drag me ↘", -1, -1], ["↖ drag me", 1, 1], ["drag me ↗", -1, 1]]
+    const places = [20, 30].flatMap((off) => ways.map(([words, a, b]) => [x + a * (off / 2 + wide / 2), y + b * off, words]))
+    const [px, py, words] = places.find(([a, b]) => this.free([a, b], wide, 21)) ?? places[0]
+    g.fillStyle = look.hand
+    g.fillRect(px - wide / 2, py - 11, wide, 21)
+    g.textAlign = "center"
+    g.textBaseline = "middle"
+    g.fillStyle = look.paper
+    g.fillText(words, px, py)
   }
 
   /** What decides how that looks which stands still while a point goes through S. */
@@ -278,7 +298,10 @@ export class Space {
     const { context: g, body, look } = this, { corners } = body
     const middle = this.px(this.flat(body.middle))
     const places = corners.map(({ u }) => this.px(this.flat(u)))
-    if (this.floor) drawAxis(this, 2 * this.read[0], this.easel.high - FLOOR + 6)
+    if (this.over) {
+      drawAxis(this, this.axed[0], this.easel.high - FLOOR + 6)
+      drawAxis(this, this.axed[1], ASIDE - 6, 1)
+    }
     const order = [...places.keys()].sort((a, b) =>
       Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
     g.beginPath()
@@ -287,7 +310,6 @@ export class Space {
     g.fillStyle = look.shade
     g.fill()
     const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
-    this.taken = [] // by words: those of the longest sides come first
     for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
       const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)
       g.strokeStyle = lit ? look.hand : look.cold
@@ -314,7 +336,6 @@ export class Space {
     }
     if (places.length < 3) return // a line among two dimensions
     drawName(this, places, middle)
-    drawCompass(this, places)
   }
 
   /** Words outside a side at (x, y), u its normal: along it, or beside it. */

@@ -33,7 +33,7 @@ SAMPLERS = {
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
-PEAK = "forces are freest here"
+PEAK = "↓ forces are freest here"
 RISES = "friction gives\neach force room"
 FALLS = "but leaves\nfewer contacts"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
@@ -102,7 +102,7 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     """
     kind = {"y_axis_type": "log" if log else "linear"}
     walks = studied.rows("walk")
-    spread = _over_mu("spread", "how much a force scatters, in mean forces", 330, **kind)
+    spread = _over_mu("spread", "how much a force scatters (mean force = 1)", 330, **kind)
     found = statistics.means(walks, "eta1")
     _line(spread, found, f"mean of {_packings(walks)} packings", log, COLOURS[0])
     _own(spread, [(here["mu"], here["eta1"], 0.0)], log, DOT, label=HERE)
@@ -149,9 +149,9 @@ def most_undetermined(points: Points) -> str:
         return ""
     peak = max(points, key=lambda point: point[1])[0]
     return (
-        f"<b>Forces are freest at friction {peak:g}.</b> On the same disks, more friction allows "
-        "more forces; but each friction here has its own packing, and more friction leaves it "
-        "fewer contacts. Click a point to see such a packing."
+        f"<b>Forces are freest at friction {peak:g}.</b> More friction leaves every "
+        "force more room, but disks packed with more friction come to rest on fewer contacts. "
+        "Click a point to see such a packing."
     )
 
 
@@ -181,14 +181,14 @@ def _peak(fig: Figure, points: Points) -> None:
     x, y, error = max(points, key=lambda point: point[1])
     fig.y_range = DataRange1d(end=1.25 * (y + error))  # room for what is written
     told = (
-        (x, y + error, PEAK, "center", DOT, "peak"),
+        (x, y + error, PEAK, "left", DOT, "peak"),
         (points[1][0], 0.45 * y, RISES, "left", "#808080", "rises"),
         (points[-1][0], 0.12 * y, FALLS, "right", "#808080", "falls"),
     )
     for at, up, text, align, colour, name in told:
         fig.add_layout(
             Label(
-                x=at, y=up, text=text, y_offset=6, text_align=align,
+                x=at, y=up, text=text, x_offset=-4, y_offset=6, text_align=align,
                 text_font_size="12px", text_color=colour, name=name,
             )
         )  # fmt: skip

@@ -181,7 +181,7 @@ def test_hovering_tells_grain_and_contact(page):
     tip = page.locator(".tip.on")
     tip.wait_for()
     assert str(scene(page, f"scene.geometry.backbone[{contact}]")) in tip.inner_text()
-    assert "fₙ / ⟨fₙ⟩" in tip.inner_text()
+    assert "normal force fₙ, mean = 1" in tip.inner_text()
     grain, x, y, r = scene(
         page,
         "(k => ['grain', 'x', 'y', 'r'].map(name => scene.geometry[name][k]))"
@@ -248,8 +248,8 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     )
     assert c >= 0 and width == pytest.approx(2 * 0.23 * force, rel=1e-5)
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
-    page.get_by_text("0.2 ⟨fₙ⟩ more").wait_for()
-    page.get_by_text("4.35 × the mean ⟨fₙ⟩: as wide as the largest disk").wait_for()
+    page.get_by_text("more by 0.2 × mean").wait_for()
+    page.get_by_text("4.35 × mean").wait_for()
     page.locator("input.typed").fill("1")  # another μ
     page.locator("input.typed").press("Enter")
     page.wait_for_function("() => location.search.includes('mu=1&')")
@@ -258,10 +258,10 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page.get_by_label("Width, times").fill("-3")
     page.get_by_label("Width, times").press("Enter")
     page.get_by_text("a number from 0.1 to 10, got '-3'").first.wait_for()
-    page.get_by_label("Full colour, ⟨fₙ⟩").fill("")
-    page.get_by_label("Full colour, ⟨fₙ⟩").press("Enter")
+    page.get_by_label("Full colour, in mean forces").fill("")
+    page.get_by_label("Full colour, in mean forces").press("Enter")
     page.wait_for_function("() => !location.search.includes('full=')")
-    page.get_by_text("0.5 ⟨fₙ⟩ more").wait_for()
+    page.get_by_text("more by 0.5 × mean").wait_for()
 
 
 def test_a_click_selects_the_contact_everywhere(page):

@@ -413,7 +413,7 @@ def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
     means = statistics.means(studied.rows("walk"), "eta1")
     most = max(means, key=lambda point: point[1])
     (peak,) = fig.select(name="peak")
-    assert peak.text == "forces are freest here" and peak.x == most[0]
+    assert peak.text == "↓ forces are freest here" and peak.x == most[0]
     assert f"at friction {most[0]:g}" in view.lead.object and "Click a point" in view.lead.object
     line, here = (r for r in fig.renderers if isinstance(r.glyph, Scatter))
     assert list(here.data_source.data["x"]) == [0.1]
@@ -560,7 +560,7 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     state.looks.tab = "perturb"
     view = View(state)
     assert view.strongest.visible and not view.push.visible
-    assert "Click any contact" in view.told.object and "<svg" in view.lead.object
+    assert "Click a line" in view.told.object and "<svg" in view.lead.object
     assert view.lead.object.count("<circle") == 8  # two that are pushed, and those around them
     press(view.strongest)
     assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and view.push.visible

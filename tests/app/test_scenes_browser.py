@@ -172,7 +172,7 @@ def test_hover_lights_the_contact_and_keys_go_through_s(look):
     until(page, f"[...small.now.contacts].join() === {stops}.join()")
     desk(page).locator("canvas.space").focus()
     place = "small.space.flat(small.body.u)"
-    x, y, _ = ask(page, place)
+    x, y = ask(page, place)
     page.keyboard.press("ArrowRight")
     assert ask(page, f"{place}[0]") > x and ask(page, f"{place}[1]") == pytest.approx(y)
     page.keyboard.press("n")
@@ -185,21 +185,33 @@ def test_hover_lights_the_contact_and_keys_go_through_s(look):
 
 
 @pytest.mark.parametrize("query", ["?scene=box", "?scene=box&mu=0.55", "?scene=six"])
-def test_a_polygon_lies_on_the_axis_of_a_force(look, query):
-    """Turned and reflected, not stretched; one force grows to the right, another one upwards."""
+def test_a_polygon_lies_over_two_of_the_forces(look, query):
+    """One normal force grows to the right, another one upwards, as far as its place says."""
     page = look(query)
-    contact, other = ask(page, "small.space.read")
-    flat = np.array(ask(page, "[[0, 0], [1, 0], [0, 1]].map(u => small.space.flat(u))"))[:, :2]
-    turned = flat[1:] - flat[0]
-    np.testing.assert_allclose(turned @ turned.T, np.eye(2), atol=1e-12)
-    axes = np.array(ask(page, "small.body.axes.map(axis => [...axis])"))
-    slope = axes[:, 2 * contact] @ turned
-    assert slope[0] > 0 and slope[1] == pytest.approx(0, abs=1e-12)
-    assert (axes[:, 2 * other] @ turned)[1] > 0
-    lie = ask(page, "small.space.read")
+    across, up = axed = ask(page, "small.space.axed")
+    assert across % 2 == up % 2 == 0 and across != up
+    for _ in range(2):
+        rest, forces = ask(
+            page, f"[{axed}.map(k => small.body.origin[k]), [...small.body.forces()]]"
+        )
+        flat = np.array(ask(page, "small.space.flat(small.body.u)"))
+        np.testing.assert_allclose(flat + rest, [forces[across], forces[up]], atol=1e-12)
+        desk(page).locator("canvas.space").focus()
+        page.keyboard.press("ArrowRight")
+    colours = ask(page, "[small.arrows.look.across, small.arrows.look.up]")
+    seen = f"{axed}.map(k => small.arrows.axisColour(k >> 1))"
+    assert ask(page, seen) == colours
     desk(page).get_by_role("slider", name="friction μ").fill("0.4")
     until(page, "small.body.mu === 0.4")
-    assert ask(page, "small.space.read") == lie  # no friction turns it
+    assert ask(page, "small.space.axed") == axed  # no friction turns it
+
+
+def test_the_first_gesture_is_pointed_out_until_it_was_made(look):
+    page = look("?scene=box")
+    assert ask(page, "small.now.fresh")
+    desk(page).locator("canvas.space").focus()
+    page.keyboard.press("ArrowRight")
+    until(page, "!small.now.fresh")
 
 
 def test_what_is_pointed_at_lights_up_everywhere(look):

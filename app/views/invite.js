@@ -1,0 +1,42 @@
+// The first gesture, pointed out: one strong line near the middle of the packing says that it can be dragged,
+// until one was; or clicked, where a contact is to be chosen.
+
+const NEAR = 0.45 // of half the view, from its middle
+const DRAG = matchMedia("(pointer: coarse)").matches ? "↙ tap, then drag" : "↙ drag me", CHOOSE = "↙ click me"
+
+export class Invitation {
+  constructor(scene) {
+    this.scene = scene
+    this.of = this.row = null // the packing, and the line that was chosen in it
+    this.tag = scene.root.appendChild(document.createElement("div"))
+    Object.assign(this.tag, { className: "invite", hidden: true })
+  }
+
+  /** Beside the line; nowhere where there is no hand for it. */
+  place(mixed, wanted, pushes) {
+    const { scene, tag } = this, { geometry, view } = scene
+    if (!wanted) return void (tag.hidden = true)
+    if (this.of !== geometry) Object.assign(this, { of: geometry, row: this.strongest(mixed.normal) })
+    if (this.row === null) return void (tag.hidden = true)
+    const [x, y] = this.middle(this.row), [px, py] = scene.toPixel(x, y)
+    tag.hidden = Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > 0.9 * view.half
+    tag.textContent = pushes ? CHOOSE : DRAG
+    tag.style.transform = `translate(${px}px, ${py}px) translateY(-100%)`
+  }
+
+  middle(k) {
+    const [xa, ya, xb, yb] = this.scene.ends(k)
+    return [(xa + xb) / 2, (ya + yb) / 2]
+  }
+
+  strongest(normal) {
+    const { geometry: { contact }, view } = this.scene
+    let best = null
+    for (let k = 0; k < contact.length; k++) {
+      const [x, y] = this.middle(k)
+      if (Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > NEAR * view.half) continue
+      if (best === null || normal[contact[k]] > normal[contact[best]]) best = k
+    }
+    return best
+  }
+}
