@@ -42,8 +42,8 @@ GROWS = "The networks come as they are found; the exact outline of S follows."
 
 COMPUTED = (
     " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
-    "it is known to {found.gap:.1g} of the mean force. The inner half is the outline shrunk to "
-    "half its lengths about its middle."
+    "it is known to {found.gap:.1g} of the mean force. Half as far out is the outline shrunk "
+    "to half its lengths about its middle."
 )
 
 LEAD = (
@@ -308,7 +308,7 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
-        words = f"<b>{inner:.0%} of the dots lie in the inner half of S</b>, less than half as far out as the outline"
+        words = f"<b>{inner:.0%} of the dots lie less than half as far out as the outline</b>"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)

@@ -742,7 +742,7 @@ def test_walk_and_uniform_states_are_shown_together(state, wait_for):
     view = plane_view.View(state)
     wait_for(state)
     assert not view.also.value and not len(view.beside.data["x"])
-    assert "inner half" in view.told.object and "uniform" not in view.told.object
+    assert "half as far out" in view.told.object and "uniform" not in view.told.object
     view.also.value = True
     wait_for(state)
     wait_for(state)  # the catalogue is read anew
