@@ -145,7 +145,7 @@ def check_complete(result: Any, what: str) -> None:
 
 PACKING = Kind(
     name="packing",
-    version=3,
+    version=3,  # that of older stores; newer ones are told by their parameters
     title="compaction",
     unit="step",
     parameters=_packing_parameters,
