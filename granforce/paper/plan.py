@@ -67,7 +67,7 @@ class Plan(NamedTuple):
     hardest_packings: int = 10  # with sweeps down to the smallest residual
     # More packings where the maximum is, and where packings differ most.
     fine_frictions: tuple[float, ...] = (0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
-    large_frictions: tuple[float, ...] = (1, 2, 5, 10)
+    large_frictions: tuple[float, ...] = (0.5, 1, 2, 5, 10)
     many_packings: int = 30
     exact_packings: int = 3
     uniform_packings: int = 10
