@@ -233,9 +233,9 @@ def test_uniform_states_against_size_reach_what_was_asked_for():
 
 
 def test_the_limit_of_packings_tells_means_with_errors_by_settings():
-    rows = bench.compaction_limit(True, n=20, frictions=(0.3,), seeds=2)
+    rows = bench.compaction_limit(True, n=20, frictions=(0.1,), seeds=2)
     assert [row["settings"] for row in rows] == list(packings.SETTINGS)
-    steps = bench.compaction_time_steps(True, n=20, frictions=(0.3,), seeds=2)
+    steps = bench.compaction_time_steps(True, n=20, frictions=(0.1,), seeds=2)
     assert [row["settings"] for row in steps] == ["Δt to 0.1, 600 sweeps", "Δt to 0.1, 150 sweeps"]
     assert all(steps[0][key] == rows[0][key] for key in ("h", "exact_eta3", "eta2"))
     for row in rows + steps:

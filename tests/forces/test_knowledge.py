@@ -158,7 +158,7 @@ def test_limit_loads_of_known_contacts_are_certified_and_no_larger():
 
 
 def test_the_violation_of_what_is_known_is_judged():
-    packing = packed(40, 0.3)
+    packing = packed(40, 0.1)
     S = gf.ensemble(packing, known=gf.Known([5], [0.5, -ANY], [ANY, ANY]))
     (at,) = S.positions([5])
     forces = S.original.copy()

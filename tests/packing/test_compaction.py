@@ -277,7 +277,8 @@ def test_a_cell_that_leans_back_keeps_its_lattice(rng):
 def unfinished(settling):
     """How many of 600 steps at μ = 1 end before they are accurate."""
     rng = np.random.default_rng(1)
-    motion = _dilute_gas(rng.uniform(0.5, 1.0, 100), rng, 1)
+    r = rng.uniform(0.5, 1.0, 100)
+    motion = _dilute_gas(r / r.max(), rng, 1)
     motion.pace[:] = 0.003, dynamics.MOST_RELAXATION
     pace = dynamics.Pace(100.0, 0.003, 0.03, 0.02, 150, settling, 0.01)
     counters, work = np.zeros(4, np.int64), {"list_rebuilds": 0}
