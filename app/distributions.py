@@ -37,7 +37,7 @@ def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
 def _kin(selection: Selection) -> tuple[Any, ...]:
     """What is the same for all cells of one statistic."""
     made = selection.packing
-    packing = {name: made.get(name) for name in ("imported", "n", "version")}
+    packing = {name: made.get(name) for name in ("imported", "n")}
     packing |= {} if selection.imported else unusual(made)
     own_mu = None if selection.same_mu else selection.packing["mu"]
     relax = selection.relax if selection.kind == "walk" else ""
