@@ -81,6 +81,7 @@ export function render({ model, view }) {
     tell("says", note || sentence(body, mu, now))
     tell("mend", `Set μ = ${now.enough}`)
     part("mend").hidden = !now.enough
+    part("says").classList.toggle("note", Boolean(note))
     part("says").classList.toggle("bad", body.empty && !body.scene.idle)
     part("undo").disabled = !now.undo.length
   }

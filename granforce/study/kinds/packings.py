@@ -145,7 +145,7 @@ def check_complete(result: Any, what: str) -> None:
 
 PACKING = Kind(
     name="packing",
-    version=3,  # that of older stores; newer ones are told by their parameters
+    version=3,  # those of version 4 tell it by their parameters alone
     title="compaction",
     unit="step",
     parameters=_packing_parameters,
