@@ -250,8 +250,8 @@ export class Grab {
 
   describe(contact, value) {
     const { walk } = this.replay, { rail, end } = this
-    let words = `Contact ${walk.backbone[contact]} pulled to ${value.toFixed(3)} × the mean force`
-    if (rail) words += ` of ${rail.lower.toFixed(3)} … ${rail.upper.toFixed(3)}`
+    const possible = rail ? ` (possible ${rail.lower.toFixed(3)} to ${rail.upper.toFixed(3)})` : ""
+    let words = `Contact ${walk.backbone[contact]} pulled to ${value.toFixed(3)}${possible} × the mean force`
     if (rail && end) {
       const { opened, sliding } = this.holding
       words += `, its ${end > 0 ? "largest" : "least"}: held there by ${opened.length} contacts that opened ` +
