@@ -216,7 +216,7 @@ export class Arrows {
     const { context: g, body, look } = this, { mu } = body
     const [normal, tangential] = [F[2 * contact], F[2 * contact + 1]]
     const [px, py] = this.px(...at), lit = look.contacts.has(contact), long = this.unit * body.scene.r[disk] * 0.62
-    const edge = mu * normal - Math.abs(tangential), slides = mu > 0 && edge < 1e-6 * Math.max(1, normal)
+    const slides = body.slides(normal, tangential)
     // The cone: where the force on the disk may point.
     const wide = Math.atan(mu), middle = Math.atan2(-inward[1], inward[0])
     g.beginPath()

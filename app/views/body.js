@@ -235,6 +235,11 @@ export class Body {
     return [...corners].sort((a, b) => angle(a) - angle(b))
   }
 
+  /** Whether a contact with this force is at the limit of friction. */
+  slides(normal, tangential) {
+    return this.mu > 0 && this.mu * normal - Math.abs(tangential) < 1e-6 * Math.max(1, normal)
+  }
+
   /** Forces f_n, f_t of all contacts at u. */
   forces(u = this.u) {
     const F = Float64Array.from(this.origin)

@@ -44,10 +44,10 @@ export function drawAxis(space, index, at, d = 0) {
   const marked = [...extreme.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
     .map(([u, colour]) => ({ v: change(u) + rest, place: space.px(space.flat(u)), colour }))
     .map((mark) => ({ ...mark, x: mark.place[d] }))
-  const own = look.axes?.get(index) ?? look.edge // a colour of its own, as its arrows have it
+  const own = look.axes?.get(index) // the colour that its arrows have
   const stroke = (x, from, to) => { g.moveTo(...(d ? [from, x] : [x, from])); g.lineTo(...(d ? [to, x] : [x, to])) }
   const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
-  g.strokeStyle = own
+  g.strokeStyle = own ?? look.edge
   g.lineWidth = 1
   g.beginPath()
   g.moveTo(...(d ? [at, ends[0]] : [ends[0], at]))
@@ -72,7 +72,7 @@ export function drawAxis(space, index, at, d = 0) {
   g.setLineDash([])
   marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) write(x, number(v), colour, 12) })
   const name = forceName(body.scene, index), words = slope > 0 ? `${name} →` : `← ${name}`
-  nameAxis(space, words, own === look.edge ? look.ink : own, d ? null : at + 33)
+  nameAxis(space, words, own ?? look.ink, d ? null : at + 33)
 }
 
 /** The name of an axis: below it, at y, or along the left edge. */

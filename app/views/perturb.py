@@ -54,7 +54,7 @@ LEAD = (
 )
 HINT = (
     "Click a line in the packing, or take the strongest one. Then guess how many times "
-    "the average force it takes, and see."
+    "the mean force it takes, and see."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "

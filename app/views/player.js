@@ -48,6 +48,7 @@ class Player {
     })
     this.replay = this.look = this.loaded = null
     this.resting = null // where a pause comes to rest, while it is on its way
+    this.took = false // whether a force was taken into the hand
     this.playing = this.follows = false // the newest state of a walk under way
     this.live = new Live(this, (live) => tell({ live }))
     this.hand = this.scene.hand = new Grab(this, tell)
@@ -77,7 +78,7 @@ class Player {
   /** Whether nothing was dragged yet, and a line can be. */
   get inviting() {
     const { model, live, difference, predict } = this
-    return !(this.took && !this.pushes) && this.replay !== null && !live.moves && (model.contact ?? null) === null && !difference.on && !predict.shown
+    return (this.pushes || !this.took) && this.replay !== null && !live.moves && (model.contact ?? null) === null && !difference.on && !predict.shown
   }
 
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */

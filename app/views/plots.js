@@ -112,9 +112,10 @@ export class Plots {
     for (let k = 0; k < now.length; k++) {
       const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
       now[k] = mixed.normal[c] / unit
-      // On the way to a network that was not seen yet it is beyond those that were; so is what is pulled.
-      bottom[k] = seen ? (held ? low[c] / unit : Math.min(low[c] / unit, now[k])) : now[k]
-      top[k] = seen ? (held ? high[c] / unit : Math.max(high[c] / unit, now[k])) : now[k]
+      const least = seen ? low[c] / unit : now[k], most = seen ? high[c] / unit : now[k]
+      // What is on its way to a network not seen before is seen, too; what is pulled is no network found.
+      bottom[k] = held ? least : Math.min(least, now[k])
+      top[k] = held ? most : Math.max(most, now[k])
     }
     this.changed(bars, "bars")
   }

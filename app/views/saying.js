@@ -54,8 +54,8 @@ export function legend(body) {
 
 /** Whether friction is at its limit at some contact. */
 function slips(body) {
-  const { scene, mu } = body, F = body.forces()
-  return Array.from(scene.i).some((_, c) => F[2 * c] > 1e-9 && mu > 0 && mu * F[2 * c] - Math.abs(F[2 * c + 1]) < 1e-6 * Math.max(1, F[2 * c]))
+  const F = body.forces()
+  return Array.from(body.scene.i).some((_, c) => F[2 * c] > 1e-9 && body.slides(F[2 * c], F[2 * c + 1]))
 }
 
 /** Forces less equations, as HTML; where S is empty, that no solution is allowed. */

@@ -50,7 +50,7 @@ export function render({ model, view }) {
     if (!body || !root.isConnected) return
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = builds() && root.getRootNode().activeElement === part("packing") ? builder.cursor : null
-    const dressed = colours(), axes = new Map(space.body?.h > 1 ? space.axed.map((force, k) => [force, [dressed.across, dressed.up][k]]) : [])
+    const dressed = colours(), axes = new Map(space.axed.map((force, k) => [force, [dressed.across, dressed.up][k]]))
     const look = { ...dressed, ...now, wall, cursor, axes, dots: now.filled && space.dots.length }
     if (body.scene !== arrows.body?.scene || arrows.wide !== part("packing").clientWidth) {
       arrows.fit(body, body.scene.name === "own" && arrows.own === part("packing").clientWidth)

@@ -50,7 +50,7 @@ CHECK_EVERY = 25
 NEARLY_BALANCED, NEARLY_BALANCED_AT_LARGE = 0.003, 0.01
 LARGE = 1.0
 # Longest time step, and most sweeps in it. From SETTLED_FROM on steps of 0.1 leave wider intervals
-# than shorter ones do, by 7 % at μ = 0.3, 13 % at 0.5, half at 1; those of 0.03 and less all leave
+# than shorter ones do, by 8 % at μ = 0.3, 13 % at 0.5, half at 1; those of 0.03 and less all leave
 # the same if the last sweeps of a step settle, of which a quarter are enough, too.
 LONGEST, SWEEPS = 0.1, 600
 SETTLED_FROM = 0.2
@@ -208,7 +208,7 @@ def _check_neighbours(packing: Packing) -> None:
 def default_steps(mu: float, dt: float | None, sweeps: int | None) -> tuple[float, int]:
     """The longest time step Δt and the most sweeps in it, each by μ where it is None.
 
-    0.1 and 600; 0.03 and 150 from μ = SETTLED_FROM on.
+    0.1 and 600; 0.03 and 150 from μ = 0.2 on.
     """
     usual = (LONGEST, SWEEPS) if mu < SETTLED_FROM else (LONGEST_SETTLED, SWEEPS_SETTLED)
     return usual[0] if dt is None else dt, usual[1] if sweeps is None else sweeps
