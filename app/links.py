@@ -33,7 +33,7 @@ def _flag(text: str) -> bool:
 VIEW: dict[str, Callable[[str], Any]] = {
     "tab": _tab,
     "contact": int,
-    "second": int,
+    "pair": _pair,
     "frame": int,
     "reference": int,
     "between": _pair,
@@ -60,7 +60,7 @@ VIEW: dict[str, Callable[[str], Any]] = {
 SPELLED: dict[str, Callable[[Any], Any]] = {"pulls": grabs.spelled, "known": known.spelled}
 SPELLED["zoom"] = lambda place: ":".join(f"{value:g}" for value in place)
 # What belongs to the states on screen, as it is where others come.
-UNSEEN: View = {"contact": None, "second": None, "frame": 0, "reference": 0, "between": None}
+UNSEEN: View = {"contact": None, "pair": None, "frame": 0, "reference": 0, "between": None}
 UNSEEN |= {"pulls": [], "known": []}
 OF_A_REPLAY = tuple(UNSEEN)
 
@@ -91,12 +91,12 @@ def fitting(view: View, replay: Replay) -> View:
     """Of these rows and contacts those that a Replay has."""
     frames, contacts = replay.normal.shape
     sizes = dict.fromkeys(OF_A_REPLAY, frames)
-    sizes |= dict.fromkeys(("contact", "second", "pulls", "known"), contacts)
+    sizes |= dict.fromkeys(("contact", "pair", "pulls", "known"), contacts)
 
     def fits(name: str) -> bool:
         if view[name] is None:
             return True
-        values = view[name] if name == "between" else (view[name],)
+        values = view[name] if name in ("between", "pair") else (view[name],)
         if name == "pulls":
             values = list(grabs.contacts(view[name]))
         if name == "known":

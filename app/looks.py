@@ -45,9 +45,9 @@ PUSHES = {
     "store": "Are undetermined packings weaker?",
 }
 PLANES = {
+    "pair": "the normal forces of two contacts",
     "principal": "the plane in which networks differ most",
     "contact": "both forces of one contact",
-    "pair": "the normal forces of two contacts",
     "stress": "the stress that networks carry",
 }
 SCALES = {"mean": "mean force = 1", "own": "force as packed = 1"}
@@ -60,7 +60,10 @@ class Looks(param.Parameterized):
     wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
     views = param.Integer(doc="how many views of tabs there are: what moves in them is drawn then")
     contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
-    second = param.Integer(default=None, allow_None=True, doc="contact beside it in a plane")
+    pair = param.Tuple(
+        default=None, length=2, allow_None=True,
+        doc="contacts whose normal forces span force space; None: two strong ones",
+    )  # fmt: skip
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
@@ -94,7 +97,7 @@ class Looks(param.Parameterized):
     axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
     pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
     axes: Any = param.Selector(
-        default="principal", objects=list(PLANES), doc="of force space on screen"
+        default="pair", objects=list(PLANES), doc="of force space on screen"
     )
     dark = param.Boolean(doc="theme")
 

@@ -37,6 +37,12 @@ class Plane(NamedTuple):
     path: Any  # (F, 2) float32: the original network, then the states shown
     kind: str = ""  # STRESS where the axes are those of stresses
 
+    @property
+    def pair(self) -> list[int]:
+        """Two contacts, of whose forces each axis is one; none for other planes."""
+        contacts = [contact for contact, _ in self.components]
+        return contacts if len(set(contacts)) == 2 else []
+
 
 STRESS = "stress"
 
@@ -78,6 +84,18 @@ def components(replay: Replay, first: Sequence[int], second: Sequence[int]) -> P
     for k, place in enumerate(chosen):
         axes[(k, *place)] = 1.0
     return _plane(replay, chosen, axes, np.zeros(axes.shape[1:]), np.full(2, np.nan))
+
+
+def strong_pair(replay: Replay) -> tuple[int, int]:
+    """Two contacts, positions in the backbone: the strongest as packed, and the strongest of those
+    that no disk has in common with it (where there are none, the second).
+    """
+    strong = np.argsort(-replay.normal[0], kind="stable")
+    disks = np.zeros((len(strong), 2), dtype=int)
+    disks[replay.links.contact] = np.column_stack([replay.links.i, replay.links.j])
+    apart = ~np.isin(disks[strong], disks[strong[0]]).any(axis=1)
+    other = strong[apart][0] if apart.any() else strong[-1 if len(strong) < 2 else 1]
+    return int(strong[0]), int(other)
 
 
 def stress(library: Library, selection: Selection, replay: Replay) -> Plane:

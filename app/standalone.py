@@ -106,7 +106,6 @@ def html(
         "busy": False,
         "live": False,
         "asked": "",
-        "second": None,
         "split": False,
         "beside": None,
         "twin": {},

@@ -204,8 +204,10 @@ export class Arrows {
       const [px, py] = this.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
       const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
       const rubs = ["tangential force", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.easel.wide - x : x
-      const both = g.measureText(rubs.join(" ")).width < room - 4 ? [rubs.join(" ")] : rubs
-      const lines = [scene.names[contact].replace("at the ", "force of the "), `normal force ${number(n)}`, ...both]
+      const fits = (line) => g.measureText(line).width < room - 4
+      const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
+      const name = ["force of the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
+      const lines = [name, `normal force ${number(n)}`, ...both]
       write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
     }
     const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = this.px(scene.x[0], scene.x[1])

@@ -3,7 +3,8 @@
 /** Its HTML; most: μ at the end of the slider. */
 export function desk(most) {
   return `
-    <p class="whole">The same disks, at rest, can be held by many different sets of forces.</p>
+    <p class="whole">The same disks, at rest, can be held by many different sets of forces.
+      <span>In a heap of sand, the shapes of the grains alone do not tell you the forces: friction leaves many answers. Here you can try them all.</span></p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${most}" step="0.005" aria-label="friction μ">
@@ -25,6 +26,7 @@ export function desk(most) {
         <button type="button" class="next">Next</button><button type="button" class="close">Close</button></div>
     </section>
     <div class="board">
+    <p class="quest" aria-live="polite" hidden></p>
     <div class="pair">
       <figure><figcaption class="legend"></figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
@@ -34,7 +36,7 @@ export function desk(most) {
           <label>up <select aria-label="force shown upwards"></select></label></div></figure>
       <div class="sums"><p class="special"></p><p class="count"></p><div class="bars" role="list"></div></div>
     </div>
-    <details class="lesson" hidden><summary>The groove: a lesson of one page, with three questions</summary>
+    <details class="lesson" hidden><summary>The groove: a one-page lesson with three questions</summary>
       <button type="button" class="print">Print</button> <button type="button" class="print answered">Print with answers</button>
       <article></article></details>
     </div>`

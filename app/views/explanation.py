@@ -13,7 +13,7 @@ from .hints import term
 from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL = "; drag a line to change its force"
+PULL, CLICK = "; drag a line to change its force", "; click a line to push there"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
@@ -28,7 +28,9 @@ def lead(state: AppState) -> str:
     """The question that the picture answers, and what is seen, as HTML."""
     if state.work.moving and not state.selection.imported:
         return jamming(state.selection)
-    return "" if state.seen is None else first(state.seen.summary, PULL)
+    return "" if state.seen is None else first(
+        state.seen.summary, CLICK if state.looks.tab == "perturb" else PULL
+    )
 
 
 def first(summary: Summary, more: str = "") -> str:

@@ -299,7 +299,7 @@ class View:
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         self.whole_item, self.exact_item = fig.legend[0].items[:2]
         legend_above(fig, 5)
-        corner(fig, "pale: all that is possible, exactly")
+        corner(fig, "possible: exact; seen: networks so far")
         fig.add_tools(
             hover(
                 [seen, exact],

@@ -2,7 +2,7 @@
 // until one was; or clicked, where a contact is to be chosen.
 
 const NEAR = 0.45 // of half the view, from its middle
-const DRAG = matchMedia("(pointer: coarse)").matches ? "↙ tap, then drag" : "↙ drag me", CHOOSE = "↙ click me"
+const DRAG = matchMedia("(pointer: coarse)").matches ? "↙ tap, then drag" : "↙ drag me: how strong can I get?", CHOOSE = "↙ click me"
 
 export class Invitation {
   constructor(scene) {

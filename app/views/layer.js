@@ -3,6 +3,7 @@
 
 const TRAIL = 40 // states that the trail in force space reaches back
 const DOT_REACH = 9 // px from a dot that still mean it
+const INVITE = "↙ drag me"
 const TOUCH_REACH = 22 // the same of a finger
 
 export class Layer {
@@ -127,15 +128,22 @@ export const LAYERS = {
   },
 }
 
-/** The state on screen, in force space. */
-function spot(context, [px, py], { colours }) {
-  context.fillStyle = colours.now
+/** The state on screen, in force space; as Bokeh draws it (views/plane.py). */
+function spot(context, [px, py], plots) {
+  context.fillStyle = plots.colours.now
   context.strokeStyle = "white"
   context.lineWidth = 1.5
   context.beginPath()
   context.arc(px, py, 6, 0, 2 * Math.PI)
   context.fill()
   context.stroke()
+  if (!plots.invites) return
+  context.font = "13px sans-serif"
+  context.fillStyle = plots.colours.now
+  const { width } = context.measureText(INVITE)
+  context.fillRect(px + 6, py - 26, width + 8, 20)
+  context.fillStyle = "white"
+  context.fillText(INVITE, px + 10, py - 12)
 }
 
 function line(context, xs, ys, x, y, count, from = 0) {

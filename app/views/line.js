@@ -26,7 +26,9 @@ export function drawSegment(space) {
     const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12
     if (side.cap) space.drawOn([x, y], 7)
     else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
-    space.write(x, y - high - (close ? 34 : 0), text, lit ? look.hand : look.ink)
+    const above = y - high - (close ? 34 : 0)
+    space.write(x, above, text, lit ? look.hand : look.ink)
+    space.free([x, above], wide, 16 * text.split("\n").length)
     space.labels.push({ side, x, y, reach: 30 })
     before = { x, wide }
   }

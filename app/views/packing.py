@@ -19,7 +19,7 @@ from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
-FOLLOWED = ("second", "tab", "views", "wide", "thickness", "full", "stretch", "overlay", "scale")
+FOLLOWED = ("tab", "views", "wide", "thickness", "full", "stretch", "overlay", "scale")
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
 
@@ -40,11 +40,11 @@ EXPLAINED = {
 }
 LEGEND = """
 <span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
-<span tabindex="0" data-term="{width_term}">width: {width}
+<span tabindex="0" data-term="{width_term}">width: {width}, up to
  <svg width="40" height="12"><polygon points="0,5.5 40,0 40,12 0,6.5"
   fill="currentColor" fill-opacity="0.65"/></svg>
- {widest:.3g} × mean</span>
-<span tabindex="0" data-term="rattler">pale disks: loose</span>
+ {widest:.3g} × mean force</span>
+<span tabindex="0" data-term="rattler">pale disks: carry nothing</span>
 {marks}
 """
 JAMMING = """
@@ -57,7 +57,7 @@ BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
 )
 # What the legend says in place of the words to choose by.
-DEFINED = {"change": "change from the forces the disks came to rest with"}
+DEFINED = {"change": "change since the disks came to rest"}
 DOT = """<svg width="12" height="12">
  <circle cx="6" cy="6" r="4" fill="{fill}" stroke="{line}" stroke-width="1.5"/></svg> {text}"""
 
@@ -97,7 +97,7 @@ class PackingView:
         state.param.watch(self._project, "plane")
         looks.param.watch(self._dress, "dark")
         looks.param.watch(
-            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark"]
+            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab"]
         )
         state.param.watch(self._explain, ["seen", "exact", "loads"])
         state.knowledge.param.watch(self._explain, "narrowed")
@@ -188,7 +188,7 @@ def projection(plane: Plane | None) -> dict[str, Any]:
     axes = plane.axes.astype(np.float32)
     names = {"xn": (0, 0), "xt": (0, 1), "yn": (1, 0), "yt": (1, 1)}
     columns = {name: np.ascontiguousarray(axes[k, :, part]) for name, (k, part) in names.items()}
-    return columns | {"origin": [float(value) for value in plane.origin]}
+    return columns | {"origin": [float(value) for value in plane.origin], "pair": plane.pair}
 
 
 def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
@@ -238,7 +238,7 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = "less", diverging, f"more by {full:.3g} × mean"  # as much less
+    change = f"−{full:.3g}", diverging, f"+{full:.3g} × mean force"
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)

@@ -49,12 +49,12 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <text x="40" y="46">holds</text><text x="280" y="46">holds</text></g>
 </svg>"""
 LEAD = (
-    "<b>Two growing forces push two touching disks apart</b> while their neighbours hold them, "
-    "until no forces can balance any more and the packing gives way."
+    "<b>Two growing forces from outside push two touching disks apart.</b> Their neighbours hold "
+    "them, until no forces can balance any more and the packing gives way."
 )
 HINT = (
-    "Click a line in the packing, or take the strongest one. Then guess how many times "
-    "the mean force it takes, and see."
+    "<b>Click a line in the packing</b>, or choose the strongest one. Then guess how hard you must "
+    "push, in multiples of the mean force, and see whether you were right."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
@@ -79,7 +79,7 @@ class View(TabView):
         super().__init__(state, "replay", looks=["contact"])
         self.what = question("Question", PUSHES, self.looks, "pushing")
         self.strongest = pmui.Button(
-            label="Take the strongest contact",
+            label="Choose the strongest contact",
             color="primary",
             size="small",
             margin=(4, 8),
@@ -103,7 +103,7 @@ class View(TabView):
         self.push.on_click(lambda event: self._push())
         self.strongest.on_click(lambda event: self._take_strongest())
         self.task.param.watch(self.failed, "message")
-        self.task.param.watch(lambda event: self.push.param.update(disabled=event.new), "running")
+        self.task.param.watch(lambda event: self._allow(), "running")
         self.looks.param.watch(self._animate, "tab")
         self.catch_up()
 
@@ -113,7 +113,7 @@ class View(TabView):
         return pn.Column(
             self.what,
             self.lead,
-            pn.FlexBox(self.guess, self.push, self.strongest, self.animate, **wide),
+            pn.FlexBox(self.strongest, self.guess, self.push, self.animate, **wide),
             Progress(self.task),
             self.numbers,
             self.plots,
@@ -130,11 +130,12 @@ class View(TabView):
             self.task.cancel()
             self.pushed, self.guess.value = None, ""
         one = what == "one"
-        self.push.visible = (one and contact is not None) or what == "all"
+        self.push.visible = what != "store"
         self.push.label = "Push" if one else "Compute for all contacts"
         self.strongest.visible = one and contact is None
         self.animate.visible = one and self.pushed is not None
-        self.guess.visible = one and contact is not None and self.pushed is None
+        self.guess.visible = one and self.pushed is None
+        self._allow()
         if state.replay is None:
             return
         if state.replay.summary["mu"] == 0:
@@ -143,6 +144,11 @@ class View(TabView):
             return
         {"one": self._one, "all": self._all, "store": self._store}[what]()
         self._animate()
+
+    def _allow(self) -> None:
+        """What needs a contact waits for one, and a push for the one before."""
+        none = self.what.value == "one" and self.looks.contact is None
+        self.guess.disabled, self.push.disabled = none, none or self.task.running
 
     def _holds(self) -> bool:
         """Whether what was pushed is still the contact selected."""
@@ -183,7 +189,7 @@ class View(TabView):
         contact, replay = self.looks.contact, self.state.replay
         drawn = LEAD + SKETCH.format(colour=DOT)
         if contact is None:
-            self._say(HINT, lead=drawn)
+            self._say("", lead=drawn + HINT)
             return
         tiles = [("carries now", f"{replay.normal[0, contact]:.2f}")]
         if self.pushed is None:

@@ -7,7 +7,7 @@ import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.core.properties import value
-from bokeh.models import ColumnDataSource, DataRange1d
+from bokeh.models import ColumnDataSource, DataRange1d, Label, Node
 from bokeh.plotting import figure as Figure
 
 from granforce.records import InputError
@@ -23,7 +23,7 @@ from . import stresses
 from .hints import term
 from .parts import MOVES, PLAIN, TabView, figure, folded, note, question, together
 from .progress import Progress
-from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
+from .style import ACROSS, DARK, DOT, ORIGINAL, PALE, SERIES, STATES, UP, corner, hover, legend_above
 
 # What is offered beside states of a kind, and what the others are called.
 ALSO = {"walk": "also show uniformly sampled networks", "uniform": "also show the walk"}
@@ -47,19 +47,21 @@ COMPUTED = (
 )
 
 LEAD = (
-    "<b>Each dot is one whole picture like that of the packing; S holds all that can be</b>"
-    "{flattened}. Drag the red dot, or sweep it: orange lines grow, blue ones shrink."
+    "<b>Each dot is one whole set of forces that balance</b>, like the one drawn in the packing. "
+    "The blue shape, S, is all that is possible. Drag the red dot: "
 )
+TOUCH = "orange lines grow, blue ones shrink."
+OF_A_PAIR = "it sets the forces of the green and the violet line, and all others follow."
 CROWDED = (
-    ". To go far in one direction, many forces have to conspire, and chance hardly ever makes "
-    "them: it has {free} directions to go"
+    ": to get far out, many forces have to change in step, which by chance hardly ever happens"
 )
 # The point goes along an axis by itself, see point.js.
-SWEEPS = {"Sweep across ↔": 0, "Sweep up and down ↕": 1}
+SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")
+SWEEPS_OF_A_PAIR = ("Sweep the green force ↔", "Sweep the violet force ↕")
 SWEEP = 'button.document.get_model_by_name("player").player.hand.spot.sweep(axis)'
 HELP = (
-    "A thin line leads from each network to the one found next. "
-    f"Shown is the shadow ({term('principal', 'projection')}) that {term('s')} casts on a plane, "
+    "A thin line leads from each network to the one found next. A line that is clicked in the "
+    f"packing becomes the green one. Shown is the shadow ({term('principal', 'projection')}) that {term('s')} casts on a plane, "
     f"not a section: the shaded {term('outline')} holds all of it."
 )
 
@@ -70,7 +72,7 @@ class View(TabView):
     name, title = "plane", "Force space"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "seen", looks=["contact", "second"], work=["fourfold"])
+        super().__init__(state, "seen", looks=["contact", "pair", "dark"], work=["fourfold"])
         empty: Columns = {"x": [], "y": []}
         self.path = ColumnDataSource(empty | {"state": []}, name="path")
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
@@ -78,19 +80,18 @@ class View(TabView):
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
         self.cone = ColumnDataSource(empty)
         self.figure = self._figure()
-        if self.looks.second is not None and self.looks.axes == "principal":
-            self.looks.axes = "pair"
+        self.lines = _lines(self.figure)
         self.planes = question("Shown", PLANES, self.looks, "axes")
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
         self.others = state.work.task()  # who finds other states
         self.other: Replay | None = None  # of those
         self.also.param.watch(lambda event: together(self._fetch), "value")
-        self.lead, self.told = note(), note()
-        self.sweeps = [_sweep(label, axis) for label, axis in SWEEPS.items()]
+        self.lead, self.finding, self.told = note(), note(), note()
+        self.sweeps = [_sweep(label, axis) for axis, label in enumerate(SWEEPS)]
         self.placing.param.watch(self.failed, "message")
-        self.planes.param.watch(self._turn, "value")
-        self.looks.param.watch(self._keep_first, "contact")
+        self.planes.param.watch(self.refresh, "value")
+        self.looks.param.watch(self._span, "contact")
         self.task.param.watch(self.failed, "message")
         self.shown: tuple[Any, ...] | None = None
         self.found: Outlined | None = None
@@ -100,9 +101,10 @@ class View(TabView):
         """Choice of the plane, plot, and what it says."""
         return pn.Column(
             self.lead,
-            self.planes,
+            self.finding,
             pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
             pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
+            self.planes,
             Progress(self.task),
             self.told,
             self.also,
@@ -118,11 +120,12 @@ class View(TabView):
         if replay is None:
             return
         free = replay.summary["dimension"]
-        self.lead.object = LEAD.format(
-            flattened=f", the flat shadow of a shape of {free} dimensions" if free > 2 else ""
-        )
-        for button in self.sweeps:
-            button.visible = free > 0 and not state.growing
+        pair = self.planes.value == "pair"
+        self.lead.object = LEAD + (OF_A_PAIR if pair else TOUCH)
+        for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
+            button.param.update(label=label, visible=free > 0 and not state.growing)
+        for line, colours in zip(self.lines, (ACROSS, UP), strict=True):
+            line.update(visible=pair, text_color=colours[self.looks.dark])
         wanted = replay, self.planes.value, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
@@ -144,8 +147,10 @@ class View(TabView):
     def _depends(self) -> tuple[Any, ...]:
         """What a plane of the kind chosen depends on, beside the states."""
         state, kind = self.state, self.planes.value
-        if kind not in WHOLE:
-            return self.looks.contact, self.looks.second
+        if kind == "pair":
+            return (self.looks.pair,)
+        if kind == "contact":
+            return (self.looks.contact,)
         return (state.work.fourfold,) if kind == "principal" and state.growing else ()
 
     def _place(self, replay: Replay, kind: str) -> None:
@@ -238,30 +243,18 @@ class View(TabView):
 
     def _components(self, replay: Replay) -> Plane:
         """The plane of one contact's forces, or of two contacts' normal forces."""
-        contact = self.looks.contact
-        if contact is None and self.planes.value == "pair":
-            raise InputError("Click two contacts in the packing, one after the other.")
-        if contact is None:
-            contact = _loosest(replay)
         if self.planes.value == "contact":
+            contact = self.looks.contact
+            contact = _loosest(replay) if contact is None else contact
             return planes.components(replay, (contact, 0), (contact, 1))
-        other = self.looks.second
-        if other is None:
-            raise InputError("Now click a second contact in the packing; both are marked there.")
-        return planes.components(replay, (other, 0), (contact, 0))
+        across, up = self.looks.pair or planes.strong_pair(replay)
+        return planes.components(replay, (across, 0), (up, 0))
 
-    def _turn(self, event: Any) -> None:
-        """Another kind of plane; a second contact belongs to one of them only."""
-        if event.new != "pair":
-            self.looks.second = None
-        elif self.looks.contact is None and self.state.replay is not None:
-            self.looks.contact = _loosest(self.state.replay)
-        self.refresh()
-
-    def _keep_first(self, event: Any) -> None:
-        """The last two contacts that were clicked span the plane."""
-        if self.visible and self.planes.value == "pair" and event.new is not None:
-            self.looks.second = event.old if event.old is not None else self.looks.second
+    def _span(self, event: Any) -> None:
+        """A contact that is clicked takes the place of the green one of a pair."""
+        pair = self.state.plane.pair if self.state.plane is not None else []
+        if self.visible and self.planes.value == "pair" and pair and event.new is not None:
+            self.looks.pair = (event.new, pair[1]) if event.new not in pair else tuple(pair)
 
     def _show(self, replay: Replay, plane: Plane) -> None:
         """Path, original and cone; the outline is to come."""
@@ -276,7 +269,7 @@ class View(TabView):
         # Distances mean something among principal axes: both then have the same scale.
         self.figure.match_aspect = not plane.components
         self.cone.data = self._cone(plane, 1.05 * float(x.max()))
-        self.told.object = ""
+        self.told.object = self.finding.object = ""
         self.found = None
         self._show_beside()
 
@@ -308,18 +301,20 @@ class View(TabView):
         area = planes.area(planes.hull(path)) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
-        words = f"<b>{inner:.0%} of the dots lie less than half as far out as the outline</b>"
+        dots = f"{'All' if inner == 1 else f'{inner:.0%} of the'} {len(path)} dots"
+        words = f"<b>{dots} lie less than half as far out as the outline</b>"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
             words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
-        words += CROWDED.format(free=free) if free >= MANY and inner > MOSTLY else ""
+        words += CROWDED if free >= MANY and inner > MOSTLY else ""
         share = (
             f" The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of its width, "
             f"{part[1]:.0%} of its height, and fill {area:.1%} of its area"
             f"{_variance(found.plane)}."
         )
-        self.told.object = words + "." + folded(HELP + share + COMPUTED.format(found=found))
+        self.finding.object = words + "."
+        self.told.object = folded(HELP + share + COMPUTED.format(found=found))
 
     @property
     def other_kind(self) -> str:
@@ -375,6 +370,11 @@ class View(TabView):
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
             legend_label="now",
         )  # fmt: skip
+        fig.text(
+            "x", "y", source=self.here, text=value("↙ drag me"), x_offset=6, y_offset=-8,
+            text_color="white", text_font_size="13px", background_fill_color=DOT, padding=4,
+            border_radius=5, name="invitation", visible=False,
+        )  # fmt: skip
         here.tags, fig.name = MOVES, "path_figure"
         # The state on screen moves too often to be looked at for the range.
         fig.x_range.renderers = fig.y_range.renderers = [*outlines, states]
@@ -384,6 +384,22 @@ class View(TabView):
         corner(fig, "outline: exact; dots: found at random; lines: one after another")
         fig.add_tools(hover([states], ("network", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
+
+
+def _lines(fig: Figure) -> tuple[Label, Label]:
+    """Words at the ends of both axes: which line's force goes across, and which up."""
+    at = {"text_font_size": "13px", "text_font_style": "bold", "visible": False}
+    across = Label(
+        x=_edge("right", -6), y=_edge("bottom", -4), text="green line →", text_align="right", **at
+    )
+    up = Label(x=_edge("left", 6), y=_edge("top", 22), text="↑ violet line", **at)
+    for line in (across, up):
+        fig.add_layout(line)
+    return across, up
+
+
+def _edge(symbol: str, offset: int) -> Node:
+    return Node(target="frame", symbol=symbol, offset=offset)
 
 
 def _sweep(label: str, axis: int) -> pmui.Button:

@@ -75,14 +75,17 @@ class Player {
     }
   }
 
-  /** Whether nothing was dragged yet, and a line can be. */
+  /** Whether nothing was dragged yet, and a line can be; where force space is turned to, its point. */
   get inviting() {
     const { model, live, difference, predict } = this
-    return (this.pushes || !this.took) && this.replay !== null && !live.moves && (model.contact ?? null) === null && !difference.on && !predict.shown
+    return (this.pushes || !this.took) && this.replay !== null && !live.moves && !this.points && (model.contact ?? null) === null && !difference.on && !predict.shown
   }
 
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
   get pushes() { return this.model.tab === "perturb" }
+
+  /** Whether force space has been turned to, where the point is what can be dragged first. */
+  get points() { return this.model.tab === "plane" }
 
   // What is on screen
 
@@ -164,7 +167,15 @@ class Player {
   select() {
     this.buttons.tellChosen(this.scene.hand && (this.model.contact ?? null) !== null)
     this.scene.selected = this.model.contact ?? null
-    this.scene.second = this.model.second ?? null
+    this.scene.pair = (this.points || this.model.wide) ? this.plots.plane.pair ?? [] : []
+  }
+
+  /** What is chosen, seen. */
+  mark() {
+    if (!this.replay || this.live.moves) return
+    this.select()
+    this.scene.drawMarks(this.look.style)
+    this.split.paint()
   }
 
   paint() {
@@ -176,6 +187,7 @@ class Player {
     const { model, plots, replay } = this
     this.told = now
     if (model.tab === "intervals") plots.show(replay, model.scale)
+    plots.invite(this.points && !this.took && !this.grows)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
     for (const listener of this.listeners) listener()
@@ -401,7 +413,7 @@ class Player {
       displacement: () => this.sway.take(model.displacement),
       twin: () => this.split.take(),
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
-      plane: () => { this.plots.plane = plain(model.plane); this.again() },
+      plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.again() },
       loads: loaded(() => { this.look.measure(); this.again() }),
       measured: loaded(() => { this.look.measure(); this.again() }),
       gone: loaded(() => { this.look.measure(); this.again() }),
@@ -412,8 +424,7 @@ class Player {
       }),
       palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
       pins: loaded(() => { this.recover(); scene.drawMarks(this.look.style) }),
-      contact: loaded(() => { this.recover(); this.difference.guess(model.contact); this.predict.guess(model.contact); this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
-      second: loaded(() => { this.select(); scene.drawMarks(this.look.style); this.split.paint() }),
+      contact: loaded(() => { this.recover(); this.difference.guess(model.contact); this.predict.guess(model.contact); this.mark() }),
     }
   }
 
@@ -434,6 +445,9 @@ export function render({ model, view }) {
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
   for (const name of ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]) {
     model.on(name, () => player.again())
+  }
+  for (const name of ["tab", "wide"]) {
+    model.on(name, () => player.mark())
   }
   const observer = new ResizeObserver(() => player.scene.resize())
   observer.observe(player.scene.root)

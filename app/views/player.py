@@ -50,7 +50,6 @@ class Player(Scripted):
     busy = param.Boolean()
     pulled = param.Boolean(doc="whether a network is on screen that was pulled; told by the page")
     contact = param.Integer(default=None, allow_None=True)
-    second = param.Integer(default=None, allow_None=True)
     frame = param.Integer(default=0)
     reference = param.Integer(default=0)
     predict = param.Integer(default=0, doc="1 … 3 while a question is asked, see predict.js")

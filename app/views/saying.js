@@ -49,7 +49,8 @@ export function legend(body) {
   const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   const axes = h === 2 || h > 3 ? "; green, violet: on the axes" : ""
-  return `blue: contact forces${axes}; wedge: where friction lets them point${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
+  const parts = scene.r.length === 1 ? " (pale: their two parts)" : ""
+  return `blue: contact forces${parts}${axes}; wedge: where friction lets them point${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
 }
 
 /** Whether friction is at its limit at some contact. */
@@ -75,9 +76,9 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }) 
 function equationsOf({ grains, r, pressing, box, equations }) {
   const disks = [...(grains ?? [])].filter((grain) => grain < r.length).length, walls = 2 * pressing.length
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
-  const said = "no force sideways, none up or down, and no turning, of every disk"
+  const said = "no net force sideways, none up or down, and no turning, of every disk"
   if (whole !== equations) return [said, ""]
-  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `${said}, less two that follow from the others; one more for the pressure`]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three of every disk, two of which follow from the others; one for the pressure`]
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
 }
 
@@ -96,7 +97,7 @@ export function pictured(body) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
-  return h > 3 ? `all pairs of values that these two forces can have; dots: found at random; chance seldom gets to the rim`
+  return h > 3 ? `all pairs of values that these two forces can have; dots: found at random, which rarely come near the edge`
     : `${S} ${["", "a line", "a polygon; its axes are two of the forces", "a body; drag beside the point to turn it"][h]}`
 }
 
@@ -116,12 +117,12 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw: you see one shadow of S, on two of the forces. Drag the point or an arrow: all forces follow, and everything stays in balance.`
+  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw: you see only the shadow of S, over the green and the violet force. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
   const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
-  const limit = `${["", "an end", "a side", "a face"][h]}: there a contact is about to slip or to open`
+  const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip or to come apart`
   return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 

@@ -10,6 +10,7 @@ const FINE = 16 // colours; of more, every second serves where chains are gather
 const GRAB = 6 // px from a chain that still mean it
 const ZOOM = [0.02, 4] // least and largest part of the whole view
 const ARROW = 1.3 // of the largest force on a disk, in largest radii
+const AXIS = 0.3 // width of a line whose force is an axis of force space, in largest radii
 const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 export class Scene {
@@ -30,7 +31,8 @@ export class Scene {
     this.size = 0
     this.painted = 0
     this.counts = { segments: 0, drawn: 0, outside: 0, thin: 0 }
-    this.selected = this.second = null
+    this.selected = null
+    this.pair = [] // contacts whose forces are the axes of force space, across and up
     this.pointed = -1 // the disk under the pointer, whose forces are drawn
     this.frozen = false // whether what is drawn moves by itself and cannot be pointed at
     this.offset = null
@@ -274,11 +276,7 @@ export class Scene {
       }
     }
     if (this.selected !== null) this.drawSelected(this.selected)
-    if (this.second !== null) {
-      marks.setLineDash([5 / scale, 4 / scale])
-      this.drawSelected(this.second)
-      marks.setLineDash([])
-    }
+    this.pair.forEach((contact, k) => this.drawAxis(contact, k ? palette.up : palette.across))
     if (this.pointed >= 0 && this.describe?.forces) this.drawForces(this.pointed)
     if (marks instanceof Sheet) this.onSheet?.(marks, this)
     else this.onMarks?.(marks, this)
@@ -306,6 +304,24 @@ export class Scene {
       }
     }
     marks.stroke()
+  }
+
+  /** A line in the colour of its axis of force space. */
+  drawAxis(chosen, colour) {
+    const { marks, scale, palette, geometry } = this
+    marks.lineCap = "round"
+    for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
+      marks.lineWidth = Math.max(AXIS, 5 / scale) + more
+      marks.strokeStyle = paint
+      marks.beginPath()
+      for (let k = 0; k < geometry.contact.length; k++) {
+        if (geometry.contact[k] !== chosen) continue
+        const [xa, ya, xb, yb] = this.ends(k)
+        marks.moveTo(xa, ya)
+        marks.lineTo(xb, yb)
+      }
+      marks.stroke()
+    }
   }
 
   drawSelected(selected) {

@@ -11,6 +11,7 @@ import { goneBanner } from "./gone.js"
 import { lesson, printed } from "./lesson.js"
 import { palette } from "./palette.js"
 import { Push } from "./push.js"
+import { Quest } from "./quest.js"
 import { counted, forceName, legend, pictured, sentence, special, stopping } from "./saying.js"
 import { Space } from "./space.js"
 import { TourCard } from "./tourcard.js"
@@ -32,7 +33,7 @@ export function render({ model, view }) {
   const builder = new Builder(part("own"), (built) => ask(model, view, { built, mu }))
   const arrows = new Arrows(part("packing"), heard), space = new Space(part("space"), heard)
   const going = new Going(part("play"), (path) => { now.path = path; say(); soon() })
-  const pushed = new Push(), bars = new Bars(part("bars")), planes = [...part("plane").querySelectorAll("select")]
+  const pushed = new Push(), quest = new Quest(part("quest")), bars = new Bars(part("bars")), planes = [...part("plane").querySelectorAll("select")]
   const tour = new TourCard(root, model.steps, model.all, ({ scene, mu: at }) => {
     if (scene !== body?.scene.name) ask(model, view, at === undefined ? { scene } : { scene, mu: at })
     else if (at !== undefined) setMu(at)
@@ -84,6 +85,14 @@ export function render({ model, view }) {
     part("says").classList.toggle("note", Boolean(note))
     part("says").classList.toggle("bad", body.empty && !body.scene.idle)
     part("undo").disabled = !now.undo.length
+    inquire()
+  }
+
+  /** The question that the hand answers is of the normal force that goes up in the picture of S, or across. */
+  function inquire() {
+    const contact = body.count && body.h && !body.empty ? space.read.at(-1) ?? 0 : null
+    const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
+    quest.look(body, contact, space.axed.at(-1) === 2 * contact ? "violet " : "", ends, !now.fresh)
   }
 
   // What is done
@@ -136,6 +145,7 @@ export function render({ model, view }) {
   function cut() {
     body.cut(mu)
     now.fall = now.bounds = now.enough = null
+    quest.begin()
     space.outline.stale = true
     if (!body.empty && !body.goTo(body.u)) body.empty = true
     if (!body.empty && body.whole && !Number.isFinite(body.u[0] ?? 0)) body.u = body.middle
@@ -205,6 +215,7 @@ export function render({ model, view }) {
     Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null, fresh: true })
     pushes(false)
     going.pause()
+    quest.begin()
     mu = scene.mu
     body = new Body(scene).cut(mu)
     returning = false

@@ -213,9 +213,14 @@ export class Space {
     g.font = "13px sans-serif"
     const wide = g.measureText("drag me ↘").width + 12
     const ways = [["↙ drag me", 1, -1], ["drag me ↘", -1, -1], ["↖ drag me", 1, 1], ["drag me ↗", -1, 1]]
-    const places = [20, 30].flatMap((off) => ways.map(([words, a, b]) => [x + a * (off / 2 + wide / 2), y + b * off, words]))
-    const [px, py, words] = places.find(([a, b]) => this.free([a, b], wide, 21)) ?? places[0]
-    g.fillStyle = look.hand
+    const places = [20, 30, 50, 75, 100].flatMap((off) => ways.map(([words, a, b]) => [x + a * (off / 2 + wide / 2), y + b * off, words]))
+    const [px, py, words] = places.find(([a, b]) => this.free([a, b], wide, 24)) ?? places[0]
+    g.strokeStyle = g.fillStyle = look.hand
+    g.lineWidth = 1.5
+    g.beginPath()
+    g.moveTo(x, y)
+    g.lineTo(px - Math.sign(px - x) * (wide / 2 - 4), py)
+    g.stroke()
     g.fillRect(px - wide / 2, py - 11, wide, 21)
     g.textAlign = "center"
     g.textBaseline = "middle"

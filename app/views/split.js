@@ -122,7 +122,7 @@ export class Split {
     const { twin, on, player, other } = this
     if (!on || !twin.style) return
     twin.selected = other ? null : player.scene.selected
-    twin.second = other ? null : player.scene.second
+    twin.pair = other ? [] : player.scene.pair
     const size = twin.root.clientWidth, ratio = window.devicePixelRatio || 1
     if (!size) return
     if (size !== twin.size || ratio !== twin.ratio) {

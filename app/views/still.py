@@ -40,7 +40,7 @@ class Light:
     ) -> None:
         # All else as where nothing is computed, chosen or known.
         self.__dict__.update({name: AppState.param[name].default for name in AppState.param})
-        here = view | {"dark": False, "between": None, "second": None, "tab": tab}
+        here = view | {"dark": False, "between": None, "tab": tab}
         self.looks = Looks(  # type: ignore[no-untyped-call]  # param says no types
             **{name: here[name] for name in Looks.param if name in here}
         )

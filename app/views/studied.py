@@ -33,9 +33,9 @@ SAMPLERS = {
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
-PEAK = "↓ forces are freest here"
+PEAK = "↓ forces are freest here: click"
 RISES = "friction gives\neach force room"
-FALLS = "but leaves\nfewer contacts"
+FALLS = "but packings have\nfewer contacts"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
 MARKERS = ("circle", "square", "triangle", "diamond", "inverted_triangle")
 SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
@@ -46,7 +46,7 @@ FOLDED = (
     "Networks found in other ways",
 )
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
-CLAIMS = """<details><summary>What the paper says, and what was found here</summary>
+CLAIMS = """<details><summary>What Shaebani, Unger and Kertész found, and what was found here</summary>
 <table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
 says, and what the study found, with its 95 % interval</caption>{}</table>{}</details>"""
 CLAIM = "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>"
@@ -102,7 +102,7 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     """
     kind = {"y_axis_type": "log" if log else "linear"}
     walks = studied.rows("walk")
-    spread = _over_mu("spread", "how much a force scatters (mean force = 1)", 330, **kind)
+    spread = _over_mu("spread", "how much a force varies (mean force = 1)", 330, **kind)
     found = statistics.means(walks, "eta1")
     _line(spread, found, f"mean of {_packings(walks)} packings", log, COLOURS[0])
     _own(spread, [(here["mu"], here["eta1"], 0.0)], log, DOT, label=HERE)
@@ -150,8 +150,8 @@ def most_undetermined(points: Points) -> str:
     peak = max(points, key=lambda point: point[1])[0]
     return (
         f"<b>Forces are freest at friction {peak:g}.</b> More friction leaves every "
-        "force more room, but disks packed with more friction come to rest on fewer contacts. "
-        "Click a point to see such a packing."
+        "force more room, but disks packed with more friction come to rest with fewer contacts. "
+        "Click a point to see such a packing; single packings lie above or below the mean."
     )
 
 
@@ -160,7 +160,7 @@ def _averaged(walks: list[Row], own: list[Row]) -> str:
     if not walks or not own:
         return ""
     return (
-        "Each point: by how much a contact's force scatters over the networks of a packing, as "
+        "Each point: by how much a contact's force varies over the networks of a packing, as "
         f"mean over {_packings(walks)} packings; open symbols: over {_packings(own)} computed on "
         "this page, which need not lie on the line, as packings differ. Grey: the friction on "
         "screen. "

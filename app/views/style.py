@@ -21,6 +21,9 @@ EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
 PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
 
+# The two forces that are axes of force space, by day and by night.
+ACROSS, UP = ("#12793f", "#4ecb8d"), ("#7a3fc4", "#c39bff")
+
 COLOURS = 33
 
 
@@ -64,6 +67,8 @@ def palettes(dark: bool) -> dict[str, Any]:
             "loose": "#ff5ca8" if dark else DOT,
             "selected": "#ff5ca8" if dark else DOT,
             "known": "#4dd0b5" if dark else "#00695c",
+            "across": ACROSS[dark],
+            "up": UP[dark],
             "halo": "rgba(20, 24, 30, 0.8)" if dark else "rgba(255, 255, 255, 0.85)",
         },
     }

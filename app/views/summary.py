@@ -83,9 +83,9 @@ def finding(summary: Summary) -> str:
         return "<b>How free are the forces?</b> Not at all: balance leaves every force one value."
     networks = "one network" if summary["states"] == 1 else f"{summary['states']} networks"
     return (
-        f"<b>How free are the forces?</b> Over {networks} found at random a contact's force "
-        f"scatters by <b>{100 * summary['eta1']:.2g} %</b> of the mean force. One that is pulled "
-        "on purpose can go much farther, as all others give way a little."
+        f"<b>How free are the forces?</b> Across {networks} found at random, the force at a "
+        f"contact varies by about <b>{100 * summary['eta1']:.2g} %</b> of the mean force. Drag one "
+        "on purpose and it can go much farther, because all the others give way a little."
     )
 
 
