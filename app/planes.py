@@ -122,13 +122,13 @@ def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
     if plane.components:
         return tuple(
             f"{'normal force fₙ' if component == 0 else 'tangential force fₜ'} of contact "
-            f"{replay.backbone[contact]}, in mean forces"
+            f"{replay.backbone[contact]} (mean force = 1)"
             for contact, component in plane.components
         )
     if plane.kind == STRESS:
         return "pressed more across than up: (σₓₓ − σᵧᵧ) / 2P", "sheared: σₓᵧ / P"
     return (
-        "the direction in which networks differ most, in mean forces",
+        "the direction in which networks differ most (mean force = 1)",
         "the second such direction",
     )
 

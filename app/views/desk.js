@@ -3,8 +3,8 @@
 /** Its HTML; most: μ at the end of the slider. */
 export function desk(most) {
   return `
-    <p class="whole">The same disks, at rest, can be held by many different sets of forces.
-      <span>In a heap of sand, the shapes of the grains alone do not tell you the forces: friction leaves many answers. Here you can try them all.</span></p>
+    <p class="whole">Many different sets of forces can hold the same disks at rest.
+      <span>So no photograph of a heap of sand, however sharp, can tell which grains carry how much. Here you can try the forces out.</span></p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${most}" step="0.005" aria-label="friction μ">

@@ -13,7 +13,7 @@ from .hints import term
 from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL, CLICK = "; drag a line to change its force", "; click a line to push there"
+PULL, CLICK = "; drag a line to change it", "; click a line to push there"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
@@ -45,7 +45,8 @@ def first(summary: Summary, more: str = "") -> str:
         networks = term("network", "force networks")
         forces = 2 * summary["contacts"]
         told = f"<b>{forces} unknown forces − {forces - free} equations = {free} free numbers.</b> "
-        told += f"Play shows {networks} that all balance{more}."
+        told += f"Each line is a force between two disks. Play shows {networks} that all "
+        told += f"balance{more}."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

@@ -33,7 +33,7 @@ BARS += ("whole_low", "whole_high")  # exact intervals without what is known
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
 # What one bar says, and at which part of the axis, from its least force to its largest; and where.
 KEY = {
-    "least possible": 0.55,
+    "smallest possible": 0.55,
     "seen so far": 0.68,
     "now; drag it up or down": 0.77,
     "largest possible": 0.93,

@@ -28,7 +28,8 @@ export function drawSegment(space) {
     else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
     const above = y - high - (close ? 34 : 0)
     space.write(x, above, text, lit ? look.hand : look.ink)
-    space.free([x, above], wide, 16 * text.split("\n").length)
+    const middle = Math.min(Math.max(x, wide / 2 + 5), easel.wide - wide / 2 - 5) // as written
+    space.free([middle, above], wide, 16 * text.split("\n").length)
     space.labels.push({ side, x, y, reach: 30 })
     before = { x, wide }
   }

@@ -50,11 +50,11 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
 </svg>"""
 LEAD = (
     "<b>Two growing forces from outside push two touching disks apart.</b> Their neighbours hold "
-    "them, until no forces can balance any more and the packing gives way."
+    "them, until balance is no longer possible and the packing gives way."
 )
 HINT = (
     "<b>Click a line in the packing</b>, or choose the strongest one. Then guess how hard you must "
-    "push, in multiples of the mean force, and see whether you were right."
+    "push (the mean force here is 1), and see whether you were right."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "

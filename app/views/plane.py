@@ -42,7 +42,7 @@ GROWS = "The networks come as they are found; the exact outline of S follows."
 
 COMPUTED = (
     " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
-    "it is known to {found.gap:.1g} of the mean force. Half as far out is the outline shrunk "
+    "it is known to {found.gap:.1g} of the mean force. Halfway is the outline shrunk "
     "to half its lengths about its middle."
 )
 
@@ -53,7 +53,7 @@ LEAD = (
 TOUCH = "orange lines grow, blue ones shrink."
 OF_A_PAIR = "it sets the forces of the green and the violet line, and all others follow."
 CROWDED = (
-    ": to get far out, many forces have to change in step, which by chance hardly ever happens"
+    ": to get far out, many forces have to change in step, which hardly ever happens by chance"
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")
@@ -302,7 +302,7 @@ class View(TabView):
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
         dots = f"{'All' if inner == 1 else f'{inner:.0%} of the'} {len(path)} dots"
-        words = f"<b>{dots} lie less than half as far out as the outline</b>"
+        words = f"<b>{dots} lie less than halfway from the middle to the outline</b>"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)

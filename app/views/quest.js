@@ -1,28 +1,61 @@
-// A question that the hand answers: how strong, and how weak, one force of a small scene can get.
+// A question that the hand answers. Famous scenes have one of their own; in all others it is how
+// strong, and how weak, one force can get.
 
 import { forceName, number } from "./saying.js"
 
 const NEAR = 0.01 // of what is possible: this near to an end it has been found
+const FIND = "Drag the red dot and find out."
+
+/** By scenes: what is asked, up to which normal force or out of the cloud, and what is said then. */
+const OWN = {
+  groove: {
+    ask: "can you make the left wall press harder than the disk weighs?", least: 1.005,
+    done: (value, high) => `✓ It presses with ${number(value)}, the disk weighs 1, and all is in balance. At ${number(high)} friction can do no more.`,
+  },
+  box: {
+    ask: "can you make the disks press on each other (violet) with four times what each weighs?", least: 4,
+    done: (value) => `✓ ${number(value)} times, and everything still balances.`,
+  },
+  thirteen: {
+    ask: "can you get the red dot out of the cloud, to the edge?",
+    done: () => "✓ Out here everything balances, too: chance hardly ever finds it.",
+  },
+}
 
 export class Quest {
   constructor(host) { this.host = host; this.begin() }
 
   /** Nothing is found yet: another scene, or another S. */
-  begin() { this.found = [false, false] }
+  begin() { Object.assign(this, { found: [false, false], best: -Infinity }) }
 
-  /** Of the normal force of a contact, with its [least, largest] if known; colour: of its axis, in words; moved: by hand. */
-  look(body, contact, colour, ends, moved) {
+  /**
+   * Of the normal force of a contact, with its [least, largest] if known; colour: of its axis, in
+   * words; outside: whether the dot has left the cloud; moved: by hand.
+   */
+  look(body, contact, { colour, ends, outside, moved }) {
     const [low, high] = (body.bounded && ends) || [NaN, NaN], room = high - low
     this.host.hidden = !(room > 1e-6 * body.scaleOf())
     if (this.host.hidden) return
-    const value = body.forces()[2 * contact]
-    if (moved) this.found = this.found.map((found, k) => found || Math.abs(value - [high, low][k]) < NEAR * room)
-    const [most, least] = this.found, name = `the ${colour}${forceName(body.scene, 2 * contact)}`
-    const now = most && least ? `✓ Any value from ${number(low)} to ${number(high)}: balance alone does not say which.`
-      : most ? `✓ ${number(high)} is its largest. And its smallest?`
-      : least ? `✓ ${number(low)} is its smallest. And its largest?`
-      : "Drag the red dot and find out."
-    const asked = `<b>Your turn: how strong can ${name} get?</b> <span>${now}</span>`
-    if (asked !== this.asked) this.host.innerHTML = this.asked = asked
+    const value = body.forces()[2 * contact], own = OWN[body.scene.name]
+    const reached = own ? [own.least ? value >= own.least : outside] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
+    if (moved) this.found = this.found.map((found, k) => found || Boolean(reached[k]))
+    const said = own ? this.own(own, value, high) : this.both(low, high)
+    const ask = own ? own.ask : `how strong can the ${colour}${forceName(body.scene, 2 * contact)} get?`
+    const text = `<b>Your turn: ${ask}</b> <span>${said}</span>`
+    if (text !== this.text) this.host.innerHTML = this.text = text
+  }
+
+  own({ least, done }, value, high) {
+    if (high < least) return "Not with this friction: take more."
+    if (!this.found[0]) return FIND
+    this.best = Math.max(value, this.best)
+    return done(this.best, high)
+  }
+
+  both(low, high) {
+    const [most, least] = this.found
+    if (most && least) return `✓ Any value from ${number(low)} to ${number(high)}: balance alone does not say which.`
+    if (most) return `✓ ${number(high)} is its largest. And its smallest?`
+    return least ? `✓ ${number(low)} is its smallest. And its largest?` : FIND
   }
 }

@@ -9,8 +9,8 @@ const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(B
 const BOTH = "at the left wall and at the right wall"
 // A disk between two walls cannot slide down both: what is so is that friction does all it can.
 const AT_BOTH = {
-  "about to slide up": "friction at its limit, down both walls",
-  "about to slide down": "friction at its limit, up both walls",
+  "about to slide up": "friction at its limit, pushing down",
+  "about to slide down": "friction at its limit, pushing up",
 }
 
 /** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
@@ -50,7 +50,7 @@ export function legend(body) {
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   const axes = h === 2 || h > 3 ? "; green, violet: on the axes" : ""
   const parts = scene.r.length === 1 ? " (pale: their two parts)" : ""
-  return `blue: contact forces${parts}${axes}; wedge: where friction lets them point${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
+  return `blue: contact forces${parts}${axes}; shaded wedge: directions that friction allows${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
 }
 
 /** Whether friction is at its limit at some contact. */
@@ -76,9 +76,9 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }) 
 function equationsOf({ grains, r, pressing, box, equations }) {
   const disks = [...(grains ?? [])].filter((grain) => grain < r.length).length, walls = 2 * pressing.length
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
-  const said = "no net force sideways, none up or down, and no turning, of every disk"
+  const said = "no net force sideways, none up or down, and no turning, for each disk"
   if (whole !== equations) return [said, ""]
-  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three of every disk, two of which follow from the others; one for the pressure`]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, two of which follow from the others; one for the pressure`]
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
 }
 
@@ -93,11 +93,11 @@ export function special({ scene }) {
 
 /** What the picture of S is. */
 export function pictured(body) {
-  const { h, whole, empty, corners, scene } = body, S = `S, all sets of forces that hold the ${scene.r.length > 1 ? "disks" : "disk"}:`
+  const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"}, here`
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
-  return h > 3 ? `all pairs of values that these two forces can have; dots: found at random, which rarely come near the edge`
+  return h > 3 ? `all pairs of values that these two forces can have; dots: random samples, few of which come near the edge`
     : `${S} ${["", "a line", "a polygon; its axes are two of the forces", "a body; drag beside the point to turn it"][h]}`
 }
 
@@ -117,7 +117,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw: you see only the shadow of S, over the green and the violet force. Drag the point or an arrow: all forces follow, and everything stays in balance.`
+  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw, so that you see only a shadow of S: the values of the green and the violet force. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""

@@ -92,7 +92,8 @@ export function render({ model, view }) {
   function inquire() {
     const contact = body.count && body.h && !body.empty ? space.read.at(-1) ?? 0 : null
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
-    quest.look(body, contact, space.axed.at(-1) === 2 * contact ? "violet " : "", ends, !now.fresh)
+    const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
+    quest.look(body, contact, { colour, ends, outside: space.outside, moved: !now.fresh })
   }
 
   // What is done

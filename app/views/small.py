@@ -18,7 +18,7 @@ FIRST_STEPS = (
     (
         "One disk, two walls",
         "A disk of weight 1 lies in a groove. Each wall presses on it and rubs: four forces. But "
-        "there are only three equations: nothing sideways, nothing up or down, no turning. One "
+        "there are only three equations: no net force sideways, none up or down, no turning. One "
         "number stays free: how hard the walls squeeze the disk. Squeezed hard, it would pop up if "
         "friction did not hold it down.",
         {"scene": "groove", "mu": 0.5},

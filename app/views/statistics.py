@@ -62,8 +62,8 @@ class View(TabView):
             self.bar,
             self.lead,
             self.plots,
-            self.scale,
             self.more,
+            self.scale,
             self.told,
             sizing_mode="stretch_width",
         )

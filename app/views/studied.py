@@ -33,7 +33,8 @@ SAMPLERS = {
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
-PEAK = "↓ forces are freest here: click"
+PEAK = "↓ freest here: click"
+LIKE = {0.03: "like ice", 1.0: "like rubber"}  # about, against themselves or a road
 RISES = "friction gives\neach force room"
 FALLS = "but packings have\nfewer contacts"
 COLOURS = (*SERIES, "#cc79a7", "#56b4e9", "#e69f00")
@@ -183,7 +184,8 @@ def _peak(fig: Figure, points: Points) -> None:
     told = (
         (x, y + error, PEAK, "left", DOT, "peak"),
         (points[1][0], 0.45 * y, RISES, "left", "#808080", "rises"),
-        (points[-1][0], 0.12 * y, FALLS, "right", "#808080", "falls"),
+        (points[-1][0], 0.22 * y, FALLS, "right", "#808080", "falls"),
+        *((at, 0.0, word, "center", "#808080", "like") for at, word in LIKE.items()),
     )
     for at, up, text, align, colour, name in told:
         fig.add_layout(

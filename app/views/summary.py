@@ -85,7 +85,7 @@ def finding(summary: Summary) -> str:
     return (
         f"<b>How free are the forces?</b> Across {networks} found at random, the force at a "
         f"contact varies by about <b>{100 * summary['eta1']:.2g} %</b> of the mean force. Drag one "
-        "on purpose and it can go much farther, because all the others give way a little."
+        "yourself and it goes much farther, because the others all adjust a little."
     )
 
 

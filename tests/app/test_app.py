@@ -608,7 +608,7 @@ def test_the_legend_says_what_colours_mean_in_the_hand(state):
     from app.views.packing import PackingView
 
     view = PackingView(state)
-    assert "change from the forces the disks came to rest with" in view.player.legend
+    assert "change since the disks came to rest" in view.player.legend
     view.player.pulled = True
     assert "change by what was pulled" in view.player.legend
 

@@ -248,7 +248,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     )
     assert c >= 0 and width == pytest.approx(2 * 0.23 * force, rel=1e-5)
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
-    page.get_by_text("more by 0.2 × mean").wait_for()
+    page.get_by_text("+0.2 × mean force").wait_for()
     page.get_by_text("4.35 × mean").wait_for()
     page.locator("input.typed").fill("1")  # another μ
     page.locator("input.typed").press("Enter")
@@ -261,7 +261,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page.get_by_label("Full colour, in mean forces").fill("")
     page.get_by_label("Full colour, in mean forces").press("Enter")
     page.wait_for_function("() => !location.search.includes('full=')")
-    page.get_by_text("more by 0.5 × mean").wait_for()
+    page.get_by_text("+0.5 × mean force").wait_for()
 
 
 def test_a_click_selects_the_contact_everywhere(page):

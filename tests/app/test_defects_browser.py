@@ -334,26 +334,24 @@ def middles(page, count):
     )
 
 
-def test_two_contacts_are_chosen_in_the_packing_and_both_are_marked(visit):
+def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     page = visit("?tab=plane")
-    page.get_by_role("combobox", name="Shown").select_option("pair")
-    page.get_by_text("Now click a second contact").wait_for()
     handle = page.locator(".scene").element_handle()
-    page.wait_for_function("e => e.scene.selected !== null", arg=handle)
-    (a, *first), (b, *second) = middles(page, 2)
-    page.mouse.click(*first)
-    searched(page, f"contact={a}")
-    page.mouse.click(*second)
-    page.wait_for_function(f"e => e.scene.selected === {b} && e.scene.second === {a}", arg=handle)
+    page.wait_for_function("e => e.scene.pair.length === 2", arg=handle)
+    green, a = scene(page, "scene.pair")
+    b, *place = next(found for found in middles(page, 3) if found[0] not in (green, a))
+    page.mouse.click(*place)
+    page.wait_for_function(f"e => `${{e.scene.pair}}` === '{b},{a}'", arg=handle)
+    assert scene(page, "scene.selected") == b
     page.wait_for_function(f"() => {MODEL}('outer').get_column('x').length > 3")
     backbone = scene(page, "Array.from(scene.geometry.backbone)")
     axes = page.evaluate(
         """() => [...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "LinearAxis").map((m) => m.axis_label)"""
     )
-    assert f"normal force fₙ of contact {backbone[a]}, in mean forces" in axes
-    assert f"normal force fₙ of contact {backbone[b]}, in mean forces" in axes
-    searched(page, f"second={a}")
+    assert f"normal force fₙ of contact {backbone[a]} (mean force = 1)" in axes
+    assert f"normal force fₙ of contact {backbone[b]} (mean force = 1)" in axes
+    searched(page, f"pair={b}-{a}")
 
 
 # 9: Small things
@@ -443,7 +441,7 @@ def test_curves_of_the_shown_states_end_at_their_targets(visit):
 def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     page = visit("?tab=statistics")
     page.get_by_text("Forces are freest at friction").wait_for()
-    page.get_by_text("What the paper says, and what was found here").click()
+    page.get_by_text("What Shaebani, Unger and Kertész found, and what was found here").click()
     assert page.get_by_role("cell", name="reproduced").count() >= 5
     most = page.evaluate(
         """() => Math.max(...[...Bokeh.documents[0].all_models]
@@ -455,7 +453,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
 @pytest.mark.parametrize(
     "tab, words",
     [
-        ("intervals", ("pale: all that is possible, exactly",)),
+        ("intervals", ("possible: exact; seen: networks so far",)),
         ("plane", ("outline: exact; dots: found at random; lines: one after another",)),
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],

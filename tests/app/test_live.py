@@ -100,7 +100,7 @@ def test_what_is_computed_at_once_is_never_offered_to_be_computed(state):
 
 def test_force_space_has_axes_of_the_states_found_so_far(state, wait_for):
     """New ones when the walk has grown fourfold; those of all states and an outline at its end."""
-    state.looks.tab = "plane"
+    state.looks.param.update(tab="plane", axes="principal")
     browser, tab = Browser(state), plane.View(state)
     wait_for(state)
     state.ask(asked(0.36, 400), at_once=True)
@@ -190,12 +190,12 @@ def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, 
 def test_while_it_is_compressed_the_words_say_that_it_moves(state):
     browser = Browser(state)
     view = PackingView(state)
-    assert "never move, yet" in view.player.lead and "pale disks: loose" in view.player.legend
+    assert "never move, yet" in view.player.lead and "pale disks: carry nothing" in view.player.legend
     state.ask(asked(0.35, 20_000), at_once=True)
     browser.run(lambda: state.work.moving)
     assert "move until they jam" in view.player.lead and "which shrinks" in view.player.legend
     browser.run(lambda: state.growing)
-    assert "never move, yet" in view.player.lead and "pale disks: loose" in view.player.legend
+    assert "never move, yet" in view.player.lead and "pale disks: carry nothing" in view.player.legend
     state.work.cancel()
     browser.run()
 

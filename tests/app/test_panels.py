@@ -96,6 +96,7 @@ def test_the_outline_holds_the_path_and_is_kept(state):
     from app.views.plane import View
 
     opened(state)
+    state.looks.axes = "principal"
     view = View(state)
     assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
     state.looks.tab = view.name
@@ -413,7 +414,7 @@ def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
     means = statistics.means(studied.rows("walk"), "eta1")
     most = max(means, key=lambda point: point[1])
     (peak,) = fig.select(name="peak")
-    assert peak.text == "↓ forces are freest here" and peak.x == most[0]
+    assert peak.text == "↓ freest here: click" and peak.x == most[0]
     assert f"at friction {most[0]:g}" in view.lead.object and "Click a point" in view.lead.object
     line, here = (r for r in fig.renderers if isinstance(r.glyph, Scatter))
     assert list(here.data_source.data["x"]) == [0.1]

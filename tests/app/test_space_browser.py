@@ -44,11 +44,11 @@ def ready(page):
     until(page, "scene.hand.player.plots.plane.xn?.length > 0")
 
 
-@pytest.mark.parametrize("query", ["", "?contact=3&second=8"])
+@pytest.mark.parametrize("query", ["?axes=principal", "?pair=3-8"])
 def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     page = visit(query, 1920, 1000)
     ready(page)
-    if not query:  # a chain first; in the plane of a pair it would become one of the two
+    if "axes" in query:  # a chain first; in the plane of a pair it would become one of the two
         pulled(page)
         page.mouse.up()
         page.wait_for_function("() => location.search.includes('pulls=')")
@@ -85,7 +85,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
-@pytest.mark.parametrize(("button", "axis"), [("Sweep across", "x"), ("Sweep up and down", "y")])
+@pytest.mark.parametrize(("button", "axis"), [("Sweep the green", "x"), ("Sweep the violet", "y")])
 def test_a_sweep_goes_to_both_ends_of_s_and_comes_back(visit, button, axis):
     """Along one axis only; all forces are as they were after it, and after one that is stopped."""
     page = visit("?tab=plane&frame=2")
