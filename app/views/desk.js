@@ -26,7 +26,7 @@ export function desk(most) {
         <button type="button" class="next">Next</button><button type="button" class="close">Close</button></div>
     </section>
     <div class="board">
-    <p class="quest" aria-live="polite" hidden></p>
+    <p class="quest none" aria-live="polite"></p>
     <div class="pair">
       <figure><figcaption class="legend"></figcaption>
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>

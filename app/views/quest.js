@@ -34,8 +34,9 @@ export class Quest {
    */
   look(body, contact, { colour, ends, outside, moved }) {
     const [low, high] = (body.bounded && ends) || [NaN, NaN], room = high - low
-    this.host.hidden = !(room > 1e-6 * body.scaleOf())
-    if (this.host.hidden) return
+    const none = !(room > 1e-6 * body.scaleOf())
+    this.host.classList.toggle("none", none)
+    if (none) return
     const value = body.forces()[2 * contact], own = OWN[body.scene.name]
     const reached = own ? [own.least ? value >= own.least : outside] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
     if (moved) this.found = this.found.map((found, k) => found || Boolean(reached[k]))

@@ -560,11 +560,11 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     opened(state)
     state.looks.tab = "perturb"
     view = View(state)
-    assert view.strongest.visible and not view.push.visible
-    assert "Click a line" in view.told.object and "<svg" in view.lead.object
+    assert view.strongest.visible and view.push.disabled and view.guess.disabled
+    assert "Click a line" in view.lead.object and "<svg" in view.lead.object
     assert view.lead.object.count("<circle") == 8  # two that are pushed, and those around them
     press(view.strongest)
-    assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and view.push.visible
+    assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and not view.push.disabled
     press(view.push)
     settled(state, done=lambda: view.pushed is not None)
     pushed = view.pushed[0]
@@ -743,13 +743,13 @@ def test_walk_and_uniform_states_are_shown_together(state, wait_for):
     view = plane_view.View(state)
     wait_for(state)
     assert not view.also.value and not len(view.beside.data["x"])
-    assert "half as far out" in view.told.object and "uniform" not in view.told.object
+    assert "halfway" in view.finding.object and "uniform" not in view.finding.object
     view.also.value = True
     wait_for(state)
     wait_for(state)  # the catalogue is read anew
     count = len(view.beside.data["x"])
     assert view.other_kind == "uniform" and count >= STATES
-    assert f"of the {count} uniform ones" in view.told.object
+    assert f"of the {count} uniform ones" in view.finding.object
     # in the store from now on: shown at once, in any plane, and the walk beside them
     view.planes.value = "contact"
     wait_for(state)

@@ -369,7 +369,7 @@ def test_thirteen_disks_have_a_shadow_whose_two_forces_light_up(look):
 
 def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
     page = look("?scene=column")
-    assert "one shadow of S" in desk(page).locator(".says").inner_text()
+    assert "a shadow of S" in desk(page).locator(".says").inner_text()
     desk(page).get_by_role("combobox", name="force shown upwards").select_option(
         "tangential force between 1 and 2"
     )
