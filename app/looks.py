@@ -96,9 +96,7 @@ class Looks(param.Parameterized):
     figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
     axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
     pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
-    axes: Any = param.Selector(
-        default="pair", objects=list(PLANES), doc="of force space on screen"
-    )
+    axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
 
     def shows(self, name: str) -> bool:

@@ -61,7 +61,7 @@ EARLY = """{%% extends "base.html" %%}
     if (event.target.src?.includes("es-module-shims")) importShim("%s")
   }, true)
 </script>{%% endblock %%}"""
-TITLE = "granforce — forces between grains"
+TITLE = "granforce — grains at rest"
 # The template's bar, which never shows anything here but which screen readers would tell.
 BAR, HIDDEN = "& .MuiAppBar-root .MuiLinearProgress-root", {"display": "none"}
 # Packing and tabs under each other, beside each other, and from 1800 px on (player.js) with force

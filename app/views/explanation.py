@@ -28,9 +28,8 @@ def lead(state: AppState) -> str:
     """The question that the picture answers, and what is seen, as HTML."""
     if state.work.moving and not state.selection.imported:
         return jamming(state.selection)
-    return "" if state.seen is None else first(
-        state.seen.summary, CLICK if state.looks.tab == "perturb" else PULL
-    )
+    more = CLICK if state.looks.tab == "perturb" else PULL
+    return "" if state.seen is None else first(state.seen.summary, more)
 
 
 def first(summary: Summary, more: str = "") -> str:

@@ -23,7 +23,7 @@ from . import stresses
 from .hints import term
 from .parts import MOVES, PLAIN, TabView, figure, folded, note, question, together
 from .progress import Progress
-from .style import ACROSS, DARK, DOT, ORIGINAL, PALE, SERIES, STATES, UP, corner, hover, legend_above
+from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above, lines
 
 # What is offered beside states of a kind, and what the others are called.
 ALSO = {"walk": "also show uniformly sampled networks", "uniform": "also show the walk"}
@@ -61,8 +61,8 @@ SWEEPS_OF_A_PAIR = ("Sweep the green force ↔", "Sweep the violet force ↕")
 SWEEP = 'button.document.get_model_by_name("player").player.hand.spot.sweep(axis)'
 HELP = (
     "A thin line leads from each network to the one found next. A line that is clicked in the "
-    f"packing becomes the green one. Shown is the shadow ({term('principal', 'projection')}) that {term('s')} casts on a plane, "
-    f"not a section: the shaded {term('outline')} holds all of it."
+    f"packing becomes the green one. Shown is the shadow ({term('principal', 'projection')}) that "
+    f"{term('s')} casts on a plane, not a section: the shaded {term('outline')} holds all of it."
 )
 
 
@@ -124,8 +124,8 @@ class View(TabView):
         self.lead.object = LEAD + (OF_A_PAIR if pair else TOUCH)
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)
-        for line, colours in zip(self.lines, (ACROSS, UP), strict=True):
-            line.update(visible=pair, text_color=colours[self.looks.dark])
+        for line, colour in zip(self.lines, lines(self.looks.dark), strict=True):
+            line.update(visible=pair, text_color=colour)
         wanted = replay, self.planes.value, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:

@@ -47,7 +47,8 @@ FOLDED = (
     "Networks found in other ways",
 )
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
-CLAIMS = """<details><summary>What Shaebani, Unger and Kertész found, and what was found here</summary>
+CLAIMS = """<details>
+<summary>What Shaebani, Unger and Kertész found, and what was found here</summary>
 <table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
 says, and what the study found, with its 95 % interval</caption>{}</table>{}</details>"""
 CLAIM = "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>"

@@ -21,9 +21,6 @@ EDGE = "#8fa1b5"
 SERIES = ("#0072b2", "#d55e00", "#009e73")  # Okabe and Ito
 PALE, DARK, DOT, ORIGINAL = "#a9cdee", "#2b74b8", "#b5236b", "#e69f00"
 
-# The two forces that are axes of force space, by day and by night.
-ACROSS, UP = ("#12793f", "#4ecb8d"), ("#7a3fc4", "#c39bff")
-
 COLOURS = 33
 
 
@@ -67,11 +64,15 @@ def palettes(dark: bool) -> dict[str, Any]:
             "loose": "#ff5ca8" if dark else DOT,
             "selected": "#ff5ca8" if dark else DOT,
             "known": "#4dd0b5" if dark else "#00695c",
-            "across": ACROSS[dark],
-            "up": UP[dark],
+            **dict(zip(("across", "up"), lines(dark), strict=True)),
             "halo": "rgba(20, 24, 30, 0.8)" if dark else "rgba(255, 255, 255, 0.85)",
         },
     }
+
+
+def lines(dark: bool) -> tuple[str, str]:
+    """Colours of the two lines whose forces are the axes of force space: across, and up."""
+    return ("#4ecb8d", "#c39bff") if dark else ("#12793f", "#7a3fc4")
 
 
 def _faded(colour: tuple[int, ...], part: float) -> str:
