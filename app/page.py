@@ -199,6 +199,7 @@ def _large(document: Document, query: str) -> Any:
         for k in range(0, len(widgets), 3):
             sidebar.extend(widgets[k : k + 3])
             yield
+        sidebar.append(figure.panel(state))
         summary = tiles(state, Volume(state))
         right.extend([of_which(state), summary])
         tabs = Tabs(state)
@@ -208,7 +209,6 @@ def _large(document: Document, query: str) -> Any:
         yield
         right.append(tabs.tabs)
         yield
-        right.append(figure.panel(state))
         yield from tabs.filling(looks.tab)
         yield from tabs.beside(middle)
         state.read_ahead()

@@ -165,7 +165,7 @@ def main(path):
             page.set_default_timeout(300_000)
             page.goto(address + MANY)
             painted(page, 60_000)
-            page.get_by_text("Packing and plots as one figure").wait_for()  # the last to come
+            page.get_by_text("All contacts as a table").wait_for()  # the last to come
             page.wait_for_timeout(4000)
             recorder = Recorder(page)
             act(page, recorder)
