@@ -13,7 +13,7 @@ from .hints import term
 from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL, CLICK = "; drag a line to change it", "; click a line to push there"
+PULL, CLICK = "; drag a line", "; click a line to push there"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
