@@ -253,8 +253,8 @@ class View(TabView):
     def _span(self, event: Any) -> None:
         """A contact that is clicked takes the place of the green one of a pair."""
         pair = self.state.plane.pair if self.state.plane is not None else []
-        if self.visible and self.planes.value == "pair" and pair and event.new is not None:
-            self.looks.pair = (event.new, pair[1]) if event.new not in pair else tuple(pair)
+        if self.visible and pair and event.new not in (None, *pair):
+            self.looks.pair = event.new, pair[1]
 
     def _show(self, replay: Replay, plane: Plane) -> None:
         """Path, original and cone; the outline is to come."""
