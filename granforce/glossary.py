@@ -309,7 +309,8 @@ TERMS = {
     ),
     "pair": Term(
         "normal forces of two contacts",
-        "The shadow of S on fₙ of two contacts, which you choose by clicking them in the packing.",
+        "The shadow of S on fₙ of two contacts, two strong ones at first; one that is clicked in "
+        "the packing takes the place of the green one.",
     ),
     "stress": Term(
         "plane of stresses",
