@@ -4,7 +4,7 @@
 export function desk(most) {
   return `
     <p class="whole">Many different sets of forces can hold the same disks at rest.
-      <span>So no photograph of a heap of sand, however sharp, can tell which grains carry how much. Here you can try the forces out.</span></p>
+      <span>So no photograph of a heap of sand, however sharp, can tell how much each grain carries. Here you can try them out for yourself.</span></p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${most}" step="0.005" aria-label="friction μ">

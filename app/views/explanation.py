@@ -13,7 +13,7 @@ from .hints import term
 from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL, CLICK = "; drag a line", "; click a line to push there"
+PULL, CLICK = ", or drag a line", ", or click a line to push there"
 STYLE = """
 :host { display: block; }
 details[hidden] { display: none; }
@@ -41,10 +41,10 @@ def first(summary: Summary, more: str = "") -> str:
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can change."
-        networks = term("network", "force networks")
+        networks = term("network", "other force networks")
         forces = 2 * summary["contacts"]
         told = f"<b>{forces} unknown forces − {forces - free} equations = {free} free numbers.</b> "
-        told += f"Each line is a force between two disks. Play shows {networks} that all "
+        told += f"Each line is a force between two disks. Press Play to see {networks}, all in "
         told += f"balance{more}."
     return f"<h2>{found}</h2><p>{told}</p>"
 

@@ -49,12 +49,12 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <text x="40" y="46">holds</text><text x="280" y="46">holds</text></g>
 </svg>"""
 LEAD = (
-    "<b>Two growing forces from outside push two touching disks apart.</b> Their neighbours hold "
+    "<b>Two disks that touch are pushed apart, harder and harder.</b> Their neighbours hold "
     "them, until balance is no longer possible and the packing gives way."
 )
 HINT = (
     "<b>Click a line in the packing</b>, or choose the strongest one. Then guess how hard you must "
-    "push (the mean force here is 1), and see whether you were right."
+    "push, and see whether you were right: the mean force is 1, the strongest here {most:.1f}."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
@@ -189,7 +189,7 @@ class View(TabView):
         contact, replay = self.looks.contact, self.state.replay
         drawn = LEAD + SKETCH.format(colour=DOT)
         if contact is None:
-            self._say("", lead=drawn + HINT)
+            self._say("", lead=drawn + HINT.format(most=replay.normal[0].max()))
             return
         tiles = [("carries now", f"{replay.normal[0, contact]:.2f}")]
         if self.pushed is None:

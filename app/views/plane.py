@@ -81,6 +81,10 @@ class View(TabView):
         self.cone = ColumnDataSource(empty)
         self.figure = self._figure()
         self.lines = _lines(self.figure)
+        self.name_of_s = Label(
+            x=0, y=0, text="S", text_color=DARK, text_font_size="20px", visible=False
+        )
+        self.figure.add_layout(self.name_of_s)
         self.planes = question("Shown", PLANES, self.looks, "axes")
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
@@ -265,6 +269,7 @@ class View(TabView):
         self.original.data = {"x": x[:1], "y": y[:1]}
         self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
         self.inner.data = self.outer.data = {"x": [], "y": []}
+        self.name_of_s.visible = False
         self.figure.xaxis.axis_label, self.figure.yaxis.axis_label = planes.labels(replay, plane)
         # Distances mean something among principal axes: both then have the same scale.
         self.figure.match_aspect = not plane.components
@@ -289,6 +294,9 @@ class View(TabView):
             closed = np.concatenate([corners, corners[:1]])
             source.data = {"x": closed[:, 0], "y": closed[:, 1]}
         self.cone.data = self._cone(found.plane, 1.05 * float(found.outer[:, 0].max()))
+        middle = found.outer.mean(axis=0)
+        x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
+        self.name_of_s.update(x=x, y=y, visible=True)
         self._tell(found)
 
     def _tell(self, found: Outlined) -> None:

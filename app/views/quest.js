@@ -6,19 +6,19 @@ import { forceName, number } from "./saying.js"
 const NEAR = 0.01 // of what is possible: this near to an end it has been found
 const FIND = "Drag the red dot and find out."
 
-/** By scenes: what is asked, up to which normal force or out of the cloud, and what is said then. */
+/** By scenes: what is asked, from which normal force on, or how many times the other axis' force, and what is said then. */
 const OWN = {
   groove: {
     ask: "can you make the left wall press harder than the disk weighs?", least: 1.005,
     done: (value, high) => `✓ It presses with ${number(value)}, the disk weighs 1, and all is in balance. At ${number(high)} friction can do no more.`,
   },
   box: {
-    ask: "can you make the disks press on each other (violet) with four times what each weighs?", least: 4,
+    ask: "can you make the disks press on each other (violet) with four times the weight of one disk?", least: 4,
     done: (value) => `✓ ${number(value)} times, and everything still balances.`,
   },
   thirteen: {
-    ask: "can you get the red dot out of the cloud, to the edge?",
-    done: () => "✓ Out here everything balances, too: chance hardly ever finds it.",
+    ask: "can you make the violet force three times as strong as the green one?", times: 3,
+    done: () => "✓ And everything still balances.",
   },
 }
 
@@ -30,15 +30,15 @@ export class Quest {
 
   /**
    * Of the normal force of a contact, with its [least, largest] if known; colour: of its axis, in
-   * words; outside: whether the dot has left the cloud; moved: by hand.
+   * words; place: of the dot, across and up; moved: by hand.
    */
-  look(body, contact, { colour, ends, outside, moved }) {
+  look(body, contact, { colour, ends, place, moved }) {
     const [low, high] = (body.bounded && ends) || [NaN, NaN], room = high - low
     const none = !(room > 1e-6 * body.scaleOf())
     this.host.classList.toggle("none", none)
     if (none) return
     const value = body.forces()[2 * contact], own = OWN[body.scene.name]
-    const reached = own ? [own.least ? value >= own.least : outside] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
+    const reached = own ? [own.times ? place[1] >= own.times * place[0] : value >= own.least] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
     if (moved) this.found = this.found.map((found, k) => found || Boolean(reached[k]))
     const said = own ? this.own(own, value, high) : this.both(low, high)
     const ask = own ? own.ask : `how strong can the ${colour}${forceName(body.scene, 2 * contact)} get?`

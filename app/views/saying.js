@@ -62,7 +62,7 @@ function slips(body) {
 /** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
 export function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
-  const forces = plural(count, "contact") + " with a normal and a tangential force each"
+  const forces = plural(count, "contact") + ", each with a normal and a tangential force"
   if (empty && !scene.idle) {
     const none = consistent ? "none of their solutions is allowed" : "they have no solution"
     const because = consistent ? "; in every solution some contact would have to pull, or its tangential force to exceed μ × its normal force" : ""
@@ -117,12 +117,12 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw, so that you see only a shadow of S: the values of the green and the violet force. Drag the point or an arrow: all forces follow, and everything stays in balance.`
+  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw, so you see only a shadow of S: the values of the green and violet forces. Drag the point or an arrow: all forces follow, and everything stays in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
   const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
-  const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip or to come apart`
+  const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip or open`
   return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 

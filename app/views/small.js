@@ -93,7 +93,7 @@ export function render({ model, view }) {
     const contact = body.count && body.h && !body.empty ? space.read.at(-1) ?? 0 : null
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
     const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
-    quest.look(body, contact, { colour, ends, outside: space.outside, moved: !now.fresh })
+    quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: !now.fresh })
   }
 
   // What is done

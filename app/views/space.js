@@ -158,12 +158,6 @@ export class Space {
     return this.around.ends
   }
 
-  /** Whether the point is outside the cloud of random points. */
-  get outside() {
-    const [low, high] = this.dotted, place = this.flat(this.body.u)
-    return low !== undefined && [0, 1].some((k) => place[k] < low[k] || place[k] > high[k])
-  }
-
   fill() {
     const { body } = this
     this.dots = []

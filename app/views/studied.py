@@ -152,8 +152,9 @@ def most_undetermined(points: Points) -> str:
     peak = max(points, key=lambda point: point[1])[0]
     return (
         f"<b>Forces are freest at friction {peak:g}.</b> More friction leaves every "
-        "force more room, but disks packed with more friction come to rest with fewer contacts. "
-        "Click a point to see such a packing; single packings lie above or below the mean."
+        "force more room, but disks packed with more friction come to rest with fewer contacts, "
+        "so fewer numbers are free. Click a point to see such a packing; individual packings lie "
+        "above or below the average."
     )
 
 
