@@ -54,7 +54,7 @@ LEAD = (
 )
 HINT = (
     "<b>Click a line in the packing</b>, or choose the strongest one. Then guess how hard you must "
-    "push, and see whether you were right: the mean force is 1, the strongest here {most:.1f}."
+    "push, and see whether you were right: the mean force is 1, the strongest here is {most:.1f}."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "

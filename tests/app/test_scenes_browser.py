@@ -451,6 +451,23 @@ def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
         until(page, "small.body.scene.name === 'box'")
 
 
+def test_the_question_of_a_scene_is_answered_by_the_hand(look):
+    page = look("?scene=groove")
+    quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
+    assert "harder than the disk weighs" in quest.inner_text() and "✓" not in quest.inner_text()
+    space.focus()
+    for _ in range(40):
+        page.keyboard.press("ArrowRight")
+    quest.get_by_text("✓ It presses with").wait_for()
+    desk(page).get_by_role("slider", name="friction μ").fill("0.1")  # at most 0.786
+    quest.get_by_text("Not with this friction").wait_for()
+    desk(page).get_by_role("slider", name="friction μ").fill("0")  # S is one point: nothing to ask
+    assert not quest.is_visible()
+    page = look("?scene=box")
+    until(page, "small.body.h === 2")
+    assert "four times the weight" in desk(page).locator(".quest").inner_text()
+
+
 def test_a_finger_drags_the_point(look):
     page = look("?scene=groove", 390, 844, has_touch=True)
     box = desk(page).locator("canvas.space").bounding_box()
