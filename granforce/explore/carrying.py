@@ -1,14 +1,12 @@
 """Which contacts carry for certain: in every network that agrees with a measurement."""
 
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
-from granforce.explore.intervals import bound_of
-from granforce.forces import knowledge
+from granforce.explore.intervals import Bounds, Key, Seen, solved
 from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, checked, likeliest
@@ -67,17 +65,12 @@ def carrying(
     best = likeliest(ensemble, m, s, unmeasured)
     width = np.fmax(positive(within, "within"), _BEYOND * np.abs(best.deviation)) * s
     most = _MOST * np.nanmax(np.abs(m), initial=np.abs(best.forces).max())
-    bounds = np.stack([np.nan_to_num(m - width, nan=-most), np.nan_to_num(m + width, nan=most)], -1)
-    if ensemble.known is not None:
-        low, high = (
-            side * ensemble.force_scale for side in (ensemble.known.low, ensemble.known.high)
-        )
-        bounds = np.stack([np.maximum(bounds[..., 0], low), np.minimum(bounds[..., 1], high)], -1)
-    known = knowledge.polygons(bounds, ensemble.mu, ensemble.force_scale, ensemble.index)
-    bounded = replace(ensemble, known=known, found=best.forces)
-    if contacts is None:
-        places = np.flatnonzero(np.isnan(m[:, 0]))
-    else:
+    bounds = ensemble.bounds
+    bounds[..., 0] = np.maximum(np.nan_to_num(m - width, nan=-most), bounds[..., 0])
+    bounds[..., 1] = np.minimum(np.nan_to_num(m + width, nan=most), bounds[..., 1])
+    bounded = ensemble.with_bounds(bounds, best.forces)
+    places = np.flatnonzero(np.isnan(m[:, 0]))
+    if contacts is not None:
         places = ensemble.positions(contacts)
     least, counts = _least(bounded, places, best.forces, workers, progress)
     return Carrying(
@@ -93,24 +86,18 @@ def _least(
     ensemble: Ensemble, places: Integers, forces: Floats, workers: int, progress: Progress | None
 ) -> tuple[Floats, dict[str, int]]:
     """Certified lower bounds (k,) of f_n, in ⟨f_n⟩, and counts."""
-    seen = forces[:, 0] / ensemble.force_scale
-
-    def note(key: Any, y: Floats) -> None:
-        np.minimum(seen, y[: 2 * len(seen)].reshape(-1, 2).mean(axis=1), out=seen)
-
-    solver = Solver(make_system(ensemble), workers=workers, seen=note)
-    least: dict[Any, tuple[float, float]] = {}
-    done = 0
-    waiting = [int(c) for c in places]
+    seen = Seen(ensemble, forces)
+    solver = Solver(make_system(ensemble), workers=workers, seen=lambda key, y: seen.add(y))
+    keys: list[Key] = [(int(c), 0, 0) for c in places]
+    bounds: Bounds = {}
+    waiting = keys
     while waiting:
-        waiting = [c for c in waiting if seen[c] > INTERVAL_GAP]
+        waiting = [key for key in waiting if seen.least[key[0]] > INTERVAL_GAP]
         batch, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
-        keys = [(c, 0, 0) for c in batch]
-        least |= solver.solve(keys, [bound_of(ensemble, *key) for key in keys])
+        bounds |= solved(ensemble, solver, batch)
         cancelling.check("exact bounds")
-        done = len(places) - len(waiting)
         if progress is not None:
-            progress(done, len(places))
-    values = np.array([least.get((int(c), 0, 0), (0.0, 0.0))[1] for c in places])
-    counts = solver.counts | {"f_n = 0 seen in a known network": len(places) - len(least)}
+            progress(len(keys) - len(waiting), len(keys))
+    values = np.array([bounds.get(key, (0.0, 0.0))[1] for key in keys])
+    counts = solver.counts | {"f_n = 0 seen in a known network": len(keys) - len(bounds)}
     return np.where(np.isfinite(values), np.maximum(values, 0.0), 0.0), counts

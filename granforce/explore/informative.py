@@ -70,17 +70,16 @@ def informative(
     best = order[:check]
     if watch is not None:
         watch(Informative(ensemble.index[order], expected[order], before, after.copy()))
-    if progress is not None and len(best):
-        progress(0, len(best))
+    if len(best):
+        if progress is not None:
+            progress(0, len(best))
+        before = _mean_extent(ensemble, workers)
     for done, c in enumerate(best):
-        if not done:
-            before = _mean_extent(ensemble, workers)
-        with_it = ensemble.with_normal(c, held[c, 0], held)
-        after[done] = _mean_extent(with_it, workers)
+        after[done] = _mean_extent(ensemble.with_normal(c, held), workers)
         if progress is not None:
             progress(done + 1, len(best))
-    place = np.append(np.argsort(after[: len(best)], kind="stable"), range(len(best), len(order)))
-    order, place = order[place.astype(int)], place.astype(int)
+    place = np.argsort(after, kind="stable")  # those that were not computed come last
+    order = order[place]
     return Informative(ensemble.index[order], expected[order], before, after[place])
 
 

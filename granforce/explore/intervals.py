@@ -11,6 +11,7 @@ shared machine):
     interior point, eight lanes                                            4 s,  16 steps each
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -25,7 +26,7 @@ from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
 from granforce.records import Cancel, Floats, InputError, Integers, Mask, Progress, float_array
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED, CARRYING, INTERVAL_GAP
+from granforce.tolerances import CARRYING, INTERVAL_GAP
 
 Key = tuple[int, int, int]  # contact, component and side of a bound
 Bounds = dict[Key, tuple[float, float]]  # value attained, and the value that bounds it
@@ -105,14 +106,14 @@ def intervals(
     """
     places = _positions(ensemble, contacts)
     frictionless = ensemble.mu == 0
-    ordered = _widest_first(ensemble, places, widths)
-    upper = [(int(c), 0, 1) for c in ordered]
-    tangential = [] if frictionless else [(int(c), 1, side) for c in ordered for side in (0, 1)]
-    lower = [(int(c), 0, 0) for c in ordered]
-    total = len(upper) + len(tangential) + len(lower)
-    known = _Seen(ensemble, states)
-    report = _counting(progress, total)
-    found = _watched(ensemble, watch)
+    count = len(ensemble.index)
+    widths = np.zeros(count) if widths is None else float_array(widths, (count,), "widths")
+    widest = [int(c) for c in places[np.argsort(-widths[places], kind="stable")]]
+    upper = [(c, 0, 1) for c in widest]
+    tangential = [] if frictionless else [(c, 1, side) for c in widest for side in (0, 1)]
+    lower = [(c, 0, 0) for c in widest]
+    every = upper + tangential + lower
+    known = Seen(ensemble, states)
     system = make_system(ensemble)
 
     def seen(key: Key, y: Floats) -> None:
@@ -120,25 +121,27 @@ def intervals(
         if key[1:] != (0, 0):
             known.add(y)
 
-    solver = Solver(system, workers=workers, seen=seen, report=report, found=found)
-    pinned = _pinned(ensemble, upper + tangential + lower)
-    report(len(pinned))
-    if needs_no_program(ensemble, system):
-        keys = [key for key in upper + tangential + lower if key not in pinned]
-        pinned |= determined(ensemble, keys)
-        report(len(keys))
-    for key, value in pinned.items():
+    def found(key: Key, attained: float, bound: float) -> None:
+        if watch and abs(attained - bound) <= INTERVAL_GAP:
+            value = (-attained if key[2] else attained) * ensemble.force_scale
+            watch(Bound(int(ensemble.index[key[0]]), *key[1:], float(value)))
+
+    given = (determined if needs_no_program(ensemble, system) else _pinned)(ensemble, every)
+    if progress:
+        progress(len(given), len(every))
+    for key, value in given.items():
         found(key, *value)
+    report: dict[str, Any] = {"progress": progress, "total": len(every), "done": len(given)}
+    solver = Solver(system, workers=workers, seen=seen, found=found, **report)
 
     def zero(key: Key) -> bool:
         """Whether f_n = 0 was seen there."""
-        return skip and key not in pinned and known.least[key[0]] <= INTERVAL_GAP
+        return skip and key not in given and known.least[key[0]] <= INTERVAL_GAP
 
     def solve(keys: Sequence[Key]) -> Bounds:
-        keys = [key for key in keys if key not in pinned]
-        return solver.solve(keys, [bound_of(ensemble, *key) for key in keys])
+        return solved(ensemble, solver, [key for key in keys if key not in given])
 
-    bounds = pinned | solve(upper)
+    bounds = given | solve(upper)
     # Lower bounds come early for those who watch. What is seen afterwards replaces them: the result
     # is as if they had come last, for a program or two in a hundred more.
     bounds |= solve([key for key in lower if not zero(key)] + tangential)
@@ -151,43 +154,16 @@ def intervals(
         "frictionless contact": 2 * len(places) if frictionless else 0,
     }
     if ensemble.known is not None:
-        counts["known exactly"] = len(pinned)
+        counts["known exactly"] = len(given)
     return _intervals(ensemble, places, bounds, counts)
-
-
-def _widest_first(ensemble: Ensemble, places: Integers, widths: Floats | None) -> Integers:
-    """The places (k,) by their width (N_c,), the largest first; as they are without one."""
-    if widths is None:
-        return places
-    widths = float_array(widths, (len(ensemble.index),), "widths")
-    return places[np.argsort(-widths[places], kind="stable")]
-
-
-def _watched(
-    ensemble: Ensemble, watch: Callable[[Bound], object] | None
-) -> Callable[[Key, float, float], None]:
-    """found(key, attained, bound) for a Solver, which calls watch with what is certified."""
-
-    def found(key: Key, attained: float, bound: float) -> None:
-        if watch and abs(attained - bound) <= INTERVAL_GAP:
-            contact, component, side = key
-            value = (-attained if side else attained) * ensemble.force_scale
-            watch(Bound(int(ensemble.index[contact]), component, side, float(value)))
-
-    return found
 
 
 def _pinned(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
     """{key: (value attained, value that bounds it)} of those whose component is known exactly."""
     if ensemble.known is None:
         return {}
-    pinned, value = ensemble.known.pinned, ensemble.known.value
-    found = {}
-    for c, component, side in keys:
-        if pinned[c, component]:
-            attained = float(-value[c, component] if side else value[c, component])
-            found[c, component, side] = attained, attained
-    return found
+    value = np.stack([ensemble.known.value, -ensemble.known.value], axis=-1)
+    return {key: (float(value[key]),) * 2 for key in keys if ensemble.known.pinned[key[:2]]}
 
 
 def needs_no_program(ensemble: Ensemble, system: System) -> bool:
@@ -202,37 +178,28 @@ def determined(ensemble: Ensemble, keys: Sequence[Key]) -> Bounds:
     For each there are rows λ with Aᵀλ = 1 there and 0 elsewhere, hence x = b·λ, in all of S. What
     rounding leaves of Aᵀλ bounds the error.
     """
-    held = np.zeros((len(ensemble.index), 2), bool)
-    held = held if ensemble.known is None else ensemble.known.pinned
-    free = np.flatnonzero(~ensemble.to_vector(held).astype(bool))
+    known, size = ensemble.known, ensemble.per_contact
+    held = np.zeros((len(ensemble.index), 2)) if known is None else known.pinned
+    free = ensemble.to_vector(held) == 0
     x = ensemble.to_vector(starting_network(ensemble)) / ensemble.force_scale
-    fixed = np.where(np.isin(np.arange(len(x)), free), 0.0, x)
-    A = ensemble.A.tocsc()[:, free].toarray()
-    b = ensemble.b / ensemble.force_scale - ensemble.A @ fixed
+    A = ensemble.free_columns.toarray()
+    b = ensemble.b / ensemble.force_scale - ensemble.A @ np.where(free, 0.0, x)
     rows = cancelling.apart(np.linalg.pinv, A)
-    left = np.abs(np.eye(len(free)) - rows @ A).sum(axis=1) * np.abs(x).max(initial=0.0)
-    follows = rows @ b
-    place = {
-        (k // ensemble.per_contact, k % ensemble.per_contact): n
-        for n, k in enumerate(free.tolist())
-    }
+    left = np.abs(np.eye(len(rows)) - rows @ A).sum(axis=1) * np.abs(x).max(initial=0.0)
+    follows, row = rows @ b, np.cumsum(free) - 1
     found = _pinned(ensemble, keys)
     for c, component, side in (key for key in keys if key not in found):
-        n = place[c, component]
-        sign = -1.0 if side else 1.0
-        found[c, component, side] = sign * x[free[n]], sign * follows[n] - left[n]
+        k, sign = size * c + component, -1.0 if side else 1.0
+        found[c, component, side] = sign * x[k], sign * follows[row[k]] - left[row[k]]
     return found
 
 
 def _intervals(
     ensemble: Ensemble, places: Integers, bounds: Bounds, counts: dict[str, int]
 ) -> Intervals:
-    value = np.full((len(places), 2, 2), np.nan)
-    gap = np.full_like(value, np.nan)
-    row = {int(c): k for k, c in enumerate(places)}
-    for (place, component, side), (attained, bound) in bounds.items():
-        value[row[place], component, side] = -attained if side else attained
-        gap[row[place], component, side] = abs(attained - bound)
+    keys = itertools.product((int(c) for c in places), (0, 1), (0, 1))
+    attained, gap = (one.reshape(-1, 2, 2) for one in told(bounds, list(keys)))
+    value = attained * [1.0, -1.0]
     if ensemble.mu == 0:
         value[:, 1], gap[:, 1] = 0.0, 0.0
     value[~(gap <= INTERVAL_GAP)] = np.nan
@@ -268,17 +235,19 @@ def limit_load_bounds(
     F/(1 − F ℓ/2P0V).) Options and errors as in `intervals`.
     """
     keys = [int(place) for place in _positions(ensemble, contacts)]
-    report = _counting(progress, len(keys))
-    solver = Solver(make_system(ensemble), workers=workers, report=report)
+    solver = Solver(make_system(ensemble), workers=workers, progress=progress, total=len(keys))
     # Of each contact: maximise F, where f_n + F and f_t act on the grains.
     bounds = solver.solve(keys, [Program([], [], key) for key in keys])
-    load, gap = np.full(len(keys), np.nan), np.full(len(keys), np.nan)
-    for k, key in enumerate(keys):
-        if key in bounds:
-            attained, bound = bounds[key]
-            load[k], gap[k] = -attained * ensemble.force_scale, abs(attained - bound)
-    load[~(gap <= INTERVAL_GAP)] = np.nan
+    attained, gap = told(bounds, keys)
+    load = np.where(gap <= INTERVAL_GAP, -attained * ensemble.force_scale, np.nan)
     return LimitLoads(ensemble.index[keys], load, gap, *_judged(gap), solver.counts)
+
+
+def told(bounds: dict[Any, tuple[float, float]], keys: Sequence[Any]) -> tuple[Floats, Floats]:
+    """Values attained and duality gaps (k,) of keys; NaN where a program has not ended."""
+    none = np.nan, np.nan
+    both = np.array([bounds.get(key, none) for key in keys]).reshape(-1, 2)
+    return both[:, 0], np.abs(both[:, 0] - both[:, 1])
 
 
 def _judged(gap: Floats) -> tuple[float, bool]:
@@ -304,33 +273,24 @@ def bound_of(ensemble: Ensemble, contact: int, component: int, side: int) -> Pro
     return Program(columns, [half * unit, (-half if component else half) * unit], -1)
 
 
-class _Seen:
+def solved(
+    ensemble: Ensemble, solver: Solver, keys: Sequence[Key], points: dict[Any, Floats] | None = None
+) -> Bounds:
+    """{key: (value attained, value that bounds it)} of those reached; points as for the Solver."""
+    return solver.solve(keys, [bound_of(ensemble, *key) for key in keys], points)
+
+
+class Seen:
     """The smallest f_n (N_c,) of any known state of S, in ⟨f_n⟩."""
 
     def __init__(self, ensemble: Ensemble, states: Floats | None) -> None:
-        self.least = np.full(len(ensemble.index), np.inf)
-        if states is not None:
-            states = np.asarray(states, dtype=np.float64).reshape(-1, len(self.least), 2)
-            admitted = (ensemble.residual(states) <= BALANCED) & (
-                ensemble.violation(states) <= ADMISSIBLE
-            )
-            normal = states[admitted, :, 0] / ensemble.force_scale
-            self.least = np.minimum(self.least, normal.min(axis=0, initial=np.inf))
+        """states (…, N_c, 2): those that are not admitted count for nothing."""
+        shape = (-1, len(ensemble.index), 2)
+        states = np.asarray(() if states is None else states, dtype=np.float64).reshape(shape)
+        normal = states[ensemble.admits(states), :, 0] / ensemble.force_scale
+        self.least = normal.min(axis=0, initial=np.inf)
 
     def add(self, y: Floats) -> None:
         """Take note of one more state, in cone coordinates (2 N_c,)."""
         pairs = y[: 2 * len(self.least)].reshape(-1, 2)
         np.minimum(self.least, pairs.mean(axis=1), out=self.least)
-
-
-def _counting(progress: Progress | None, total: int) -> Callable[[int], None]:
-    """report(count) for a Solver, which calls progress(done, total)."""
-    done = 0
-
-    def report(count: int) -> None:
-        nonlocal done
-        done += count
-        if progress:
-            progress(done, total)
-
-    return report

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from granforce.explore.intervals import bound_of, determined, needs_no_program
+from granforce.explore.intervals import determined, needs_no_program, solved, told
 from granforce.forces.contact_problem import (
     forces_of,
     independent_problem_of,
@@ -32,7 +32,7 @@ from granforce.records import (
     float_array,
 )
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED, INTERVAL_GAP
+from granforce.tolerances import BALANCED, INTERVAL_GAP
 
 # A force of zero is approached to within this (in ⟨f_n⟩), so that its contact has an inside.
 _LEAST = 1e-13
@@ -97,17 +97,12 @@ def pull(
         state = starting_network(ensemble)
     state = float_array(state, (len(ensemble.index), 2), "state")
     states = _pulled_all(ensemble, position, values, state, workers)
-    missed = ~_admitted(ensemble, states)
+    missed = ~ensemble.admits(states)
     if missed.any():
         states[missed] = _near_ends(ensemble, contact, values[missed], state)
     residual, violation = ensemble.residual(states), ensemble.violation(states)
     opened, sliding = _at_walls(ensemble, states)
     return Pull(int(contact), states[:, position, 0], states, residual, violation, opened, sliding)
-
-
-def _admitted(ensemble: Ensemble, states: Floats) -> Mask:
-    balanced = ensemble.residual(states) <= BALANCED
-    return balanced & (ensemble.violation(states) <= ADMISSIBLE)
 
 
 def _pulled_all(
@@ -116,14 +111,9 @@ def _pulled_all(
     """The networks (k, N_c, 2) of values (k,); where S has none, what comes nearest to it."""
     width = 1 if len(state) > _ALONE else LANES
     groups = [values[first : first + width] for first in range(0, len(values), width)]
-
-    def pulled(some: Floats) -> Floats:
-        return _pulled(ensemble, int(position), some, state)
-
-    if workers == 1 or len(groups) < 2:
-        return np.concatenate([pulled(some) for some in groups])
     with cancelling.threads(workers) as pool:
-        return np.concatenate(list(pool.map(pulled, groups)))
+        found = pool.map(lambda some: _pulled(ensemble, int(position), some, state), groups)
+        return np.concatenate(list(found))
 
 
 def _pulled(ensemble: Ensemble, position: int, values: Floats, state: Floats) -> Floats:
@@ -161,39 +151,31 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
         )
     width = found.upper - found.lower
     if width <= _AT_WALL * ensemble.force_scale:  # every network has this f_n
-        return np.stack([_without_pulling(ensemble, contact, state)] * len(values))
+        states = np.stack([some_network(ensemble, state)] * len(values))
+        if np.all(ensemble.admits(states)):
+            return states
+        raise UndecidedError(
+            f"the network nearest to the given one was not reached; contact {contact} has the same "
+            "normal force in all of them"
+        )
     (position,) = ensemble.positions([contact])
     for part in _INWARD:
         inside = found.lower + part * width, found.upper - part * width
         states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
-        if np.all(admitted := _admitted(ensemble, states)):
+        if np.all(admitted := ensemble.admits(states)):
             return states
     between = np.clip((values - found.lower) / width, 0.0, 1.0)[:, None, None]
     # On the line between both ends lies a network with each value: S with that known has one.
     on_the_line = (1 - between) * found.states[0] + between * found.states[1]
     for k in np.flatnonzero(~admitted):
-        there = on_the_line[k]
-        states[k] = some_network(ensemble.with_normal(position, there[position, 0], there), state)
-    if np.all(admitted := _admitted(ensemble, states)):
+        states[k] = some_network(ensemble.with_normal(position, on_the_line[k]), state)
+    if np.all(admitted := ensemble.admits(states)):
         return states
     raise UndecidedError(
         f"the network with a normal force of {values[np.argmin(admitted)]:.9g} on contact "
         f"{contact} was not reached; take a value further from the ends of its interval, "
         f"{found.lower:.9g} to {found.upper:.9g}"
     )
-
-
-def _without_pulling(ensemble: Ensemble, contact: int, state: Floats) -> Floats:
-    """The network nearest to state, which has the only f_n there is."""
-    found = some_network(ensemble, state)
-    if not ensemble.admits(found) and ensemble.dimension == 0 and ensemble.member is not None:
-        found = ensemble.member
-    if not ensemble.admits(found):
-        raise UndecidedError(
-            f"the network nearest to the given one was not reached; contact {contact} has the same "
-            "normal force in all of them"
-        )
-    return found
 
 
 @cancelling.cancellable
@@ -216,18 +198,15 @@ def reach(
         found = determined(ensemble, keys)
         states = np.stack([starting_network(ensemble)] * 2)
     else:
-        found = Solver(system, workers=workers).solve(
-            keys, [bound_of(ensemble, *key) for key in keys], points
-        )
+        found = solved(ensemble, Solver(system, workers=workers), keys, points)
         cancelling.check("exact interval")
         states = np.stack([_balanced(ensemble, points[key]) for key in keys])
-    bounds = [found[key] for key in keys]
-    gap = np.array([abs(bounds[side][0] - bounds[side][1]) for side in (0, 1)])
+    attained, gap = told(found, keys)
     if not np.all(gap <= INTERVAL_GAP):
         raise UndecidedError(f"the interval of contact {contact} could not be certified")
-    if not np.all(_admitted(ensemble, states)):
+    if not np.all(ensemble.admits(states)):
         raise UndecidedError(f"no balanced network at the ends of contact {contact} was reached")
-    lower, upper = bounds[0][0] * ensemble.force_scale, -bounds[1][0] * ensemble.force_scale
+    lower, upper = attained * [1.0, -1.0] * ensemble.force_scale
     return Reach(int(contact), lower, upper, gap, states, *_at_walls(ensemble, states))
 
 

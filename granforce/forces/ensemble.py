@@ -209,19 +209,26 @@ class Ensemble:
         left_out = {name.replace("_", " "): n for name, n in self.skipped.items() if n}
         return notebook.table("Admissible force networks S", lines | left_out)
 
-    def with_normal(self, position: int, value: float, found: Floats) -> Ensemble:
-        """The same where f_n of the contact at `position` is known, too, to be `value` (force).
+    @property
+    def bounds(self) -> Floats:
+        """What is known, as bounds (N_c, 2, 2) [contact, component, low or high], force."""
+        if self.known is None:
+            return np.tile([-np.inf, np.inf], (len(self.index), 2, 1))
+        return self.force_scale * np.stack([self.known.low, self.known.high], axis=-1)
+
+    def with_bounds(self, bounds: Floats, found: Floats) -> Ensemble:
+        """The same where other `bounds` are known; found (N_c, 2): a network at hand, as before."""
+        known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
+        return replace(self, known=known, found=found)
+
+    def with_normal(self, position: int, found: Floats) -> Ensemble:
+        """The same where f_n of the contact at `position` is known, too.
 
         found (N_c, 2): a network of S with that f_n, which is then at hand.
         """
-        bounds = np.empty((len(self.index), 2, 2))
-        bounds[..., 0], bounds[..., 1] = -np.inf, np.inf
-        if self.known is not None:
-            bounds[..., 0] = self.known.low * self.force_scale
-            bounds[..., 1] = self.known.high * self.force_scale
-        bounds[position, 0] = value
-        known = knowledge.polygons(bounds, self.mu, self.force_scale, self.index)
-        return replace(self, known=known, found=found)
+        bounds = self.bounds
+        bounds[position, 0] = found[position, 0]
+        return self.with_bounds(bounds, found)
 
     def positions(self, contacts: npt.ArrayLike) -> Integers:
         """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
@@ -237,7 +244,8 @@ class Ensemble:
     def to_vector(self, forces: Any) -> Any:
         """Forces (…, N_c, 2) as vectors x (…, unknowns)."""
         forces = np.asarray(forces, dtype=np.float64)
-        return forces[..., : self.per_contact].reshape(*forces.shape[:-2], -1)
+        unknowns = forces.shape[-2] * self.per_contact
+        return forces[..., : self.per_contact].reshape(*forces.shape[:-2], unknowns)
 
     def to_forces(self, vector: Floats) -> Floats:
         """Vectors x (…, unknowns) as forces (…, N_c, 2)."""
@@ -291,9 +299,12 @@ class Ensemble:
 
     def admits(
         self, forces: Floats, residual: float = BALANCED, violation: float = ADMISSIBLE
-    ) -> bool:
-        """Whether forces (N_c, 2) are an equilibrium inside the cones, to the given tolerances."""
-        return bool(self.residual(forces) <= residual and self.violation(forces) <= violation)
+    ) -> Any:
+        """Whether forces are an equilibrium inside the cones, to the given tolerances.
+
+        A bool for forces (N_c, 2), a mask (…,) for (…, N_c, 2).
+        """
+        return (self.residual(forces) <= residual) & (self.violation(forces) <= violation)
 
 
 def _plain(values: Floats) -> Floats | float:

@@ -150,7 +150,8 @@ def some_network(ensemble: Ensemble, start: Floats) -> Floats:
     """A network (N_c, 2) of S, the one nearest to start where that is reached.
 
     Where it is not, others are asked: PIQP, then HiGHS, whose vertices are exact to rounding. What
-    none of them reaches is the last iterate, which is not admitted.
+    none of them reaches is the network at hand where it is the only one, or else the last iterate,
+    which is not admitted.
     """
     found = nearest(ensemble, start).forces
     if ensemble.admits(found):
@@ -163,7 +164,8 @@ def some_network(ensemble: Ensemble, start: Floats) -> Floats:
         other = restored(ensemble, y)
         if ensemble.admits(other):
             return other
-    return found
+    only = ensemble.member
+    return found if only is None or ensemble.dimension else only
 
 
 class Search:

@@ -22,7 +22,7 @@ from scipy import sparse
 from granforce.numerics import certificates, highs, linear_programs
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.linear_programs import Centre, Outcome, Program
-from granforce.records import Cancelled, Floats
+from granforce.records import Cancelled, Floats, Progress
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
@@ -123,16 +123,18 @@ class Solver:
         *,
         workers: int = 1,
         seen: Callable[[Any, Floats], object] | None = None,
-        report: Callable[[int], object] | None = None,
+        progress: Progress | None = None,
+        total: int = 0,
+        done: int = 0,
         found: Callable[[Any, float, float], object] | None = None,
     ) -> None:
         """seen(key, y): called with each y (n,) of S without load at which a value is attained.
 
-        report(count): called as so many programs end. found(key, attained, bound): called as each
-        of them does. All come from one thread at a time.
+        found(key, attained, bound): called as each program ends, and progress(done, total), which
+        counts on from `done`. All come from one thread at a time.
         """
         self.system, self.workers = system, workers
-        self.seen, self.report = seen, report or (lambda count: None)
+        self.seen, self.progress, self.total, self.done = seen, progress, total, done
         self.found = found or (lambda key, attained, bound: None)
         self.counts = {"programs": 0, "again": 0, "iterations": 0}
         self.lock = threading.Lock()
@@ -185,7 +187,9 @@ class Solver:
                 key = asked.keys[outcome.number]
                 if key not in bounds:
                     self.counts["programs"] += 1
-                    self.report(1)
+                    self.done += 1
+                    if self.progress:
+                        self.progress(self.done, self.total)
                 before = bounds.get(key, (np.inf, -np.inf))
                 least = max(before[1], bound[k])
                 bounds[key] = _nearer(before[0], attained[k], least), least
