@@ -8,6 +8,7 @@ them is still too far, so that the polygons close on each other from both sides 
 Math. Math. Phys. 32, 114, 1992).
 """
 
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from granforce.forces.contact_problem import cone_costs, forces_of, known_part, 
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
-from granforce.records import Cancel, Floats, InputError, Mask, Progress, float_array
+from granforce.records import Cancel, Cancelled, Floats, InputError, Mask, Progress, float_array
 from granforce.system import cancelling
 
 _FIRST = 16  # directions to begin with
@@ -74,27 +75,21 @@ def outline(
     solver = Solver(make_system(ensemble), workers=workers)
     plane = cone_costs(ensemble, axes / length).T, known_part(ensemble, axes / length)
     angle = 2 * np.pi * np.arange(_FIRST) / _FIRST
-    new, support = np.column_stack([np.cos(angle), np.sin(angle)]), None
-    while len(new):
-        found = _solve(solver, plane, new, 0 if support is None else len(support.d))
-        if found is None:
-            break
-        support = found if support is None else _merged(support, found)
-        corners, gap = _corners(support)
-        allowed = max(tolerance * np.ptp(support.point, axis=0).max(), _FLOOR)
-        new = _normals(support, gap > allowed)
-        if progress:
-            progress(len(support.d), len(support.d) + len(new))
-        if len(support.d) + len(new) > _MOST:
-            break
-    if support is None:
-        counts = {"directions": 0, **solver.counts}
-        return Outline(np.empty((0, 2)), np.empty((0, 2)), np.inf, False, counts)
-    gap = float(gap.max()) * length
-    inner, outer = _hull(support.point) * length, _hull(corners) * length
-    converged = bool(gap <= allowed * length)
+    new = np.column_stack([np.cos(angle), np.sin(angle)])
+    support = _Support(np.empty((0, 2)), np.empty((0, 2)), np.empty(0))
+    with suppress(Cancelled):
+        while len(new) and len(support.d) + len(new) <= _MOST:
+            support = _merged(support, _solved(solver, plane, new, len(support.d))[1])
+            corners, gap = _corners(support)
+            allowed = max(tolerance * np.ptp(support.point, axis=0).max(), _FLOOR)
+            new = _normals(support, gap > allowed)
+            if progress:
+                progress(len(support.d), len(support.d) + len(new))
     counts = {"directions": len(support.d), **solver.counts}
-    return Outline(inner, outer, gap, converged, counts)
+    if not len(support.d):
+        return Outline(np.empty((0, 2)), np.empty((0, 2)), np.inf, False, counts)
+    far, inner, outer = float(gap.max()), _hull(support.point), _hull(corners)
+    return Outline(inner * length, outer * length, far * length, bool(far <= allowed), counts)
 
 
 def supports(
@@ -102,16 +97,13 @@ def supports(
 ) -> tuple[Floats, Floats]:
     """Largest cos θ u1·F + sin θ u2·F over S, F in ⟨f_n⟩, and duality gaps: (k,) for angles (k,).
 
-    axes (2, N_c, 2): u1, u2. NaN where cancelled.
+    axes (2, N_c, 2): u1, u2.
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
     solver = Solver(make_system(ensemble), workers=workers)
     plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    found = _solve(solver, plane, directions, 0)
-    if found is None:
-        nothing = np.full(len(directions), np.nan)
-        return nothing, nothing.copy()
+    _, found = _solved(solver, plane, directions)
     reached = (found.point * found.d).sum(axis=1)
     return reached, np.abs(found.bound - reached)
 
@@ -122,39 +114,31 @@ def extremes(ensemble: Ensemble, axes: Floats, directions: Floats) -> Floats:
     axes (2, N_c, 2). Raises Cancelled, and InputError where a program fails.
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
-    across = cone_costs(ensemble, axes).T
-    points: dict[int, Floats] = {}
-    tasks = _tasks(across, directions)
-    bounds = Solver(make_system(ensemble)).solve(list(range(len(tasks))), tasks, points)
-    cancelling.check("outline")
-    if not np.all(np.isfinite(list(bounds.values()))):
-        raise InputError("the outline cannot be certified: linear programs over S fail")
-    return np.stack([forces_of(ensemble, points[key]) for key in range(len(tasks))])
+    plane = cone_costs(ensemble, axes).T, known_part(ensemble, axes)
+    return forces_of(ensemble, _solved(Solver(make_system(ensemble)), plane, directions)[0])
 
 
-def _solve(solver: Solver, plane: Any, directions: Floats, first: int) -> _Support | None:
-    """_Support of new directions (k, 2), whose keys begin at first; None where cancelled.
+def _solved(
+    solver: Solver, plane: Any, directions: Floats, first: int = 0
+) -> tuple[Floats, _Support]:
+    """(y (k, n) farthest along new directions (k, 2), their _Support); keys begin at first.
 
     plane: the axes in cone coordinates (n, 2), and what known forces add (2,).
     """
     across, origin = plane
     keys = list(range(first, first + len(directions)))
+    costs = -(across @ directions.T)
+    columns = list(range(len(costs)))
     points: dict[int, Floats] = {}
-    bounds = solver.solve(keys, _tasks(across, directions), points)
-    if len(bounds) < len(keys) or cancelling.cancelled():
-        return None
+    tasks = [Program(columns, cost.tolist(), -1) for cost in costs.T]
+    bounds = solver.solve(keys, tasks, points)
+    cancelling.check("outline")
     y = np.stack([points[key] for key in keys])
     attained, bound = -np.array([bounds[key] for key in keys]).T
     if not np.all(np.isfinite(attained) & np.isfinite(bound)):
         raise InputError("the outline cannot be certified: linear programs over S fail")
-    return _Support(directions, y[:, : len(across)] @ across + origin, bound + directions @ origin)
-
-
-def _tasks(across: Floats, directions: Floats) -> list[Program]:
-    """The programs that go farthest along directions (k, 2) of the axes `across` (n, 2)."""
-    costs = -(across @ directions.T)
-    columns = list(range(len(costs)))
-    return [Program(columns, cost.tolist(), -1) for cost in costs.T]
+    point = y[:, : len(across)] @ across + origin
+    return y, _Support(directions, point, bound + directions @ origin)
 
 
 def _merged(support: _Support, new: _Support) -> _Support:
