@@ -7,7 +7,6 @@ and for every perturbation; it visits the same kind of states (see `granforce be
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -76,59 +75,6 @@ class Found(NamedTuple):
     attempts: int  # perturbations tried since the state before
 
 
-class ChainState(NamedTuple):
-    """Where a chain stands: its forces and its own random stream."""
-
-    forces: Floats  # (N_c, 2)
-    rng: np.random.Generator
-
-
-class Attempt(NamedTuple):
-    """What one step did."""
-
-    relaxation: Relaxation  # of the perturbed forces
-    outcome: str  # "accepted": the chain moved; "rejected" or "unconverged": it did not
-
-
-def init(ensemble: Ensemble, seed: Seed) -> ChainState:
-    """A chain at the packing's own network, or at the nearest admissible one if that left S.
-
-    seed: anything numpy.random.default_rng takes. Raises NotJammedError where S is empty.
-    """
-    return ChainState(np.array(starting_network(ensemble)), np.random.default_rng(seed))
-
-
-def step(
-    ensemble: Ensemble, state: ChainState, *, relax: Relax = nearest, **options: Any
-) -> tuple[ChainState, Attempt]:
-    """One attempt: add to every component a number uniform in ±⟨F_n⟩ of the state, then relax.
-
-    Returns (state, Attempt): "accepted" moves the chain; "rejected" (the solver ended, but not in
-    equilibrium) and "unconverged" (it ran out of iterations) leave it. The given state is left as
-    it was.
-    """
-    start, rng = kicked(ensemble, state)
-    return _moved(state, rng, relax(ensemble, start, **options), options)
-
-
-def kicked(ensemble: Ensemble, state: ChainState) -> tuple[Floats, np.random.Generator]:
-    """A state's forces (N_c, 2), a number uniform in ±⟨F_n⟩ added to each, and the stream then."""
-    rng = copy.deepcopy(state.rng)
-    amplitude = np.mean(state.forces[:, 0])
-    kick = rng.uniform(-amplitude, amplitude, state.forces.shape)
-    if ensemble.mu == 0:
-        kick[:, 1] = 0.0
-    return state.forces + kick, rng
-
-
-def _moved(
-    state: ChainState, rng: np.random.Generator, relaxation: Relaxation, options: dict[str, Any]
-) -> tuple[ChainState, Attempt]:
-    outcome = judge(relaxation, options.get("tolerance", BALANCED))
-    forces = relaxation.forces if outcome == "accepted" else state.forces
-    return ChainState(forces, rng), Attempt(relaxation, outcome)
-
-
 def judge(relaxation: Relaxation, tolerance: float = BALANCED) -> str:
     """ "accepted", "rejected" or "unconverged", by residual and violation in ⟨f_n⟩."""
     if not relaxation.converged:
@@ -176,12 +122,10 @@ def walk(
         raise InputError("states, chains and workers must be at least 1, and chains ≤ states")
     if chains > 1 and not (begun is None and enough is None):
         raise InputError("only one chain alone goes on from a walk, or ends when it is enough")
-    seeds = np.random.SeedSequence(seed).spawn(chains)
-    all_chains = []
-    for k, own in enumerate(seeds):
-        share = states // chains + (k < states % chains)
-        limit = max_attempts or 20 * share
-        all_chains.append(_Chain(ensemble, k, share, own, limit, whole))
+    all_chains = [
+        _Chain(ensemble, k, states // chains + (k < states % chains), own, max_attempts, whole)
+        for k, own in enumerate(np.random.SeedSequence(seed).spawn(chains))
+    ]
     if begun is not None:
         all_chains[0].go_on(begun, watch)
 
@@ -190,21 +134,15 @@ def walk(
             progress(sum(chain.counts["accepted"] for chain in all_chains), states)
 
     if ensemble.dimension == 0 and skip:
-        parts = [chain.single_point() for chain in all_chains]
+        for chain in all_chains:
+            chain.stay()
     else:
         with cancelling.threads(workers) as pool:
             groups = _groups(all_chains, relax, workers, options)
             list(pool.map(lambda group: _run(group, relax, tell, watch, enough, options), groups))
-        parts = [chain.walked() for chain in all_chains]
-    counts = {name: sum(part.counts[name] for part in parts) for name in parts[0].counts}
-    return Walk(
-        states=np.concatenate([part.states for part in parts]),
-        residual=np.concatenate([part.residual for part in parts]),
-        violation=np.concatenate([part.violation for part in parts]),
-        sweeps=np.concatenate([part.sweeps for part in parts]),
-        attempts=np.concatenate([part.attempts for part in parts]),
-        counts=counts,
-    )
+    *fields, counts = zip(*(chain.walked() for chain in all_chains), strict=True)
+    summed = {name: sum(own[name] for own in counts) for name in counts[0]}
+    return Walk._make([*(np.concatenate(field) for field in fields), summed])
 
 
 def _groups(
@@ -212,8 +150,8 @@ def _groups(
 ) -> list[list[_Chain]]:
     """Chains that go side by side, in lanes if there are enough; it changes nothing in them."""
     in_lanes = relax is nearest or (relax is gauss_seidel and options.keys().isdisjoint(SHUFFLED))
-    together = min(LANES, -(-len(chains) // workers)) if in_lanes else 1
-    together = together if together >= WORTH_LANES else 1
+    together = min(LANES, -(-len(chains) // workers))
+    together = together if in_lanes and together >= WORTH_LANES else 1
     return [chains[k : k + together] for k in range(0, len(chains), together)]
 
 
@@ -226,12 +164,8 @@ def _run(
     options: dict[str, Any],
 ) -> None:
     """All chains of a group to their end."""
-    if len(group) == 1:
-        found = _alone(group[0], relax, options)
-    elif relax is nearest:
-        found = _in_step(group, options)
-    else:
-        found = _each_at_its_pace(group, options)
+    at_own_pace = relax is gauss_seidel and len(group) > 1
+    found = _each_at_its_pace(group, options) if at_own_pace else _in_step(group, relax, options)
     for chain, relaxation in found:
         accepted = chain.take(relaxation, options)
         if accepted and watch is not None:
@@ -245,20 +179,16 @@ def _run(
 # Each yields (chain, relaxation of its kicked state) until no chain goes on.
 
 
-def _alone(
-    chain: _Chain, relax: Relax, options: dict[str, Any]
+def _in_step(
+    chains: list[_Chain], relax: Relax, options: dict[str, Any]
 ) -> Iterator[tuple[_Chain, Relaxation]]:
-    while not chain.done:
-        yield chain, relax(chain.ensemble, chain.kicked(), **options)
-
-
-def _in_step(chains: list[_Chain], options: dict[str, Any]) -> Iterator[tuple[_Chain, Relaxation]]:
+    S = chains[0].ensemble
     while left := [chain for chain in chains if not chain.done]:
         starts = [chain.kicked() for chain in left]
-        if len(left) > 1:
-            found = nearest_of_many(left[0].ensemble, starts, **options)
+        if relax is nearest:
+            found = nearest_of_many(S, starts, **options)
         else:
-            found = [nearest(left[0].ensemble, starts[0], **options)]
+            found = [relax(S, start, **options) for start in starts]
         yield from zip(left, found, strict=True)
 
 
@@ -282,84 +212,92 @@ class _Chain:
     """One chain of a walk, and the states it has found."""
 
     def __init__(
-        self, ensemble: Ensemble, number: int, states: int, seed: Seed, limit: int, whole: bool
+        self,
+        ensemble: Ensemble,
+        number: int,
+        states: int,
+        seed: Seed,
+        limit: int | None,
+        whole: bool,
     ) -> None:
         self.ensemble, self.number = ensemble, number
-        self.limit, self.whole, self.ended = limit, whole, False
-        self.state = init(ensemble, seed)
-        self.rng = self.state.rng  # after the attempt under way
+        self.limit, self.whole, self.ended = limit or 20 * states, whole, False
+        # At the packing's own network, or at the nearest admissible one if that left S.
+        self.forces, self.rng = np.array(starting_network(ensemble)), np.random.default_rng(seed)
         self.counts = {"accepted": 0, "rejected": 0, "unconverged": 0, "skipped": 0}
-        self.states = np.empty((states, *self.state.forces.shape))
-        self.sweeps, self.attempts = np.zeros((2, states), dtype=np.int64)
-        self.residual, self.violation = np.empty((2, states))
+        room = np.empty((states, *self.forces.shape)), *np.empty((2, states))
+        self.walk = Walk._make([*room, *np.zeros((2, states), dtype=np.int64), self.counts])
 
     @property
     def done(self) -> bool:
         """Whether it has all its states, or may end without them."""
         ended = not self.whole and sum(self.counts.values()) >= self.limit
-        return ended or self.ended or self.counts["accepted"] == len(self.states)
+        return ended or self.ended or self.counts["accepted"] == len(self.walk.states)
 
     def go_on(self, begun: Walk, watch: Callable[[Found], object] | None) -> None:
         """Take over the states of a walk that was the same so far, and its place in the stream."""
         tried = int(begun.attempts.sum())
-        if len(begun.states) > len(self.states) or tried != sum(begun.counts.values()):
+        if len(begun.states) > len(self.walk.states) or tried != sum(begun.counts.values()):
             raise InputError("the walk to go on from has more states, or ended between two")
-        self.counts = dict(begun.counts)
-        for name in ("states", "residual", "violation", "sweeps", "attempts"):
-            getattr(self, name)[: len(begun.states)] = getattr(begun, name)
+        self.counts.update(begun.counts)
+        for mine, before in zip(self.walk[:-1], begun[:-1], strict=True):
+            mine[: len(begun.states)] = before
         for _ in range(tried):  # each attempt drew so many numbers
-            self.rng.uniform(size=self.state.forces.shape)
-        self.state = ChainState(np.array(begun.states[-1]), self.rng)
+            self.rng.uniform(size=self.forces.shape)
+        self.forces = begun.states[-1]
         if watch is not None:
             for k in range(len(begun.states)):
                 watch(self.found(k))
 
     def kicked(self) -> Floats:
-        """The start of the next attempt; NotJammedError where there were too many."""
+        """The start of the next attempt: to every component a number uniform in ±⟨F_n⟩ is added.
+
+        Raises NotJammedError where there were too many.
+        """
         if sum(self.counts.values()) >= self.limit:
             raise NotJammedError(
-                f"only {self.counts['accepted']} of {len(self.states)} states after {self.limit} "
-                f"attempts ({self.counts['rejected']} rejected, {self.counts['unconverged']} "
-                "unconverged): allow more iterations, or take another relaxation"
+                f"only {self.counts['accepted']} of {len(self.walk.states)} states after "
+                f"{self.limit} attempts ({self.counts['rejected']} rejected, "
+                f"{self.counts['unconverged']} unconverged): allow more iterations, or take "
+                "another relaxation"
             )
-        start, self.rng = kicked(self.ensemble, self.state)
-        return start
+        amplitude = np.mean(self.forces[:, 0])
+        kick = self.rng.uniform(-amplitude, amplitude, self.forces.shape)
+        if self.ensemble.mu == 0:
+            kick[:, 1] = 0.0
+        return self.forces + kick
 
     def take(self, relaxation: Relaxation, options: dict[str, Any]) -> bool:
         """Count an attempt, and keep its state if it is accepted; whether it was."""
-        k = self.counts["accepted"]
-        self.state, (_, outcome) = _moved(self.state, self.rng, relaxation, options)
-        self.counts[outcome] += 1
-        self.sweeps[k] += relaxation.iterations
-        self.attempts[k] += 1
-        if outcome == "accepted":
-            self.states[k] = relaxation.forces
-            self.residual[k] = relaxation.residual
-            self.violation[k] = relaxation.violation
-        return outcome == "accepted"
+        (states, residual, violation, sweeps, attempts, counts), k = (
+            self.walk,
+            self.counts["accepted"],
+        )
+        outcome = judge(relaxation, options.get("tolerance", BALANCED))
+        counts[outcome] += 1
+        sweeps[k] += relaxation.iterations
+        attempts[k] += 1
+        if outcome != "accepted":
+            return False
+        states[k] = self.forces = relaxation.forces
+        residual[k], violation[k] = relaxation.residual, relaxation.violation
+        return True
 
     def found(self, k: int = -1) -> Found:
         """A state accepted, by default the last one."""
         k %= self.counts["accepted"]
-        numbers = float(self.residual[k]), float(self.violation[k]), int(self.attempts[k])
-        return Found(self.number, k, self.states[k].copy(), *numbers)
+        states, residual, violation, _, attempts, _ = self.walk
+        numbers = float(residual[k]), float(violation[k]), int(attempts[k])
+        return Found(self.number, k, states[k].copy(), *numbers)
+
+    def stay(self) -> None:
+        """Every state is where the chain stands: S is this one point."""
+        self.counts["skipped"] = len(self.walk.states)
+        self.walk.states[:] = self.forces
+        self.walk.residual[:] = self.ensemble.residual(self.forces)
+        self.walk.violation[:] = self.ensemble.violation(self.forces)
 
     def walked(self) -> Walk:
-        """The chain as a Walk."""
+        """The walk with the states that it has."""
         count = self.counts["accepted"] + self.counts["skipped"]
-        return Walk(
-            states=self.states[:count],
-            residual=self.residual[:count],
-            violation=self.violation[:count],
-            sweeps=self.sweeps[:count],
-            attempts=self.attempts[:count],
-            counts=self.counts,
-        )
-
-    def single_point(self) -> Walk:
-        """The Walk where S is the one point that the chain stands at."""
-        self.counts["skipped"] = len(self.states)
-        self.states[:] = self.state.forces
-        self.residual[:] = self.ensemble.residual(self.state.forces)
-        self.violation[:] = self.ensemble.violation(self.state.forces)
-        return self.walked()
+        return Walk._make([*(field[:count] for field in self.walk[:-1]), self.counts])

@@ -5,10 +5,10 @@ import pytest
 from packings import packed, two_disks
 
 from granforce import measures
-from granforce.explore.random_walk import WORTH_LANES, init, judge, step, walk
+from granforce.explore.random_walk import WORTH_LANES, judge, walk
 from granforce.forces.ensemble import ensemble
 from granforce.forces.gauss_seidel import gauss_seidel
-from granforce.forces.nearest import nearest
+from granforce.forces.nearest import nearest, starting_network
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.records import Cancelled, InputError, NotJammedError, Relaxation
 
@@ -98,10 +98,9 @@ def test_a_single_point_needs_no_relaxation():
         assert np.ptp(done.states, axis=0).max() == 0
         assert done.residual.max() < 1e-10
         # What was skipped would have led to the same point.
-        state = init(point, 0)
-        again, info = step(point, state, relax=nearest_piqp)
-        assert info.outcome == "accepted"
-        assert np.abs(again.forces - state.forces).max() < 1e-7 * point.force_scale
+        again = walk(point, 1, 0, relax=nearest_piqp, skip=False)
+        assert again.counts["accepted"] == 1
+        assert np.abs(again.states - done.states).max() < 1e-7 * point.force_scale
 
 
 def test_rejection_and_lack_of_convergence_are_told_apart():
@@ -137,17 +136,19 @@ def test_a_walk_may_end_with_the_states_it_has(S):
 
 
 def test_a_rejected_attempt_stays_where_it_was(S):
-    state = init(S, 0)
-    again, info = step(S, state, max_iterations=2)
-    assert info.outcome == "unconverged"
-    assert np.array_equal(again.forces, state.forces)
+    starts = []
 
+    def relax(S, start):
+        starts.append(start)
+        return nearest(S, start)._replace(converged=len(starts) > 1)
 
-def test_a_step_leaves_its_state_as_it_was(S):
-    state = init(S, 0)
-    one, two = (step(S, state)[0].forces for _ in range(2))
-    assert np.array_equal(one, two)
-    assert not np.array_equal(one, state.forces)
+    done = walk(S, 1, 0, relax=relax)
+    assert (done.counts["unconverged"], done.counts["accepted"]) == (1, 1)
+    own = starting_network(S)
+    for start in starts:
+        assert np.abs(start - own).max() <= own[:, 0].mean()
+    assert not np.array_equal(*starts)
+    assert not np.array_equal(done.states[0], own)
 
 
 def test_a_walk_can_be_cancelled(S):
@@ -160,7 +161,8 @@ def test_a_walk_can_be_cancelled(S):
 def test_an_original_outside_the_cones_is_replaced_by_the_nearest():
     S = ensemble(packed(60, 0.3), mu=0.28)
     assert not S.admits(S.original)
-    assert S.admits(init(S, 0).forces)
+    assert S.admits(starting_network(S))
+    assert walk(S, 2, 0).violation.max() < 1e-9
 
 
 @pytest.mark.parametrize("sizes", [{"states": 0}, {"states": 2, "chains": 3}])
