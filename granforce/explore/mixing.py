@@ -5,8 +5,7 @@ Rank-normalised split R̂ and effective sample sizes as in Vehtari et al., Bayes
 numbers, one component after the other: of thousands that takes longer than to draw them.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import fft, stats
@@ -33,17 +32,17 @@ class Mixing(NamedTuple):
     @property
     def worst_r_hat(self) -> float:
         """Largest R̂, NaN where none is known."""
-        return _over(np.max, self.r_hat)
+        return float(np.fmax.reduce(self.r_hat, axis=None, initial=np.nan))
 
     @property
     def least_bulk(self) -> float:
         """Smallest bulk effective sample size, NaN where none is known."""
-        return _over(np.min, self.bulk)
+        return float(np.fmin.reduce(self.bulk, axis=None, initial=np.nan))
 
     @property
     def least_tail(self) -> float:
         """Smallest tail effective sample size, NaN where none is known."""
-        return _over(np.min, self.tail)
+        return float(np.fmin.reduce(self.tail, axis=None, initial=np.nan))
 
 
 def mixing(draws: Floats, varies: Mask) -> Mixing:
@@ -122,8 +121,3 @@ def _effective(x: Floats) -> Floats:
     size = chains * n
     found = size / np.maximum(2 * before + rest - 1, 1 / np.log10(size))
     return np.where(np.ptp(x, axis=(1, 2)) < np.finfo(float).resolution, size, found)
-
-
-def _over(choose: Callable[[Floats], Any], values: Floats) -> float:
-    known = values[~np.isnan(values)]
-    return float(choose(known)) if known.size else float("nan")
