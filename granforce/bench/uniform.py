@@ -15,7 +15,7 @@ from scipy import linalg
 
 from granforce.bench.report import exponent, note
 from granforce.bench.solvers import tile
-from granforce.explore.billiard import all_rows, make_rows, some_rows
+from granforce.explore.billiard import make_rows, room_for_rows
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.uniform import METHODS, forces_of, sample_uniform, step, varying, warm_up
 from granforce.explore.walls import walls
@@ -101,10 +101,10 @@ def _ours(S: Ensemble, made: Any, kept: Any, method: str, seed: int) -> _Run:
     for count in (1, STATES // 4):  # the first time it is compiled
         begin = time.process_time()
         own = seed + METHODS.index(method)
-        ends, reach, _ = warm_up(made, 4, own, method=method, stores=[kept])
-        _, done = step(made, ends, count=count, reach=reach, rows=kept, method=method)
+        ends, reach, _ = warm_up(made, 4, own, [kept], method=method)
+        _, slacks, _ = step(made, ends, count=count, reach=reach, rows=kept, method=method)
         seconds = time.process_time() - begin
-    states = forces_of(S, made, np.array([one.slacks for one in done]))
+    states = forces_of(S, made, slacks)
     return _Run(method, states, mixing(states, varying(S, made)), seconds, 0.0)
 
 
@@ -159,7 +159,16 @@ def uniform_growth(
 
 def _set_up(S: Ensemble) -> tuple[Any, Any]:
     made = walls(S)
-    return made, all_rows(made)
+    return made, _all_rows(made, 1.0)
+
+
+def _all_rows(made: Any, part: float) -> Any:
+    """All rows of K where they fit into a part of the memory, none of them yet where not."""
+    rows = room_for_rows(made, part)
+    if len(rows.owner) == made.count:
+        for first in range(0, len(made.moving), LANES):
+            make_rows(made, rows, range(first, min(first + LANES, len(made.moving))))
+    return rows
 
 
 def _peak() -> float:
@@ -168,13 +177,10 @@ def _peak() -> float:
 
 def _going_on(sample: Any, part: float) -> Any:
     """Seconds of processor time per state, rows of K in a part of the memory meant for them."""
-    made, ends, rows = sample.walls, sample.ends, some_rows(sample.walls, part)
-    if len(rows.owner) == made.count:
-        for first in range(0, len(made.moving), LANES):
-            make_rows(made, rows, range(first, min(first + LANES, len(made.moving))))
+    made, ends, rows = sample.walls, sample.ends, _all_rows(sample.walls, part)
     for _ in range(2):
         begin = time.process_time()
-        ends, _ = step(made, ends, count=_TIMED, reach=sample.reach, rows=rows)
+        ends, *_ = step(made, ends, count=_TIMED, reach=sample.reach, rows=rows)
         seconds = time.process_time() - begin
     return seconds / (_TIMED * len(ends))
 
@@ -187,7 +193,7 @@ def _null_space(S: Ensemble, made: Any) -> float:
 
 def _two_cores(made: Any, kept: Any, seed: int) -> float:
     wall = []
-    ends, reach, _ = warm_up(made, 2, seed, stores=[kept])
+    ends, reach, _ = warm_up(made, 2, seed, [kept])
     for workers in (1, 2):
         begin = time.perf_counter()
         with ThreadPoolExecutor(workers) as pool:

@@ -2,8 +2,8 @@
 
 A path is told by the slacks s of all walls and the speeds w at which they change. At a wall that is
 met, its own speed is turned: w ← w − 2 w_k/K_kk · (row k of K). So a turn costs one pass over the
-walls, and a row of K, which is kept (`Rows`) or asked for: a path then stops where it is, and goes
-on, bit for bit as if the row had been there, once it is.
+walls, and a row of K. Where that is not among those that are kept (`Rows`), a path stops where it
+is until it is made, and goes on, bit for bit as if it had been there.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # it needs this file to run
 
 # Walls are padded to a multiple of this, so that the search for the next one runs in lanes.
 LANES = 64
-# Memory for rows of K, all threads together: those of 11,500 walls (3500 disks at μ = 0.1) fit.
+# Memory for rows of K, all threads together: all those of 11,500 walls (3500 disks at μ = 0.1) fit.
 MEMORY = 1 << 30
 # Turns after which a path is not taken, per dimension; a usual path has less than one.
 MOST_TURNS = 10
@@ -54,18 +54,7 @@ class Flight(NamedTuple):
     count: Integers  # type: ignore[assignment]  # (6,) path, its hits, turns, …, as named above
 
 
-def all_rows(walls: Walls) -> Rows | None:
-    """The Rows of all walls where they fit into MEMORY, None where not."""
-    rows = some_rows(walls, 1.0)
-    if len(rows.owner) < walls.count:
-        return None
-    for first in range(0, len(walls.moving), lanes.LANES):
-        cancelling.check("uniform sample")
-        make_rows(walls, rows, range(first, min(first + lanes.LANES, len(walls.moving))))
-    return rows
-
-
-def some_rows(walls: Walls, part: float) -> Rows:
+def room_for_rows(walls: Walls, part: float = 1.0) -> Rows:
     """Rows with room in a part of MEMORY, none of them there yet."""
     count = max(1, walls.count)
     places = min(count, max(2 * lanes.LANES, int(part * MEMORY / (8 * count))))

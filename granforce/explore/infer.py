@@ -50,7 +50,7 @@ class Draws(NamedTuple):
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component
     reached: bool  # all in S, and R̂ ≤ MIXED
     counts: dict[str, Any]  # turns, refused paths, dropped states, held coordinates
-    setup_seconds: float  # wall time of the walls and of the rows of K that are kept
+    setup_seconds: float  # wall time of the walls
     sampling_seconds: float  # wall time of the draws, those dropped included
 
     effective = uniform.UniformSample.effective  # type: ignore[misc]
@@ -201,24 +201,17 @@ def _draws(
 ) -> Draws:
     begin, (states, chains, workers) = time.perf_counter(), numbers
     made = walls(ensemble, weight, m)
-    rows = uniform.stores(made, billiard.all_rows(made), chains, workers)
-    ends = [uniform.init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
+    stores, on = uniform.stores_for(made, chains, workers), partial(step, made)
     ready = time.perf_counter()
-    parts, have, target = [], -_DROPPED, -(-states // chains)
-    counts = {"turns": 0, "refused": 0, "dropped": _DROPPED * chains}
-    while have < target:
-        count = min(uniform.ROUND, target - have) if have >= 0 else -have
-        ends, moves = uniform.shared(rows, ends, partial(step, made, count=count))
-        counts = uniform.counted(counts, moves)
-        if have >= 0:
-            parts.append(uniform.forces_of(ensemble, made, np.stack([m.slacks for m in moves])))
-            if progress is not None:
-                progress((have + count) * chains, target * chains)
-        have += count
-    found = np.concatenate(parts, axis=1)
+    ends = uniform.begun(made, chains, seed)
+    ends, _, dropped = uniform.together(stores, ends, partial(on, count=_DROPPED))
+    each = -(-states // chains)
+    _, found, done = uniform.drawn(ensemble, made, stores, ends, on, 0, each, progress)
+    cancelling.check("inference")
     drawn = time.perf_counter()
     worth = mixing(found, uniform.varying(ensemble, made))
-    counts["held"] = len(made.centre) - len(made.moving)
+    counts = uniform.counted({"turns": 0, "refused": 0}, dropped + done)
+    counts |= {"dropped": _DROPPED * chains, "held": len(made.centre) - len(made.moving)}
     mixed = not made.dimension or worth.worst_r_hat <= uniform.MIXED
     return judged(ensemble, found, worth, mixed, counts, ready - begin, drawn - ready)
 
@@ -229,7 +222,7 @@ def step(
     rows: billiard.Rows | None = None,
     *,
     count: int,
-) -> tuple[list[uniform.ChainState], list[uniform.Moves]]:
+) -> uniform.Flown:
     """The next `count` states of some chains, as `uniform.step` gives them.
 
     Two steps take turns (Gibbs). To every wall's 1 + B (f − f°) a normal error of variance 1 is
@@ -237,8 +230,8 @@ def step(
     point that one solve gives, cut by the walls: a harmonic path for a quarter of an oscillation
     draws from it. Without a measurement that leaves uniform states.
     """
-    rows = billiard.some_rows(made, 1.0) if rows is None else rows
-    pulls, times = np.broadcast_to(made.pull, (len(ends), made.pull.size)), np.array([_TIME])
+    rows, times = rows or billiard.room_for_rows(made), np.array([_TIME])
+    pulls = np.tile(made.pull, (len(ends), 1))
     ahead: list[Any] = []
 
     def on(ends: list[uniform.ChainState], left: int) -> uniform.Flown:

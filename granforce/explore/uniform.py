@@ -7,6 +7,7 @@ as their stationary one (see `billiard`), from whatever state they start.
 import copy
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple, cast
 
@@ -55,16 +56,8 @@ class ChainState(NamedTuple):
     paths: int = 0  # taken so far
 
 
-class Moves(NamedTuple):
-    """What one step did."""
-
-    slacks: Floats  # (count, walls) the states, for Walls.points
-    turns: int  # reflections at walls
-    refused: int  # paths that were not taken, for their number of turns
-
-
-# Chains where they end, their slacks (chains, paths, walls) after each path, turns and paths that
-# were refused (chains, 2).
+# Chains where they end, their slacks (chains, count, walls) after each path or state, and how often
+# each turned at walls and how many paths were refused for that (chains, 2).
 Flown = tuple[list[ChainState], Floats, Integers]
 
 
@@ -77,12 +70,12 @@ class UniformSample(NamedTuple):
     mixing: Mixing  # R̂, bulk and tail effective sample size of each component (NaN if cancelled)
     reached: bool  # complete, all in S, R̂ ≤ MIXED, worth as many independent states as wanted
     counts: dict[str, Any]  # turns, refused paths, dropped states, held coordinates, skipped states
-    setup_seconds: float  # wall time of the walls and of the rows of K that are kept
+    setup_seconds: float  # wall time of the walls
     sampling_seconds: float  # wall time of the steps, those dropped included
     diagnosis_seconds: float  # wall time of the diagnostics
     method: str
     walls: Walls  # the coordinates used
-    rows: Rows | None  # those of K where all are kept
+    rows: Sequence[Rows]  # those of K that are kept, by thread
     reach: float  # root mean square distance |s − 1| from the centre, as found in the warm-up
     ends: Sequence[ChainState]  # ChainState of each chain, from which it can be continued
 
@@ -121,16 +114,16 @@ def step(
     count: int,
     reach: float,
     method: str = "billiard",
-) -> tuple[list[ChainState], list[Moves]]:
-    """The next `count` states of some chains: (ChainState of each, Moves of each).
+) -> Flown:
+    """The next `count` states of some chains, as slacks for Walls.points.
 
-    The given ones are left as they were. rows: where rows of K are kept, made here by default.
-    reach: how far states are from the centre (root mean square of |s − 1|), which sets the length
-    of the billiard's paths; any fixed number leaves the measure uniform.
+    The given ChainStates are left as they were. rows: where rows of K are kept. reach: how far
+    states are from the centre (root mean square of |s − 1|), which sets the length of the
+    billiard's paths; any fixed number leaves the measure uniform.
     """
     if method == "hit_and_run":
         return walked(made, ends, count, 1, lambda ends, left: _chords(made, ends))
-    rows = billiard.some_rows(made, 1.0) if rows is None else rows
+    rows = rows or billiard.room_for_rows(made)
     straight = np.ones((0, made.count))
 
     def on(ends: list[ChainState], left: int) -> Flown:
@@ -148,24 +141,23 @@ def walked(
     count: int,
     paths: int,
     on: Callable[[list[ChainState], int], Flown],
-) -> tuple[list[ChainState], list[Moves]]:
+) -> Flown:
     """The next `count` states of some chains, so many paths between them, as `step` gives them.
 
     on(ends, left): each chain on by some paths, up to `left`.
     """
     ends, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
-    if not made.dimension:
-        return ends, [Moves(np.ones((count, made.count)), 0, 0)] * len(ends)
+    states, counts = np.ones((len(ends), count, made.count)), np.zeros((len(ends), 2), dtype=int)
     found: list[Floats] = []
-    counts: Any = 0
-    while left:
+    while left and made.dimension:
         ends, outs, done = on(ends, left)
         found.append(outs)
-        counts = counts + done
+        counts += done
         left -= outs.shape[1]
-    slacks = np.concatenate(found, axis=1)[:, paths - 1 :: paths]
-    numbers = counts.tolist()
-    return ends, [Moves(made.on_hull(s), *n) for s, n in zip(slacks, numbers, strict=True)]
+    if found:
+        slacks = np.concatenate(found, axis=1)[:, paths - 1 :: paths]
+        states = np.stack([made.on_hull(s) for s in slacks])
+    return ends, states, counts
 
 
 def flown(made: Walls, rows: Rows, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
@@ -238,73 +230,108 @@ def sample_uniform(
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}: take one of {', '.join(METHODS)}")
     sample = previous or _start(ensemble, chains, seed, method, workers)
+    if len(sample.rows) != min(workers, len(sample.ends)):
+        sample = sample._replace(rows=stores_for(sample.walls, len(sample.ends), workers))
     most = MOST_STATES * max(states, effective or 0)
     while True:
-        sample, complete = _extend(ensemble, sample, states, workers, progress)
+        sample, complete = _extend(ensemble, sample, states, progress)
         h, done = sample.walls.dimension, len(sample.flat)
         enough = not h or not effective or sample.effective >= effective
         if enough or not complete or done >= most:
             mixed = not h or sample.mixing.worst_r_hat <= MIXED
             good = complete and enough and mixed and inside(sample.residual, sample.violation)
-            return sample._replace(reached=bool(good))
+            counts = sample.counts | {"skipped": 0 if h else done}
+            return sample._replace(reached=bool(good), counts=counts)
         growth = 1.1 * (effective or 0.0) / max(sample.effective, 1.0)
         states = int(min(most, int(done * min(2.0, max(1.1, growth))) + 1))
 
 
+def begun(made: Walls, chains: int, seed: int) -> list[ChainState]:
+    """Where so many chains begin, each with a random stream of its own."""
+    return [init(made, own) for own in np.random.SeedSequence(seed).spawn(chains)]
+
+
 def warm_up(
-    made: Walls,
-    chains: int,
-    seed: int,
-    *,
-    method: str = "billiard",
-    stores: Sequence[Rows] | None = None,
-) -> tuple[list[ChainState], float, list[Moves]]:
-    """Chains ready to draw from: (ChainState of each, reach, Moves made and dropped)."""
-    ends = [init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
-    reach, dropped = float(np.sqrt(made.dimension)), []
-    stores = stores or [billiard.some_rows(made, 1.0)]
+    made: Walls, chains: int, seed: int, stores: Sequence[Rows], *, method: str = "billiard"
+) -> tuple[list[ChainState], float, Integers]:
+    """Chains ready to draw from: (ChainState of each, reach, turns and refused paths of each)."""
+    ends, counts = begun(made, chains, seed), np.zeros((chains, 2), dtype=int)
+    reach = float(np.sqrt(made.dimension))
     for count in WARM_UP if made.dimension else ():
         on = partial(step, made, count=count, reach=reach, method=method)
-        ends, moves = shared(stores, ends, on)
-        dropped += moves
-        square = np.mean([np.sum((one.slacks - 1) ** 2, axis=1) for one in moves])
-        reach = float(np.sqrt(square))
-    return ends, reach, dropped
+        ends, slacks, done = together(stores, ends, on)
+        counts += done
+        reach = float(np.sqrt(np.mean(np.sum((slacks - 1) ** 2, axis=2))))
+    return ends, reach, counts
 
 
-def stores(made: Walls, kept: Rows | None, chains: int, workers: int) -> Sequence[Rows]:
-    """Rows of K for each thread: all of them together, or a part of the memory each."""
-    groups = min(workers, chains)
-    if kept is not None:
-        return [kept] * groups
-    return [billiard.some_rows(made, 1 / groups) for _ in range(groups)]
+def stores_for(made: Walls, chains: int, workers: int) -> list[Rows]:
+    """Rows of K for each thread, which share the memory that there is for them."""
+    threads = min(workers, chains)
+    return [billiard.room_for_rows(made, 1 / threads) for _ in range(threads)]
 
 
 def shared(
-    stores: Sequence[Any],
-    ends: Sequence[Any],
-    work: Callable[[list[Any], Any], tuple[list[Any], list[Any]]],
-) -> tuple[list[Any], list[Any]]:
-    """work(some chains, rows) → (ends, moves), over a thread for each store, put together again."""
-    groups = [[int(k) for k in part] for part in np.array_split(np.arange(len(ends)), len(stores))]
-    if len(stores) == 1:
-        return work(list(ends), stores[0])
+    stores: Sequence[Rows], tasks: Sequence[Any], work: Callable[[list[Any], Rows], Any]
+) -> list[Any]:
+    """work(some tasks, rows) of consecutive parts of the tasks, each by a thread with its store."""
+    parts = np.array_split(np.arange(len(tasks)), len(stores))
     with cancelling.threads(len(stores)) as pool:
-        parts = [[ends[k] for k in group] for group in groups]
-        done = list(pool.map(work, parts, stores))
-    return [end for part in done for end in part[0]], [one for part in done for one in part[1]]
+        return list(pool.map(work, [[tasks[k] for k in part] for part in parts], stores))
+
+
+def together(
+    stores: Sequence[Rows], ends: Sequence[ChainState], on: Callable[[list[Any], Rows], Flown]
+) -> Flown:
+    """on(some chains, rows) of all chains, over threads."""
+    parts, slacks, counts = zip(*shared(stores, ends, on), strict=True)
+    return [end for part in parts for end in part], np.concatenate(slacks), np.concatenate(counts)
+
+
+def drawn(
+    ensemble: Ensemble,
+    made: Walls,
+    stores: Sequence[Rows],
+    ends: Sequence[ChainState],
+    on: Callable[..., Flown],
+    have: int,
+    target: int,
+    progress: Progress | None,
+) -> tuple[Sequence[ChainState], Floats, Integers]:
+    """Where chains end, forces (chains, k, N_c, 2) of more states, and counts (chains, 2) of those.
+
+    Each has so many states, and gets more up to the target, or until the work is cancelled. on(some
+    chains, rows, count=…): as `step`.
+    """
+    found = [np.zeros((len(ends), 0, len(ensemble.index), 2))]
+    counts = np.zeros((len(ends), 2), dtype=int)
+    with suppress(Cancelled):
+        while have < target:
+            cancelling.check("uniform sample")
+            count = min(ROUND, target - have)
+            ends, slacks, done = together(stores, ends, partial(on, count=count))
+            found.append(forces_of(ensemble, made, slacks))
+            counts, have = counts + done, have + count
+            if progress is not None:
+                progress(have * len(ends), target * len(ends))
+    return ends, np.concatenate(found, axis=1), counts
+
+
+def counted(counts: dict[str, Any], done: Integers) -> dict[str, Any]:
+    """Counts with turns and refused paths (chains, 2) added."""
+    turns, refused = done.sum(axis=0).tolist()
+    return counts | {"turns": counts["turns"] + turns, "refused": counts["refused"] + refused}
 
 
 def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int) -> UniformSample:
     """A sample without states yet, its chains warmed up."""
     begin = time.perf_counter()
     made = walls(ensemble)
-    kept = billiard.all_rows(made) if method == "billiard" else None
     ready = time.perf_counter()
-    rows = stores(made, kept, chains, workers)
-    ends, reach, dropped = warm_up(made, chains, seed, method=method, stores=rows)
-    counts = {"turns": 0, "refused": 0, "dropped": sum(len(one.slacks) for one in dropped)}
-    counts |= {"held": len(made.centre) - len(made.moving), "skipped": 0}
+    stores = stores_for(made, chains, workers)
+    ends, reach, done = warm_up(made, chains, seed, stores, method=method)
+    dropped = chains * sum(WARM_UP) if made.dimension else 0
+    counts = {"turns": 0, "refused": 0, "dropped": dropped}
     nothing = np.zeros((chains, 0))
     return UniformSample(
         states=np.zeros((chains, 0, len(ensemble.index), 2)),
@@ -312,69 +339,45 @@ def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int
         violation=nothing,
         mixing=cast("Mixing", None),  # until there are states
         reached=False,
-        counts=counted(counts, dropped),
+        counts=counted(counts | {"held": len(made.centre) - len(made.moving)}, done),
         setup_seconds=ready - begin,
         sampling_seconds=time.perf_counter() - ready,
         diagnosis_seconds=0.0,
         method=method,
         walls=made,
-        rows=kept,
+        rows=stores,
         reach=reach,
         ends=ends,
     )
 
 
-def counted(counts: dict[str, Any], moves: Sequence[Moves]) -> dict[str, Any]:
-    """Counts, and those of some moves."""
-    turns, refused = sum(m.turns for m in moves), sum(m.refused for m in moves)
-    return {**counts, "turns": counts["turns"] + turns, "refused": counts["refused"] + refused}
-
-
 def _extend(
-    ensemble: Ensemble, sample: UniformSample, states: int, workers: int, progress: Progress | None
+    ensemble: Ensemble, sample: UniformSample, states: int, progress: Progress | None
 ) -> tuple[UniformSample, bool]:
     """The sample with at least `states` states, diagnosed, and whether it was not cancelled."""
-    made, ends, counts = sample.walls, sample.ends, sample.counts
-    chains, have = sample.residual.shape
+    made, (chains, have) = sample.walls, sample.residual.shape
     target = -(-states // chains)
     begin = time.perf_counter()
-    rows = stores(made, sample.rows, chains, workers)
-    parts = [(sample.states, sample.residual, sample.violation)]
-    while have < target and not cancelling.cancelled():
-        count = min(ROUND, target - have)
-        try:
-            on = partial(step, made, count=count, reach=sample.reach, method=sample.method)
-            ends, moves = shared(rows, ends, on)
-        except Cancelled:
-            break
-        new = forces_of(ensemble, made, np.stack([one.slacks for one in moves]))
-        parts.append((new, ensemble.residual(new), ensemble.violation(new)))
-        counts = counted(counts, moves)
-        have += count
-        if progress is not None:
-            progress(have * chains, target * chains)
-    forces, residual, violation = (
-        np.concatenate(field, axis=1) for field in zip(*parts, strict=True)
-    )
-    drawn = time.perf_counter()
+    on = partial(step, made, reach=sample.reach, method=sample.method)
+    ends, new, done = drawn(ensemble, made, sample.rows, sample.ends, on, have, target, progress)
+    forces = np.concatenate([sample.states, new], axis=1)
+    ready = time.perf_counter()
     varies = varying(ensemble, made)
     try:
         diagnosis = mixing(forces, varies)
     except Cancelled:
         diagnosis = mixing(forces[:, :0], varies)
-    if not made.dimension:
-        counts = {**counts, "skipped": forces.shape[0] * forces.shape[1]}
     sample = sample._replace(
         states=forces,
-        residual=residual,
-        violation=violation,
+        residual=ensemble.residual(forces),
+        violation=ensemble.violation(forces),
         mixing=diagnosis,
-        counts=counts,
-        sampling_seconds=sample.sampling_seconds + drawn - begin,
-        diagnosis_seconds=sample.diagnosis_seconds + time.perf_counter() - drawn,
+        counts=counted(sample.counts, done),
+        sampling_seconds=sample.sampling_seconds + ready - begin,
+        diagnosis_seconds=sample.diagnosis_seconds + time.perf_counter() - ready,
         ends=ends,
     )
-    return sample, have >= target and not cancelling.cancelled()
+    return sample, forces.shape[1] >= target and not cancelling.cancelled()
 
 
 def inside(residual: Floats, violation: Floats) -> bool:

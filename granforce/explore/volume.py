@@ -15,6 +15,7 @@ their own, one down from the narrowest distribution and one up from uniform stat
 short to forget where they came from, both would differ.
 """
 
+import itertools
 import math
 import time
 from collections.abc import Sequence
@@ -108,7 +109,7 @@ def volume(
         counts = dict.fromkeys(("rungs", "paths", *_COUNTS), 0)
         return Volume(0.0, 0.0, 0, 0.0, np.zeros(2), True, counts, time.perf_counter() - begin)
     top, log_top, top_variance = _top(made, np.random.default_rng([seed, 0]))
-    stores = uniform.stores(made, billiard.all_rows(made), workers, workers)
+    stores = uniform.stores_for(made, workers, workers)
     rungs = _climbed(made, stores[0], top, seed)
     rungs = _extended(made, stores, rungs, np.full((2, len(rungs[0])), _FIRST), progress)
     for _ in range(_MOST_ROUNDS):
@@ -288,11 +289,10 @@ def _extended(
         for way in (0, 1)
     ]
     tasks = [(rungs[way][k], int(more[way, k])) for way, k in order]
-
-    done, _ = uniform.shared(
-        stores, tasks, lambda some, rows: ([_flown(made, rows, *task) for task in some], [])
+    parts = uniform.shared(
+        stores, tasks, lambda some, rows: [_flown(made, rows, *task) for task in some]
     )
     found = [list(way) for way in rungs]
-    for (way, k), rung in zip(order, done, strict=True):
+    for (way, k), rung in zip(order, itertools.chain(*parts), strict=True):
         found[way][k] = rung
     return found

@@ -22,11 +22,8 @@ from granforce.records import Cancelled, InputError
 def drawn(body, W, d, states, chains=4, seed=0):
     """Draws (chains, states, n) of y with the weight exp(−½ |W y − d|²), as infer makes them."""
     made = BodyWalls(body, W, d)
-    ends = [uniform.init(made, one) for one in np.random.SeedSequence(seed).spawn(chains)]
-    ends, _ = inference.step(made, ends, count=20)
-    return made.points(
-        np.array([one.slacks for one in inference.step(made, ends, count=states)[1]])
-    )
+    ends, *_ = inference.step(made, uniform.begun(made, chains, seed), count=20)
+    return made.points(inference.step(made, ends, count=states)[1])
 
 
 @pytest.mark.parametrize("sigma", [1e-3, 0.1, 0.5, 3.0, 1e3])

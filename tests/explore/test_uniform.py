@@ -56,9 +56,10 @@ BODIES = {
 def drawn(body, states, chains=4, seed=0, method="billiard"):
     """Draws (chains, states, n) of y, by the same steps as sample_uniform."""
     made = BodyWalls(body)
-    ends, reach, _ = uniform.warm_up(made, chains, seed, method=method)
-    _, done = uniform.step(made, ends, count=states, reach=reach, method=method)
-    return made, made.points(np.array([one.slacks for one in done]))
+    stores = uniform.stores_for(made, chains, 1)
+    ends, reach, _ = uniform.warm_up(made, chains, seed, stores, method=method)
+    _, slacks, _ = uniform.step(made, ends, *stores, count=states, reach=reach, method=method)
+    return made, made.points(slacks)
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -390,15 +391,16 @@ def test_the_benchmark_compares_walks_by_cost_and_by_moments():
 
 def test_rows_made_on_demand_change_no_bit(sample):
     """Room for as few rows as there can be: each is made again and again."""
-    made, few = sample.walls, billiard.some_rows(sample.walls, 0.0)
-    assert len(few.owner) < made.count == len(billiard.all_rows(made).owner)
+    made, few = sample.walls, billiard.room_for_rows(sample.walls, 0.0)
+    assert len(few.owner) < made.count == len(billiard.room_for_rows(made).owner)
     on = partial(uniform.step, made, count=10, reach=sample.reach)
-    kept_ends, kept = on(sample.ends, sample.rows)
-    for stores in ([few], [billiard.some_rows(made, 0.0) for _ in range(3)]):
-        ends, moves = uniform.shared(stores, sample.ends, on)
-        for one, other in zip((*ends, *moves), (*kept_ends, *kept), strict=True):
+    kept_ends, *kept = on(sample.ends, *sample.rows)
+    for stores in ([few], [billiard.room_for_rows(made, 0.0) for _ in range(3)]):
+        ends, *moved = uniform.together(stores, sample.ends, on)
+        for one, other in zip(ends, kept_ends, strict=True):
             assert np.array_equal(one.slacks, other.slacks)
-        assert [move[1:] for move in moves] == [move[1:] for move in kept]
+        for one, other in zip(moved, kept, strict=True):
+            assert np.array_equal(one, other)
 
 
 def test_slacks_move_as_the_null_space_lets_them(S):

@@ -53,8 +53,7 @@ def endless_walk(S):
 
 def endless_paths(S):
     made = walls(S)
-    ends = [uniform.init(made, 0)]
-    uniform.step(made, ends, count=10**7, reach=1.0, rows=billiard.all_rows(made))
+    uniform.step(made, [uniform.init(made, 0)], count=10**7, reach=1.0)
 
 
 def one_endless_path(S):
@@ -62,7 +61,9 @@ def one_endless_path(S):
     flight, out = billiard.make_flight(uniform.init(made, 0).slacks), np.ones((1, made.count))
     speeds = made.moved(np.random.default_rng(0).standard_normal((1, made.count)))
     path = speeds, np.array([1e12]), np.ones((0, made.count)), flight, 10**12
-    billiard.fly(billiard.all_rows(made), *path, out, cancelling.flag())
+    rows = billiard.room_for_rows(made)
+    billiard.make_rows(made, rows, np.arange(made.count))
+    billiard.fly(rows, *path, out, cancelling.flag())
     cancelling.check()
 
 
