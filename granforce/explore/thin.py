@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granforce.numerics.lanes import LANES
 from granforce.numerics.wall_matrix import DEPENDENT
 from granforce.records import Floats, Integers
 from granforce.system import cancelling
@@ -17,32 +18,41 @@ from granforce.tolerances import FLAT
 
 
 class ThinMatrix(NamedTuple):
-    """K of `moving` walls, dense; walls beyond them are padding."""
+    """K of w walls, dense; walls beyond them are padding."""
 
-    moving: Integers  # (w,) positions of the walls in y
     null: Floats  # (w, h) N
     root: Floats  # (w, h) G: K = G Gᵀ
     levers: Floats  # (2 N_c, w) L, f_n and f_t/μ
     inverse: Floats  # (w, rows) of the balance of relative slacks
+    count: int  # type: ignore[assignment]  # number of walls, padding included
 
     def moved(self, g: Floats, pulls: Floats | None = None) -> Floats:
         """K (g + Lᵀ p), (k, count), of g (k, count) and p (2 N_c,) or (k, 2 N_c)."""
-        w = len(self.moving)
-        push = g[:, :w] if pulls is None else g[:, :w] + pulls @ self.levers
-        found = np.zeros_like(g)
-        found[:, :w] = push @ self.root @ self.root.T
+        push = g[:, : len(self.root)] + (0.0 if pulls is None else pulls @ self.levers)
+        return self._padded(push @ self.root @ self.root.T)
+
+    def rows(self, walls: Integers) -> Floats:
+        """Rows (k, walls) of K for walls (k,).
+
+        Products round by the shapes of matrices: each row is made among the same others.
+        """
+        found = np.empty((len(walls), self.count))
+        for at, wall in enumerate(walls.tolist()):
+            first = wall - wall % LANES
+            some = np.eye(min(LANES, len(self.root) - first), self.count, first)
+            found[at] = self.moved(some)[wall - first]
         return found
 
     def on_hull(self, away: Floats) -> Floats:
         """The nearest to away (k, count) that the balance lets be."""
-        w = len(self.moving)
-        found = np.zeros_like(away)
-        found[:, :w] = away[:, :w] @ self.null @ self.null.T
-        return found
+        return self._padded(away[:, : len(self.null)] @ self.null @ self.null.T)
+
+    def _padded(self, slacks: Floats) -> Floats:
+        return np.pad(slacks, ((0, 0), (0, self.count - slacks.shape[1])))
 
 
 def thin_matrix(
-    balance: Floats, y: Floats, moving: Integers, levers: Floats, weight: Floats
+    balance: Floats, y: Floats, levers: Floats, weight: Floats, count: int
 ) -> ThinMatrix:
     """The ThinMatrix at y (w,), of its balance (rows, w); weight (2 N_c,): W on levers.
 
@@ -54,7 +64,7 @@ def thin_matrix(
     H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
     root = np.linalg.solve(np.linalg.cholesky(H), null.T).T
     inverse = cancelling.apart(np.linalg.pinv, balance * y, DEPENDENT)
-    return ThinMatrix(moving, null, root, levers, inverse)
+    return ThinMatrix(null, root, levers, inverse, count)
 
 
 def null_space(dense: Floats, least: float = FLAT) -> Floats:

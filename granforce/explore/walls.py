@@ -25,7 +25,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics import highs as programs
 from granforce.numerics.contact_program import PINNED, Problem
-from granforce.numerics.wall_matrix import DEPENDENT, PROBES, WallMatrix
+from granforce.numerics.wall_matrix import DEPENDENT, POLISH, PROBES, WallMatrix
 from granforce.records import Floats, InputError, Integers, Mask, UndecidedError
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, FLAT
@@ -33,8 +33,8 @@ from granforce.tolerances import BALANCED, FLAT
 # What every coordinate is asked to reach, if it can, in the point the centring starts from.
 _AWAY = 0.01
 _MOST_NEWTON_STEPS = 200
-# Newton's decrement at the centre: it only has to make S round. Steps are then balanced so often.
-_NEAR_CENTRE, _POLISH = 1e-3, 3
+# Newton's decrement at the centre: it only has to make S round.
+_NEAR_CENTRE = 1e-3
 # Dimensions up to which they are counted by dense matrices as well.
 _THIN = 4
 
@@ -44,38 +44,28 @@ class Walls(NamedTuple):
 
     centre: Floats  # (n,) y°, coordinates of `Ensemble.scaled_form`
     moving: Integers  # (w,) positions in y of what is not held in all of S
-    matrix: WallMatrix  # K of all `count` walls
+    matrix: WallMatrix | ThinMatrix  # K of all `count` walls; thin where S is too thin for pivots
     dimension: int  # h of the affine hull of S
     pull: Floats  # (2 N_c,) W (m − f°), what a measurement pulls with; 0 without one
     root: Floats  # (2 N_c,) √W
-    barrier: Floats  # (N_c, 3) conductances of the barrier alone
     units: float  # ln of the volume of S in ⟨f_n⟩ over that in s
-    thin: ThinMatrix | None  # K where S is too thin for the matrix, whatever its number of walls
 
     @property
     def count(self) -> int:  # type: ignore[override]
         """Number of walls, padding included."""
-        return len(self.matrix.contact)
+        return self.matrix.count
 
     def rows(self, walls: Integers) -> Floats:
         """Rows (k, count) of K."""
-        if self.thin is not None:
-            return self.thin.moved(np.eye(self.count)[walls])
-        return wall_matrix.rows(self.matrix, walls)
+        return self.matrix.rows(walls)
 
     def moved(self, g: Floats, pulls: Floats | None = None) -> Floats:
         """K g + B Q p, (k, count), of g (k, count) and forces p (k, 2 N_c)."""
-        if self.thin is not None:
-            return self.thin.moved(g, pulls)
-        return wall_matrix.moved(self.matrix, g, pulls)
+        return self.matrix.moved(g, pulls)
 
     def on_hull(self, slacks: Floats) -> Floats:
         """The slacks (k, count), or next to them, that balance lets be and walls, too."""
-        if self.thin is not None:
-            away = self.thin.on_hull(slacks - 1.0)
-        else:
-            # With the barrier's own conductances f − f° is read off the slacks, contact by contact.
-            away = wall_matrix.moved(self.matrix, slacks - 1.0, None, _POLISH, self.barrier)
+        away = self.matrix.on_hull(slacks - 1.0)
         # Beyond a wall by rounding: to where the way from the centre meets it.
         return 1.0 - away / away.min(axis=1, initial=-1.0, keepdims=True)
 
@@ -87,7 +77,7 @@ class Walls(NamedTuple):
 
 
 def walls(
-    ensemble: Ensemble, weight: Floats | None = None, measured: Floats | None = None
+    ensemble: Ensemble, weight: Floats | float = 0.0, measured: Floats | float = 0.0
 ) -> Walls:
     """The Walls of an ensemble.
 
@@ -105,12 +95,11 @@ def walls(
     else:
         held = (y == 0) | is_a_point(ensemble)
     frame = _frame(ensemble, y, held, weight, measured)
-    centre, thin = _centred(frame, y, _metric), None
+    centre = _centred(frame, y, _matrix)
     # Where rows are lost, no centre may be found, or a wrong one.
-    if _is_thin(frame, y if centre is None else centre):
-        centre = _centred(frame, y, _thin_metric)
-        if centre is not None:
-            thin = _thin_metric(frame, centre).matrix
+    thin = _is_thin(frame, y if centre is None else centre)
+    if thin:
+        centre = _centred(frame, y, _thin_matrix)
     if centre is None:
         raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
     if not np.all(centre >= 0):
@@ -178,6 +167,11 @@ class _Frame(NamedTuple):
         """W (N_c, 2), 0 for what is known."""
         return np.where(self.stiff < PINNED, self.stiff, 0.0)
 
+    @property
+    def known(self) -> Floats:
+        """The stiffness (N_c, 2) without W."""
+        return np.where(self.stiff < PINNED, 0.0, PINNED)
+
     def forces(self, y: Floats) -> Floats:
         """f_n, f_t/μ (N_c, 2) of y (n,)."""
         pairs = y[: self.cones].reshape(len(self.stiff), -1)
@@ -191,16 +185,14 @@ class _Frame(NamedTuple):
 
 
 def _frame(
-    ensemble: Ensemble, y: Floats, held: Mask, weight: Floats | None, measured: Floats | None
+    ensemble: Ensemble, y: Floats, held: Mask, weight: Floats | float, measured: Floats | float
 ) -> _Frame:
     contacts, mu, known = len(ensemble.index), ensemble.mu, ensemble.known
     unit = knowledge.units(mu)
     contact = np.repeat(np.arange(contacts), ensemble.per_contact)
     normal = np.tile([[1.0, 1.0], [1.0, -1.0]] if mu > 0 else [[1.0, 0.0]], (contacts, 1))
-    stiff, target = np.zeros((contacts, 2)), np.zeros((contacts, 2))
-    if weight is not None:
-        assert measured is not None  # they come together
-        stiff, target = weight * unit**2, measured / unit
+    stiff, target = np.empty((2, contacts, 2))
+    stiff[:], target[:] = weight * unit**2, measured / unit
     if mu == 0:
         stiff[:, 1] = PINNED
     if known is not None:
@@ -236,16 +228,18 @@ def _barrier(frame: _Frame, y: Floats) -> Floats:
     return np.where(frame.held, 1.0, y) ** -2.0
 
 
-def _matrix(frame: _Frame, y: Floats, stiff: Floats) -> tuple[WallMatrix, Integers]:
+def _matrix(frame: _Frame, y: Floats) -> tuple[WallMatrix, Integers]:
     """(K at y, its walls' positions in y)."""
-    C, _, free = _conductances(frame, _barrier(frame, y), stiff)
+    curvature = _barrier(frame, y)
+    C, _, free = _conductances(frame, curvature, frame.stiff)
+    own, _, _ = _conductances(frame, curvature, frame.known)
     moving = np.flatnonzero(~frame.held & (free[frame.contact] > 0))
     padding = -len(moving) % LANES
     contact = np.append(frame.contact[moving], np.zeros(padding, dtype=np.int64))
     normal = np.vstack([frame.normal[moving] / y[moving, None], np.zeros((padding, 2))])
     problem = frame.problem
     factors, _ = wall_matrix.factored(problem.network, C, problem.diagonal, 0.0)
-    return WallMatrix(problem.network, contact, normal, C, factors), moving
+    return WallMatrix(problem.network, contact, normal, C, own, factors), moving
 
 
 def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
@@ -258,57 +252,24 @@ def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
     return rest[: len(problem.b)], rest[len(problem.b) :]
 
 
-class _Metric(NamedTuple):
-    """K at a point, by the sparse factor."""
-
-    frame: _Frame
-    matrix: WallMatrix
-    moving: Integers  # (w,) positions in y
-
-    def balanced(self, y: Floats) -> Floats:
-        """y, what it lacks of the balance added."""
-        lacking = wall_matrix.balancing(self.matrix, *_rest(self.frame, y))
-        return _shifted(y, self.moving, lacking[: len(self.moving)])
-
-    def uphill(self, pull: Floats) -> Floats:
-        """Relative change (w,) of slacks by Newton's step to the centre."""
-        ones = np.ones((1, self.matrix.contact.size))
-        return wall_matrix.moved(self.matrix, ones, pull)[0, : len(self.moving)]
-
-
-class _ThinMetric(NamedTuple):
+def _thin_matrix(frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
     """The same by singular values."""
-
-    frame: _Frame
-    matrix: ThinMatrix
-
-    @property
-    def moving(self) -> Integers:
-        return self.matrix.moving
-
-    def balanced(self, y: Floats) -> Floats:
-        A, b, _ = self.frame.ensemble.scaled_form
-        return _shifted(y, self.moving, self.matrix.inverse @ (b - A @ y))
-
-    def uphill(self, pull: Floats) -> Floats:
-        return self.matrix.moved(np.ones((1, len(self.moving))), pull)[0]
-
-
-def _metric(frame: _Frame, y: Floats) -> _Metric:
-    return _Metric(frame, *_matrix(frame, y, frame.stiff))
-
-
-def _thin_metric(frame: _Frame, y: Floats) -> _ThinMetric:
-    moving = _matrix(frame, y, frame.stiff)[1]
-    levers = np.zeros((frame.weight.size, len(y)))
-    for k in range(2):
-        cones = np.arange(frame.cones)
-        levers[2 * frame.contact[cones] + k, cones] = 0.5 * frame.normal[cones, k] * y[cones]
-    if frame.ensemble.mu == 0:
-        levers *= 2.0
-    weight = frame.weight.ravel()
+    by_pivots, moving = _matrix(frame, y)
     balance = _balance(frame.ensemble, moving)
-    return _ThinMetric(frame, thin_matrix(balance, y[moving], moving, levers[:, moving], weight))
+    levers = np.stack([frame.forces(one).ravel() for one in np.diag(y)[moving]], axis=1)
+    return thin_matrix(balance, y[moving], levers, frame.weight.ravel(), by_pivots.count), moving
+
+
+def _balanced(
+    frame: _Frame, y: Floats, matrix: WallMatrix | ThinMatrix, moving: Integers
+) -> Floats:
+    """y, what it lacks of the balance added."""
+    if isinstance(matrix, ThinMatrix):
+        A, b, _ = frame.ensemble.scaled_form
+        lacking = matrix.inverse @ (b - A @ y)
+    else:
+        lacking = wall_matrix.balancing(matrix, *_rest(frame, y))[: len(moving)]
+    return _shifted(y, moving, lacking)
 
 
 def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
@@ -322,24 +283,26 @@ def _is_thin(frame: _Frame, y: Floats) -> bool:
     A, b, _ = ensemble.scaled_form
     if A.shape[0] > MOST_DENSE:
         return False
-    at = _metric(frame, y)
-    if not len(at.moving):
+    matrix, moving = _matrix(frame, y)
+    if not len(moving):
         return False
-    for _ in range(_POLISH):
-        y = at.balanced(y)
-    if not (np.abs(A @ y - b).max(initial=0.0) <= BALANCED / 10 and y[at.moving].min() > 0):
+    for _ in range(POLISH):
+        y = _balanced(frame, y, matrix, moving)
+    if not (np.abs(A @ y - b).max(initial=0.0) <= BALANCED / 10 and y[moving].min() > 0):
         return True
-    g = np.random.default_rng(0).standard_normal((PROBES, at.matrix.contact.size))
-    change = wall_matrix.moved(at.matrix, g, None, _POLISH)[:, : len(at.moving)]
-    balance = _balance(ensemble, at.moving)
-    if not np.abs(change @ (balance * y[at.moving]).T).max(initial=0.0) <= BALANCED / 10:
+    g = np.random.default_rng(0).standard_normal((PROBES, matrix.count))
+    change = matrix.moved(g, None, POLISH)[:, : len(moving)]
+    balance = _balance(ensemble, moving)
+    if not np.abs(change @ (balance * y[moving]).T).max(initial=0.0) <= BALANCED / 10:
         return True
-    h, _ = _shape(frame, _barrier(frame, y), np.where(frame.stiff < PINNED, 0.0, PINNED))
+    h, _ = _shape(frame, _barrier(frame, y), frame.known)
     return h <= _THIN and h != null_space(balance).shape[1]
 
 
 def _centred(
-    frame: _Frame, y: Floats, metric: Callable[[_Frame, Floats], _Metric | _ThinMetric]
+    frame: _Frame,
+    y: Floats,
+    matrix_at: Callable[[_Frame, Floats], tuple[WallMatrix | ThinMatrix, Integers]],
 ) -> Floats | None:
     """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps.
 
@@ -347,24 +310,25 @@ def _centred(
     """
     for _ in range(_MOST_NEWTON_STEPS):
         cancelling.check("uniform sample")
-        at = metric(frame, y)
-        if not len(at.moving):
+        matrix, moving = matrix_at(frame, y)
+        if not len(moving):
             return y
-        y = at.balanced(y)
+        y = _balanced(frame, y, matrix, moving)
         pull = frame.pull(y)
-        relative = at.uphill(pull)
-        change = frame.forces(_shifted(y, at.moving, relative)) - frame.forces(y)
+        # Newton's step to the centre.
+        relative = matrix.moved(np.ones((1, matrix.count)), pull)[0, : len(moving)]
+        change = frame.forces(_shifted(y, moving, relative)) - frame.forces(y)
         # The decrement squared: the growth of the sum along the step, to first order.
         gain = float(relative.sum() + pull @ change.ravel())
         if gain < _NEAR_CENTRE**2:
-            for _ in range(_POLISH):
-                y = at.balanced(y)
+            for _ in range(POLISH):
+                y = _balanced(frame, y, matrix, moving)
             return y
         slope, curve = float(pull @ change.ravel()), float(np.sum(frame.weight * change**2))
         step = min(1.0, 0.95 / max(-relative.min(), 1e-300))
         while _rise(step, relative, slope, curve) < 0.1 * step * gain:
             step /= 2
-        y = _shifted(y, at.moving, step * relative)
+        y = _shifted(y, moving, step * relative)
     return None
 
 
@@ -379,34 +343,25 @@ def _shifted(y: Floats, moving: Integers, relative: Floats) -> Floats:
     return y
 
 
-def _walls(frame: _Frame, y: Floats, thin: ThinMatrix | None) -> Walls:
+def _walls(frame: _Frame, y: Floats, thin: bool) -> Walls:
     """The Walls around y."""
-    known, weight = np.where(frame.stiff < PINNED, 0.0, PINNED), frame.weight
-    barrier, moving = _matrix(frame, y, known)
-    matrix = barrier
-    if thin is None:
+    ensemble = frame.ensemble
+    matrix: WallMatrix | ThinMatrix
+    if thin:
+        matrix, moving = _thin_matrix(frame, y)
+        h = matrix.null.shape[1]
+        forces = ensemble.scaled_form[2].tocsc()[:, moving] @ (y[moving, None] * matrix.null)
+        units = 0.5 * float(np.linalg.slogdet(forces.T @ forces)[1])
+    else:
+        known = frame.known
         h, shape = _shape(frame, _barrier(frame, y), known)
         # f_t is in units of μ: its own length is μ times that.
-        plain = np.maximum(known, knowledge.units(frame.ensemble.mu) ** 2)
+        plain = np.maximum(known, knowledge.units(ensemble.mu) ** 2)
         units = _shape(frame, np.zeros_like(y), plain)[1] - shape
-        matrix = _matrix(frame, y, frame.stiff)[0] if weight.any() else barrier
+        matrix, moving = _matrix(frame, y)
         matrix = wall_matrix.restored(matrix)
-    else:
-        h = thin.null.shape[1]
-        T = frame.ensemble.scaled_form[2].tocsc()[:, moving]
-        forces = T @ (y[moving, None] * thin.null)
-        units = 0.5 * float(np.linalg.slogdet(forces.T @ forces)[1])
-    return Walls(
-        centre=y,
-        moving=moving,
-        matrix=matrix,
-        dimension=h,
-        pull=frame.pull(y),
-        root=np.sqrt(weight).ravel(),
-        barrier=barrier.C,
-        units=units,
-        thin=thin,
-    )
+    root = np.sqrt(frame.weight).ravel()
+    return Walls(y, moving, matrix, h, frame.pull(y), root, units)
 
 
 def _shape(frame: _Frame, curvature: Floats, stiff: Floats) -> tuple[int, float]:

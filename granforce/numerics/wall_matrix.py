@@ -39,6 +39,8 @@ from granforce.system import cancelling
 DEPENDENT = 1e-13
 # Random forces that tell what varies in S.
 PROBES = 8
+# Balance is restored so many times as often where only rounding may be left.
+POLISH = 3
 # Balance is restored so often at most; until the slacks of random forces change by less than this,
 # relative to the largest: usually 10⁻⁹ or less after the first time, 10⁻⁵ and more otherwise.
 _MOST_TIMES, _STEADY = 12, 1e-7
@@ -51,8 +53,46 @@ class WallMatrix(NamedTuple):
     contact: Integers  # (walls,) contact of each wall
     normal: Floats  # (walls, 2) B: what unit f_n, f_t/μ add to its slack
     C: Floats  # (N_c, 3) nn, nt, tt of each conductance
+    own: Floats  # (N_c, 3) the same without W: with it f − f° is read off the slacks
     factors: Factors  # of A C Aᵀ, one number for all lanes
     times: int = 1  # how often balance is restored
+
+    @property
+    def count(self) -> int:  # type: ignore[override]
+        """Number of walls, padding included."""
+        return len(self.contact)
+
+    def moved(
+        self, g: Floats, pulls: Floats | None = None, times: int = 1, C: Floats | None = None
+    ) -> Floats:
+        """B Q (Bᵀ g + p), (k, walls), of g (k, walls) and p (2 N_c,) or (k, 2 N_c).
+
+        times: how many times as often as the matrix says balance is restored: once, what is left of
+        the unbalance is that of rounding and of the weights together. C (N_c, 3): where forces come
+        from, if not the matrix's own.
+        """
+        found = np.empty_like(g)
+        for first in range(0, len(g), LANES):
+            part = slice(first, first + LANES)
+            count = len(g[part])
+            lanes = ONE if count == 1 else MANY
+            at = make_scratch(self, len(lanes))
+            at.g[:, :count] = g[part].T
+            if pulls is not None:
+                at.f[:, :count] = pulls[:, None] if pulls.ndim == 1 else pulls[part].T
+            _move(self, self.C if C is None else C, times * self.times, at, lanes)
+            found[part] = at.out[:, :count].T
+        return found
+
+    def rows(self, walls: Integers) -> Floats:
+        """Rows (k, walls) of K for walls (k,)."""
+        g = np.zeros((len(walls), len(self.contact)))
+        g[np.arange(len(walls)), walls] = 1.0
+        return self.moved(g)
+
+    def on_hull(self, away: Floats) -> Floats:
+        """The nearest to away (k, walls) that the balance lets be."""
+        return self.moved(away, None, POLISH, self.own)
 
 
 class Scratch(NamedTuple):
@@ -133,33 +173,6 @@ def log_determinant(network: Network, factors: Factors) -> float:
     return -2 * np.log(pivots).sum()
 
 
-def moved(
-    matrix: WallMatrix,
-    g: Floats,
-    pulls: Floats | None = None,
-    times: int = 1,
-    C: Floats | None = None,
-) -> Floats:
-    """B Q (Bᵀ g + p), (k, walls), of g (k, walls) and p (2 N_c,) or (k, 2 N_c).
-
-    times: how many times as often as the matrix says balance is restored: once, what is left of the
-    unbalance is that of rounding and of the weights together. C (N_c, 3): where forces come from,
-    if not the matrix's own.
-    """
-    found = np.empty_like(g)
-    for first in range(0, len(g), LANES):
-        part = slice(first, first + LANES)
-        count = len(g[part])
-        lanes = ONE if count == 1 else MANY
-        at = make_scratch(matrix, len(lanes))
-        at.g[:, :count] = g[part].T
-        if pulls is not None:
-            at.f[:, :count] = pulls[:, None] if pulls.ndim == 1 else pulls[part].T
-        _move(matrix, matrix.C if C is None else C, times * matrix.times, at, lanes)
-        found[part] = at.out[:, :count].T
-    return found
-
-
 def restored(matrix: WallMatrix) -> WallMatrix:
     """The matrix, balance restored as often as it takes until once more changes nothing.
 
@@ -167,20 +180,13 @@ def restored(matrix: WallMatrix) -> WallMatrix:
     takes but a part off; else once is enough.
     """
     g = np.random.default_rng(0).standard_normal((PROBES, len(matrix.contact)))
-    before = moved(matrix, g)
+    before = matrix.moved(g)
     for times in range(1, _MOST_TIMES):
-        after = moved(matrix, g, None, times + 1)
+        after = matrix.moved(g, None, times + 1)
         if np.abs(after - before).max(initial=0.0) <= _STEADY * np.abs(after).max(initial=0.0):
             return matrix._replace(times=times)
         before = after
     return matrix._replace(times=_MOST_TIMES)
-
-
-def rows(matrix: WallMatrix, walls: Integers) -> Floats:
-    """Rows (k, walls) of K for walls (k,)."""
-    g = np.zeros((len(walls), len(matrix.contact)))
-    g[np.arange(len(walls)), walls] = 1.0
-    return moved(matrix, g)
 
 
 def balancing(matrix: WallMatrix, rest: Floats, rest_border: Floats) -> Floats:
