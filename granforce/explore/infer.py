@@ -134,8 +134,10 @@ def infer(
     m, s, best, numbers = asked(ensemble, measured, sigma, unmeasured, numbers)
     draws = None
     if numbers[0]:
-        fit = _fit(ensemble, m, s, unmeasured)
-        draws = _draws(ensemble, *fit, numbers, seed, progress)
+        # In ⟨f_n⟩, so that χ² = Σ W (f − m)².
+        m, s = m / ensemble.force_scale, s / ensemble.force_scale
+        weight = np.where(np.isnan(m), unmeasured, s) ** -2.0
+        draws = _draws(ensemble, weight, np.nan_to_num(m), numbers, seed, progress)
     return told(Inference, ensemble, best, draws, begin)
 
 
@@ -182,13 +184,6 @@ def judged(
     residual, violation = ensemble.residual(found), ensemble.violation(found)
     good = bool(uniform.inside(residual, violation) and mixed)
     return Draws(found, residual, violation, worth, good, counts, *seconds)
-
-
-def _fit(ensemble: Ensemble, m: Floats, s: Floats, unmeasured: float) -> tuple[Floats, Floats]:
-    """W and m (N_c, 2) in ⟨f_n⟩: χ² = Σ W (f − m)²."""
-    unit = ensemble.force_scale
-    sigma = np.where(np.isnan(m), unmeasured, s / unit)
-    return sigma**-2.0, np.nan_to_num(m / unit)
 
 
 def _draws(

@@ -382,8 +382,7 @@ def _extend(
 
 def inside(residual: Floats, violation: Floats) -> bool:
     """Whether all states are in S, by the judges of the ensemble."""
-    balanced = residual.max(initial=0.0) <= BALANCED
-    return bool(balanced and violation.max(initial=0.0) <= ADMISSIBLE)
+    return bool(np.all(residual <= BALANCED) and np.all(violation <= ADMISSIBLE))
 
 
 def forces_of(ensemble: Ensemble, made: Walls, slacks: Floats) -> Floats:
