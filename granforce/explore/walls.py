@@ -256,7 +256,7 @@ def _thin_matrix(frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
     """The same by singular values."""
     by_pivots, moving = _matrix(frame, y)
     balance = _balance(frame.ensemble, moving)
-    levers = np.stack([frame.forces(one).ravel() for one in np.diag(y)[moving]], axis=1)
+    levers = np.array([frame.forces(one).ravel() for one in np.diag(y)[moving]]).T
     return thin_matrix(balance, y[moving], levers, frame.weight.ravel(), by_pivots.count), moving
 
 
