@@ -147,17 +147,17 @@ def walked(
     on(ends, left): each chain on by some paths, up to `left`.
     """
     ends, left = [end._replace(rng=copy.deepcopy(end.rng)) for end in ends], count * paths
-    states, counts = np.ones((len(ends), count, made.count)), np.zeros((len(ends), 2), dtype=int)
+    counts = np.zeros((len(ends), 2), dtype=int)
     found: list[Floats] = []
     while left and made.dimension:
         ends, outs, done = on(ends, left)
         found.append(outs)
         counts += done
         left -= outs.shape[1]
-    if found:
-        slacks = np.concatenate(found, axis=1)[:, paths - 1 :: paths]
-        states = np.stack([made.on_hull(s) for s in slacks])
-    return ends, states, counts
+    if not found:
+        return ends, np.ones((len(ends), count, made.count)), counts
+    slacks = np.concatenate(found, axis=1)[:, paths - 1 :: paths]
+    return ends, np.stack([made.on_hull(s) for s in slacks]), counts
 
 
 def flown(made: Walls, rows: Rows, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
