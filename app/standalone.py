@@ -20,8 +20,8 @@ from .links import View
 from .replays import Replay, evenly
 from .views import explanation, still
 from .views.packing import exact_intervals, full_extent, legend
-from .views.player import SCALES, frames
-from .views.scripts import FOLDER, module
+from .views.player import SCALES, Player, frames
+from .views.scripts import module
 from .views.style import palettes
 
 FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
@@ -128,7 +128,7 @@ def html(
         left_out=f"{left} of the networks are left out, evenly, to keep this file small."
         if left
         else "",
-        style=_script((FOLDER / "player.css").read_text()),
+        style=_script("".join(Player._stylesheets)),
         given=_script({name: _plain(value) for name, value in given.items()}),
         code=module("standalone"),
     )

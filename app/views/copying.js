@@ -2,7 +2,7 @@
 
 export function render({ model }) {
   const button = document.createElement("button")
-  button.type = "button"
+  Object.assign(button, { type: "button", className: "soft" })
   const tell = (text) => { button.textContent = text }
   // Browsers offer a clipboard to pages of this machine and of https only.
   async function copy(text) {

@@ -1,13 +1,13 @@
 """Slider for the friction coefficient."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from ..data import LEAST_PLACE
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
 
@@ -21,9 +21,6 @@ class FrictionSlider(Scripted):
     least = param.Number(default=LEAST_PLACE, constant=True, doc="stands for μ = 0")
     most = param.Number(default=MOST_PLACE, constant=True)
     on_narrow = param.Boolean(doc="whether it is for narrow pages, else for all others")
-
-    _esm = module("friction")
-    _stylesheets: ClassVar = [FOLDER / "friction.css"]
 
     def __init__(self, on_typed: Callable[[str], object] | None = None, **params: Any) -> None:
         """on_typed(text): what to do with a value that was typed, sensible or not."""

@@ -19,8 +19,7 @@ export function render({ model, view }) {
 
   function button(key, words) {
     const made = document.createElement("button")
-    made.type = "button"
-    made.textContent = words
+    Object.assign(made, { type: "button", className: "soft", textContent: words })
     made.dataset.key = key
     made.addEventListener("click", () => {
       made.classList.add("busy")

@@ -1,13 +1,12 @@
 """What a word on the page means: told where it stands, on hover, focus and touch."""
 
 from html import escape
-from typing import ClassVar
 
 import param
 
 from granforce.glossary import TERMS, title
 
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 # Words on the page that are not the glossary's own: what stands there → key of the glossary.
 LABELS = {
@@ -74,6 +73,3 @@ class Hints(Scripted):
 
     terms = param.Dict(default={key: [title(key), t.sentence] for key, t in TERMS.items()})
     labels = param.Dict(default=labels())
-
-    _esm = module("hints")
-    _stylesheets: ClassVar = [FOLDER / "hints.css"]

@@ -7,7 +7,7 @@ export function render({ model, view }) {
   root.className = "known"
   root.innerHTML = `
     <div class="chips"></div><div class="words" role="status"></div>
-    <button type="button" class="next">Which force to measure next?</button><ol class="ranked"></ol>`
+    <button type="button" class="soft next">Which force to measure next?</button><ol class="ranked"></ol>`
   const [chips, words, next, ranked] = root.children
   const tell = (message) => ask(model, view, message)
 

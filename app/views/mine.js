@@ -10,7 +10,7 @@ export function render({ model, view }) {
   const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
 
   function button(words, act) {
-    const made = Object.assign(document.createElement("button"), { type: "button", textContent: words })
+    const made = Object.assign(document.createElement("button"), { type: "button", className: "soft", textContent: words })
     made.addEventListener("click", () => act(made))
     return made
   }

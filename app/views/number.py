@@ -1,12 +1,12 @@
 """A field for a whole number."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 
 class NumberField(Scripted):
@@ -22,9 +22,6 @@ class NumberField(Scripted):
     end = param.Integer(default=2**53 - 1)
     step = param.Integer(default=1, doc="of the arrow keys and buttons")
     disabled = param.Boolean()
-
-    _esm = module("number")
-    _stylesheets: ClassVar = [FOLDER / "number.css"]
 
     def __init__(self, on_wrong: Callable[[str], object] | None = None, **params: Any) -> None:
         """on_wrong(line): told what is wrong with what was typed, if anything."""

@@ -1,7 +1,7 @@
 """The player: draws the packing and replays states in the browser; no server work per frame."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import param
@@ -11,7 +11,7 @@ from granforce.records import Floats
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..replays import Replay
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 Heard = Callable[[Any], object] | None
 
@@ -70,8 +70,6 @@ class Player(Scripted):
     scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    _esm = module("player")
-    _stylesheets: ClassVar = [FOLDER / "player.css"]
     on_digit: Heard
     on_live: Heard
     on_hand: Heard

@@ -1,7 +1,7 @@
 """A small scene and the whole of its S: drawn, cut and pulled in the browser; see small.js."""
 
 import base64
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
@@ -11,7 +11,7 @@ from granforce.records import InputError, NotJammedError, UndecidedError
 from .. import scenes
 from ..jobs import Task
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 # Title, text, and what the scene shows, of the steps of the tour before those of large packings.
 FIRST_STEPS = (
@@ -58,9 +58,6 @@ class Small(Scripted):
     note = param.String(doc="what was wrong with the link")
     first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
-
-    _esm = module("small")
-    _stylesheets: ClassVar = [FOLDER / "small.css"]
 
     def __init__(self, asked: scenes.Asked, task: Task, all_steps: int, **params: Any) -> None:
         """asked: scenes.Asked. task: a jobs.Task of the page, for scenes that take a while."""

@@ -7,7 +7,7 @@ import panel as pn
 
 from ..live import Summary
 from ..state import AppState
-from .explanation import Foldout
+from .foldout import Foldout
 from .hints import term
 from .parts import of_replay
 
