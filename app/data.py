@@ -201,8 +201,7 @@ class Library:
 
     def exact(self, selection: Selection) -> xr.Dataset | None:
         """The exact intervals of a selection's packing at its μ as a dataset, or None."""
-        params = kinds.INTERVALS.parameters(selection.packing, mu=selection.mu)
-        return self.stored(kinds.INTERVALS, params)
+        return self.stored(kinds.INTERVALS, selection.intervals)
 
     def stored(self, kind: study.Kind, params: Parameters) -> xr.Dataset | None:
         """The dataset of this kind and parameters from the first store that has it, or None."""

@@ -53,9 +53,8 @@ def exact_rows(library: Library, cells: Iterable[Cell]) -> list[Row]:
     """The same from exact intervals, of those packings whose intervals a store has."""
     found = []
     for cell in cells:
-        params = kinds.INTERVALS.parameters(cell.selection.packing, mu=cell.selection.mu)
         for store in library.stores:
-            name = entry_name(store, kinds.INTERVALS, params)
+            name = entry_name(store, kinds.INTERVALS, cell.selection.intervals)
             if name in store:
                 found.append(_row(store, name, cell.selection))
                 break

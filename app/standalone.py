@@ -20,8 +20,8 @@ from .links import View
 from .replays import Replay, evenly
 from .views import explanation, still
 from .views.packing import exact_intervals, full_extent, legend
-from .views.player import SCALES, Player, frames
-from .views.scripts import module
+from .views.player import Player, frames
+from .views.scripts import Scripted, module
 from .views.style import palettes
 
 FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
@@ -89,28 +89,20 @@ def html(
     if len(shown.normal) < len(replay.normal):
         frame, between = 0, None
     same = ("contact", "colour", "thickness", "full", "stretch", "overlay", "scale")
-    given = {name: view[name] for name in same}
+    own = set(Player.param) - set(Scripted.param)
+    given = {name: Player.param[name].default for name in own}
+    given |= {name: view[name] for name in same}
     given |= {
         "walk": frames(shown) | {"acceptance": acceptance},
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
-        "scales": SCALES,
         "lead": explanation.first(replay.summary),
         "legend": legend(still.Light(replay, exact, view, loads=loads)),  # type: ignore[arg-type]  # has what is asked of it
         "source": source,
         "frame": frame,
         "between": between,
-        "reference": 0,
         "tab": "intervals",
-        "busy": False,
-        "live": False,
-        "asked": "",
-        "split": False,
-        "beside": None,
-        "twin": {},
-        "plane": {},
-        "displacement": None,
         "loads": loads,
         "gone": gone,
         "measured": measured or {},

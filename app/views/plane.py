@@ -298,7 +298,7 @@ class View(TabView):
             return
         path = found.plane.path[1:]
         part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
-        area = planes.area(planes.hull(path)) / planes.area(found.outer)
+        area = planes.area(path) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
         dots = f"{'All' if inner == 1 else f'{inner:.0%} of the'} {len(path)} dots"

@@ -13,8 +13,6 @@ from ..replays import Replay
 from .messages import Message
 from .scripts import Scripted
 
-Heard = Callable[[Any], object] | None
-
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
 
@@ -70,32 +68,15 @@ class Player(Scripted):
     scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
-    on_digit: Heard
-    on_live: Heard
-    on_hand: Heard
-    on_wide: Heard
-    on_known: Heard
-
     def __init__(self, **params: Any) -> None:
         super().__init__(**params)
-        self.on_digit = self.on_live = self.on_hand = self.on_wide = self.on_known = None
-
-    def hand_over(self, news: Message) -> None:
-        """Send something of what is being computed, or of what was pulled."""
-        self.tell(news)
+        # Who hears of "tab", "hand", "known", "wide" and "live", each called with what is told.
+        self.hears: dict[str, Callable[[Any], object]] = {}
 
     def _heard(self, message: Message) -> None:
-        """Digits pressed anywhere on the page; what the browser has painted of a computation."""
-        hear: dict[str, Heard] = {
-            "tab": self.on_digit,
-            "hand": self.on_hand,
-            "known": self.on_known,
-            "wide": self.on_wide,
-            "live": self.on_live,
-        }
         for name, part in message.items():
-            if (listener := hear[name]) is not None:
-                listener(part)
+            if name in self.hears:
+                self.hears[name](part)
 
 
 def frames(replay: Replay, room: int = 0) -> dict[str, Any]:

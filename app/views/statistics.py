@@ -257,16 +257,9 @@ def over_friction(
     return work
 
 
-def _indeterminacy(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
-    return studied.indeterminacy(rows, exact, here, log)
-
-
-def _extents(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
-    return studied.extents(distributions.groups(rows, here["mu"]), here["mu"], log)
-
-
-def _correlations(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
-    return studied.correlations(rows, exact)
-
-
-DRAWN = {"eta": _indeterminacy, "extent": _extents, "correlation": _correlations}
+# Figures over μ, of rows, exact rows, the row on screen, and whether the axis is logarithmic.
+DRAWN: dict[str, Callable[[list[Row], list[Row], Row, bool], Drawn]] = {
+    "eta": studied.indeterminacy,
+    "extent": lambda rows, exact, here, log: studied.extents(rows, here["mu"], log),
+    "correlation": lambda rows, exact, here, log: studied.correlations(rows, exact),
+}

@@ -12,7 +12,7 @@ from bokeh.plotting import figure as Figure
 from granforce.measures import statistics
 from granforce.records import Floats
 
-from .. import studied
+from .. import distributions, studied
 from ..distributions import Row
 from .hints import term
 from .labels import labels
@@ -231,11 +231,9 @@ def strong_and_undetermined() -> str:
     )
 
 
-def extents(groups: dict[float, list[Floats]], mu: float, log: bool) -> Drawn:
-    """P(ΔF_n) in ⟨f_n⟩ for some μ of the study, and of the packings on the page with this μ.
-
-    groups: {μ: extents} of the packings on the page.
-    """
+def extents(own: list[Row], mu: float, log: bool) -> Drawn:
+    """P(ΔF_n) in ⟨f_n⟩ for some μ of the study, and of the packings on the page with this μ."""
+    groups = distributions.groups(own, mu)
     fig = figure(
         "extents", None, "length ΔFₙ of a contact's interval, in mean forces",
         "how often, P(ΔFₙ)", height=400, y_axis_type="log" if log else "linear",
