@@ -22,6 +22,19 @@ WIDTHS = {
     "known": "what is known: length of the interval gone",
     "measured": "measured fₙ",
 }
+# What colours and widths show → key of the glossary.
+EXPLAINED = {
+    "mobilised": "mobilisation",
+    "extent": "extent",
+    "change": "change",
+    "sign": "sign",
+    "normal": "fn",
+    "difference": "difference",
+    "load": "limit_load",
+    "known": "gone",
+    "deviation": "deviation",
+    "measured": "measured",
+}
 SORTS = {
     "original": "fₙ as packed",
     "extent": "ΔFₙ of all networks",

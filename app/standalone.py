@@ -77,7 +77,7 @@ def html(
     intervals = exact_intervals(exact, replay)
     shown, acceptance = thinned(replay)
     plane = planes.principal(shown)
-    figures = still.figures(shown, exact, plane, outlined, view)
+    figures = still.figures(library, shown, exact, plane, outlined, view)
     # In a document of their own: else Bokeh adds what a page that is served just then has its
     # browser do.
     bare = Document()
@@ -98,7 +98,7 @@ def html(
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
         "lead": explanation.first(replay.summary),
-        "legend": legend(still.Light(replay, exact, view, loads=loads)),  # type: ignore[arg-type]  # has what is asked of it
+        "legend": legend(still.at_rest(library, replay, exact, view, loads=loads)),
         "source": source,
         "frame": frame,
         "between": between,

@@ -55,11 +55,11 @@ class AppState(param.Parameterized):
         self,
         library: Library,
         wake: Callable[[Callable[[], object]], object] | None = None,
-        query: str = "",
+        query: str | None = "",
     ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task.
 
-        query: of the address that opened the page.
+        query: of the address that opened the page; None: nothing is to be shown yet.
         """
         super().__init__()  # type: ignore[no-untyped-call]  # param says no types
         self.library, self.work = library, Work(wake)
@@ -79,7 +79,8 @@ class AppState(param.Parameterized):
         self.hand.param.watch(self._forget, "pulls")
         chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
         self.looks.param.watch(self._forget, chosen)
-        self.open(query)
+        if query is not None:
+            self.open(query)
 
     def _forget(self, *events: Any) -> None:
         self.work.message = ""

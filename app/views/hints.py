@@ -6,6 +6,7 @@ import param
 
 from granforce.glossary import TERMS, title
 
+from ..looks import COLOURS, EXPLAINED, WIDTHS
 from .scripts import Scripted
 
 # Words on the page that are not the glossary's own: what stands there → key of the glossary.
@@ -18,15 +19,8 @@ LABELS = {
     "States from": "s",
     "Relaxation": "accelerated",
     "Precomputed results": "store",
-    "what is known: part of the interval gone": "gone",
-    "what is known: length of the interval gone": "gone",
-    "inferred less measured fₙ, in σ": "deviation",
     "Colour": "mobilisation",
     "Width": "fn",
-    "mobilisation fₜ/(μ fₙ)": "mobilisation",
-    "length of the interval ΔFₙ": "extent",
-    "ΔFₙ": "extent",
-    "normal force fₙ": "fn",
     "Strong and undetermined contacts": "overlay",
     "fₙ as packed": "original",
     "ΔFₙ of all networks": "seen",
@@ -52,9 +46,8 @@ LABELS = {
     "Push": "push",
     "Force space": "s",
     "How far?": "exact",
-    "limit load": "limit_load",
     "what limit loads are": "limit_load",
-}
+} | {words: EXPLAINED[key] for shown in (COLOURS, WIDTHS) for key, words in shown.items()}
 
 
 def labels() -> dict[str, str]:

@@ -10,7 +10,7 @@ from granforce.records import Floats
 from .. import live
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..known import Knowledge
-from ..looks import COLOURS, WIDTHS, Looks
+from ..looks import COLOURS, EXPLAINED, WIDTHS, Looks
 from ..planes import Plane
 from ..replays import Replay
 from ..state import AppState
@@ -25,19 +25,6 @@ Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; emp
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
-# What colours and widths show → key of the glossary.
-EXPLAINED = {
-    "mobilised": "mobilisation",
-    "extent": "extent",
-    "change": "change",
-    "sign": "sign",
-    "normal": "fn",
-    "difference": "difference",
-    "load": "limit_load",
-    "known": "gone",
-    "deviation": "deviation",
-    "measured": "measured",
-}
 LEGEND = """
 <span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
 <span tabindex="0" data-term="{width_term}">width: {width}, up to

@@ -28,6 +28,9 @@ EXTRA = {"display": "var(--extra, flex)"}
 BESIDE = {"content-visibility": "var(--beside, visible)"}
 
 PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
+# Small buttons: what one is here for, and what else can be done.
+PRIMARY = {"color": "primary", "size": "small"}
+OUTLINED = {"variant": "outlined", "color": "default", "size": "small"}
 
 SVG_ICON = (
     "data:image/svg+xml;utf8,<svg xmlns='http://www.w3.org/2000/svg' width='24' height='24'>"
@@ -190,6 +193,11 @@ def saving(mark: str) -> list[Any]:
         button.js_on_click(args={"button": button, "mark": mark, "kind": kind}, code=NEWEST + SAVED)
         buttons.append(button)
     return buttons
+
+
+def plotted(fig: Figure) -> pn.pane.Bokeh:
+    """A figure's place, as wide as there is room."""
+    return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
 
 
 def figure(name: str, title: str | None, x: str, y: str, **options: Any) -> Figure:

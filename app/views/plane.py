@@ -21,7 +21,18 @@ from ..replays import Replay
 from ..state import AppState
 from . import stresses
 from .hints import term
-from .parts import MOVES, PLAIN, TabView, figure, folded, note, question, together
+from .parts import (
+    MOVES,
+    OUTLINED,
+    PLAIN,
+    TabView,
+    figure,
+    folded,
+    note,
+    plotted,
+    question,
+    together,
+)
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above, lines
 
@@ -102,7 +113,7 @@ class View(TabView):
         return pn.Column(
             self.lead,
             self.finding,
-            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
+            plotted(self.figure),
             pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
             self.planes,
             Progress(self.task),
@@ -404,9 +415,7 @@ def _edge(symbol: str, offset: int) -> Node:
 
 def _sweep(label: str, axis: int) -> pmui.Button:
     """A button by which the point goes along an axis and back; pressed again, it stops."""
-    button = pmui.Button(
-        label=label, variant="outlined", color="default", sx=PLAIN, size="small", margin=(4, 6)
-    )
+    button = pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED)
     button.js_on_click(args={"button": button, "axis": axis}, code=SWEEP)
     return button
 

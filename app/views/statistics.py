@@ -19,7 +19,7 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .packing import exact_intervals
-from .parts import TabView, chosen, figure, folded, folded_away, note, question
+from .parts import TabView, chosen, figure, folded, folded_away, note, plotted, question
 from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
@@ -90,7 +90,7 @@ class View(TabView):
             self.bar.visible = False
             draw = self._scatter if what == "scatter" else self._force
             fig, self.lead.object, self.told.object = draw(state.replay)
-            self.plots.objects = [_pane(fig)]
+            self.plots.objects = [plotted(fig)]
             return
         log = self.scale.value == "log"
         cells = distributions.alike(state.catalogue, state.cell) or [state.cell]
@@ -104,12 +104,12 @@ class View(TabView):
         figures, self.lead.object, self.told.object = found
         for fig in figures:
             self._choosable(fig)
-        first = [_pane(figures[0])]
+        first = [plotted(figures[0])]
         self.plots.objects = first
         yield
         if self.plots.objects == first:  # nothing else was chosen
             for place, fig in zip(self.folded, figures[1:], strict=False):
-                place.objects = [_pane(fig)]
+                place.objects = [plotted(fig)]
 
     def _follow(self, *events: Any) -> None:
         self.bar.visible = self.task.running and self.what.value in DRAWN
@@ -232,10 +232,6 @@ class View(TabView):
             f"{beyond:.2%} of the forces lie beyond the axis."
         )
         return fig, lead, folded(text)
-
-
-def _pane(fig: Figure) -> pn.pane.Bokeh:
-    return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
 
 
 def over_friction(
