@@ -80,9 +80,7 @@ export class Difference {
     context.strokeStyle = palette.known
     context.lineWidth = 4 / scale
     context.beginPath()
-    for (let k = 0; k < geometry.contact.length; k++) {
-      if (!this.found.has(geometry.contact[k])) continue
-      const [xa, ya, xb, yb] = scene.ends(k), x = (xa + xb) / 2, y = (ya + yb) / 2
+    for (const { middle: [x, y] } of scene.segments((contact) => this.found.has(contact))) {
       context.moveTo(x + size, y)
       context.arc(x, y, size, 0, 2 * Math.PI)
     }

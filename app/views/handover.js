@@ -3,6 +3,7 @@
 import { ask } from "./ask.js"
 import { composed, plotsSeen, printFigure } from "./figure.js"
 import { plain } from "./plain.js"
+import { save } from "./save.js"
 
 const RATE = 6e6 // bits a second of a movie
 const LONGEST_MS = 60000 // of a movie
@@ -36,14 +37,6 @@ export function render({ model, view }) {
       for (const [key, words] of Object.entries(plain(files))) group.append(button(key, words))
       root.append(group)
     }
-  }
-
-  function save(blob, name) {
-    const link = document.createElement("a")
-    link.href = URL.createObjectURL(blob)
-    link.download = name
-    link.click()
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000)
   }
 
   const player = () => view.model.document.get_model_by_name("player").player

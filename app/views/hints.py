@@ -46,7 +46,6 @@ LABELS = {
     "Push": "push",
     "Force space": "s",
     "How far?": "exact",
-    "what limit loads are": "limit_load",
 } | {words: EXPLAINED[key] for shown in (COLOURS, WIDTHS) for key, words in shown.items()}
 
 

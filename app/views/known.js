@@ -11,28 +11,24 @@ export function render({ model, view }) {
   const [chips, words, next, ranked] = root.children
   const tell = (message) => ask(model, view, message)
 
+  /** A button in `made` that tells this. */
+  function button(made, textContent, message, look = {}) {
+    const added = made.appendChild(document.createElement("button"))
+    Object.assign(added, { type: "button", textContent, ...look })
+    added.addEventListener("click", () => tell(message))
+  }
+
   function chip([contact, text]) {
     const made = document.createElement("span")
     made.className = "chip"
-    const choose = made.appendChild(document.createElement("button"))
-    const release = made.appendChild(document.createElement("button"))
-    choose.type = release.type = "button"
-    choose.textContent = text
-    choose.title = "find it in the packing"
-    release.textContent = "×"
-    release.className = "release"
-    release.title = "let it go"
-    release.setAttribute("aria-label", `let go: ${text}`)
-    choose.addEventListener("click", () => tell({ choose: contact }))
-    release.addEventListener("click", () => tell({ release: contact }))
+    button(made, text, { choose: contact }, { title: "find it in the packing" })
+    button(made, "×", { release: contact }, { className: "release", title: "let it go", ariaLabel: `let go: ${text}` })
     return made
   }
 
   function row([contact, text]) {
-    const made = document.createElement("li"), choose = made.appendChild(document.createElement("button"))
-    choose.type = "button"
-    choose.textContent = text
-    choose.addEventListener("click", () => tell({ choose: contact }))
+    const made = document.createElement("li")
+    button(made, text, { choose: contact })
     return made
   }
 

@@ -1,6 +1,7 @@
 // The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
+import { circle, line } from "./pen.js"
 import { listen } from "./pointing.js"
 import { PIXELS, Sheet } from "./sheet.js"
 
@@ -211,6 +212,16 @@ export class Scene {
     ]
   }
 
+  /** Of the contacts that are chosen(contact) each segment k: both ends a and b, and its middle. */
+  *segments(chosen) {
+    const { contact } = this.geometry
+    for (let k = 0; k < contact.length; k++) {
+      if (!chosen(contact[k])) continue
+      const [xa, ya, xb, yb] = this.ends(k)
+      yield { k, contact: contact[k], a: [xa, ya], b: [xb, yb], middle: [(xa + xb) / 2, (ya + yb) / 2] }
+    }
+  }
+
   strokeEach(order, count, colours) {
     const { chains, width, bin } = this
     chains.lineCap = "round"
@@ -255,16 +266,13 @@ export class Scene {
 
   /** Fig. 5 of the paper: strong contacts filled, undetermined ones open; and the selected one. */
   drawMarks(style) {
-    const { marks, scale, palette, geometry } = this
+    const { marks, scale, palette } = this
     this.begin(marks)
-    const { contact } = geometry
     const radius = Math.max(MARK, 2 / scale)
     if (style.strong) {
       for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
         marks.beginPath()
-        for (let k = 0; k < contact.length; k++) {
-          if (!chosen[contact[k]]) continue
-          const [xa, ya, xb, yb] = this.ends(k), x = (xa + xb) / 2, y = (ya + yb) / 2
+        for (const { middle: [x, y] } of this.segments((contact) => chosen[contact])) {
           marks.moveTo(x + radius * size, y)
           marks.arc(x, y, radius * size, 0, 2 * Math.PI)
         }
@@ -308,19 +316,12 @@ export class Scene {
 
   /** A line in the colour of its axis of force space. */
   drawAxis(chosen, colour) {
-    const { marks, scale, palette, geometry } = this
+    const { marks, scale, palette } = this
     marks.lineCap = "round"
     for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
       marks.lineWidth = Math.max(AXIS, 5 / scale) + more
       marks.strokeStyle = paint
-      marks.beginPath()
-      for (let k = 0; k < geometry.contact.length; k++) {
-        if (geometry.contact[k] !== chosen) continue
-        const [xa, ya, xb, yb] = this.ends(k)
-        marks.moveTo(xa, ya)
-        marks.lineTo(xb, yb)
-      }
-      marks.stroke()
+      for (const { a, b } of this.segments((contact) => contact === chosen)) line(marks, a, b)
     }
   }
 
@@ -328,20 +329,14 @@ export class Scene {
     const { marks, scale, palette, geometry } = this
     marks.strokeStyle = palette.selected
     marks.lineCap = "round"
-    for (let k = 0; k < geometry.contact.length; k++) {
-      if (geometry.contact[k] !== selected) continue
-      const [xa, ya, xb, yb] = this.ends(k)
+    for (const { k, a, b } of this.segments((contact) => contact === selected)) {
       marks.lineWidth = 2 / scale
-      for (const [x, y, grain] of [[xa, ya, geometry.i[k]], [xb, yb, geometry.j[k]]]) {
-        marks.beginPath()
-        marks.arc(x, y, geometry.radius[grain], 0, 2 * Math.PI)
+      for (const [at, grain] of [[a, geometry.i[k]], [b, geometry.j[k]]]) {
+        circle(marks, at, geometry.radius[grain])
         marks.stroke()
       }
       marks.lineWidth = Math.max(0.12, 3 / scale)
-      marks.beginPath()
-      marks.moveTo(xa, ya)
-      marks.lineTo(xb, yb)
-      marks.stroke()
+      line(marks, a, b)
     }
   }
 

@@ -123,12 +123,8 @@ export class Split {
     if (!on || !twin.style) return
     twin.selected = other ? null : player.scene.selected
     twin.pair = other ? [] : player.scene.pair
-    const size = twin.root.clientWidth, ratio = window.devicePixelRatio || 1
-    if (!size) return
-    if (size !== twin.size || ratio !== twin.ratio) {
-      Object.assign(twin, { size, ratio })
-      for (const { canvas } of [twin.disks, twin.chains, twin.marks]) canvas.width = canvas.height = Math.round(size * ratio)
-    }
+    twin.resize()
+    if (!twin.size) return
     twin.drawDisks()
     twin.stale = false
     twin.drawChains(twin.style)
