@@ -256,13 +256,16 @@ def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:
     return min(cells, key=lambda cell: abs(place(cell.mu) - place(mu)))
 
 
+def cell_of(cells: Sequence[Cell], wanted: Selection | None) -> Cell | None:
+    """The cell of the wanted Selection, or None."""
+    return next((c for c in cells if wanted is not None and c.selection.names(wanted)), None)
+
+
 def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | None:
     """The cell of the wanted Selection, or the one most worth opening with; None without cells."""
-    for cell in cells:
-        if wanted is not None and cell.selection.names(wanted):
-            return cell
-    if not cells:
-        return None
+    found = cell_of(cells, wanted)
+    if found is not None or not cells:
+        return found
     names = [cell.series for cell in cells]
     fullest = max(dict.fromkeys(names), key=names.count)
     return nearest_cell([cell for cell in cells if cell.series == fullest], OPENING_MU)

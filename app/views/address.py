@@ -5,12 +5,9 @@ from typing import Any
 import param
 
 from ..links import VIEW
-from ..state import AppState
+from ..state import PASSING, AppState
 from .messages import Message
 from .scripts import Scripted
-
-# Nobody goes back to the frame before, to the view of a moment ago, or to the other theme.
-PASSING = ("frame", "dark", "zoom")
 
 
 class Address(Scripted):

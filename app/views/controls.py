@@ -17,7 +17,7 @@ from ..state import AppState
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
-from .parts import EXTRA, by_words, folded_away
+from .parts import EXTRA, by_words, folded_away, linked, question
 from .scenelist import SceneList
 from .select import Select
 
@@ -87,15 +87,16 @@ class Controls:
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **FIELD)
         self.series = Select(label="Precomputed results", **FIELD)
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
-        self.colour = Select(label="Colour", options=by_words(COLOURS), **FIELD)
-        self.thickness = Select(label="Width", options=by_words(WIDTHS), **FIELD)
+        self.colour = question("Colour", COLOURS, self.looks, "colour", **FIELD)
+        self.thickness = question("Width", WIDTHS, self.looks, "thickness", **FIELD)
         self.full = pmui.TextInput(
             label="Full colour, in mean forces", placeholder="by itself", **SMALL
         )
         self.stretch = pmui.TextInput(label="Width, times", **SMALL)
-        self.overlay = pmui.Switch(
+        marks = pmui.Switch(
             label="Strong and undetermined contacts", value=self.looks.overlay, margin=(2, 10)
         )
+        self.overlay = linked(marks, self.looks, "overlay")
         self.error = pmui.Alert(
             severity="error", variant="filled", visible=False, closeable=True, margin=0,
             stylesheets=[AT_EDGE],
@@ -156,19 +157,12 @@ class Controls:
             widget.param.watch(lambda event: self._ask(), "value")
         self.series.param.watch(self._choose, "value")
         self.go.on_click(lambda event: state.compute())
-        for name in ("colour", "thickness", "overlay"):
-            widget = getattr(self, name)
-            widget.param.watch(
-                lambda event, name=name: looks.param.update({name: event.new}), "value"
-            )
         self.full.param.watch(self._scale, "value")
         self.stretch.param.watch(self._scale, "value")
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
         state.param.watch(self._look, "measured")
         state.knowledge.param.watch(self._look, "known")
-        looks.param.watch(
-            self._look, ["colour", "thickness", "full", "stretch", "overlay", "reference"]
-        )
+        looks.param.watch(self._look, ["colour", "thickness", "full", "stretch", "reference"])
         state.param.watch(self._command, ["selection", "missing", "replay"])
         state.knowledge.param.watch(self._command, "known")
         self._command()
@@ -274,8 +268,6 @@ class Controls:
     def _look(self, *events: Any) -> None:
         for name, labels in (("colour", COLOURS), ("thickness", WIDTHS)):
             getattr(self, name).options = by_words(meaningful(self.state, labels, name))
-        for name in ("colour", "thickness", "overlay"):
-            getattr(self, name).value = getattr(self.looks, name)
         full = self.looks.full
         self.full.value = "" if full is None else f"{full:g}"
         self.stretch.value = f"{self.looks.stretch:g}"

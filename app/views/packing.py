@@ -67,11 +67,11 @@ class PackingView:
         for name in SHARED:
             self.player.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
         self._shown = None
-        self.player.param.watch(self._swing, "between")
-        self.player.param.watch(self._look_at, "zoom")
+        for name in ("between", "zoom"):
+            self.player.param.watch(self._go, name)
         self.player.param.watch(self._explain, "pulled")
         looks.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(self._follow, "source")
+        state.param.watch(self._follow, ["source", "loads"])
         state.work.param.watch(self._follow, "busy")
         state.param.watch(self._show, ["seen", "exact", "measured"])
         state.knowledge.param.watch(self._show, "narrowed")
@@ -80,7 +80,6 @@ class PackingView:
         state.knowledge.param.watch(self._pin, ["known", "ranked"])
         state.param.watch(self._displace, "displacement")
         state.besides.param.watch(self._accompany, "twin")
-        state.param.watch(self._load, "loads")
         state.param.watch(self._project, "plane")
         looks.param.watch(self._dress, "dark")
         looks.param.watch(
@@ -95,11 +94,9 @@ class PackingView:
         self._pin()
         self._explain()
 
-    def _swing(self, event: Any) -> None:
-        self.looks.between = None if event.new is None else tuple(event.new)
-
-    def _look_at(self, event: Any) -> None:
-        self.looks.zoom = None if event.new is None else tuple(event.new)
+    def _go(self, event: Any) -> None:
+        """To and fro, or to another part of the picture: browsers have lists for tuples."""
+        self.looks.param.update({event.name: None if event.new is None else tuple(event.new)})
 
     def _follow(self, *events: Any) -> None:
         self.player.param.update({event.name: event.new for event in events})
@@ -135,9 +132,6 @@ class PackingView:
 
     def _pin(self, *events: Any) -> None:
         self.player.pins = pins(self.state.knowledge)
-
-    def _load(self, event: Any) -> None:
-        self.player.loads = event.new
 
     def _project(self, event: Any) -> None:
         """The plane of force space on screen: where networks lie in it that are no states."""
