@@ -1,7 +1,7 @@
 """A movie of what plays, as GIF: drawn here, small enough for slides."""
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -42,7 +42,13 @@ def gif(
     cancelled() ends it with Cancelled.
     """
     for part in FEWER:
-        images = _drawn(replay, look, int(SIDE * part), between, progress, cancelled)
+        images: list[Image.Image] = []
+        for image in _drawn(replay, look, int(SIDE * part), between):
+            if cancelled is not None and cancelled():
+                raise Cancelled("the movie was cancelled")
+            images.append(image)
+            if progress is not None:
+                progress(len(images), FRAMES)
         file = io.BytesIO()
         images[0].save(
             file, "GIF", save_all=True, append_images=images[1:], duration=FRAME_MS, loop=0
@@ -53,19 +59,11 @@ def gif(
 
 
 def _drawn(
-    replay: Replay,
-    look: Look,
-    side: int,
-    between: tuple[int, int] | None,
-    progress: Progress | None,
-    cancelled: Cancel | None,
-) -> list[Image.Image]:
+    replay: Replay, look: Look, side: int, between: tuple[int, int] | None
+) -> Iterator[Image.Image]:
     fine = side * FINER
     ground = _disks(replay, look, fine)
-    images: list[Image.Image] = []
     for k, (a, b, part) in enumerate(_moments(len(replay.normal), between)):
-        if cancelled is not None and cancelled():
-            raise Cancelled("the movie was cancelled")
         normal, tangential = (
             (1 - part) * values[a] + part * values[b]
             for values in (replay.normal, replay.tangential)
@@ -77,10 +75,7 @@ def _drawn(
         # One palette for all frames, or colours would flicker: of the first and all that may come.
         if k == 0:
             tones = _with_all_colours(small, look).quantize(TONES, dither=Image.Dither.NONE)
-        images.append(small.quantize(palette=tones, dither=Image.Dither.NONE))
-        if progress is not None:
-            progress(k + 1, FRAMES)
-    return images
+        yield small.quantize(palette=tones, dither=Image.Dither.NONE)
 
 
 def _with_all_colours(image: Image.Image, look: Look) -> Image.Image:

@@ -230,31 +230,20 @@ class View(TabView):
             y_range=Range1d(0, 1, name="bars_range"),
             height=320,
         )
-        bar = {"x": "rank", "source": self.bars, "line_color": None}
-        self.whole = fig.vbar(
-            bottom="whole_low",
-            top="whole_high",
-            width=1,
-            fill_color=PALE,
-            fill_alpha=0.3,
-            legend_label="before",
-            **bar,
-        )
-        exact = fig.vbar(
-            bottom="exact_low",
-            top="exact_high",
-            width=1,
-            fill_color=PALE,
-            legend_label="possible",
-            **bar,
-        )
-        seen = fig.vbar(
-            bottom="low", top="high", width=1, fill_color=DARK, legend_label="seen", **bar
-        )
+        self.layers = [
+            fig.vbar(
+                x="rank", bottom=f"{of}low", top=f"{of}high", width=1, source=self.bars,
+                line_color=None, fill_color=colour, fill_alpha=alpha, legend_label=label,
+            )
+            for label, of, colour, alpha in (
+                ("before", "whole_", PALE, 0.3), ("possible", "exact_", PALE, 1.0),
+                ("seen", "", DARK, 1.0),
+            )
+        ]  # fmt: skip
+        for layer in self.layers:
+            layer.nonselection_glyph = None
+        self.whole, exact, seen = self.layers
         seen.name = "seen"  # see layer.js
-        self.layers = self.whole, exact, seen
-        for glyph in self.layers:
-            glyph.nonselection_glyph = None
         line = fig.line(
             "rank",
             "original",

@@ -80,8 +80,9 @@ class PackingView:
         state.knowledge.param.watch(self._pin, ["known", "ranked"])
         state.param.watch(self._displace, "displacement")
         state.besides.param.watch(self._accompany, "twin")
-        state.param.watch(self._project, "plane")
-        looks.param.watch(self._dress, "dark")
+        dress = self.player.param.update
+        state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
+        looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
             self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab"]
         )
@@ -133,17 +134,10 @@ class PackingView:
     def _pin(self, *events: Any) -> None:
         self.player.pins = pins(self.state.knowledge)
 
-    def _project(self, event: Any) -> None:
-        """The plane of force space on screen: where networks lie in it that are no states."""
-        self.player.plane = projection(event.new)
-
     def _displace(self, event: Any) -> None:
         field = event.new
         flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
         self.player.displacement = flat
-
-    def _dress(self, event: Any) -> None:
-        self.player.palettes = palettes(event.new)
 
     def _explain(self, *events: Any) -> None:
         pulled = self.player.pulled or bool(self.state.hand.pulls)

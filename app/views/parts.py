@@ -12,7 +12,6 @@ from panel.io import document as panel_document
 from panel.io import unlocked
 from panel.reactive import Syncable
 
-from ..live import Summary
 from ..looks import Looks
 from ..state import AppState
 from .select import Select
@@ -223,20 +222,6 @@ def note(text: str = "", **options: Any) -> pn.pane.HTML:
     )  # fmt: skip
 
 
-def of_replay(
-    state: AppState, text: Callable[[Summary], str], style: str, margin: tuple[int, ...]
-) -> pn.pane.HTML:
-    """HTML about the replay on screen, text(summary) of its numbers; empty while there is none."""
-    pane = pn.pane.HTML(stylesheets=[style], sizing_mode="stretch_width", margin=margin)
-
-    def show(*events: Any) -> None:
-        pane.object = "" if state.replay is None else text(state.replay.summary)
-
-    state.param.watch(show, "replay")
-    show()
-    return pane
-
-
 def by_words(labels: dict[str, str]) -> dict[str, str]:
     """Labels {value: words} as a list takes them: {words: value}."""
     return {words: value for value, words in labels.items()}
@@ -254,13 +239,8 @@ def choice(labels: dict[str, str], value: str) -> Any:
     )
 
 
-def chosen(labels: dict[str, str], looks: Looks, name: str) -> Any:
-    """A `choice` of the parameter of this name."""
-    return linked(choice(labels, getattr(looks, name)), looks, name)
-
-
 def question(label: str, labels: dict[str, str], looks: Looks, name: str, **options: Any) -> Select:
-    """The same as a list under a label, for choices that are sentences."""
+    """A list under a label, of the values {value: words} of the parameter of this name."""
     look = options or {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
     made = Select(label=label, options=by_words(labels), value=getattr(looks, name), **look)
     return linked(made, looks, name)

@@ -211,8 +211,7 @@ class Player {
     this.viewed = key
     clearTimeout(this.looking)
     this.looking = setTimeout(() => {
-      const [left, right, low, high] = scene.geometry.window
-      const whole = [(left + right) / 2, (low + high) / 2, (right - left) / 2], now = [x, y, half]
+      const whole = Object.values(scene.whole), now = [x, y, half]
       const rounded = now.map((value) => Number(value.toPrecision(5)))
       model.zoom = now.every((value, k) => Math.abs(value - whole[k]) < 1e-6) ? null : rounded
     }, REST_MS)

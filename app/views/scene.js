@@ -53,9 +53,14 @@ export class Scene {
     if (moved) this.reset(false)
   }
 
-  reset(paint = true) {
+  /** The view of all of it. */
+  get whole() {
     const [left, right, bottom, top] = this.geometry.window
-    this.view = { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
+    return { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
+  }
+
+  reset(paint = true) {
+    this.view = this.whole
     if (paint) this.changed()
   }
 
@@ -402,7 +407,7 @@ export class Scene {
 
   zoom(factor, px, py) {
     if (!this.geometry) return
-    const [left, right] = this.geometry.window, whole = (right - left) / 2
+    const whole = this.whole.half
     const before = this.toPlace(px, py)
     this.view.half = Math.min(ZOOM[1] * whole, Math.max(ZOOM[0] * whole, this.view.half * factor))
     const after = this.toPlace(px, py)

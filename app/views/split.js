@@ -136,17 +136,13 @@ class Through {
   constructor(scene, twin) { Object.assign(this, { scene, twin }) }
 
   /** A packing that moves is seen whole, and so is what is beside it. */
-  get from() { return this.scene.frozen ? this.whole(this.scene) : this.scene.view }
+  get from() { return this.scene.frozen ? this.scene.whole : this.scene.view }
 
-  whole({ geometry: { window: [left, right, bottom, top] } }) {
-    return { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
-  }
+  get ratio() { return this.twin.whole.half / this.scene.whole.half }
 
-  get ratio() { return this.whole(this.twin).half / this.whole(this.scene).half }
+  of(axis) { return this.twin.whole[axis] + (this.from[axis] - this.scene.whole[axis]) * this.ratio }
 
-  of(axis) { return this.whole(this.twin)[axis] + (this.from[axis] - this.whole(this.scene)[axis]) * this.ratio }
-
-  back(axis, value) { this.from[axis] = this.whole(this.scene)[axis] + (value - this.whole(this.twin)[axis]) / this.ratio }
+  back(axis, value) { this.from[axis] = this.scene.whole[axis] + (value - this.twin.whole[axis]) / this.ratio }
 
   get x() { return this.of("x") }
   set x(value) { this.back("x", value) }

@@ -19,7 +19,7 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .packing import exact_intervals
-from .parts import TabView, chosen, figure, folded, folded_away, note, plotted, question
+from .parts import TabView, choice, figure, folded, folded_away, linked, note, plotted, question
 from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
@@ -39,7 +39,7 @@ class View(TabView):
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", "exact", "catalogue")
         self.what = question("Question", FIGURES, self.looks, "figure")
-        self.scale = chosen(AXES, self.looks, "axis")
+        self.scale = linked(choice(AXES, self.looks.axis), self.looks, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
         # Always on the page: what React draws must not leave it meanwhile.
         self.folded = [pn.Column(sizing_mode="stretch_width") for _ in studied.FOLDED]

@@ -9,7 +9,6 @@ from ..live import Summary
 from ..state import AppState
 from .foldout import Foldout
 from .hints import term
-from .parts import of_replay
 
 TILE = """<div class="tile" tabindex="0" data-term="{term}"><div class="name">{name}</div>
 <div>{value}</div><div class="name">{meaning}</div></div>"""
@@ -141,12 +140,15 @@ def tiles(state: AppState, volume: Any) -> pn.Column:
     within = pn.Column(volume.tiles, volume.measure, visible=False, sizing_mode="stretch_width")
     folded.link(within, open="visible")
 
+    shown = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
+
     def tell(*events: Any) -> None:
-        folded.inside = "" if state.replay is None else checks(state.replay.summary)
+        if state.replay is not None:
+            summary = state.replay.summary
+            shown.object, folded.inside = numbers(summary), checks(summary)
 
     state.param.watch(tell, "replay")
     tell()
-    shown = of_replay(state, numbers, STYLE, margin=(0, 10))
     return pn.Column(shown, folded, within, sizing_mode="stretch_width")
 
 
