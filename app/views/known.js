@@ -11,24 +11,24 @@ export function render({ model, view }) {
   const [chips, words, next, ranked] = root.children
   const tell = (message) => ask(model, view, message)
 
-  /** A button in `made` that tells this. */
-  function button(made, textContent, message, look = {}) {
+  function button(made, textContent, act, look = {}) {
     const added = made.appendChild(document.createElement("button"))
     Object.assign(added, { type: "button", textContent, ...look })
-    added.addEventListener("click", () => tell(message))
+    added.addEventListener("click", act)
   }
 
   function chip([contact, text]) {
     const made = document.createElement("span")
     made.className = "chip"
-    button(made, text, { choose: contact }, { title: "find it in the packing" })
-    button(made, "×", { release: contact }, { className: "release", title: "let it go", ariaLabel: `let go: ${text}` })
+    button(made, text, () => tell({ choose: contact }), { title: "find it in the packing" })
+    const look = { className: "release", title: "let it go", ariaLabel: `let go: ${text}` }
+    button(made, "×", () => tell({ release: contact }), look)
     return made
   }
 
   function row([contact, text]) {
     const made = document.createElement("li")
-    button(made, text, { choose: contact })
+    button(made, text, () => tell({ choose: contact }))
     return made
   }
 

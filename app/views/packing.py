@@ -10,7 +10,7 @@ from granforce.records import Floats
 from .. import live
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..known import Knowledge
-from ..looks import COLOURS, EXPLAINED, WIDTHS, Looks
+from ..looks import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
 from ..planes import Plane
 from ..replays import Replay
 from ..state import AppState
@@ -19,7 +19,7 @@ from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
-FOLLOWED = ("tab", "views", "wide", "thickness", "full", "stretch", "overlay", "scale")
+SEEN = sorted(set(Seen.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
 
@@ -60,7 +60,7 @@ class PackingView:
             sizing_mode="stretch_width",
             palettes=palettes(looks.dark),
             zoom=None if looks.zoom is None else list(looks.zoom),
-            **{name: getattr(looks, name) for name in (*SHARED, *FOLLOWED)},
+            **{name: getattr(looks, name) for name in SEEN},
             source=state.source,
             busy=state.work.busy,
         )
@@ -70,7 +70,7 @@ class PackingView:
         for name in ("between", "zoom"):
             self.player.param.watch(self._go, name)
         self.player.param.watch(self._explain, "pulled")
-        looks.param.watch(self._follow, [*SHARED, *FOLLOWED])
+        looks.param.watch(self._follow, SEEN)
         state.param.watch(self._follow, ["source", "loads"])
         state.work.param.watch(self._follow, "busy")
         state.param.watch(self._show, ["seen", "exact", "measured"])

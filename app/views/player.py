@@ -9,6 +9,7 @@ import param
 from granforce.records import Floats
 
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
+from ..looks import Seen
 from ..replays import Replay
 from .messages import Message
 from .scripts import Scripted
@@ -16,7 +17,7 @@ from .scripts import Scripted
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
 
-class Player(Scripted):
+class Player(Scripted, Seen):
     """Packing on canvases, with buttons, scrub slider and live numbers.
 
     Its script is of parts: what is replayed (replay.js), how it looks (look.js), where it is drawn
@@ -47,25 +48,10 @@ class Player(Scripted):
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
     pulled = param.Boolean(doc="whether a network is on screen that was pulled; told by the page")
-    contact = param.Integer(default=None, allow_None=True)
-    frame = param.Integer(default=0)
-    reference = param.Integer(default=0)
-    predict = param.Integer(default=0, doc="1 … 3 while a question is asked, see predict.js")
     free = param.Integer(default=0, doc="dimension h of S")
-    split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
-    beside = param.Number(default=None, allow_None=True, doc="μ that is seen beside in its place")
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
     between = param.List(default=None, allow_None=True)
-    tab = param.String()
-    views = param.Integer(doc="of tabs, so far")
-    wide = param.Boolean(doc="whether force space is on screen, whatever the tab")
-    colour = param.String(default="change")
-    thickness = param.String(default="normal")
-    full = param.Number(default=None, allow_None=True, doc="⟨f_n⟩ at which colours are full")
-    stretch = param.Number(default=1.0, doc="how many times as wide chains are")
-    overlay = param.Boolean()
-    scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
 
     def __init__(self, **params: Any) -> None:
