@@ -202,40 +202,36 @@ def shades(
     """
     low, high = (exact["low"], exact["high"]) if exact else (replay.low[:, 0], replay.high[:, 0])
     extent, first, pinned = high - low, replay.normal[0], replay.normal[reference]
-    mu, of = replay.summary["mu"], measured or {"off": np.zeros_like(first)}
-
-    def mobilised(normal: Floats, tangential: Floats) -> Floats:
-        limit = np.maximum(mu * normal, 1e-9)
-        return 0.5 + tangential / limit / 2 if mu > 0 else np.zeros_like(normal)
-
+    mu, of = replay.summary["mu"], measured or {}
+    neutral = (
+        (colour == "mobilised" and mu == 0)
+        or (colour == "known" and gone is None)
+        or (colour == "deviation" and not of)
+    )
     shade = {
-        "mobilised": mobilised,
+        "neutral": lambda normal, tangential: np.zeros_like(normal),
+        "mobilised": lambda normal, tangential: (
+            0.5 + tangential / np.maximum(mu * normal, 1e-9) / 2
+        ),
         "extent": lambda normal, tangential: extent / (most or 1.0),
         "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * (full or FULL_CHANGE)),
         "sign": lambda normal, tangential: 0.5 + 0.5 * np.sign(normal - pinned),
         "load": lambda normal, tangential: (
             np.full_like(normal, 0.5) if loads is None else loads / (full or loads.max())
         ),
-        "known": lambda normal, tangential: (
-            np.zeros_like(normal) if gone is None else gone / np.maximum(gone + extent, 1e-6)
-        ),
+        "known": lambda normal, tangential: gone / np.maximum(gone + extent, 1e-6),
         "deviation": lambda normal, tangential: (
             0.5 + np.nan_to_num(of["off"]) / (2 * FULL_DEVIATION)
         ),
-    }[colour]
+    }["neutral" if neutral else colour]
     width = {
         "normal": lambda normal: normal,
         "extent": lambda normal: extent,
         "difference": lambda normal: np.abs(normal - pinned),
         "load": lambda normal: normal if loads is None else loads,
         "known": lambda normal: normal if gone is None else gone,
-        "measured": lambda normal: np.nan_to_num(of["normal"]) if measured else normal,
+        "measured": lambda normal: np.nan_to_num(of["normal"]) if of else normal,
     }[thickness]
-    neutral = (
-        (colour == "mobilised" and mu == 0)
-        or (colour == "known" and gone is None)
-        or (colour == "deviation" and not measured)
-    )
     tones = {"ground": "#121212", "disk": "#3b444f", "pale": "#22272d", "edge": "#55606e"}
     if not dark:
         tones = {"ground": "#ffffff", "disk": "#d0d8e2", "pale": "#eef1f5", "edge": "#a9b7c8"}

@@ -10,7 +10,7 @@ from granforce.records import InputError, friction
 from .. import studied
 from ..data import SOURCES
 from ..jobs import reading
-from ..limits import LIMITS, RANGES
+from ..limits import LIMITS, MOST_SEED
 from ..looks import COLOURS, WIDTHS
 from ..selection import KINDS, SOLVERS, Selection, differing, select, unusual
 from ..state import AppState
@@ -79,7 +79,7 @@ class Controls:
         self.mu.link(self.beside, stored="stored", hill="hill")
         self.work.task(reading).start(lambda job: studied.hill(), self._draw)
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
-        self.seed = self._number("Seed", 0, RANGES["seed"][1])
+        self.seed = self._number("Seed", 0, MOST_SEED)
         self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
         self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}

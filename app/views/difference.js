@@ -25,7 +25,7 @@ export class Difference {
     this.on = true
     this.found.clear()
     model.split = true
-    this.dress()
+    this.player.dress(true)
     this.tell(`Two force networks in the same disks. Click the ${this.wanted.size} lines that differ most.`)
   }
 
@@ -57,7 +57,7 @@ export class Difference {
     const was = this.on
     this.on = false
     this.tell(words)
-    if (was) this.dress()
+    if (was) this.player.dress(false)
   }
 
   tell(words) {
@@ -65,13 +65,6 @@ export class Difference {
     this.player.buttons.part("quiz").textContent = words
     this.player.buttons.part("differ").classList.toggle("on", this.on)
     this.player.buttons.root.classList.toggle("quizzed", this.on) // what is under the pointer would tell
-  }
-
-  /** Both networks without colour, or as they were. */
-  dress() {
-    const { player } = this
-    player.look.plain = this.on
-    player.again()
   }
 
   draw(context, scene) {

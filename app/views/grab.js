@@ -6,6 +6,7 @@ import { CARRYING } from "./look.js"
 import { circle, line } from "./pen.js"
 import { plain } from "./plain.js"
 import { PointHand } from "./point.js"
+import { between } from "./replay.js"
 
 const RAIL = 190 // px, the longest
 const EDGE = 14 // px between a rail and the edge of the picture
@@ -208,10 +209,7 @@ export class Grab {
     while (k < values.length - 2 && values[k + 1] < this.value) k++
     const part = (this.value - values[k]) / (values[k + 1] - values[k] || 1)
     const held = { normal: new Float32Array(size), tangential: new Float32Array(size) }
-    for (const name of ["normal", "tangential"]) {
-      const out = held[name], all = rail[name], a = k * size, b = a + size
-      for (let c = 0; c < size; c++) out[c] = (1 - part) * all[a + c] + part * all[b + c]
-    }
+    for (const [name, out] of Object.entries(held)) between(rail[name], k, k + 1, part, out)
     held.residual = Math.max(rail.residual[k], rail.residual[k + 1])
     this.describe(this.contact, this.value)
     this.show(held)

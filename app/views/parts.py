@@ -14,6 +14,7 @@ from panel.reactive import Syncable
 
 from ..looks import Looks
 from ..state import AppState
+from .scripts import SHARED
 from .select import Select
 from .style import plot
 
@@ -205,8 +206,6 @@ def figure(name: str, title: str | None, x: str, y: str, **options: Any) -> Figu
 
 
 CLAIMS = """
-.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
-.term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
 .claims { border-collapse: collapse; margin-top: 10px; font-size: 12.5px; }
 .claims caption { text-align: left; padding-bottom: 4px; font-weight: 600; }
 .claims td { border-top: 1px solid rgba(128, 128, 128, 0.35); padding: 3px 12px 3px 0; }
@@ -217,7 +216,7 @@ CLAIMS = """
 def note(text: str = "", **options: Any) -> pn.pane.HTML:
     """Small print, as HTML."""
     return pn.pane.HTML(
-        text, styles=NOTE, stylesheets=[CLAIMS], sizing_mode="stretch_width",
+        text, styles=NOTE, stylesheets=[SHARED, CLAIMS], sizing_mode="stretch_width",
         margin=(2, 10, 8, 10), **options,
     )  # fmt: skip
 

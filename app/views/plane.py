@@ -1,6 +1,5 @@
 """Force space in a plane: the states' path, the state on screen, and the outline of S."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from bokeh.plotting import figure as Figure
 from granforce.records import InputError
 
 from .. import compute, live, planes
-from ..data import Cell, Shown
+from ..data import Shown
 from ..jobs import Job, reading
 from ..looks import PLANES
 from ..planes import Outlined, Plane
@@ -230,7 +229,11 @@ class View(TabView):
         found, own = planes.beside(state.catalogue, state.cell), state.cell.selection
         kind = "walk" if own.kind == "uniform" else "uniform"
         wanted = own._replace(kind=kind, states=min(own.states, ENOUGH))
-        work = compute.states(state.library, wanted) if found is None else _shown(state, found)
+        work = (
+            compute.states(state.library, wanted)
+            if found is None
+            else lambda job: state.library.shown(found)
+        )
 
         def done(shown: Shown) -> None:
             if state.replay is replay:
@@ -432,11 +435,6 @@ def _variance(plane: Plane) -> str:
         return ""
     across, up = plane.share
     return f", and {across:.0%} of their variance goes across, {up:.0%} upwards"
-
-
-def _shown(state: AppState, cell: Cell) -> Callable[[Job], Shown]:
-    """Work that reads a cell."""
-    return lambda job: state.library.shown(cell)
 
 
 def _loosest(replay: Replay) -> int:

@@ -233,6 +233,12 @@ class Player {
     if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
   }
 
+  /** Networks without colour, where it would give something away, or as they were. */
+  dress(plain) {
+    this.look.plain = plain
+    this.again()
+  }
+
   again() {
     this.split.show()
     if (this.replay && !this.playing && !this.live.moves) this.show(this.replay.position, false)

@@ -11,7 +11,7 @@ from panel.custom import JSComponent
 from .messages import FROM_BROWSER, TO_BROWSER, Message, listed
 
 FOLDER = Path(__file__).parent
-
+SHARED = (FOLDER / "shared.css").read_text()  # what all styles have in common
 
 # What a script may say to be of one module with others, each a line of its own.
 IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+)\.js"$', re.M)
@@ -68,7 +68,7 @@ class Scripted(JSComponent):
         super().__init_subclass__(**options)
         name = cls.__module__.rpartition(".")[2]
         cls._esm = module(name)
-        cls._stylesheets = [(FOLDER / f"{style}.css").read_text() for style in ("shared", name)]
+        cls._stylesheets = [SHARED, (FOLDER / f"{name}.css").read_text()]
 
     def __init__(self, **params: Any) -> None:
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types

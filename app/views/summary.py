@@ -23,8 +23,6 @@ STYLE = """
   background: #7a4a00; color: #ffffff; }
 .first { font-size: 14px; line-height: 1.45; margin: 8px 2px 0; }
 .rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
-.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
-.term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
 """
 
 # Words and symbol, name among the summary's numbers, form, key of the glossary, and what it is of.
