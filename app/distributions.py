@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from granforce.records import Floats
 from granforce.study import kinds
@@ -94,14 +93,3 @@ def groups(found: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[flo
     pick = np.unique(np.linspace(0, len(others) - 1, min(most, len(others))).round().astype(int))
     chosen = sorted({others[k] for k in pick} | ({mu} & set(by_mu)))
     return {value: by_mu[value] for value in chosen}
-
-
-def histogram(
-    values: npt.ArrayLike, bins: int = 40, largest: float | None = None
-) -> tuple[Floats, Floats]:
-    """Edges (bins + 1,) and probability density (bins,) of values from 0 to the largest."""
-    values = np.asarray(values).ravel()
-    largest = float(values.max(initial=0)) if largest is None else largest
-    edges = np.linspace(0, largest or 1.0, bins + 1)
-    counts = np.histogram(values, edges)[0]
-    return edges, counts / max(1, len(values)) / np.diff(edges)

@@ -4,6 +4,7 @@ import base64
 import json
 from collections.abc import Mapping
 from html import escape
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from .views.player import Player, frames
 from .views.scripts import Scripted, module
 from .views.style import palettes
 
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
 
 PAGE = """<!doctype html>
@@ -59,56 +61,50 @@ def html(
     cell: Cell,
     replay: Replay,
     exact: xr.Dataset | None,
+    shown: Mapping[str, Any] = NOTHING,
     *,
     view: View,
     link: str,
     command: str,
     source: str,
     outlined: planes.Outlined | None = None,
-    loads: Floats | None = None,
-    gone: Floats | None = None,
-    measured: Mapping[str, Any] | None = None,
-    pins: Mapping[str, Any] | None = None,
 ) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
-    exact: under what is known; gone, measured, pins: as the player has them.
+    exact: under what is known; shown: loads, gone, measured and pins, as the player has them.
     """
     intervals = exact_intervals(exact, replay)
-    shown, acceptance = thinned(replay)
-    plane = planes.principal(shown)
-    figures = still.figures(library, shown, exact, plane, outlined, view)
+    kept, acceptance = thinned(replay)
+    plane = planes.principal(kept)
+    figures = still.figures(library, kept, exact, plane, outlined, view)
     # In a document of their own: else Bokeh adds what a page that is served just then has its
     # browser do.
     bare = Document()
     for figure in figures:
         bare.add_root(figure)
     script, plots = components(figures)
-    frame = min(view["frame"], len(shown.normal) - 1)
+    frame = min(view["frame"], len(kept.normal) - 1)
     between = view["between"]
-    if len(shown.normal) < len(replay.normal):
+    if len(kept.normal) < len(replay.normal):
         frame, between = 0, None
     same = ("contact", "colour", "thickness", "full", "stretch", "overlay", "scale")
     own = set(Player.param) - set(Scripted.param)
     given = {name: Player.param[name].default for name in own}
     given |= {name: view[name] for name in same}
+    given |= shown
     given |= {
-        "walk": frames(shown) | {"acceptance": acceptance},
+        "walk": frames(kept) | {"acceptance": acceptance},
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
         "lead": explanation.first(replay.summary),
-        "legend": legend(still.at_rest(library, replay, exact, view, loads=loads)),
+        "legend": legend(still.at_rest(library, replay, exact, view, loads=given["loads"])),
         "source": source,
         "frame": frame,
         "between": between,
         "tab": "intervals",
-        "loads": loads,
-        "gone": gone,
-        "measured": measured or {},
-        "pins": pins or {},
     }
-    left = len(replay.normal) - len(shown.normal)
+    left = len(replay.normal) - len(kept.normal)
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         bokeh=Resources(mode="inline", components=["bokeh"]).render(),

@@ -77,7 +77,8 @@ class Controls:
         self.beside = FrictionSlider(self._typed, on_narrow=True, **WIDE)
         self.beside.link(self.mu, mu="mu", bidirectional=True)
         self.mu.link(self.beside, stored="stored", hill="hill")
-        self.work.task(reading).start(lambda job: studied.hill(), self._draw)
+        draw = self.mu.param.update
+        self.work.task(reading).start(lambda job: studied.hill(), lambda hill: draw(hill=hill))
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
         self.seed = self._number("Seed", 0, MOST_SEED)
         self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
@@ -170,9 +171,6 @@ class Controls:
         self.error.param.watch(self._read, "closed")
         self.work.computation.param.watch(self._rest, "running")
         self._tell()
-
-    def _draw(self, hill: list[tuple[float, float]]) -> None:
-        self.mu.hill = hill
 
     # From the widgets
 

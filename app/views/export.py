@@ -89,9 +89,10 @@ class View:
         """Work that makes a file of what is on screen now."""
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
-        possible = state.possible
-        loads, given, known = state.loads, gone(state.knowledge, replay), pins(state.knowledge)
-        seen = measured(state, replay)
+        possible, known = state.possible, state.knowledge
+        drawn: dict[str, Any] = {"loads": state.loads, "gone": gone(known, replay)}
+        drawn["measured"] = measured(state, replay)
+        shown = drawn | {"pins": pins(known)}
         view, link, command, held = state.view, state.link(), state.command, state.hand.held
         told, source = caption(state), " ".join([origin(cell), *known_words(state)])
         frame = min(state.looks.frame, len(replay.normal) - 1)
@@ -123,10 +124,8 @@ class View:
                 bounds = exact_intervals(possible, replay)
                 most = full_extent(replay, bounds, view["full"])
                 names = ("colour", "thickness", "reference", "dark", "full", "stretch")
-                look = movies.shades(
-                    replay, bounds, palettes(view["dark"]), loads=loads, gone=given, measured=seen,
-                    most=most, **{name: view[name] for name in names},
-                )  # fmt: skip
+                looks = {name: view[name] for name in names} | {"most": most} | drawn
+                look = movies.shades(replay, bounds, palettes(view["dark"]), **looks)
                 content = movies.gif(
                     replay, look | told, between=view["between"], progress=job.tell,
                     cancelled=job.cancelled,
@@ -134,25 +133,13 @@ class View:
                 return exports.File(f"{stem}.gif", "image/gif", content)
             outlined = None
             if replay.summary["dimension"] > 0:
-                shown = standalone.thinned(replay)[0]
-                plane = planes.principal(shown)
-                outlined = planes.outline(library, cell, shown, plane)(job)
+                kept = standalone.thinned(replay)[0]
+                outlined = planes.outline(library, cell, kept, planes.principal(kept))(job)
             job.begin("making the page")
             content = standalone.html(
-                library,
-                cell,
-                replay,
-                possible,
-                loads=loads,
-                gone=given,
-                measured=seen,
-                pins=known,
-                view=view,
-                outlined=outlined,
-                link=link,
-                command=command,
-                source=source,
-            )
+                library, cell, replay, possible, shown, view=view, outlined=outlined, link=link,
+                command=command, source=source,
+            )  # fmt: skip
             return exports.File(f"{stem}.html", "text/html", content)
 
         return work

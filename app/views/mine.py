@@ -47,7 +47,6 @@ class Mine(Scripted):
                     state.work.message = str(error)
                 self._list()
             case {"delete": str(entry)} if entry in known:
-                self._task.start(lambda job: mine.delete(state.library, entry), self._gone)
-
-    def _gone(self, nothing: None) -> None:
-        self._state.refresh()
+                self._task.start(
+                    lambda job: mine.delete(state.library, entry), lambda nothing: state.refresh()
+                )

@@ -10,6 +10,8 @@ import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
 from bokeh.plotting import figure as Figure
 
+from granforce.measures import statistics
+
 from .. import distributions
 from ..data import Cell, Library
 from ..distributions import Row
@@ -24,7 +26,7 @@ from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
-LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
+LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 EACH = (
     "<b>Each dot is one contact:</b> the farther up, the less its force is determined; the farther "
     "right, the stronger it is. Click a dot to find its contact in the packing."
@@ -205,9 +207,9 @@ class View(TabView):
         layers = [("as packed", replay.normal[0], ORIGINAL)]
         if several:
             layers.insert(0, ("networks", replay.normal[1:], DARK))
-        largest = min(LARGEST, float(replay.normal.max()))
+        edges = np.linspace(0, min(LARGEST, float(replay.normal.max())), BINS + 1)
         for label, values, colour in layers:
-            edges, density = distributions.histogram(values, largest=largest)
+            density = statistics.density(values.ravel(), edges)
             height = np.where(density > 0, density, np.nan) if log else density
             middle = (edges[1:] + edges[:-1]) / 2
             if label == "networks":

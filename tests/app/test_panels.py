@@ -366,14 +366,6 @@ def test_groups_spread_over_mu_and_hold_the_one_on_screen():
     assert min(chosen) == 0.1 and max(chosen) == 10
 
 
-def test_a_histogram_is_a_density():
-    values = np.random.default_rng(0).exponential(size=10_000)
-    edges, density = distributions.histogram(values)
-    assert (density * np.diff(edges)).sum() == pytest.approx(1)
-    edges, density = distributions.histogram(values, largest=1.0)
-    assert (density * np.diff(edges)).sum() == pytest.approx(1 - np.exp(-1), abs=0.02)
-
-
 @pytest.mark.parametrize("what", ["eta", "extent", "correlation", "scatter", "force"])
 @pytest.mark.parametrize("scale", ["linear", "log"])
 def test_every_statistic_is_drawn_from_the_data(state, what, scale):
