@@ -46,7 +46,7 @@ LONG = ("netcdf", "zarr", "gif", "html")  # with progress
 class View:
     """Buttons; a file is made, off the event loop, when it is asked for."""
 
-    name, title = "export", "Export"
+    name = "export"
 
     def __init__(self, state: AppState) -> None:
         self.state = state

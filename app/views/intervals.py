@@ -62,7 +62,7 @@ Click a bar to find its contact in the packing.
 class View(TabView):
     """One bar a contact, growing as the states go by; the player rewrites low, high and now."""
 
-    name, title = "intervals", "Intervals"
+    name = "intervals"
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "seen", "exact", looks=["drawn", "sort", "scale", "contact"])

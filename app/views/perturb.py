@@ -73,7 +73,7 @@ UNIT = "Forces are in units of the mean normal force."
 class View(TabView):
     """The selected contact pushed; every contact's limit load; critical force and decay."""
 
-    name, title = "perturb", "Push"
+    name = "perturb"
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", looks=["contact"])

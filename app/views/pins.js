@@ -1,7 +1,7 @@
 // Marks of what is known: a pin on each contact that is held, open where it has an error bar;
 // numbers on those that would be worth measuring, the best first; and where a contact is pushed, arrows.
 
-import { circle } from "./pen.js"
+import { arrow, circle } from "./pen.js"
 import { plain } from "./plain.js"
 
 const PIN = 17 // px, its height
@@ -45,8 +45,10 @@ export class Pins {
       const far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, u = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
       context.globalAlpha = k === first ? 1 : COPY
       context.beginPath()
-      arrow(context, a, u.map((v) => -v), scale * geometry.radius[geometry.i[k]] + ARROW_PX)
-      arrow(context, b, u, scale * geometry.radius[geometry.j[k]] + ARROW_PX)
+      for (const [from, grain, way] of [[a, geometry.i[k], -1], [b, geometry.j[k], 1]]) {
+        const long = way * (scale * geometry.radius[grain] + ARROW_PX)
+        arrow(context, from, from.map((v, d) => v + long * u[d]), 12, 0.7)
+      }
       for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
         context.lineWidth = width
         context.strokeStyle = colour
@@ -98,16 +100,5 @@ export class Pins {
     context.textAlign = "center"
     context.textBaseline = "middle"
     context.fillText(number, x, y + 0.5)
-  }
-}
-
-/** Adds an arrow to the path, of this length from a point in the direction (ux, uy). */
-function arrow(context, [x, y], [ux, uy], long) {
-  const tip = [x + long * ux, y + long * uy], head = 12
-  context.moveTo(x, y)
-  context.lineTo(...tip)
-  for (const side of [1, -1]) {
-    context.moveTo(tip[0] - head * (ux - 0.7 * side * uy), tip[1] - head * (uy + 0.7 * side * ux))
-    context.lineTo(...tip)
   }
 }

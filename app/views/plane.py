@@ -79,7 +79,7 @@ HELP = (
 class View(TabView):
     """A plane of force space; the player moves the state on screen along the path."""
 
-    name, title = "plane", "Force space"
+    name = "plane"
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "seen", looks=["contact", "pair", "dark"], work=["fourfold"])

@@ -448,12 +448,9 @@ export function render({ model, view }) {
   view.model.data.player = player
   view.model.data.scene = player.scene // for those who find the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
-  for (const name of ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]) {
-    model.on(name, () => player.again())
-  }
-  for (const name of ["tab", "wide"]) {
-    model.on(name, () => player.mark())
-  }
+  const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
+  model.on(looks, () => player.again())
+  model.on(["tab", "wide"], () => player.mark())
   const observer = new ResizeObserver(() => player.scene.resize())
   observer.observe(player.scene.root)
   model.on("msg:custom", (message) => {

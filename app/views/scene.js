@@ -1,7 +1,7 @@
 // The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
-import { circle, line } from "./pen.js"
+import { arrow, circle, line } from "./pen.js"
 import { listen } from "./pointing.js"
 import { PIXELS, Sheet } from "./sheet.js"
 
@@ -306,15 +306,9 @@ export class Scene {
     marks.lineCap = "round"
     marks.beginPath()
     for (const { nx, ny, fx, fy } of forces) {
-      const size = Math.hypot(fx, fy)
-      if (!(size > 1e-3 * most)) continue
-      const ux = fx / size, uy = fy / size, ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
-      marks.moveTo(ex - (long * fx) / most, ey - (long * fy) / most)
-      marks.lineTo(ex, ey)
-      for (const side of [1, -1]) {
-        marks.moveTo(ex - head * (ux - 0.5 * side * uy), ey - head * (uy + 0.5 * side * ux))
-        marks.lineTo(ex, ey)
-      }
+      if (!(Math.hypot(fx, fy) > 1e-3 * most)) continue
+      const ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
+      arrow(marks, [ex - (long * fx) / most, ey - (long * fy) / most], [ex, ey], head, 0.5)
     }
     marks.stroke()
   }

@@ -106,7 +106,7 @@ class Small(Scripted):
                 case {"built": built, "mu": mu}:
                     self._show(scenes.OWN, mu, built[: scenes.LONGEST])
                 case {"save": of}:
-                    self._answer(scenes.file_of, lambda file: {"file": _as_text(file)}, **of)
+                    self._answer(scenes.file_of, _as_text, **of)
                 case {"fall": of}:
                     self._answer(scenes.falling, lambda motion: {"fall": motion.tolist()}, **of)
                 case {"measure": of}:
@@ -126,5 +126,5 @@ class Small(Scripted):
         )
 
 
-def _as_text(file: bytes) -> str:
-    return base64.b64encode(file).decode()
+def _as_text(file: bytes) -> Message:
+    return {"file": base64.b64encode(file).decode()}

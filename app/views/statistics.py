@@ -36,7 +36,7 @@ EACH = (
 class View(TabView):
     """One figure at a time; those over μ are drawn in a thread by granforce.figures."""
 
-    name, title = "statistics", "Statistics"
+    name = "statistics"
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", "exact", "catalogue")

@@ -46,7 +46,7 @@ SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
 class View:
     """Drop files, see the report; the packing is then on the page."""
 
-    name, title = "upload", "Your packing"
+    name = "upload"
 
     def __init__(self, state: AppState) -> None:
         self.state = state
