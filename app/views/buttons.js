@@ -1,5 +1,6 @@
 // The player's buttons, sliders and numbers around the scene, and the keys that stand for them.
 
+import { made } from "./made.js"
 import { LEAST } from "./scene.js"
 
 const ICONS = {
@@ -99,12 +100,9 @@ const CLOSER = 0.7 // of the view, by a button
 export class Buttons {
   /** actions: by the buttons' names; scrub(position); tab(number), for the digits. */
   constructor(scene, actions) {
-    this.root = document.createElement("div")
-    this.root.className = "stage"
-    this.root.innerHTML = BUTTONS
+    this.root = made("div", { className: "stage", innerHTML: BUTTONS })
     this.actions = actions
-    this.asked = scene.root.appendChild(document.createElement("div"))
-    this.asked.className = "asked"
+    this.asked = scene.root.appendChild(made("div", { className: "asked" }))
     this.scenes = this.part("scenes")
     this.scenes.prepend(scene.root)
     this.scene = scene

@@ -1,6 +1,7 @@
 // What is known, as chips; what it leaves open, in words; and which contact would be worth measuring.
 
 import { ask } from "./ask.js"
+import { button, made } from "./made.js"
 
 export function render({ model, view }) {
   const root = document.createElement("div")
@@ -11,25 +12,20 @@ export function render({ model, view }) {
   const [chips, words, next, ranked] = root.children
   const tell = (message) => ask(model, view, message)
 
-  function button(made, textContent, act, look = {}) {
-    const added = made.appendChild(document.createElement("button"))
-    Object.assign(added, { type: "button", textContent, ...look })
-    added.addEventListener("click", act)
-  }
-
   function chip([contact, text]) {
-    const made = document.createElement("span")
-    made.className = "chip"
-    button(made, text, () => tell({ choose: contact }), { title: "find it in the packing" })
+    const it = made("span", { className: "chip" })
     const look = { className: "release", title: "let it go", ariaLabel: `let go: ${text}` }
-    button(made, "×", () => tell({ release: contact }), look)
-    return made
+    it.append(
+      button(text, () => tell({ choose: contact }), { title: "find it in the packing" }),
+      button("×", () => tell({ release: contact }), look),
+    )
+    return it
   }
 
   function row([contact, text]) {
-    const made = document.createElement("li")
-    button(made, text, () => tell({ choose: contact }))
-    return made
+    const it = document.createElement("li")
+    it.append(button(text, () => tell({ choose: contact })))
+    return it
   }
 
   const shown = {

@@ -1,6 +1,7 @@
 // What moves in the plots beside, on canvases of its own above what stands still: while the player
 // plays or a force is in the hand, Bokeh draws nothing. At rest the same is drawn by Bokeh again.
 
+import { made } from "./made.js"
 import { circle, line } from "./pen.js"
 
 const TRAIL = 40 // states that the trail in force space reaches back
@@ -14,9 +15,7 @@ export class Layer {
     this.fig = fig
     this.draw = draw
     this.on = false
-    this.canvas = document.createElement("canvas")
-    this.canvas.className = "layer"
-    this.canvas.style = "position: absolute; inset: 0; pointer-events: none"
+    this.canvas = made("canvas", { className: "layer", style: "position: absolute; inset: 0; pointer-events: none" })
   }
 
   get view() {

@@ -1,6 +1,8 @@
 // Predict, then look: three questions on the packing on screen, each asked before the page shows what it
 // asks for. In links `predict=2` opens the second one.
 
+import { button } from "./made.js"
+
 const ASKED = [
   {
     words: "Nothing moves. Are the forces at the contacts fixed, too?",
@@ -80,11 +82,7 @@ export class Predict {
 
   tell(words, choices) {
     const row = document.createElement("div")
-    for (const [text, act] of choices) {
-      const made = Object.assign(document.createElement("button"), { type: "button", textContent: text })
-      made.addEventListener("click", act)
-      row.append(made)
-    }
+    row.append(...choices.map(([text, act]) => button(text, act)))
     this.quiz.replaceChildren(words, row)
   }
 }

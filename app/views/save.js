@@ -1,20 +1,17 @@
 // What the browser does with what was made for the visitor: it saves a file, or prints a page.
 
+import { made } from "./made.js"
+
 /** Save a blob as a file of this name. */
 export function save(blob, name) {
-  const link = document.createElement("a")
-  link.href = URL.createObjectURL(blob)
-  link.download = name
+  const link = made("a", { href: URL.createObjectURL(blob), download: name })
   link.click()
   setTimeout(() => URL.revokeObjectURL(link.href), 10000)
 }
 
 /** Print an HTML document alone; title: of it, for screen readers. */
 export function print(title, html) {
-  const sheet = document.createElement("iframe")
-  sheet.title = title
-  sheet.style.cssText = "position: fixed; width: 0; height: 0; border: 0"
-  sheet.srcdoc = html
+  const sheet = made("iframe", { title, srcdoc: html, style: "position: fixed; width: 0; height: 0; border: 0" })
   sheet.addEventListener("load", () => {
     sheet.contentWindow.addEventListener("afterprint", () => sheet.remove())
     sheet.contentWindow.print()

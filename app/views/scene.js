@@ -1,6 +1,7 @@
 // The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
+import { made } from "./made.js"
 import { arrow, circle, line } from "./pen.js"
 import { listen } from "./pointing.js"
 import { PIXELS, Sheet } from "./sheet.js"
@@ -16,17 +17,12 @@ const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 export class Scene {
   constructor(onSelect) {
-    this.root = document.createElement("div")
-    this.root.className = "scene"
-    this.root.tabIndex = 0
-    this.root.setAttribute("role", "img")
-    this.root.setAttribute("aria-label", "packing with its force chains")
+    this.root = made("div", { className: "scene", tabIndex: 0, role: "img", ariaLabel: "packing with its force chains" })
     const layer = () => this.root.appendChild(document.createElement("canvas")).getContext("2d")
     this.disks = layer()
     this.chains = layer()
     this.marks = layer()
-    this.tip = this.root.appendChild(document.createElement("div"))
-    this.tip.className = "tip"
+    this.tip = this.root.appendChild(made("div", { className: "tip" }))
     this.root.scene = this
     this.onSelect = onSelect
     this.size = 0

@@ -3,6 +3,7 @@
 // or the pinned state changes.
 
 import { Look } from "./look.js"
+import { made } from "./made.js"
 import { plain } from "./plain.js"
 import { Replay } from "./replay.js"
 import { Scene } from "./scene.js"
@@ -14,8 +15,7 @@ export class Split {
     const twin = new Scene((contact) => { if (!this.other) model.contact = contact })
     this.twin = twin
     this.other = null // the Replay of another packing
-    twin.root.className = "twin"
-    twin.root.setAttribute("aria-label", "the network beside")
+    Object.assign(twin.root, { className: "twin", ariaLabel: "the network beside" })
     this.through = new Through(scene, twin)
     Object.defineProperty(twin, "view", {
       get: () => (this.other ? this.through : scene.view),
@@ -24,12 +24,7 @@ export class Split {
     twin.changed = () => scene.changed()
     twin.reset = (paint = true) => { if (paint) scene.reset() }
     twin.onRepaint = () => {}
-    const own = (root) => {
-      const made = root.appendChild(document.createElement("div"))
-      made.className = "caption"
-      return made
-    }
-    this.captions = [own(twin.root), own(scene.root)]
+    this.captions = [twin, scene].map(({ root }) => root.appendChild(made("div", { className: "caption" })))
     player.buttons.scenes.prepend(twin.root)
   }
 
