@@ -7,7 +7,7 @@ import param
 from granforce.records import InputError
 
 from . import compute
-from .data import Shown, best_cell
+from .data import Shown, cell_of
 from .limits import LIMITS
 from .selection import Selection
 
@@ -58,8 +58,8 @@ class Beside(param.Parameterized):
 
     def _find(self, wanted: Selection) -> None:
         state, library = self.state, self.state.library
-        cell = best_cell(state.catalogue, wanted)
-        if cell is None or not cell.selection.names(wanted):
+        cell = cell_of(state.catalogue, wanted)
+        if cell is None:
             self.task.start(compute.states(library, wanted), self._found)
             return
         shown = library.shown_in_memory(cell)

@@ -99,14 +99,9 @@ def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, An
     return {"begun": begun, "watch": add, "enough": job.enough}
 
 
-def exact_parameters(selection: Selection) -> Parameters:
-    """As a store names the exact intervals of a Selection."""
-    return kinds.INTERVALS.parameters(selection.packing, mu=selection.mu)
-
-
 def exact(library: Library, shown: Shown) -> Work:
     """Work that computes the exact intervals beside what is shown; results in a new Shown."""
-    params = exact_parameters(shown.cell.selection)
+    params = shown.cell.selection.intervals
 
     def work(job: Job) -> Shown:
         replay = shown.replay

@@ -201,8 +201,7 @@ class Library:
 
     def exact(self, selection: Selection) -> xr.Dataset | None:
         """The exact intervals of a selection's packing at its μ as a dataset, or None."""
-        params = kinds.INTERVALS.parameters(selection.packing, mu=selection.mu)
-        return self.stored(kinds.INTERVALS, params)
+        return self.stored(kinds.INTERVALS, selection.intervals)
 
     def stored(self, kind: study.Kind, params: Parameters) -> xr.Dataset | None:
         """The dataset of this kind and parameters from the first store that has it, or None."""
@@ -257,13 +256,16 @@ def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:
     return min(cells, key=lambda cell: abs(place(cell.mu) - place(mu)))
 
 
+def cell_of(cells: Sequence[Cell], wanted: Selection | None) -> Cell | None:
+    """The cell of the wanted Selection, or None."""
+    return next((c for c in cells if wanted is not None and c.selection.names(wanted)), None)
+
+
 def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | None:
     """The cell of the wanted Selection, or the one most worth opening with; None without cells."""
-    for cell in cells:
-        if wanted is not None and cell.selection.names(wanted):
-            return cell
-    if not cells:
-        return None
+    found = cell_of(cells, wanted)
+    if found is not None or not cells:
+        return found
     names = [cell.series for cell in cells]
     fullest = max(dict.fromkeys(names), key=names.count)
     return nearest_cell([cell for cell in cells if cell.series == fullest], OPENING_MU)

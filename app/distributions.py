@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from granforce.records import Floats
 from granforce.study import kinds
@@ -53,9 +52,8 @@ def exact_rows(library: Library, cells: Iterable[Cell]) -> list[Row]:
     """The same from exact intervals, of those packings whose intervals a store has."""
     found = []
     for cell in cells:
-        params = kinds.INTERVALS.parameters(cell.selection.packing, mu=cell.selection.mu)
         for store in library.stores:
-            name = entry_name(store, kinds.INTERVALS, params)
+            name = entry_name(store, kinds.INTERVALS, cell.selection.intervals)
             if name in store:
                 found.append(_row(store, name, cell.selection))
                 break
@@ -95,14 +93,3 @@ def groups(found: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[flo
     pick = np.unique(np.linspace(0, len(others) - 1, min(most, len(others))).round().astype(int))
     chosen = sorted({others[k] for k in pick} | ({mu} & set(by_mu)))
     return {value: by_mu[value] for value in chosen}
-
-
-def histogram(
-    values: npt.ArrayLike, bins: int = 40, largest: float | None = None
-) -> tuple[Floats, Floats]:
-    """Edges (bins + 1,) and probability density (bins,) of values from 0 to the largest."""
-    values = np.asarray(values).ravel()
-    largest = float(values.max(initial=0)) if largest is None else largest
-    edges = np.linspace(0, largest or 1.0, bins + 1)
-    counts = np.histogram(values, edges)[0]
-    return edges, counts / max(1, len(values)) / np.diff(edges)

@@ -37,11 +37,6 @@ class Links(NamedTuple):
     j: Integers
 
 
-def into_cell(packing: Packing) -> Floats:
-    """Centres (N, 2), moved into the cell along each periodic direction."""
-    return packing.cell.wrapped(packing.x)
-
-
 def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     """(x_low, x_high, y_low, y_high) of a square around the cell (where open, the grains)."""
     margin = MARGIN * packing.r.max()

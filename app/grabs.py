@@ -6,7 +6,8 @@ the point in force space was pulled.
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -156,7 +157,8 @@ class Hand(param.Parameterized):
 
         def work(job: Job) -> tuple[Any, ...]:
             puller = _puller(library, cell, known.rows(replay, told))
-            held, refusal = _networks(library, cell, replay, puller, told, made, pulls, first)
+            pulled = partial(_pulled, library, cell, replay, puller)
+            held, refusal = _networks(pulled, _held(told), made, pulls, first)
             ready: Iterator[Message] = iter(())
             if grabbed is not None and not refusal:
                 last = held[-1][1] if held else first
@@ -205,20 +207,16 @@ def _held(told: Iterable[known.Statement]) -> dict[int, float]:
 
 
 def _networks(
-    library: Library,
-    cell: Cell,
-    replay: Replay,
-    puller: Puller,
-    told: Iterable[known.Statement],
+    pulled: Callable[[Held, Pull], Held],
+    held: Mapping[int, float],
     made: Sequence[tuple[Pull, Held]],
     pulls: Sequence[Pull],
     first: Held,
 ) -> tuple[list[tuple[Pull, Held]], str]:
     """The networks of all pulls, those made before included; a refusal.
 
-    told: Statements, which hold in all of them.
+    pulled(network, pull): what a pull makes of it; held: {contact: f_n} in all of them.
     """
-    held = _held(told)
     kept = 0
     while kept < min(len(made), len(pulls)) and made[kept][0] == pulls[kept]:
         kept += 1
@@ -228,10 +226,9 @@ def _networks(
         try:
             # A pull to where the contact was held afterwards.
             to = (pull[0], held[pull[0]]) if pull[0] in held else pull
-            network = _pulled(library, cell, replay, puller, last, to)
+            made.append((pull, pulled(last, to)))
         except InputError as error:
             return made, str(error)
-        made.append((pull, network))
     return made, ""
 
 

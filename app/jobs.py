@@ -91,6 +91,7 @@ class Job:
         self.fraction: float | None = None  # done, 0 … 1; None where unknown
         self.seconds_left: float | None = None  # of this stage
         self.error = ""
+        self.so_far: Any = None  # what of its result is there already, if the work says so
         self.result: Any = None
         self._work: Callable[[Job], Any] | None = work
         self._pool, self._on_end = pool, on_end

@@ -15,7 +15,7 @@ from granforce.tolerances import CARRYING
 
 from . import compute
 from .data import Cell, Library, Shown
-from .jobs import Job, as_one
+from .jobs import Job, Task, as_one
 from .replays import Replay
 from .selection import Selection, of_packing
 
@@ -145,11 +145,9 @@ class Knowledge(param.Parameterized):
         self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
         self.param.watch(self._follow, "known")
         state.param.watch(self._follow, "replay")
-        self._arriving: Underway | None = None  # the Underway of what is being computed
         self.task.param.watch(self._failed, "message")
         self.task.param.watch(self._arrive, "fraction")
-        self._first: Ranked | None = None  # of what is being computed, before exact bounds
-        self.ranking.param.watch(lambda event: self._rank(self._first), "fraction")
+        self.ranking.param.watch(lambda event: self._rank(_so_far(self.ranking)), "fraction")
 
     def hold(self, contact: int, value: float, error: float = 0.0) -> None:
         """Take f_n of a contact for known, in ⟨f_n⟩; a message where it cannot be."""
@@ -184,16 +182,12 @@ class Knowledge(param.Parameterized):
         state = self.state
         replay, known, cell = state.replay, tuple(self.known), state.cell
         shown = Shown(cell, replay, state.exact)
-        self._arriving = None
-
-        def tell(arriving: Underway) -> None:
-            self._arriving = arriving
 
         def done(narrowed: Narrowed) -> None:
             if state.replay is replay:
                 self._narrow(narrowed)
 
-        self.task.start(narrowing(state.library, shown, known, tell), done)
+        self.task.start(narrowing(state.library, shown, known), done)
 
     def rank(self) -> None:
         """Find which contact to measure next, in the background."""
@@ -202,13 +196,7 @@ class Knowledge(param.Parameterized):
         if replay is None or state.growing:
             return
         self.work.message = ""
-
-        self._first = None
-
-        def tell(ranked: Ranked) -> None:
-            self._first = ranked
-
-        self.ranking.start(ranking(state.library, state.cell, replay, known, tell), self._rank)
+        self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
 
     def _rank(self, found: Ranked | None) -> None:
         """Show contacts to measure next, if it is still this that is known."""
@@ -262,7 +250,7 @@ class Knowledge(param.Parameterized):
 
     def _arrive(self, event: Any) -> None:
         """Show the intervals that are there by now."""
-        arriving = self._arriving
+        arriving = _so_far(self.task)
         if event.new and arriving is not None and arriving.known == tuple(self.known):
             self._narrow(arriving.narrowed)
 
@@ -278,6 +266,10 @@ class Knowledge(param.Parameterized):
             state = self.state
             self.known = list(self.narrowed.known) if self._settled else []
             self.work.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
+
+
+def _so_far(task: Task) -> Any:
+    return task.job and task.job.so_far
 
 
 def _number(value: float, what: str) -> float:
@@ -310,21 +302,18 @@ def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -
 
 
 def narrowing(
-    library: Library,
-    shown: Shown,
-    known: tuple[Statement, ...],
-    tell: Callable[[Underway], object],
+    library: Library, shown: Shown, known: tuple[Statement, ...]
 ) -> Callable[[Job], Narrowed]:
     """Work, for jobs.Task, that finds the intervals under what is known; a Narrowed.
 
-    tell(Underway): called before they are computed, the contacts first that may change most.
+    So far it is an Underway, the contacts first that may change most.
     """
 
     def work(job: Job) -> Narrowed:
         whole = (shown if shown.exact is not None else compute.exact(library, shown)(job)).exact
         assert whole is not None  # found or made
         bounds = Underway(known, whole, shown.replay.backbone)
-        tell(bounds)
+        job.so_far = bounds
         selection = shown.cell.selection
         given: dict[str, Any] = {"mu": selection.mu, "known": rows(shown.replay, known)}
         params = kinds.INTERVALS.parameters(selection.packing, **given)
@@ -347,15 +336,11 @@ def affected(replay: Replay, known: Iterable[Statement]) -> Floats:
 
 
 def ranking(
-    library: Library,
-    cell: Cell,
-    replay: Replay,
-    known: tuple[Statement, ...],
-    tell: Callable[[Ranked], object],
+    library: Library, cell: Cell, replay: Replay, known: tuple[Statement, ...]
 ) -> Callable[[Job], Ranked]:
     """Work, for jobs.Task, that finds which contact to measure next; a Ranked.
 
-    tell(Ranked): called with their order before it is checked by exact bounds.
+    So far it is their order before it is checked by exact bounds.
     """
 
     def ranked(contacts: Integers, expected: Floats, before: Any, after: Floats) -> Ranked:
@@ -370,8 +355,11 @@ def ranking(
             selection.packing, check=LISTED if few else CHECKED, k=LISTED, **given
         )
         stage = "which measurement next"
-        options = {"watch": lambda found: tell(ranked(*found))}
-        found = compute.found_or_made(library, job, stage, kinds.INFORMATIVE, params, **options)
+
+        def watch(found: Any) -> None:
+            job.so_far = ranked(*found)
+
+        found = compute.found_or_made(library, job, stage, kinds.INFORMATIVE, params, watch=watch)
         names = "backbone", "part_expected", "mean_before", "mean_after"
         return ranked(*(found[name].values for name in names))
 

@@ -11,6 +11,7 @@ LIMITS_VARIABLE = "GRANFORCE_LIMITS"
 
 MOST = 10**9  # of any limit,
 MOST_COMPUTATIONS = 64  # and of threads
+MOST_SEED = 2**53 - 1  # whole numbers that browsers know, too
 
 
 class Limits(NamedTuple):
@@ -24,7 +25,7 @@ class Limits(NamedTuple):
     def check(self, **asked: Any) -> None:
         """InputError if a number lies outside its limits, or radii differ by more than SIZE_RATIO.
 
-        asked: any of NAMES; what has no field here must lie in its range of RANGES.
+        asked: any of NAMES.
         """
         for name, value in asked.items():
             if name == "radii":
@@ -32,36 +33,29 @@ class Limits(NamedTuple):
                 continue
             if name in ("box", "version"):
                 continue  # a name that was checked when it was given; of the algorithm
-            least, most = RANGES.get(name) or (1, getattr(self, name))
+            words, least, most = NAMES[name]
+            most = getattr(self, name) if most is None else most
             if not least <= value <= most:  # nor if it is NaN
                 raise InputError(
-                    f"{NAMES[name]} must lie between {least:g} and {most}, got {_told(value)}"
+                    f"{words} must lie between {least:g} and {most}, got {_told(value)}"
                 )
 
 
-# What else a link can name, and between which values the dynamics makes sense.
-RANGES = {
-    "mu": (0, 1000),
-    "seed": (0, 2**53 - 1),  # whole numbers that browsers know, too
-    "pressure": (1e-6, 1e6),
-    "dt": (0.01, 1),
-    "box_mass": (10, 10_000),
-    "sweeps": (1, 10_000),
-    "accuracy": (1e-6, 1),
-}
 SIZE_RATIO = 20  # largest over smallest radius that a distribution may name
 DISTRIBUTIONS = {"uniform": 2, "bidisperse": 3}  # of radii, and how many numbers they take
-NAMES = {
-    "n": "N",
-    "states": "the number of states",
-    "upload": "an upload's size in MB",
-    "mu": "the friction coefficient",
-    "seed": "a seed",
-    "pressure": "the pressure",
-    "dt": "the time step dt",
-    "box_mass": "the box mass",
-    "sweeps": "the number of sweeps",
-    "accuracy": "the accuracy of a step",
+# What is asked for in words, and between which values: up to the limit, or where the dynamics makes
+# sense.
+NAMES: dict[str, tuple[str, float, float | None]] = {
+    "n": ("N", 1, None),
+    "states": ("the number of states", 1, None),
+    "upload": ("an upload's size in MB", 1, None),
+    "mu": ("the friction coefficient", 0, 1000),
+    "seed": ("a seed", 0, MOST_SEED),
+    "pressure": ("the pressure", 1e-6, 1e6),
+    "dt": ("the time step dt", 0.01, 1),
+    "box_mass": ("the box mass", 10, 10_000),
+    "sweeps": ("the number of sweeps", 1, 10_000),
+    "accuracy": ("the accuracy of a step", 1e-6, 1),
 }
 
 

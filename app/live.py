@@ -60,7 +60,7 @@ class Compaction:
         with self._lock:
             self.run += 1
             self._kept: deque[Message] = deque()
-            self._total = 0
+            self.total = 0  # pictures kept since, those dropped included
             self._side, self._at = np.inf, -np.inf
 
     def add(self, glimpse: Any) -> None:
@@ -73,25 +73,20 @@ class Compaction:
         size = sum(value.nbytes for value in picture.values() if isinstance(value, np.ndarray))
         with self._lock:
             self._kept.append(picture)
-            self._total += 1
+            self.total += 1
             while len(self._kept) * size > PICTURE_BYTES and len(self._kept) > 1:
                 self._kept.popleft()
-
-    @property
-    def total(self) -> int:
-        """Pictures kept since it was begun, those dropped since included."""
-        return self._total
 
     def after(self, run: int, place: int) -> tuple[int, int, Message | None]:
         """(run, place, picture or None): the next picture for who has seen `place` of a run."""
         with self._lock:
             if run != self.run:
                 run, place = self.run, 0
-            left = self._total - place
+            left = self.total - place
             if left <= 0:
                 return run, place, None
-            place = max(place + (left - 1) // BEHIND, self._total - len(self._kept))
-            return run, place + 1, self._kept[place - self._total]
+            place = max(place + (left - 1) // BEHIND, self.total - len(self._kept))
+            return run, place + 1, self._kept[place - self.total]
 
 
 def _picture(glimpse: Any) -> Message:

@@ -22,6 +22,19 @@ WIDTHS = {
     "known": "what is known: length of the interval gone",
     "measured": "measured fₙ",
 }
+# What colours and widths show → key of the glossary.
+EXPLAINED = {
+    "mobilised": "mobilisation",
+    "extent": "extent",
+    "change": "change",
+    "sign": "sign",
+    "normal": "fn",
+    "difference": "difference",
+    "load": "limit_load",
+    "known": "gone",
+    "deviation": "deviation",
+    "measured": "measured",
+}
 SORTS = {
     "original": "fₙ as packed",
     "extent": "ΔFₙ of all networks",
@@ -53,30 +66,19 @@ PLANES = {
 SCALES = {"mean": "mean force = 1", "own": "force as packed = 1"}
 
 
-class Looks(param.Parameterized):
-    """How a page looks at what is on screen; rows and contacts are those of its Replay."""
+class Seen(param.Parameterized):
+    """Of how a page looks at what is on screen what its player knows, too; see Looks."""
 
     tab = param.String(default="intervals", doc="name of the visible tab; others compute nothing")
     wide = param.Boolean(doc="whether force space has a place of its own beside the packing")
     views = param.Integer(doc="how many views of tabs there are: what moves in them is drawn then")
     contact = param.Integer(default=None, allow_None=True, doc="selected: position in the backbone")
-    pair = param.Tuple(
-        default=None, length=2, allow_None=True,
-        doc="contacts whose normal forces span force space; None: two strong ones",
-    )  # fmt: skip
     frame = param.Integer(default=0, doc="row of `replay` on screen; told while it is at rest")
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
     predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
     beside = param.Number(
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
-    )
-    zoom = param.Tuple(
-        default=None, length=3, allow_None=True,
-        doc="middle and half width of what is seen, in largest radii; None: the whole packing",
-    )  # fmt: skip
-    between = param.Tuple(
-        default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
     )
     colour: Any = param.Selector(default="change", objects=list(COLOURS))
     thickness: Any = param.Selector(default="normal", objects=list(WIDTHS))
@@ -86,13 +88,29 @@ class Looks(param.Parameterized):
     )  # fmt: skip
     stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
+    scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
+
+
+class Looks(Seen):
+    """How a page looks at what is on screen; rows and contacts are those of its Replay."""
+
+    pair = param.Tuple(
+        default=None, length=2, allow_None=True,
+        doc="contacts whose normal forces span force space; None: two strong ones",
+    )  # fmt: skip
+    zoom = param.Tuple(
+        default=None, length=3, allow_None=True,
+        doc="middle and half width of what is seen, in largest radii; None: the whole packing",
+    )  # fmt: skip
+    between = param.Tuple(
+        default=None, length=2, allow_None=True, doc="rows of `replay` to go to and fro between"
+    )
     drawn: Any = param.Selector(
         default="some", objects=list(DRAWN), doc="of which contacts intervals are drawn"
     )
     sort: Any = param.Selector(
         default="original", objects=list(SORTS), doc="order of the intervals"
     )
-    scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
     figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
     axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
     pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")

@@ -1,13 +1,10 @@
 """What is in the cache: computations by name, time and size, to be opened or deleted."""
 
-import os
-import secrets
-import shutil
 from typing import Any
 
 from granforce.records import InputError
 from granforce.study.keys import Parameters, canonical
-from granforce.study.store import Entry, Store
+from granforce.study.store import Entry
 
 from .data import SOURCES, Library
 from .names import call, names
@@ -42,25 +39,12 @@ def delete(library: Library, name: str) -> None:
     entry = store.entry(name)
     if entry is None or entry.kind not in SOURCES:
         raise InputError("that computation is in the cache no more")
-    _retire(store, name)
+    store.remove(name)
     packing, others = canonical(_packing(entry)), store.entries()
     same = [other for other in others if canonical(_packing(other)) == packing]
     if not any(other.kind in SOURCES for other in same):
-        for other in same:
-            _retire(store, other.name)
+        store.remove(*(other.name for other in same))
     call(store, name, "")
-
-
-def _retire(store: Store, name: str) -> None:
-    """Remove an entry: renamed first, so that it vanishes as a whole."""
-    gone = store.path / f".tmp-{secrets.token_hex(4)}"
-    try:
-        os.rename(store.path / name, gone)
-    except FileNotFoundError:
-        return  # somebody else has done it
-    except OSError as error:
-        raise InputError(f"{name} cannot be deleted: {error.strerror}") from None
-    shutil.rmtree(gone, ignore_errors=True)
 
 
 def _packing(entry: Entry) -> Parameters:

@@ -1,7 +1,7 @@
 """A movie of what plays, as GIF: drawn here, small enough for slides."""
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -42,7 +42,13 @@ def gif(
     cancelled() ends it with Cancelled.
     """
     for part in FEWER:
-        images = _drawn(replay, look, int(SIDE * part), between, progress, cancelled)
+        images: list[Image.Image] = []
+        for image in _drawn(replay, look, int(SIDE * part), between):
+            if cancelled is not None and cancelled():
+                raise Cancelled("the movie was cancelled")
+            images.append(image)
+            if progress is not None:
+                progress(len(images), FRAMES)
         file = io.BytesIO()
         images[0].save(
             file, "GIF", save_all=True, append_images=images[1:], duration=FRAME_MS, loop=0
@@ -53,19 +59,11 @@ def gif(
 
 
 def _drawn(
-    replay: Replay,
-    look: Look,
-    side: int,
-    between: tuple[int, int] | None,
-    progress: Progress | None,
-    cancelled: Cancel | None,
-) -> list[Image.Image]:
+    replay: Replay, look: Look, side: int, between: tuple[int, int] | None
+) -> Iterator[Image.Image]:
     fine = side * FINER
     ground = _disks(replay, look, fine)
-    images: list[Image.Image] = []
     for k, (a, b, part) in enumerate(_moments(len(replay.normal), between)):
-        if cancelled is not None and cancelled():
-            raise Cancelled("the movie was cancelled")
         normal, tangential = (
             (1 - part) * values[a] + part * values[b]
             for values in (replay.normal, replay.tangential)
@@ -77,10 +75,7 @@ def _drawn(
         # One palette for all frames, or colours would flicker: of the first and all that may come.
         if k == 0:
             tones = _with_all_colours(small, look).quantize(TONES, dither=Image.Dither.NONE)
-        images.append(small.quantize(palette=tones, dither=Image.Dither.NONE))
-        if progress is not None:
-            progress(k + 1, FRAMES)
-    return images
+        yield small.quantize(palette=tones, dither=Image.Dither.NONE)
 
 
 def _with_all_colours(image: Image.Image, look: Look) -> Image.Image:
@@ -207,40 +202,36 @@ def shades(
     """
     low, high = (exact["low"], exact["high"]) if exact else (replay.low[:, 0], replay.high[:, 0])
     extent, first, pinned = high - low, replay.normal[0], replay.normal[reference]
-    mu, of = replay.summary["mu"], measured or {"off": np.zeros_like(first)}
-
-    def mobilised(normal: Floats, tangential: Floats) -> Floats:
-        limit = np.maximum(mu * normal, 1e-9)
-        return 0.5 + tangential / limit / 2 if mu > 0 else np.zeros_like(normal)
-
+    mu, of = replay.summary["mu"], measured or {}
+    neutral = (
+        (colour == "mobilised" and mu == 0)
+        or (colour == "known" and gone is None)
+        or (colour == "deviation" and not of)
+    )
     shade = {
-        "mobilised": mobilised,
+        "neutral": lambda normal, tangential: np.zeros_like(normal),
+        "mobilised": lambda normal, tangential: (
+            0.5 + tangential / np.maximum(mu * normal, 1e-9) / 2
+        ),
         "extent": lambda normal, tangential: extent / (most or 1.0),
         "change": lambda normal, tangential: 0.5 + (normal - first) / (2 * (full or FULL_CHANGE)),
         "sign": lambda normal, tangential: 0.5 + 0.5 * np.sign(normal - pinned),
         "load": lambda normal, tangential: (
             np.full_like(normal, 0.5) if loads is None else loads / (full or loads.max())
         ),
-        "known": lambda normal, tangential: (
-            np.zeros_like(normal) if gone is None else gone / np.maximum(gone + extent, 1e-6)
-        ),
+        "known": lambda normal, tangential: gone / np.maximum(gone + extent, 1e-6),
         "deviation": lambda normal, tangential: (
             0.5 + np.nan_to_num(of["off"]) / (2 * FULL_DEVIATION)
         ),
-    }[colour]
+    }["neutral" if neutral else colour]
     width = {
         "normal": lambda normal: normal,
         "extent": lambda normal: extent,
         "difference": lambda normal: np.abs(normal - pinned),
         "load": lambda normal: normal if loads is None else loads,
         "known": lambda normal: normal if gone is None else gone,
-        "measured": lambda normal: np.nan_to_num(of["normal"]) if measured else normal,
+        "measured": lambda normal: np.nan_to_num(of["normal"]) if of else normal,
     }[thickness]
-    neutral = (
-        (colour == "mobilised" and mu == 0)
-        or (colour == "known" and gone is None)
-        or (colour == "deviation" and not measured)
-    )
     tones = {"ground": "#121212", "disk": "#3b444f", "pale": "#22272d", "edge": "#55606e"}
     if not dark:
         tones = {"ground": "#ffffff", "disk": "#d0d8e2", "pale": "#eef1f5", "edge": "#a9b7c8"}

@@ -4,13 +4,11 @@ They are kept in a hidden file of the store's folder: {entry, or digest of an up
 """
 
 import json
-import os
-import secrets
 import threading
 from contextlib import suppress
 
-from granforce.records import InputError
 from granforce.study.store import Store
+from granforce.system.files import written
 
 NAMES = ".names.json"
 LONGEST = 80  # characters of a name
@@ -28,20 +26,15 @@ def names(store: Store) -> dict[str, str]:
 
 
 def call(store: Store, key: str, name: str) -> None:
-    """Give an entry, or the digest of an upload, a name; an empty one takes it away."""
+    """Give an entry, or the digest of an upload, a name; an empty one takes it away.
+
+    InputError where it cannot be kept.
+    """
     name = " ".join(name.split())[:LONGEST]
     with _lock:
         known = names(store)
         known.pop(key, None)
         if name:
             known[key] = name
-        _write(store, known)
-
-
-def _write(store: Store, known: dict[str, str]) -> None:
-    new = store.path / f".tmp-{secrets.token_hex(4)}"  # which the store cleans away if it stays
-    try:
-        new.write_text(json.dumps(known, ensure_ascii=False))
-        os.replace(new, store.path / NAMES)
-    except OSError as error:
-        raise InputError(f"no name can be kept in {store.path}: {error.strerror}") from None
+        with written(store.path / NAMES) as file:
+            file.write(json.dumps(known, ensure_ascii=False).encode())

@@ -138,13 +138,7 @@ def _small(document: Document, asked: scenes.Asked) -> Any:
         busy_indicator=None,
     )
     whole.param.watch(lambda event: view.param.update(dark=event.new), "dark_theme")
-    closed = garbage.opened()
-
-    def end(context: object) -> None:
-        task.close()
-        closed()
-
-    pn.state.on_session_destroyed(end)
+    _at_end(task.close)
     return whole
 
 
@@ -156,9 +150,9 @@ def _large(document: Document, query: str) -> Any:
     wide = {"sizing_mode": "stretch_width"}
     packing = PackingView(state)
     Stream(state, packing.player, document)
-    packing.player.on_wide = lambda wide: looks.param.update(wide=wide)
-    packing.player.on_hand, state.hand.tell = state.hand.heard, packing.player.hand_over
-    packing.player.on_known = state.knowledge.heard
+    hears, state.hand.tell = packing.player.hears, packing.player.tell
+    hears["wide"] = lambda wide: looks.param.update(wide=wide)
+    hears |= {"hand": state.hand.heard, "known": state.knowledge.heard}
     left = pn.Column(packing.player, **wide)
     middle = pn.Column(visible=False, css_classes=["in-plane"], styles=BESIDE, **wide)
     right, sidebar = pn.Column(styles=BESIDE, **wide), pn.Column()
@@ -204,7 +198,7 @@ def _large(document: Document, query: str) -> Any:
         right.extend([of_which(state), summary])
         tabs = Tabs(state)
         _pale_when_old([*tabs.pages.items(), ("summary", summary), ("plane", middle)])
-        packing.player.on_digit = tabs.choose
+        hears["tab"] = tabs.choose
         looks.param.watch(lambda event: work.piecewise(tabs.beside(middle)), "wide")
         yield
         right.append(tabs.tabs)
@@ -217,14 +211,19 @@ def _large(document: Document, query: str) -> Any:
     whole.param.watch(lambda event: looks.param.update(dark=event.new), "dark_theme")
     _poll_while_running(work, document)
     document.add_periodic_callback(partial(send_what_waits, document), WAITING_MS)
+    _at_end(work.close)
+    return whole
+
+
+def _at_end(close: Callable[[], object]) -> None:
+    """Count the page as open, and call this when it is closed."""
     closed = garbage.opened()
 
     def end(context: object) -> None:
-        work.close()
+        close()
         closed()
 
     pn.state.on_session_destroyed(end)
-    return whole
 
 
 def _turns(document: Document) -> Callable[[Callable[[], object]], None]:

@@ -22,7 +22,6 @@ from .limits import LIMITS
 
 DRAWS = 80  # for error bars on the page
 CERTAIN = 2.0  # standard errors above 0 from which on a contact is told to carry for certain
-ROLES = ("positions", "adjacency"), ("solved",)
 
 
 class Frame(NamedTuple):
@@ -84,7 +83,7 @@ def infer(
     def work(job: Job) -> Frame:
         LIMITS.check(mu=mu)
         job.begin("looking for forces that balance the disks, near the measured ones")
-        roles = next(roles for roles in ROLES if roles[0] in files)
+        roles = uploads.FAMILIES[uploads.family(files)][1]
         frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
         found = read_pegs(
             frames, frame=number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n

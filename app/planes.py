@@ -195,18 +195,12 @@ def inner_share(points: Floats, outline: npt.ArrayLike) -> float:
     return float(np.mean(np.all(turn * np.sign(slice_.sum()) >= 0, axis=1)))
 
 
-def hull(points: Floats) -> Floats:
-    """Corners of the convex hull of points (n, 2); all points where they lie on a line."""
+def area(points: npt.ArrayLike) -> float:
+    """Area of the convex hull of points (n, 2); 0 where they lie on a line."""
     try:
-        return points[ConvexHull(points).vertices]
+        return float(ConvexHull(points).volume)  # as it is called in any dimension
     except QhullError:
-        return points
-
-
-def area(polygon: npt.ArrayLike) -> float:
-    """Area of a convex polygon (k, 2); 0 for fewer than three corners."""
-    x, y = np.asarray(polygon, dtype=np.float64).T
-    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+        return 0.0
 
 
 def outline(

@@ -117,7 +117,7 @@ def _replay(
     packing: Packing, backbone: Integers, scale: float, frames: Any, **numbers: Any
 ) -> Replay:
     """The Replay of frames (F, N_c, 2), float32, the original network first."""
-    x = geometry.into_cell(packing)
+    x = packing.cell.wrapped(packing.x)
     return Replay(
         disks=geometry.disks(packing, x, backbone),
         links=geometry.links(packing, x, backbone),

@@ -47,6 +47,7 @@ def asked(query: str) -> Asked:
     a tab or the like, and are of large packings.
     """
     given = dict(parse_qsl(query.lstrip("?")))
+    named = "scene" in given
     name = given.pop("scene", MANY if given else FIRST)
     if name not in (*scenes.SCENES, OWN):
         name = FIRST
@@ -55,7 +56,7 @@ def asked(query: str) -> Asked:
     except (KeyError, InputError):
         mu = None
     step = int(given["tour"]) if re.fullmatch("[1-9]", given.get("tour", "")) else 0
-    if "scene" in dict(parse_qsl(query.lstrip("?"))):
+    if named:
         query = f"?{urlencode(given)}" if given else ""
     dark = given.get("dark") == "1"
     return Asked(name, mu, step, dark, given.get("built", "")[:LONGEST], query)

@@ -68,6 +68,11 @@ class Selection(NamedTuple):
             self.packing, self.states, self.seed, relax=self.relax, **common
         )
 
+    @property
+    def intervals(self) -> Parameters:
+        """Parameters of the exact intervals of its packing at its μ."""
+        return kinds.INTERVALS.parameters(self.packing, mu=self.mu)
+
     def check(self, limits: Limits) -> None:
         """InputError if it asks for more than these Limits allow."""
         limits.check(states=self.states, mu=self.mu, seed=self.seed)

@@ -4,6 +4,7 @@ import base64
 import json
 from collections.abc import Mapping
 from html import escape
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,11 @@ from .links import View
 from .replays import Replay, evenly
 from .views import explanation, still
 from .views.packing import exact_intervals, full_extent, legend
-from .views.player import SCALES, frames
-from .views.scripts import FOLDER, module
+from .views.player import Player, frames
+from .views.scripts import Scripted, module
 from .views.style import palettes
 
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
 
 PAGE = """<!doctype html>
@@ -59,64 +61,50 @@ def html(
     cell: Cell,
     replay: Replay,
     exact: xr.Dataset | None,
+    shown: Mapping[str, Any] = NOTHING,
     *,
     view: View,
     link: str,
     command: str,
     source: str,
     outlined: planes.Outlined | None = None,
-    loads: Floats | None = None,
-    gone: Floats | None = None,
-    measured: Mapping[str, Any] | None = None,
-    pins: Mapping[str, Any] | None = None,
 ) -> bytes:
     """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
 
-    exact: under what is known; gone, measured, pins: as the player has them.
+    exact: under what is known; shown: loads, gone, measured and pins, as the player has them.
     """
     intervals = exact_intervals(exact, replay)
-    shown, acceptance = thinned(replay)
-    plane = planes.principal(shown)
-    figures = still.figures(shown, exact, plane, outlined, view)
+    kept, acceptance = thinned(replay)
+    plane = planes.principal(kept)
+    figures = still.figures(library, kept, exact, plane, outlined, view)
     # In a document of their own: else Bokeh adds what a page that is served just then has its
     # browser do.
     bare = Document()
     for figure in figures:
         bare.add_root(figure)
     script, plots = components(figures)
-    frame = min(view["frame"], len(shown.normal) - 1)
+    frame = min(view["frame"], len(kept.normal) - 1)
     between = view["between"]
-    if len(shown.normal) < len(replay.normal):
+    if len(kept.normal) < len(replay.normal):
         frame, between = 0, None
     same = ("contact", "colour", "thickness", "full", "stretch", "overlay", "scale")
-    given = {name: view[name] for name in same}
+    own = set(Player.param) - set(Scripted.param)
+    given = {name: Player.param[name].default for name in own}
+    given |= {name: view[name] for name in same}
+    given |= shown
     given |= {
-        "walk": frames(shown) | {"acceptance": acceptance},
+        "walk": frames(kept) | {"acceptance": acceptance},
         "exact": intervals,
         "most": full_extent(replay, intervals, view["full"]),
         "palettes": palettes(False),
-        "scales": SCALES,
         "lead": explanation.first(replay.summary),
-        "legend": legend(still.Light(replay, exact, view, loads=loads)),  # type: ignore[arg-type]  # has what is asked of it
+        "legend": legend(still.at_rest(library, replay, exact, view, loads=given["loads"])),
         "source": source,
         "frame": frame,
         "between": between,
-        "reference": 0,
         "tab": "intervals",
-        "busy": False,
-        "live": False,
-        "asked": "",
-        "split": False,
-        "beside": None,
-        "twin": {},
-        "plane": {},
-        "displacement": None,
-        "loads": loads,
-        "gone": gone,
-        "measured": measured or {},
-        "pins": pins or {},
     }
-    left = len(replay.normal) - len(shown.normal)
+    left = len(replay.normal) - len(kept.normal)
     text = PAGE.format(
         title=escape(f"Force space: {source}"),
         bokeh=Resources(mode="inline", components=["bokeh"]).render(),
@@ -128,7 +116,7 @@ def html(
         left_out=f"{left} of the networks are left out, evenly, to keep this file small."
         if left
         else "",
-        style=_script((FOLDER / "player.css").read_text()),
+        style=_script("".join(Player._stylesheets)),
         given=_script({name: _plain(value) for name, value in given.items()}),
         code=module("standalone"),
     )

@@ -12,7 +12,7 @@ from granforce.records import InputError
 
 from . import known, perturbations
 from .beside import Beside
-from .data import Cell, Library, Shown, best_cell, nearest_cell, with_states
+from .data import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
 from .grabs import Hand
 from .jobs import Job, as_one
 from .known import Knowledge
@@ -25,7 +25,8 @@ from .selection import Selection, brief, command, link, read_link
 from .work import Work
 
 EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
-# What of Looks changes as it plays or is zoomed, not by a visitor's choice of what to see.
+# What of Looks changes as it plays or is zoomed, not by a visitor's choice of what to see: nobody
+# goes back to the frame before, to the view of a moment ago, or to the other theme.
 PASSING = ("frame", "zoom", "dark")
 PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
 
@@ -55,11 +56,11 @@ class AppState(param.Parameterized):
         self,
         library: Library,
         wake: Callable[[Callable[[], object]], object] | None = None,
-        query: str = "",
+        query: str | None = "",
     ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task.
 
-        query: of the address that opened the page.
+        query: of the address that opened the page; None: nothing is to be shown yet.
         """
         super().__init__()  # type: ignore[no-untyped-call]  # param says no types
         self.library, self.work = library, Work(wake)
@@ -79,7 +80,8 @@ class AppState(param.Parameterized):
         self.hand.param.watch(self._forget, "pulls")
         chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
         self.looks.param.watch(self._forget, chosen)
-        self.open(query)
+        if query is not None:
+            self.open(query)
 
     def _forget(self, *events: Any) -> None:
         self.work.message = ""
@@ -140,8 +142,8 @@ class AppState(param.Parameterized):
 
     def _ask(self, selection: Selection, at_once: bool) -> None:
         self.work.message = ""
-        found = best_cell(self.catalogue, selection)
-        if found is not None and found.selection.names(selection):
+        found = cell_of(self.catalogue, selection)
+        if found is not None:
             self.show(found)
             return
         try:

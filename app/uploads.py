@@ -201,12 +201,8 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
 
 def told(report: dict[str, Any]) -> list[tuple[str, str]]:
     """The report as rows (name, value) of texts for the page."""
-    rows = []
-    for label, name, form, unit in _ROWS:
-        value = report[name]
-        if value is not None:
-            rows.append((label, f"{value:{form}}{unit}"))
-    return rows
+    known = ((label, report[name], form, unit) for label, name, form, unit in _ROWS)
+    return [(label, f"{v:{form}}{unit}") for label, v, form, unit in known if v is not None]
 
 
 _ROWS = (

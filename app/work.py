@@ -109,7 +109,7 @@ class Work(param.Parameterized):
         """Compute exact intervals in the background; `arriving` has them as they are found."""
         self.message = ""
         self.computation.start(compute.exact(library, shown), done)
-        self.arriving = Arriving(compute.exact_parameters(shown.cell.selection))
+        self.arriving = Arriving(shown.cell.selection.intervals)
 
     def shown(self, selection: Selection) -> None:
         """These states are on screen: what is computed for others is waited for no more."""

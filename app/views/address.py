@@ -1,16 +1,13 @@
 """The page's address: a copy of it reopens the view, Back and Forward go through the views."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from ..links import VIEW
-from ..state import AppState
+from ..state import PASSING, AppState
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
-
-# Nobody goes back to the frame before, to the view of a moment ago, or to the other theme.
-PASSING = ("frame", "dark", "zoom")
+from .scripts import Scripted
 
 
 class Address(Scripted):
@@ -24,9 +21,6 @@ class Address(Scripted):
     passing = param.List(
         default=list(PASSING), doc="what changes the address but is not gone back to"
     )
-
-    _esm = module("address")
-    _stylesheets: ClassVar = [FOLDER / "address.css"]
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(**params)

@@ -3,6 +3,7 @@
 
 import { distance, dot } from "./body.js"
 import { Easel } from "./easel.js"
+import { circle, line } from "./pen.js"
 import { number } from "./saying.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
@@ -22,10 +23,7 @@ export class Arrows {
     this.easel = new Easel(root, ratio)
     this.hover = null
     this.held = null
-    const at = (event) => {
-      const box = root.getBoundingClientRect()
-      return [event.clientX - box.left, event.clientY - box.top]
-    }
+    const at = (event) => this.easel.at(event)
     root.addEventListener("pointermove", (event) => this.moved(...at(event)))
     root.addEventListener("pointerleave", () => { if (!this.held) { this.hover = null; told("hover", null) } })
     root.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
@@ -138,9 +136,7 @@ export class Arrows {
     const { context: g, look } = this
     g.strokeStyle = look.hand
     g.lineWidth = 2
-    g.beginPath()
-    for (const [dx, dy] of [[9, 0], [0, 9]]) { g.moveTo(x - dx, y - dy); g.lineTo(x + dx, y + dy) }
-    g.stroke()
+    for (const [dx, dy] of [[9, 0], [0, 9]]) line(g, [x - dx, y - dy], [x + dx, y + dy])
   }
 
   drawDisks() {
@@ -150,8 +146,7 @@ export class Arrows {
       for (const a of shifts) for (const b of shifts) {
         const [px, py] = this.px(x[2 * d] + a * box[0], x[2 * d + 1] + b * box[1]), R = r[d] * this.unit
         if (px < -R || py < -R || px > wide + R || py > high + R) continue
-        g.beginPath()
-        g.arc(px, py, R, 0, 7)
+        circle(g, [px, py], R)
         g.globalAlpha = a || b ? 0.3 : 1
         g.fillStyle = look.disk === d ? look.lit : look.fill
         g.fill()
@@ -229,8 +224,7 @@ export class Arrows {
     g.fill()
     if (mu < 0.01) { g.strokeStyle = look.coneLit; g.lineWidth = 1; g.stroke() }
     if (normal < 1e-9) {
-      g.beginPath()
-      g.arc(px, py, 4, 0, 7)
+      circle(g, [px, py], 4)
       g.strokeStyle = look.warm
       g.lineWidth = 1.5
       g.stroke()
@@ -261,11 +255,8 @@ export class Arrows {
     g.strokeStyle = g.fillStyle = colour
     g.lineWidth = thick
     g.lineCap = "butt"
-    g.beginPath()
     if (cut) g.setLineDash([8, 4])
-    g.moveTo(px, py)
-    g.lineTo(px + dx - head * 0.8 * ux, py + dy - head * 0.8 * uy)
-    g.stroke()
+    line(g, [px, py], [px + dx - head * 0.8 * ux, py + dy - head * 0.8 * uy])
     g.setLineDash([])
     g.beginPath()
     g.moveTo(px + dx, py + dy)

@@ -1,5 +1,6 @@
 // The player's buttons, sliders and numbers around the scene, and the keys that stand for them.
 
+import { made } from "./made.js"
 import { LEAST } from "./scene.js"
 
 const ICONS = {
@@ -35,6 +36,7 @@ function button(name, title, word = "") {
     `${icon(name)}${said}</button>`
 }
 
+// Around the scene, and over it tools that come and go with what is selected.
 const BUTTONS = `
   <div class="lead"></div>
   <div class="bar">
@@ -51,23 +53,25 @@ const BUTTONS = `
     <span>network <b class="state"></b></span>
     <span class="differs">forces changed by <b class="apart"></b> of the mean force</span>
     <span class="said"></span>
-  </div>`
-// Over the packing, as they come and go with what is selected.
-const TOOLS = `
-  ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
-  <span class="knowing">
-    ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
-    <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
-      <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
-  </span>`
-const VIEW = `
-  ${button("closer", "zoom in (wheel, pinch)")}
-  ${button("farther", "zoom out")}
-  ${button("whole", "the whole packing (double click)")}
-  ${button("full", "full screen")}`
-const CLOSER = 0.7 // of the view, by a button
-// What is closed until it is opened.
-const MORE = `<summary>More</summary>
+  </div>
+  <div class="scenes">
+    <div class="view">
+      ${button("closer", "zoom in (wheel, pinch)")}
+      ${button("farther", "zoom out")}
+      ${button("whole", "the whole packing (double click)")}
+      ${button("full", "full screen")}
+    </div>
+    <div class="bar tools">
+      ${button("undo", "the last pull (Z); Esc lets all go", "Undo")}
+      <span class="knowing">
+        ${button("hold", "the selected contact keeps its present force (H); again: let it go", "Hold")}
+        <label title="error bar of a force that is held, in mean forces; 0: held exactly">±
+          <input class="error" type="number" min="0" step="0.05" value="0" aria-label="error bar in mean forces"></label>
+      </span>
+    </div>
+  </div>
+  <div class="legend"></div>
+  <details class="extras"><summary>More</summary>
   <div class="game">Games:
     ${button("predict", "three questions, each asked before the page shows the answer", "Predict, then look")}
     ${button("differ", "two networks without colour: which lines differ most?", "Spot the difference")}
@@ -88,36 +92,19 @@ const MORE = `<summary>More</summary>
       <span tabindex="0" data-term="eta2">distance <b class="eta2"></b></span>
       <span tabindex="0" data-term="eta3">range <b class="eta3"></b></span>
     </span>
-  </div>`
+  </div>
+  <div class="skips" data-term="segment" tabindex="0"></div>
+  </details>`
+const CLOSER = 0.7 // of the view, by a button
 
 export class Buttons {
   /** actions: by the buttons' names; scrub(position); tab(number), for the digits. */
   constructor(scene, actions) {
-    this.root = document.createElement("div")
-    this.root.className = "stage"
-    this.root.innerHTML = BUTTONS
+    this.root = made("div", { className: "stage", innerHTML: BUTTONS })
     this.actions = actions
-    this.skips = document.createElement("div")
-    this.skips.className = "skips"
-    this.skips.dataset.term = "segment"
-    this.skips.tabIndex = 0
-    this.asked = scene.root.appendChild(document.createElement("div"))
-    this.asked.className = "asked"
-    this.scenes = document.createElement("div")
-    this.scenes.className = "scenes"
-    const view = document.createElement("div")
-    view.className = "view"
-    view.innerHTML = VIEW
-    const tools = document.createElement("div")
-    tools.className = "bar tools"
-    tools.innerHTML = TOOLS
-    this.scenes.append(scene.root, view, tools)
-    const legend = document.createElement("div"), more = document.createElement("details")
-    legend.className = "legend"
-    more.className = "extras"
-    more.innerHTML = MORE
-    more.append(this.skips)
-    this.root.append(this.scenes, legend, more)
+    this.asked = scene.root.appendChild(made("div", { className: "asked" }))
+    this.scenes = this.part("scenes")
+    this.scenes.prepend(scene.root)
     this.scene = scene
     const zoom = (factor) => () => scene.zoom(factor, scene.size / 2, scene.size / 2)
     const all = {
@@ -220,7 +207,7 @@ export class Buttons {
 
   count() {
     const { drawn, segments, outside, thin } = this.scene.counts
-    this.skips.textContent = `Drawn: ${drawn} of ${segments} force lines ` +
+    this.part("skips").textContent = `Drawn: ${drawn} of ${segments} force lines ` +
       `(${outside} out of view, ${thin} thinner than ${LEAST} px).`
   }
 

@@ -1,20 +1,15 @@
 """All contacts as a table, to be opened; it follows the network on screen, see contacts.js."""
 
-from typing import ClassVar
-
 import param
 
 from ..looks import Looks
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 
 class Contacts(Scripted):
     """Number, disks, forces and their bounds of each contact; sorted, searched and filtered."""
 
     dark = param.Boolean()
-
-    _esm = module("contacts")
-    _stylesheets: ClassVar = [FOLDER / "contacts.css"]
 
     def __init__(self, looks: Looks) -> None:
         super().__init__(sizing_mode="stretch_width", dark=looks.dark)

@@ -10,14 +10,14 @@ from granforce.records import InputError, friction
 from .. import studied
 from ..data import SOURCES
 from ..jobs import reading
-from ..limits import LIMITS, RANGES
+from ..limits import LIMITS, MOST_SEED
 from ..looks import COLOURS, WIDTHS
 from ..selection import KINDS, SOLVERS, Selection, differing, select, unusual
 from ..state import AppState
 from .copying import CopyButton
 from .friction import FrictionSlider
 from .number import NumberField
-from .parts import EXTRA, by_words, folded_away
+from .parts import EXTRA, by_words, folded_away, linked, question
 from .scenelist import SceneList
 from .select import Select
 
@@ -77,9 +77,10 @@ class Controls:
         self.beside = FrictionSlider(self._typed, on_narrow=True, **WIDE)
         self.beside.link(self.mu, mu="mu", bidirectional=True)
         self.mu.link(self.beside, stored="stored", hill="hill")
-        self.work.task(reading).start(lambda job: studied.hill(), self._draw)
+        draw = self.mu.param.update
+        self.work.task(reading).start(lambda job: studied.hill(), lambda hill: draw(hill=hill))
         self.n = self._number("Disks N", 3, LIMITS.n, 100)
-        self.seed = self._number("Seed", 0, RANGES["seed"][1])
+        self.seed = self._number("Seed", 0, MOST_SEED)
         self.packed = pmui.TextInput(label="Friction during packing", value=SAME, **SMALL)
         self.states = self._number("States", 1, LIMITS.states, 100)
         kinds = {name: label for name, label in KINDS.items() if name in SOURCES}
@@ -87,15 +88,16 @@ class Controls:
         self.relax = Select(label="Relaxation", options=by_words(SOLVERS), **FIELD)
         self.series = Select(label="Precomputed results", **FIELD)
         self.go = pmui.Button(label="Compute", color="primary", visible=False, **WIDE)
-        self.colour = Select(label="Colour", options=by_words(COLOURS), **FIELD)
-        self.thickness = Select(label="Width", options=by_words(WIDTHS), **FIELD)
+        self.colour = question("Colour", COLOURS, self.looks, "colour", **FIELD)
+        self.thickness = question("Width", WIDTHS, self.looks, "thickness", **FIELD)
         self.full = pmui.TextInput(
             label="Full colour, in mean forces", placeholder="by itself", **SMALL
         )
         self.stretch = pmui.TextInput(label="Width, times", **SMALL)
-        self.overlay = pmui.Switch(
+        marks = pmui.Switch(
             label="Strong and undetermined contacts", value=self.looks.overlay, margin=(2, 10)
         )
+        self.overlay = linked(marks, self.looks, "overlay")
         self.error = pmui.Alert(
             severity="error", variant="filled", visible=False, closeable=True, margin=0,
             stylesheets=[AT_EDGE],
@@ -156,19 +158,12 @@ class Controls:
             widget.param.watch(lambda event: self._ask(), "value")
         self.series.param.watch(self._choose, "value")
         self.go.on_click(lambda event: state.compute())
-        for name in ("colour", "thickness", "overlay"):
-            widget = getattr(self, name)
-            widget.param.watch(
-                lambda event, name=name: looks.param.update({name: event.new}), "value"
-            )
         self.full.param.watch(self._scale, "value")
         self.stretch.param.watch(self._scale, "value")
         state.param.watch(self._follow, ["selection", "missing", "catalogue", "cell"])
         state.param.watch(self._look, "measured")
         state.knowledge.param.watch(self._look, "known")
-        looks.param.watch(
-            self._look, ["colour", "thickness", "full", "stretch", "overlay", "reference"]
-        )
+        looks.param.watch(self._look, ["colour", "thickness", "full", "stretch", "reference"])
         state.param.watch(self._command, ["selection", "missing", "replay"])
         state.knowledge.param.watch(self._command, "known")
         self._command()
@@ -176,9 +171,6 @@ class Controls:
         self.error.param.watch(self._read, "closed")
         self.work.computation.param.watch(self._rest, "running")
         self._tell()
-
-    def _draw(self, hill: list[tuple[float, float]]) -> None:
-        self.mu.hill = hill
 
     # From the widgets
 
@@ -274,8 +266,6 @@ class Controls:
     def _look(self, *events: Any) -> None:
         for name, labels in (("colour", COLOURS), ("thickness", WIDTHS)):
             getattr(self, name).options = by_words(meaningful(self.state, labels, name))
-        for name in ("colour", "thickness", "overlay"):
-            getattr(self, name).value = getattr(self.looks, name)
         full = self.looks.full
         self.full.value = "" if full is None else f"{full:g}"
         self.stretch.value = f"{self.looks.stretch:g}"

@@ -1,25 +1,23 @@
 // A button that copies a text, or the address of the page, and says so for a moment.
 
+import { button, made } from "./made.js"
+
 export function render({ model }) {
-  const button = document.createElement("button")
-  button.type = "button"
-  const tell = (text) => { button.textContent = text }
+  const tell = (text) => { root.textContent = text }
   // Browsers offer a clipboard to pages of this machine and of https only.
   async function copy(text) {
     if (navigator.clipboard) return navigator.clipboard.writeText(text)
-    const area = document.createElement("textarea")
-    area.value = text
+    const area = made("textarea", { value: text })
     document.body.append(area)
     area.select()
     document.execCommand("copy")
     area.remove()
   }
-  button.addEventListener("click", async () => {
+  const root = button(model.label, async () => {
     await copy(model.text || window.location.href)
     tell("copied ✓")
     setTimeout(() => tell(model.label), 1500)
-  })
+  }, { className: "soft" })
   model.on("label", () => tell(model.label))
-  tell(model.label)
-  return button
+  return root
 }

@@ -25,7 +25,7 @@ export class Difference {
     this.on = true
     this.found.clear()
     model.split = true
-    this.dress()
+    this.player.dress(true)
     this.tell(`Two force networks in the same disks. Click the ${this.wanted.size} lines that differ most.`)
   }
 
@@ -57,7 +57,7 @@ export class Difference {
     const was = this.on
     this.on = false
     this.tell(words)
-    if (was) this.dress()
+    if (was) this.player.dress(false)
   }
 
   tell(words) {
@@ -67,22 +67,13 @@ export class Difference {
     this.player.buttons.root.classList.toggle("quizzed", this.on) // what is under the pointer would tell
   }
 
-  /** Both networks without colour, or as they were. */
-  dress() {
-    const { player } = this
-    player.look.plain = this.on
-    player.again()
-  }
-
   draw(context, scene) {
     if (!this.on || !this.found.size) return
     const { geometry, palette, scale } = scene, size = RING * Math.max(...geometry.radius)
     context.strokeStyle = palette.known
     context.lineWidth = 4 / scale
     context.beginPath()
-    for (let k = 0; k < geometry.contact.length; k++) {
-      if (!this.found.has(geometry.contact[k])) continue
-      const [xa, ya, xb, yb] = scene.ends(k), x = (xa + xb) / 2, y = (ya + yb) / 2
+    for (const { middle: [x, y] } of scene.segments((contact) => this.found.has(contact))) {
       context.moveTo(x + size, y)
       context.arc(x, y, size, 0, 2 * Math.PI)
     }

@@ -1,12 +1,12 @@
 """A place to drop files on; their content stays in memory and is handed over when all are there."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 NAME_LENGTH = 120  # of a file's name, as shown in messages
 MOST_FILES = 16  # of one drop; a packing has two at most
@@ -21,8 +21,6 @@ class Dropper(Scripted):
     label = param.String()
     most = param.Integer(doc="bytes of all files of one drop together")
 
-    _esm = module("dropper")
-    _stylesheets: ClassVar = [FOLDER / "dropper.css"]
     _files: Any  # {name: content}; None once the drop was refused
 
     def __init__(

@@ -14,6 +14,12 @@ export class Easel {
   /** Size in CSS pixels; to be asked for once a frame, before it, as the answer may need a layout. */
   measure() { ({ clientWidth: this.wide, clientHeight: this.high } = this.canvas) }
 
+  /** Where an event is on it. */
+  at(event) {
+    const box = this.canvas.getBoundingClientRect()
+    return [event.clientX - box.left, event.clientY - box.top]
+  }
+
   /** A frame with what stands still; that is painted by `paint` where a value of `key` is another one. */
   begin(paper, key, paint) {
     const { ratio } = this, size = [this.wide, this.high].map((v) => Math.max(1, Math.round(v * ratio)))

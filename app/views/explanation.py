@@ -1,27 +1,18 @@
 """What the picture shows, in sentences with the numbers of the packing on screen."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-import param
 
 from ..live import Summary
 from ..replays import Replay
 from ..selection import Selection
 from ..state import AppState
+from .foldout import Foldout
 from .hints import term
-from .scripts import Scripted, module
 
 QUESTION = "What am I seeing? Why more than one force network?"
 PULL, CLICK = ", or drag a line", ", or click a line to push there"
-STYLE = """
-:host { display: block; }
-details[hidden] { display: none; }
-p { margin: 6px 0; font-size: 13.5px; line-height: 1.5; max-width: 68ch; }
-summary { cursor: pointer; font-size: 13.5px; font-weight: 600; padding: 4px 0; }
-summary:focus-visible, .term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
-.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
-"""
 
 
 def lead(state: AppState) -> str:
@@ -122,17 +113,6 @@ def jamming(selection: Selection) -> str:
 def more(replay: Replay) -> str:
     """The longer part, to be opened, as HTML for a page without scripts of its own."""
     return f"<details><summary>{QUESTION}</summary>{rest(replay)}</details>"
-
-
-class Foldout(Scripted):
-    """Sentences under a line that opens them; what was opened stays open, see foldout.js."""
-
-    line = param.String()
-    inside = param.String(doc="HTML; empty where there is nothing to say")
-    open = param.Boolean()
-
-    _esm = module("foldout")
-    _stylesheets: ClassVar = [STYLE]
 
 
 def view(state: AppState) -> Foldout:

@@ -46,7 +46,7 @@ LONG = ("netcdf", "zarr", "gif", "html")  # with progress
 class View:
     """Buttons; a file is made, off the event loop, when it is asked for."""
 
-    name, title = "export", "Export"
+    name = "export"
 
     def __init__(self, state: AppState) -> None:
         self.state = state
@@ -76,29 +76,42 @@ class View:
         name = stem(state.cell.selection)
         if key in DRAWN:
             self.buttons.hand_over_picture(f"{name}.{key}", caption(state))
-        elif key in LONG:
-            self.making.start(self._long(key, name), self.buttons.hand_over)
-        else:
-            self.task.start(self._making(key, name), self.buttons.hand_over)
+            return
+        task = self.making if key in LONG else self.task
+        task.start(self._work(key, name), self.buttons.hand_over)
 
     def _rest(self, event: Any) -> None:
         """What failed or was cancelled brings no file: its button rests, too."""
         if not event.new:
             self.buttons.rest()
 
-    def _long(self, key: str, stem: str) -> Callable[[Job], exports.File]:
-        """Work that makes a file that takes a while: all states, a movie, the page."""
+    def _work(self, key: str, stem: str) -> Callable[[Job], exports.File]:
+        """Work that makes a file of what is on screen now."""
         state = self.state
         library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
-        possible = state.possible
-        loads, given, known = state.loads, gone(state.knowledge, replay), pins(state.knowledge)
-        seen = measured(state, replay)
-        view = state.view
-        source = " ".join([origin(cell), *known_words(state)])
-        told = {"link": state.link(), "command": state.command, "source": source}
-        legend = {name: caption(state)[name] for name in ("ink", "bar", "lines")}
+        possible, known = state.possible, state.knowledge
+        drawn: dict[str, Any] = {"loads": state.loads, "gone": gone(known, replay)}
+        drawn["measured"] = measured(state, replay)
+        shown = drawn | {"pins": pins(known)}
+        view, link, command, held = state.view, state.link(), state.command, state.hand.held
+        told, source = caption(state), " ".join([origin(cell), *known_words(state)])
+        frame = min(state.looks.frame, len(replay.normal) - 1)
 
         def work(job: Job) -> exports.File:
+            job.begin("making the file")
+            if key == "csv":
+                columns = exports.contacts(replay, exact, frame, held)
+                head = exports.explained(
+                    columns, replay, origin(cell), exports.on_screen(replay, frame, held)
+                )
+                content = exports.csv(columns, head)
+                return exports.File(f"{stem}.csv", "text/csv", content)
+            if key == "json":
+                content = exports.parameters(cell, link, view)
+                return exports.File(f"{stem}.json", "application/json", content)
+            if key == "npz":
+                content = exports.npz(library.packing(cell.params["packing"]))
+                return exports.File(f"{stem}.npz", "application/zip", content)
             if key in ("netcdf", "zarr"):
                 states = all_states(library, cell, job)
                 job.begin("making the file")
@@ -111,60 +124,23 @@ class View:
                 bounds = exact_intervals(possible, replay)
                 most = full_extent(replay, bounds, view["full"])
                 names = ("colour", "thickness", "reference", "dark", "full", "stretch")
-                look = movies.shades(
-                    replay, bounds, palettes(view["dark"]), loads=loads, gone=given, measured=seen,
-                    most=most, **{name: view[name] for name in names},
-                )  # fmt: skip
+                looks = {name: view[name] for name in names} | {"most": most} | drawn
+                look = movies.shades(replay, bounds, palettes(view["dark"]), **looks)
                 content = movies.gif(
-                    replay, look | legend, between=view["between"], progress=job.tell,
+                    replay, look | told, between=view["between"], progress=job.tell,
                     cancelled=job.cancelled,
                 )  # fmt: skip
                 return exports.File(f"{stem}.gif", "image/gif", content)
             outlined = None
             if replay.summary["dimension"] > 0:
-                shown = standalone.thinned(replay)[0]
-                plane = planes.principal(shown)
-                outlined = planes.outline(library, cell, shown, plane)(job)
+                kept = standalone.thinned(replay)[0]
+                outlined = planes.outline(library, cell, kept, planes.principal(kept))(job)
             job.begin("making the page")
             content = standalone.html(
-                library,
-                cell,
-                replay,
-                possible,
-                loads=loads,
-                gone=given,
-                measured=seen,
-                pins=known,
-                view=view,
-                outlined=outlined,
-                **told,
-            )
+                library, cell, replay, possible, shown, view=view, outlined=outlined, link=link,
+                command=command, source=source,
+            )  # fmt: skip
             return exports.File(f"{stem}.html", "text/html", content)
-
-        return work
-
-    def _making(self, key: str, stem: str) -> Callable[[Job], exports.File]:
-        """Work that makes a file of what is on screen now."""
-        state = self.state
-        library, cell, replay, exact = state.library, state.cell, state.replay, state.exact
-        frame = min(state.looks.frame, len(replay.normal) - 1)
-        source, held = origin(cell), state.hand.held
-        link, view = state.link(), state.view
-
-        def work(job: Job) -> exports.File:
-            job.begin("making the file")
-            if key == "csv":
-                columns = exports.contacts(replay, exact, frame, held)
-                head = exports.explained(
-                    columns, replay, source, exports.on_screen(replay, frame, held)
-                )
-                content = exports.csv(columns, head)
-                return exports.File(f"{stem}.csv", "text/csv", content)
-            if key == "json":
-                content = exports.parameters(cell, link, view)
-                return exports.File(f"{stem}.json", "application/json", content)
-            packing = library.packing(cell.params["packing"])
-            return exports.File(f"{stem}.npz", "application/zip", exports.npz(packing))
 
         return work
 

@@ -1,6 +1,8 @@
 // Packing and plots on screen as one figure in a chosen width: all of it lines and letters but for the small marks
 // of legends, which Bokeh draws as pixels.
 
+import { print } from "./save.js"
+
 const SIDE_BY_SIDE_MM = 120 // from this width on the plots are beside the packing, else below it
 const COLUMN = 900 // units across the packing or a plot; so wide is its picture, see sheet.js
 const SPACE = 24 // units between them
@@ -44,14 +46,6 @@ export function composed(packing, plots, width, ground) {
 
 /** Print a figure alone, on a sheet of its own size: saved as PDF there, it stays lines and letters. */
 export function printFigure({ text, height }, width) {
-  const sheet = document.createElement("iframe")
-  sheet.title = "The figure, to be printed"
-  sheet.style.cssText = "position: fixed; width: 0; height: 0; border: 0"
-  sheet.srcdoc = `<!doctype html><meta charset="utf-8"><title>Figure</title><style>
-    @page { size: ${width}mm ${height}mm; margin: 0 } body { margin: 0 } svg { display: block }</style>${text}`
-  sheet.addEventListener("load", () => {
-    sheet.contentWindow.addEventListener("afterprint", () => sheet.remove())
-    sheet.contentWindow.print()
-  })
-  document.body.append(sheet)
+  print("The figure, to be printed", `<!doctype html><meta charset="utf-8"><title>Figure</title><style>
+    @page { size: ${width}mm ${height}mm; margin: 0 } body { margin: 0 } svg { display: block }</style>${text}`)
 }

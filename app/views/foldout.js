@@ -1,8 +1,10 @@
 // Sentences under a line that opens them: told anew as they change, and what was opened stays open.
 
+import { made } from "./made.js"
+
 export function render({ model }) {
   const more = document.createElement("details"), inside = document.createElement("div")
-  more.append(Object.assign(document.createElement("summary"), { textContent: model.line }), inside)
+  more.append(made("summary", { textContent: model.line }), inside)
   const tell = () => {
     inside.innerHTML = model.inside
     more.hidden = !model.inside

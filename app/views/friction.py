@@ -1,13 +1,13 @@
 """Slider for the friction coefficient."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from ..data import LEAST_PLACE
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
 
@@ -22,15 +22,11 @@ class FrictionSlider(Scripted):
     most = param.Number(default=MOST_PLACE, constant=True)
     on_narrow = param.Boolean(doc="whether it is for narrow pages, else for all others")
 
-    _esm = module("friction")
-    _stylesheets: ClassVar = [FOLDER / "friction.css"]
-
-    def __init__(self, on_typed: Callable[[str], object] | None = None, **params: Any) -> None:
+    def __init__(self, on_typed: Callable[[str], object], **params: Any) -> None:
         """on_typed(text): what to do with a value that was typed, sensible or not."""
         super().__init__(**params)
         self._on_typed = on_typed
 
     def _heard(self, message: Message) -> None:
-        if self._on_typed is not None:
-            self._on_typed(message["typed"])
-            self.tell({"settled": True})
+        self._on_typed(message["typed"])
+        self.tell({"settled": True})

@@ -1,14 +1,13 @@
 // Where the server is gone, that is said; when there is one again, the page opens anew with its
 // address, which holds the view.
 
+import { made } from "./made.js"
+
 const RETRY_MS = 1000 // how often a server that is gone is asked for
 
 /** The banner that says so; still: what goes on meanwhile. */
 export function goneBanner(view, still) {
-  const banner = document.createElement("div")
-  banner.className = "gone"
-  banner.setAttribute("role", "alert")
-  banner.hidden = true
+  const banner = made("div", { className: "gone", role: "alert", hidden: true })
   let lost = false
 
   function gone() {

@@ -3,8 +3,10 @@
 // too. Let go, and it stays: the next pull starts there.
 
 import { CARRYING } from "./look.js"
+import { circle, line } from "./pen.js"
 import { plain } from "./plain.js"
 import { PointHand } from "./point.js"
+import { between } from "./replay.js"
 
 const RAIL = 190 // px, the longest
 const EDGE = 14 // px between a rail and the edge of the picture
@@ -207,10 +209,7 @@ export class Grab {
     while (k < values.length - 2 && values[k + 1] < this.value) k++
     const part = (this.value - values[k]) / (values[k + 1] - values[k] || 1)
     const held = { normal: new Float32Array(size), tangential: new Float32Array(size) }
-    for (const name of ["normal", "tangential"]) {
-      const out = held[name], all = rail[name], a = k * size, b = a + size
-      for (let c = 0; c < size; c++) out[c] = (1 - part) * all[a + c] + part * all[b + c]
-    }
+    for (const [name, out] of Object.entries(held)) between(rail[name], k, k + 1, part, out)
     held.residual = Math.max(rail.residual[k], rail.residual[k + 1])
     this.describe(this.contact, this.value)
     this.show(held)
@@ -321,9 +320,13 @@ export class Grab {
     if (this.rail) {
       const [bottom, top] = this.ends(), { lower, upper } = this.rail
       const at = bottom - ((this.value - lower) / (upper - lower || 1)) * (bottom - top)
-      this.line(context, 9, palette.halo, [[x, bottom], [x, top]])
-      this.line(context, 3, palette.selected, [[x, bottom], [x, top]])
-      for (const end of [bottom, top, y]) this.line(context, 2, palette.selected, [[x - 7, end], [x + 7, end]])
+      for (const [width, colour] of [[9, palette.halo], [3, palette.selected]]) {
+        context.lineWidth = width
+        context.strokeStyle = colour
+        line(context, [x, bottom], [x, top])
+      }
+      context.lineWidth = 2
+      for (const end of [bottom, top, y]) line(context, [x - 7, end], [x + 7, end])
       context.font = "12px sans-serif"
       context.textBaseline = "middle"
       const side = x > scene.size - 70 ? -1 : 1
@@ -335,36 +338,19 @@ export class Grab {
         context.strokeText(value.toFixed(2), x + 16 * side, py)
         context.fillText(value.toFixed(2), x + 16 * side, py)
       }
-      context.beginPath()
-      context.arc(x, at, 8, 0, 2 * Math.PI)
+      circle(context, [x, at], 8)
       context.fill()
-      context.lineWidth = 2
-      context.stroke()
-    } else {
-      context.lineWidth = 2
-      context.beginPath()
-      context.arc(x, y, 8, 0, 2 * Math.PI)
-      context.stroke()
-    }
-  }
-
-  line(context, width, colour, [[xa, ya], [xb, yb]]) {
-    context.lineWidth = width
-    context.strokeStyle = colour
-    context.beginPath()
-    context.moveTo(xa, ya)
-    context.lineTo(xb, yb)
+    } else circle(context, [x, y], 8)
+    context.lineWidth = 2
     context.stroke()
   }
 
   /** Contacts at a limit: open ones ring-shaped, sliding ones as squares. */
   drawHolding(context, scene, contacts, opened) {
     if (!contacts.length) return
-    const chosen = new Set(contacts), { geometry, scale, palette } = scene, r = 4.5 / scale
+    const chosen = new Set(contacts), { scale, palette } = scene, r = 4.5 / scale
     context.beginPath()
-    for (let k = 0; k < geometry.contact.length; k++) {
-      if (!chosen.has(geometry.contact[k])) continue
-      const [xa, ya, xb, yb] = scene.ends(k), x = (xa + xb) / 2, y = (ya + yb) / 2
+    for (const { middle: [x, y] } of scene.segments((contact) => chosen.has(contact))) {
       if (opened) { context.moveTo(x + r, y); context.arc(x, y, r, 0, 2 * Math.PI) }
       else context.rect(x - r / 2, y - r / 2, r, r)
     }

@@ -2,7 +2,9 @@
 
 import { ask } from "./ask.js"
 import { composed, plotsSeen, printFigure } from "./figure.js"
+import { button, made } from "./made.js"
 import { plain } from "./plain.js"
+import { save } from "./save.js"
 
 const RATE = 6e6 // bits a second of a movie
 const LONGEST_MS = 60000 // of a movie
@@ -17,34 +19,21 @@ export function render({ model, view }) {
   const deep = (given) => (given instanceof Map || given?.constructor === Object
     ? Object.fromEntries(Object.entries(plain(given)).map(([name, part]) => [name, deep(part)])) : given)
 
-  function button(key, words) {
-    const made = document.createElement("button")
-    made.type = "button"
-    made.textContent = words
-    made.dataset.key = key
-    made.addEventListener("click", () => {
-      made.classList.add("busy")
-      ask(model, view, { key })
-    })
-    return made
+  function offered(key, words) {
+    const act = (it) => { it.classList.add("busy"); ask(model, view, { key }) }
+    const it = button(words, act, { className: "soft" })
+    it.dataset.key = key
+    return it
   }
 
   function offer() {
     root.replaceChildren()
     for (const [heading, files] of Object.entries(plain(model.files))) {
       const group = document.createElement("section")
-      if (heading) group.append(Object.assign(document.createElement("h4"), { textContent: heading }))
-      for (const [key, words] of Object.entries(plain(files))) group.append(button(key, words))
+      if (heading) group.append(made("h4", { textContent: heading }))
+      for (const [key, words] of Object.entries(plain(files))) group.append(offered(key, words))
       root.append(group)
     }
-  }
-
-  function save(blob, name) {
-    const link = document.createElement("a")
-    link.href = URL.createObjectURL(blob)
-    link.download = name
-    link.click()
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000)
   }
 
   const player = () => view.model.document.get_model_by_name("player").player
@@ -58,9 +47,7 @@ export function render({ model, view }) {
   async function recorded(caption, button) {
     const it = player(), { scene } = it, layers = [scene.disks, scene.chains, scene.marks]
     const { position } = it.replay, told = await imageOf(drawn(caption)), height = told.naturalHeight - SIDE
-    const canvas = document.createElement("canvas")
-    canvas.width = SIDE
-    canvas.height = (SIDE + height) & ~1
+    const canvas = made("canvas", { width: SIDE, height: (SIDE + height) & ~1 })
     const context = canvas.getContext("2d"), pieces = []
     const stream = canvas.captureStream(30)
     const recorder = new MediaRecorder(stream, { mimeType: "video/webm", videoBitsPerSecond: RATE })
@@ -112,9 +99,8 @@ export function render({ model, view }) {
   }
 
   async function rendered(svg) {
-    const image = await imageOf(svg), canvas = document.createElement("canvas")
-    canvas.width = SCALE * image.naturalWidth
-    canvas.height = SCALE * image.naturalHeight
+    const image = await imageOf(svg)
+    const canvas = made("canvas", { width: SCALE * image.naturalWidth, height: SCALE * image.naturalHeight })
     canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height)
     return new Promise((resolve) => canvas.toBlob(resolve, "image/png"))
   }

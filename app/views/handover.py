@@ -1,13 +1,13 @@
 """Buttons that hand files over: made when asked for, saved by the browser."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from ..exports import File
 from .messages import Message
-from .scripts import Scripted, module
+from .scripts import Scripted
 
 
 class Handover(Scripted):
@@ -17,26 +17,6 @@ class Handover(Scripted):
     """
 
     files = param.Dict(default={}, doc="{heading: {key: words}}")
-
-    _esm = module("handover")
-    _stylesheets: ClassVar = [
-        """
-        :host { display: block; }
-        section { display: flex; flex-wrap: wrap; gap: 6px; margin-bottom: 14px; }
-        h4 {
-          flex: 1 0 100%; margin: 0; font-size: 12px; font-weight: 400; letter-spacing: 0.08em;
-          text-transform: uppercase;
-        }
-        button {
-          padding: 7px 12px; border-radius: 5px; background: transparent; font: inherit;
-          font-size: 13px; color: inherit; border: 1px solid rgba(128, 128, 128, 0.5);
-          cursor: pointer;
-        }
-        button:hover { background: rgba(128, 128, 128, 0.15); }
-        button:focus-visible { outline: 2px solid #e8710a; }
-        button.busy { opacity: 0.5; }
-        """
-    ]
 
     def __init__(self, on_ask: Callable[[str], object], **params: Any) -> None:
         super().__init__(**params)

@@ -1,6 +1,7 @@
 // The glossary where its words stand. Marked are elements with data-term; of widgets the words of
 // their label and of the option chosen are looked up.
 
+import { made } from "./made.js"
 import { plain } from "./plain.js"
 
 const WAIT_MS = 250 // before a hint opens under a resting pointer
@@ -10,10 +11,7 @@ const DEEP = 14 // levels above the pointer that may hold the word
 
 export function render({ model }) {
   const terms = plain(model.terms), labels = plain(model.labels)
-  const tip = document.createElement("div")
-  tip.className = "hint"
-  tip.hidden = true
-  tip.setAttribute("role", "tooltip")
+  const tip = made("div", { className: "hint", role: "tooltip", hidden: true })
   let waiting = 0, at = null
 
   const words = (node, part) => node?.querySelector(part)?.textContent.trim()
@@ -58,7 +56,7 @@ export function render({ model }) {
     at = node
     tip.replaceChildren(...keys.filter((key) => terms[key]).map((key) => {
       const [title, sentence] = plain(terms[key]), row = document.createElement("p")
-      row.append(Object.assign(document.createElement("b"), { textContent: title }), ` ${sentence}`)
+      row.append(made("b", { textContent: title }), ` ${sentence}`)
       return row
     }))
     if (!node.ariaDescription) node.setAttribute("aria-description", tip.textContent)

@@ -1,13 +1,13 @@
 """What a word on the page means: told where it stands, on hover, focus and touch."""
 
 from html import escape
-from typing import ClassVar
 
 import param
 
 from granforce.glossary import TERMS, title
 
-from .scripts import FOLDER, Scripted, module
+from ..looks import COLOURS, EXPLAINED, WIDTHS
+from .scripts import Scripted
 
 # Words on the page that are not the glossary's own: what stands there → key of the glossary.
 LABELS = {
@@ -19,15 +19,8 @@ LABELS = {
     "States from": "s",
     "Relaxation": "accelerated",
     "Precomputed results": "store",
-    "what is known: part of the interval gone": "gone",
-    "what is known: length of the interval gone": "gone",
-    "inferred less measured fₙ, in σ": "deviation",
     "Colour": "mobilisation",
     "Width": "fn",
-    "mobilisation fₜ/(μ fₙ)": "mobilisation",
-    "length of the interval ΔFₙ": "extent",
-    "ΔFₙ": "extent",
-    "normal force fₙ": "fn",
     "Strong and undetermined contacts": "overlay",
     "fₙ as packed": "original",
     "ΔFₙ of all networks": "seen",
@@ -53,9 +46,7 @@ LABELS = {
     "Push": "push",
     "Force space": "s",
     "How far?": "exact",
-    "limit load": "limit_load",
-    "what limit loads are": "limit_load",
-}
+} | {words: EXPLAINED[key] for shown in (COLOURS, WIDTHS) for key, words in shown.items()}
 
 
 def labels() -> dict[str, str]:
@@ -74,6 +65,3 @@ class Hints(Scripted):
 
     terms = param.Dict(default={key: [title(key), t.sentence] for key, t in TERMS.items()})
     labels = param.Dict(default=labels())
-
-    _esm = module("hints")
-    _stylesheets: ClassVar = [FOLDER / "hints.css"]

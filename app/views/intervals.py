@@ -19,7 +19,7 @@ from .contacts import Contacts
 from .hints import term
 from .known import Known
 from .packing import Bounds, exact_intervals
-from .parts import MOVES, figure, folded_away, note, question
+from .parts import MOVES, OUTLINED, TabView, figure, folded_away, note, plotted, question
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
@@ -59,13 +59,13 @@ Click a bar to find its contact in the packing.
 </details>"""
 
 
-class View:
+class View(TabView):
     """One bar a contact, growing as the states go by; the player rewrites low, high and now."""
 
-    name, title = "intervals", "Intervals"
+    name = "intervals"
 
     def __init__(self, state: AppState) -> None:
-        self.state, self.looks = state, state.looks
+        super().__init__(state, "seen", "exact", looks=["drawn", "sort", "scale", "contact"])
         self.bars = _source("bars", BARS)
         self.growth = _source("growth", ("state", *ETAS))
         self.chosen = _source("chosen", ("rank", "low", "high"))
@@ -76,34 +76,28 @@ class View:
         ]
         self.figure, self.growth_figure = self._bars_figure(), self._growth_figure()
         self.contacts = np.array([], dtype=int)
+        self._grown: Replay | None = None  # whose growth is drawn
         self.choices = [
             question("Contacts", DRAWN, self.looks, "drawn", **SMALL),
             question("Sorted by", SORTS, self.looks, "sort", **SMALL),
             question("Scale", SCALES, self.looks, "scale", **SMALL),
         ]
-        self.exact = pmui.Button(
-            label="Compute exact intervals",
-            variant="outlined",
-            color="default",
-            size="small",
-            margin=(14, 8, 2, 8),
-        )
+        self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
         self.told = note(HELP)
         self._connect()
-        self._show()
+        self.catch_up()
 
     def panel(self) -> pn.Column:
         """Choices and bars; growth, to be opened."""
-        wide = {"sizing_mode": "stretch_width", "margin": 0}
         choices = pn.FlexBox(*self.choices, sizing_mode="stretch_width")
         return pn.Column(
             note(LEAD),
-            pn.pane.Bokeh(self.figure, **wide),
+            plotted(self.figure),
             choices,
             self.exact,  # below, as the plot must not move when the button goes
             Known(self.state),
             self.told,
-            folded_away(GROWS, pn.pane.Bokeh(self.growth_figure, **wide)),
+            folded_away(GROWS, plotted(self.growth_figure)),
             Contacts(self.looks),
             sizing_mode="stretch_width",
         )
@@ -112,28 +106,19 @@ class View:
         state = self.state
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
-        state.param.watch(self._show, ["seen", "exact"])
-        state.knowledge.param.watch(self._show, "narrowed")
-        self.looks.param.watch(self._show, ["drawn", "sort", "scale", "contact"])
+        state.knowledge.param.watch(self.refresh, "narrowed")
         state.param.watch(self._offer, ["seen", "exact"])
         state.work.param.watch(self._offer, "arriving")
-        self.looks.param.watch(self._catch_up, "tab")
         for task in (state.work.computation, state.knowledge.task):
             task.param.watch(self._offer, "running")
         self._offer()
-        self._stale = False
 
     # Contents
 
-    def _catch_up(self, event: Any) -> None:
-        if event.new == self.name and self._stale:
-            self._show()
-
-    def _show(self, *events: Any) -> None:
+    def update(self) -> None:
         """Take over contacts, exact intervals and the walk's length."""
         state, looks, replay = self.state, self.looks, self.state.seen
-        self._stale = looks.tab != self.name
-        if replay is None or self._stale:
+        if replay is None:
             return
         exact = exact_intervals(state.possible, replay)
         order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
@@ -141,7 +126,7 @@ class View:
         named += [] if looks.contact is None else [looks.contact]
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact, len(order))
-        if not events or any(event.name == "seen" for event in events):
+        if replay is not self._grown:
             self._show_growth(replay)
         self._mark()
 
@@ -201,7 +186,7 @@ class View:
         self.words.data = {"rank": [KEY_AT] * len(KEY), "at": heights, "words": list(KEY)}
 
     def _show_growth(self, replay: Replay) -> None:
-        grows = self.state.growing
+        self._grown, grows = replay, self.state.growing
         number = live.numbers(replay.summary) if grows else replay.number
         unseen = np.full(len(number), np.nan, dtype=np.float32)
         self.growth.data = {"state": number.astype(np.int32)} | {
@@ -226,17 +211,12 @@ class View:
             self.looks.contact = int(self.contacts[new[0]])
             self.bars.selected.indices = []
 
-    def _mark(self, *events: Any) -> None:
-        """Show where the selected contact stands."""
-        looks = self.looks
-        marks: dict[str, list[float]] = {"rank": [], "low": [], "high": []}
-        if looks.contact is not None and self.state.seen is not None and looks.tab == self.name:
-            at = np.flatnonzero(self.contacts == looks.contact)
-            if len(at):
-                column = self.bars.data
-                low, high = self.figure.y_range.start, self.figure.y_range.end
-                marks = {"rank": [float(column["rank"][at[0]])], "low": [low], "high": [high]}
-        self.chosen.data = marks
+    def _mark(self) -> None:
+        """Show where the selected contact stands, if it is drawn."""
+        at = np.flatnonzero(self.contacts == self.looks.contact)
+        low, high = self.figure.y_range.start, self.figure.y_range.end
+        rank = self.bars.data["rank"][at].tolist()
+        self.chosen.data = {"rank": rank, "low": [low] * len(at), "high": [high] * len(at)}
 
     # Figures
 
@@ -250,31 +230,20 @@ class View:
             y_range=Range1d(0, 1, name="bars_range"),
             height=320,
         )
-        bar = {"x": "rank", "source": self.bars, "line_color": None}
-        self.whole = fig.vbar(
-            bottom="whole_low",
-            top="whole_high",
-            width=1,
-            fill_color=PALE,
-            fill_alpha=0.3,
-            legend_label="before",
-            **bar,
-        )
-        exact = fig.vbar(
-            bottom="exact_low",
-            top="exact_high",
-            width=1,
-            fill_color=PALE,
-            legend_label="possible",
-            **bar,
-        )
-        seen = fig.vbar(
-            bottom="low", top="high", width=1, fill_color=DARK, legend_label="seen", **bar
-        )
+        self.layers = [
+            fig.vbar(
+                x="rank", bottom=f"{of}low", top=f"{of}high", width=1, source=self.bars,
+                line_color=None, fill_color=colour, fill_alpha=alpha, legend_label=label,
+            )
+            for label, of, colour, alpha in (
+                ("before", "whole_", PALE, 0.3), ("possible", "exact_", PALE, 1.0),
+                ("seen", "", DARK, 1.0),
+            )
+        ]  # fmt: skip
+        for layer in self.layers:
+            layer.nonselection_glyph = None
+        self.whole, exact, seen = self.layers
         seen.name = "seen"  # see layer.js
-        self.layers = self.whole, exact, seen
-        for glyph in self.layers:
-            glyph.nonselection_glyph = None
         line = fig.line(
             "rank",
             "original",

@@ -18,22 +18,16 @@ export class Invitation {
     if (!wanted) return void (tag.hidden = true)
     if (this.of !== geometry) Object.assign(this, { of: geometry, row: this.strongest(mixed.normal) })
     if (this.row === null) return void (tag.hidden = true)
-    const [x, y] = this.middle(this.row), [px, py] = scene.toPixel(x, y)
+    const [xa, ya, xb, yb] = scene.ends(this.row), x = (xa + xb) / 2, y = (ya + yb) / 2, [px, py] = scene.toPixel(x, y)
     tag.hidden = Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > 0.9 * view.half
     tag.textContent = pushes ? CHOOSE : DRAG
     tag.style.transform = `translate(${px}px, ${py}px) translateY(-100%)`
   }
 
-  middle(k) {
-    const [xa, ya, xb, yb] = this.scene.ends(k)
-    return [(xa + xb) / 2, (ya + yb) / 2]
-  }
-
   strongest(normal) {
     const { geometry: { contact }, view } = this.scene
     let best = null
-    for (let k = 0; k < contact.length; k++) {
-      const [x, y] = this.middle(k)
+    for (const { k, middle: [x, y] } of this.scene.segments(() => true)) {
       if (Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > NEAR * view.half) continue
       if (best === null || normal[contact[k]] > normal[contact[best]]) best = k
     }

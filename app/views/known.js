@@ -1,39 +1,31 @@
 // What is known, as chips; what it leaves open, in words; and which contact would be worth measuring.
 
 import { ask } from "./ask.js"
+import { button, made } from "./made.js"
 
 export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "known"
   root.innerHTML = `
     <div class="chips"></div><div class="words" role="status"></div>
-    <button type="button" class="next">Which force to measure next?</button><ol class="ranked"></ol>`
+    <button type="button" class="soft next">Which force to measure next?</button><ol class="ranked"></ol>`
   const [chips, words, next, ranked] = root.children
   const tell = (message) => ask(model, view, message)
 
   function chip([contact, text]) {
-    const made = document.createElement("span")
-    made.className = "chip"
-    const choose = made.appendChild(document.createElement("button"))
-    const release = made.appendChild(document.createElement("button"))
-    choose.type = release.type = "button"
-    choose.textContent = text
-    choose.title = "find it in the packing"
-    release.textContent = "×"
-    release.className = "release"
-    release.title = "let it go"
-    release.setAttribute("aria-label", `let go: ${text}`)
-    choose.addEventListener("click", () => tell({ choose: contact }))
-    release.addEventListener("click", () => tell({ release: contact }))
-    return made
+    const it = made("span", { className: "chip" })
+    const look = { className: "release", title: "let it go", ariaLabel: `let go: ${text}` }
+    it.append(
+      button(text, () => tell({ choose: contact }), { title: "find it in the packing" }),
+      button("×", () => tell({ release: contact }), look),
+    )
+    return it
   }
 
   function row([contact, text]) {
-    const made = document.createElement("li"), choose = made.appendChild(document.createElement("button"))
-    choose.type = "button"
-    choose.textContent = text
-    choose.addEventListener("click", () => tell({ choose: contact }))
-    return made
+    const it = document.createElement("li")
+    it.append(button(text, () => tell({ choose: contact })))
+    return it
   }
 
   const shown = {

@@ -1,6 +1,6 @@
 """What is known above the intervals: chips, what it leaves open, which measurement comes next."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import param
@@ -11,7 +11,7 @@ from ..known import Knowledge, Ranked
 from ..state import AppState
 from .hints import term
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 STRONGEST = 5  # contacts that are named whose interval has shrunk most
 ASK = (
@@ -27,9 +27,6 @@ class Known(Scripted):
     words = param.String(doc="what it leaves open, HTML")
     ranked = param.List(doc="pairs (contact, words), the best to measure first")
     asking = param.Boolean(doc="whether the best to measure are being looked for")
-
-    _esm = module("known")
-    _stylesheets: ClassVar = [FOLDER / "known.css"]
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", margin=0, **params)

@@ -9,6 +9,7 @@ from granforce.records import Floats
 
 # Pixels between the axes of the smallest plot that has labels, and of a letter and a point.
 SMALLEST, LETTER, POINT = (270.0, 190.0), (6.0, 11.0), 4.0
+Pair = tuple[float, float]
 Box = tuple[float, float, float, float]  # left, top, right, bottom, in pixels
 # Where a label may stand beside its point.
 CORNERS = (
@@ -19,9 +20,7 @@ CORNERS = (
 )
 
 
-def labels(
-    x: Floats, y: Floats, words: Sequence[str], span: tuple[float, float]
-) -> dict[str, list[Any]]:
+def labels(x: Floats, y: Floats, words: Sequence[str], span: Pair) -> dict[str, list[Any]]:
     """Where labels stand beside points such that none collide, as columns of a text glyph.
 
     span: of what the axes show. In plots larger than the SMALLEST there is more room between them.
@@ -36,7 +35,7 @@ def labels(
     rows = []
     for k, (px, py) in enumerate(places):
         size = LETTER[0] * len(words[k]), LETTER[1]
-        found = [(corner, _box(px, py, *corner, *size)) for corner in CORNERS]
+        found = [(corner, _box((px, py), corner, size)) for corner in CORNERS]
         free = [
             (corner, box)
             for corner, box in found
@@ -51,17 +50,9 @@ def labels(
     return {name: list(column) for name, column in zip(names, columns, strict=True)}
 
 
-def _box(
-    px: float,
-    py: float,
-    right: float,
-    down: float,
-    align: str,
-    baseline: str,
-    width: float,
-    height: float,
-) -> Box:
-    """Pixels (left, top, right, bottom) of a label beside a point."""
+def _box(place: Pair, corner: tuple[float, float, str, str], size: Pair) -> Box:
+    """Pixels (left, top, right, bottom) of a label of a size at a corner of a point."""
+    (px, py), (right, down, align, baseline), (width, height) = place, corner, size
     left = px + right - (width if align == "right" else 0)
     top = py + down - (height if baseline == "bottom" else 0)
     return left, top, left + width, top + height

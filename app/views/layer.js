@@ -1,6 +1,9 @@
 // What moves in the plots beside, on canvases of its own above what stands still: while the player
 // plays or a force is in the hand, Bokeh draws nothing. At rest the same is drawn by Bokeh again.
 
+import { made } from "./made.js"
+import { circle, line } from "./pen.js"
+
 const TRAIL = 40 // states that the trail in force space reaches back
 const DOT_REACH = 9 // px from a dot that still mean it
 const INVITE = "↙ drag me"
@@ -12,9 +15,7 @@ export class Layer {
     this.fig = fig
     this.draw = draw
     this.on = false
-    this.canvas = document.createElement("canvas")
-    this.canvas.className = "layer"
-    this.canvas.style = "position: absolute; inset: 0; pointer-events: none"
+    this.canvas = made("canvas", { className: "layer", style: "position: absolute; inset: 0; pointer-events: none" })
   }
 
   get view() {
@@ -77,7 +78,7 @@ export const LAYERS = {
     }
     context.strokeStyle = plots.colours.original
     context.lineWidth = 1.5
-    line(context, rank, original, x, y, rank.length)
+    curve(context, rank, original, x, y, rank.length)
     context.fillStyle = plots.colours.now
     context.beginPath()
     for (let k = 0; k < rank.length; k++) {
@@ -88,8 +89,7 @@ export const LAYERS = {
     const chosen = plots.find("chosen")?.get_column("rank")?.[0]
     const at = chosen === undefined ? -1 : rank.indexOf(chosen)
     if (at < 0) return
-    context.beginPath()
-    context.arc(x(rank[at]), y(now[at]), 6, 0, 2 * Math.PI)
+    circle(context, [x(rank[at]), y(now[at])], 6)
     context.fill()
   },
 
@@ -98,7 +98,7 @@ export const LAYERS = {
     for (const name of ["eta1", "eta2", "eta3"]) {
       context.strokeStyle = plots.colours[name]
       context.lineWidth = 2
-      line(context, state, growth.get_column(name), x, y, Math.min(seen + 1, state.length), 1)
+      curve(context, state, growth.get_column(name), x, y, Math.min(seen + 1, state.length), 1)
     }
   },
 
@@ -118,10 +118,7 @@ export const LAYERS = {
     points.push([x(mix(px)), y(mix(py))])
     for (let k = 1; k < points.length; k++) {
       context.globalAlpha = 0.85 * (k / points.length) ** 2
-      context.beginPath()
-      context.moveTo(...points[k - 1])
-      context.lineTo(...points[k])
-      context.stroke()
+      line(context, points[k - 1], points[k])
     }
     context.globalAlpha = 1
     spot(context, points[points.length - 1], plots)
@@ -133,8 +130,7 @@ function spot(context, [px, py], plots) {
   context.fillStyle = plots.colours.now
   context.strokeStyle = "white"
   context.lineWidth = 1.5
-  context.beginPath()
-  context.arc(px, py, 6, 0, 2 * Math.PI)
+  circle(context, [px, py], 6)
   context.fill()
   context.stroke()
   if (!plots.invites) return
@@ -146,7 +142,7 @@ function spot(context, [px, py], plots) {
   context.fillText(INVITE, px + 10, py - 12)
 }
 
-function line(context, xs, ys, x, y, count, from = 0) {
+function curve(context, xs, ys, x, y, count, from = 0) {
   context.beginPath()
   for (let k = from; k < count; k++) context.lineTo(x(xs[k]), y(ys[k]))
   context.stroke()

@@ -1,5 +1,7 @@
 // A lesson of one page, for the groove, made to be printed: the numbers, and three questions.
 
+import { print } from "./save.js"
+
 const AT = [0, 0.2, 0.5, 0.8, 1]
 const QUESTIONS = [
   ["What presses on the walls without friction, and how many answers are there?",
@@ -38,18 +40,10 @@ export function lesson() {
 
 /** Have it printed alone, with the pictures of the disk and of S; open: with its answers. */
 export function printed(pictures, open) {
-  const sheet = document.createElement("iframe")
-  sheet.title = "The lesson, to be printed"
-  sheet.style.cssText = "position: fixed; width: 0; height: 0; border: 0"
-  sheet.srcdoc = `<!doctype html><meta charset="utf-8"><title>The groove</title><style>
+  print("The lesson, to be printed", `<!doctype html><meta charset="utf-8"><title>The groove</title><style>
     body { font: 10.5pt/1.35 sans-serif; max-width: 17cm; margin: 0 auto; } figure { display: flex; gap: 4mm; margin: 3mm 0; } img { flex: 1; min-width: 0; border: 1px solid #ccc; }
     sub { line-height: 0; } td, th { padding: 1px 14px 1px 0; text-align: left; } h2 { margin: 0; } .formula { text-align: center; }
     ${open ? "" : "details { height: 1.2cm; overflow: hidden; color: transparent; }"}</style>
     ${open ? lesson().replaceAll("<details>", "<details open>") : lesson()}`.replace(
-      "</h2>", `</h2><figure>${pictures.map((picture) => `<img src="${picture}" alt="">`).join("")}</figure>`)
-  sheet.addEventListener("load", () => {
-    sheet.contentWindow.addEventListener("afterprint", () => sheet.remove())
-    sheet.contentWindow.print()
-  })
-  document.body.append(sheet)
+      "</h2>", `</h2><figure>${pictures.map((picture) => `<img src="${picture}" alt="">`).join("")}</figure>`))
 }

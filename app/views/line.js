@@ -1,5 +1,6 @@
 // S where it is a line: with what stops it at its ends; and axes of forces, below S and beside it.
 
+import { line } from "./pen.js"
 import { forceName, number } from "./saying.js"
 
 const TICKS = 70 // pixels between two numbers of an axis, at least
@@ -13,16 +14,13 @@ export function drawSegment(space) {
   g.strokeStyle = look.cold
   g.lineWidth = 7
   g.lineCap = "butt"
-  g.beginPath()
-  g.moveTo(...ends[0])
-  g.lineTo(...(ends[1] ?? ends[0]))
-  g.stroke()
+  line(g, ends[0], ends[1] ?? ends[0])
   g.font = "13px sans-serif"
   let before = null // words of the other end
   for (const side of ends.length > 1 ? body.sides : []) {
     const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.told("words", side)
     const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
-    const wide = Math.max(...text.split("\n").map((line) => g.measureText(line).width)), high = text.includes("\n") ? 40 : 30
+    const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
     const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12
     if (side.cap) space.drawOn([x, y], 7)
     else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
@@ -48,13 +46,11 @@ export function drawAxis(space, index, at, d = 0) {
     .map(([u, colour]) => ({ v: change(u) + rest, place: space.px(space.flat(u)), colour }))
     .map((mark) => ({ ...mark, x: mark.place[d] }))
   const own = look.axes?.get(index) // the colour that its arrows have
-  const stroke = (x, from, to) => { g.moveTo(...(d ? [from, x] : [x, from])); g.lineTo(...(d ? [to, x] : [x, to])) }
+  const stroke = (x, from, to) => (d ? line(g, [from, x], [to, x]) : line(g, [x, from], [x, to]))
   const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
   g.strokeStyle = own ?? look.edge
   g.lineWidth = 1
-  g.beginPath()
-  g.moveTo(...(d ? [at, ends[0]] : [ends[0], at]))
-  g.lineTo(...(d ? [at, ends[1]] : [ends[1], at]))
+  line(g, ...ends.map((x) => (d ? [at, x] : [x, at])))
   const free = (x, k = marked.length) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > (d ? 16 : 40))
   const ticks = [], [first, last] = ends.map((x) => (x - place(0)) / (place(1) - place(0)) / step).sort((a, b) => a - b)
   for (let k = Math.ceil(index % 2 ? first : Math.max(first, 0)); k <= last; k++) { // no normal force is below 0
@@ -62,15 +58,12 @@ export function drawAxis(space, index, at, d = 0) {
     stroke(x, at - 4, at + 4)
     if (free(x)) ticks.push([x, String(Number((k * step).toPrecision(6)))])
   }
-  g.stroke()
   for (const [x, text] of ticks) write(x, text, look.ink, 11)
   g.lineWidth = 1
   g.setLineDash([2, 4])
   for (const { x, place: there, colour } of marked) {
     g.strokeStyle = colour
-    g.beginPath()
     stroke(x, there[1 - d], at)
-    g.stroke()
   }
   g.setLineDash([])
   marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) write(x, number(v), colour, 12) })

@@ -1,6 +1,7 @@
 // What was computed here: a name to be typed, what it is, when, how large; to be opened or deleted.
 
 import { ask } from "./ask.js"
+import { button, made } from "./made.js"
 import { plain } from "./plain.js"
 
 export function render({ model, view }) {
@@ -9,27 +10,20 @@ export function render({ model, view }) {
   const told = root.querySelector(".told"), body = root.querySelector("tbody")
   const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
 
-  function button(words, act) {
-    const made = Object.assign(document.createElement("button"), { type: "button", textContent: words })
-    made.addEventListener("click", () => act(made))
-    return made
-  }
-
   /** Only a second click deletes. */
-  function remove(entry, made) {
-    if (made.dataset.sure) return ask(model, view, { delete: entry })
-    made.dataset.sure = "yes"
-    made.textContent = "Delete for good?"
+  function remove(entry, it) {
+    if (it.dataset.sure) return ask(model, view, { delete: entry })
+    it.dataset.sure = "yes"
+    it.textContent = "Delete for good?"
   }
 
   function line({ entry, name, what, when, megabytes, here }) {
-    const row = document.createElement("tr"), field = document.createElement("input")
-    Object.assign(field, { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
+    const row = document.createElement("tr"), look = { className: "soft" }
+    const field = made("input", { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
     field.addEventListener("change", () => ask(model, view, { call: [entry, field.value] }))
-    const words = document.createElement("span")
-    words.textContent = what
-    const last = here ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }))]
-    last.push(" ", button("Delete", (made) => remove(entry, made)))
+    const words = made("span", { textContent: what })
+    const last = here ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
+    last.push(" ", button("Delete", (it) => remove(entry, it), look))
     const parts = [[field, words], [new Date(when).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })],
       [size(megabytes)], last]
     for (const part of parts) row.insertCell().append(...part)

@@ -1,6 +1,6 @@
 """My computations: what is in the visitor's own cache, to be opened, named or deleted."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
@@ -10,16 +10,13 @@ from .. import mine, names
 from ..jobs import reading
 from ..state import AppState
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 
 class Mine(Scripted):
     """A table of what was computed here, the newest first; see mine.js."""
 
     rows = param.List(doc="dicts, see mine.rows; and `here`, whether it is on screen")
-
-    _esm = module("mine")
-    _stylesheets: ClassVar = [FOLDER / "mine.css"]
 
     def __init__(self, state: AppState, **params: Any) -> None:
         super().__init__(sizing_mode="stretch_width", **params)
@@ -50,7 +47,6 @@ class Mine(Scripted):
                     state.work.message = str(error)
                 self._list()
             case {"delete": str(entry)} if entry in known:
-                self._task.start(lambda job: mine.delete(state.library, entry), self._gone)
-
-    def _gone(self, nothing: None) -> None:
-        self._state.refresh()
+                self._task.start(
+                    lambda job: mine.delete(state.library, entry), lambda nothing: state.refresh()
+                )

@@ -1,12 +1,12 @@
 """A field for a whole number."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 
 class NumberField(Scripted):
@@ -23,16 +23,12 @@ class NumberField(Scripted):
     step = param.Integer(default=1, doc="of the arrow keys and buttons")
     disabled = param.Boolean()
 
-    _esm = module("number")
-    _stylesheets: ClassVar = [FOLDER / "number.css"]
-
-    def __init__(self, on_wrong: Callable[[str], object] | None = None, **params: Any) -> None:
+    def __init__(self, on_wrong: Callable[[str], object], **params: Any) -> None:
         """on_wrong(line): told what is wrong with what was typed, if anything."""
         super().__init__(**params)
         self._on_wrong = on_wrong
 
     def _heard(self, message: Message) -> None:
         """Something was typed that is no whole number."""
-        if self._on_wrong is not None:
-            typed, within = message["typed"][:30], f"{self.start} to {self.end}"
-            self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed!r}")
+        typed, within = message["typed"][:30], f"{self.start} to {self.end}"
+        self._on_wrong(f"{self.label} must be a whole number from {within}, got {typed!r}")

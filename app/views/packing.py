@@ -10,7 +10,7 @@ from granforce.records import Floats
 from .. import live
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..known import Knowledge
-from ..looks import COLOURS, WIDTHS, Looks
+from ..looks import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
 from ..planes import Plane
 from ..replays import Replay
 from ..state import AppState
@@ -19,25 +19,12 @@ from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
 SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
-FOLLOWED = ("tab", "views", "wide", "thickness", "full", "stretch", "overlay", "scale")
+SEEN = sorted(set(Seen.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
-# What colours and widths show → key of the glossary.
-EXPLAINED = {
-    "mobilised": "mobilisation",
-    "extent": "extent",
-    "change": "change",
-    "sign": "sign",
-    "normal": "fn",
-    "difference": "difference",
-    "load": "limit_load",
-    "known": "gone",
-    "deviation": "deviation",
-    "measured": "measured",
-}
 LEGEND = """
 <span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
 <span tabindex="0" data-term="{width_term}">width: {width}, up to
@@ -73,18 +60,18 @@ class PackingView:
             sizing_mode="stretch_width",
             palettes=palettes(looks.dark),
             zoom=None if looks.zoom is None else list(looks.zoom),
-            **{name: getattr(looks, name) for name in (*SHARED, *FOLLOWED)},
+            **{name: getattr(looks, name) for name in SEEN},
             source=state.source,
             busy=state.work.busy,
         )
         for name in SHARED:
             self.player.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
         self._shown = None
-        self.player.param.watch(self._swing, "between")
-        self.player.param.watch(self._look_at, "zoom")
+        for name in ("between", "zoom"):
+            self.player.param.watch(self._go, name)
         self.player.param.watch(self._explain, "pulled")
-        looks.param.watch(self._follow, [*SHARED, *FOLLOWED])
-        state.param.watch(self._follow, "source")
+        looks.param.watch(self._follow, SEEN)
+        state.param.watch(self._follow, ["source", "loads"])
         state.work.param.watch(self._follow, "busy")
         state.param.watch(self._show, ["seen", "exact", "measured"])
         state.knowledge.param.watch(self._show, "narrowed")
@@ -93,9 +80,9 @@ class PackingView:
         state.knowledge.param.watch(self._pin, ["known", "ranked"])
         state.param.watch(self._displace, "displacement")
         state.besides.param.watch(self._accompany, "twin")
-        state.param.watch(self._load, "loads")
-        state.param.watch(self._project, "plane")
-        looks.param.watch(self._dress, "dark")
+        dress = self.player.param.update
+        state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
+        looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
             self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab"]
         )
@@ -108,11 +95,9 @@ class PackingView:
         self._pin()
         self._explain()
 
-    def _swing(self, event: Any) -> None:
-        self.looks.between = None if event.new is None else tuple(event.new)
-
-    def _look_at(self, event: Any) -> None:
-        self.looks.zoom = None if event.new is None else tuple(event.new)
+    def _go(self, event: Any) -> None:
+        """To and fro, or to another part of the picture: browsers have lists for tuples."""
+        self.looks.param.update({event.name: None if event.new is None else tuple(event.new)})
 
     def _follow(self, *events: Any) -> None:
         self.player.param.update({event.name: event.new for event in events})
@@ -149,20 +134,10 @@ class PackingView:
     def _pin(self, *events: Any) -> None:
         self.player.pins = pins(self.state.knowledge)
 
-    def _load(self, event: Any) -> None:
-        self.player.loads = event.new
-
-    def _project(self, event: Any) -> None:
-        """The plane of force space on screen: where networks lie in it that are no states."""
-        self.player.plane = projection(event.new)
-
     def _displace(self, event: Any) -> None:
         field = event.new
         flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
         self.player.displacement = flat
-
-    def _dress(self, event: Any) -> None:
-        self.player.palettes = palettes(event.new)
 
     def _explain(self, *events: Any) -> None:
         pulled = self.player.pulled or bool(self.state.hand.pulls)

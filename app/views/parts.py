@@ -12,9 +12,9 @@ from panel.io import document as panel_document
 from panel.io import unlocked
 from panel.reactive import Syncable
 
-from ..live import Summary
 from ..looks import Looks
 from ..state import AppState
+from .scripts import SHARED
 from .select import Select
 from .style import plot
 
@@ -28,6 +28,9 @@ EXTRA = {"display": "var(--extra, flex)"}
 BESIDE = {"content-visibility": "var(--beside, visible)"}
 
 PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
+# Small buttons: what one is here for, and what else can be done.
+PRIMARY = {"color": "primary", "size": "small"}
+OUTLINED = {"variant": "outlined", "color": "default", "size": "small"}
 
 SVG_ICON = (
     "data:image/svg+xml;utf8,<svg xmlns='http://www.w3.org/2000/svg' width='24' height='24'>"
@@ -192,14 +195,17 @@ def saving(mark: str) -> list[Any]:
     return buttons
 
 
+def plotted(fig: Figure) -> pn.pane.Bokeh:
+    """A figure's place, as wide as there is room."""
+    return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
+
+
 def figure(name: str, title: str | None, x: str, y: str, **options: Any) -> Figure:
     """A savable figure in the style of all others."""
     return savable(plot(title, x, y, **options), name)
 
 
 CLAIMS = """
-.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
-.term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
 .claims { border-collapse: collapse; margin-top: 10px; font-size: 12.5px; }
 .claims caption { text-align: left; padding-bottom: 4px; font-weight: 600; }
 .claims td { border-top: 1px solid rgba(128, 128, 128, 0.35); padding: 3px 12px 3px 0; }
@@ -210,23 +216,9 @@ CLAIMS = """
 def note(text: str = "", **options: Any) -> pn.pane.HTML:
     """Small print, as HTML."""
     return pn.pane.HTML(
-        text, styles=NOTE, stylesheets=[CLAIMS], sizing_mode="stretch_width",
+        text, styles=NOTE, stylesheets=[SHARED, CLAIMS], sizing_mode="stretch_width",
         margin=(2, 10, 8, 10), **options,
     )  # fmt: skip
-
-
-def of_replay(
-    state: AppState, text: Callable[[Summary], str], style: str, margin: tuple[int, ...]
-) -> pn.pane.HTML:
-    """HTML about the replay on screen, text(summary) of its numbers; empty while there is none."""
-    pane = pn.pane.HTML(stylesheets=[style], sizing_mode="stretch_width", margin=margin)
-
-    def show(*events: Any) -> None:
-        pane.object = "" if state.replay is None else text(state.replay.summary)
-
-    state.param.watch(show, "replay")
-    show()
-    return pane
 
 
 def by_words(labels: dict[str, str]) -> dict[str, str]:
@@ -246,13 +238,8 @@ def choice(labels: dict[str, str], value: str) -> Any:
     )
 
 
-def chosen(labels: dict[str, str], looks: Looks, name: str) -> Any:
-    """A `choice` of the parameter of this name."""
-    return linked(choice(labels, getattr(looks, name)), looks, name)
-
-
 def question(label: str, labels: dict[str, str], looks: Looks, name: str, **options: Any) -> Select:
-    """The same as a list under a label, for choices that are sentences."""
+    """A list under a label, of the values {value: words} of the parameter of this name."""
     look = options or {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
     made = Select(label=label, options=by_words(labels), value=getattr(looks, name), **look)
     return linked(made, looks, name)

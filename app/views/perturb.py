@@ -19,7 +19,7 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .hints import term
-from .parts import PLAIN, TabView, figure, folded, note, question
+from .parts import PLAIN, PRIMARY, TabView, figure, folded, note, plotted, question
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
@@ -73,21 +73,14 @@ UNIT = "Forces are in units of the mean normal force."
 class View(TabView):
     """The selected contact pushed; every contact's limit load; critical force and decay."""
 
-    name, title = "perturb", "Push"
+    name = "perturb"
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", looks=["contact"])
         self.what = question("Question", PUSHES, self.looks, "pushing")
-        self.strongest = pmui.Button(
-            label="Choose the strongest contact",
-            color="primary",
-            size="small",
-            margin=(4, 8),
-            sx=PLAIN,
-        )
-        self.push = pmui.Button(
-            label="Push", color="primary", size="small", margin=(4, 8), sx=PLAIN
-        )
+        look = PRIMARY | {"margin": (4, 8), "sx": PLAIN}
+        self.strongest = pmui.Button(label="Choose the strongest contact", **look)
+        self.push = pmui.Button(label="Push", **look)
         self.guess = pmui.TextInput(label="Your guess", size="small", width=130, margin=(4, 8))
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
@@ -159,9 +152,7 @@ class View(TabView):
         self, text: str, plots: Iterable[Figure] = (), numbers: str = "", lead: str = ""
     ) -> None:
         self.lead.object, self.told.object, self.numbers.object = lead, text, numbers
-        self.plots.objects = [
-            pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0) for fig in plots
-        ]
+        self.plots.objects = [plotted(fig) for fig in plots]
 
     # One contact
 

@@ -19,7 +19,7 @@ from ..photoelastic import Frame
 from ..uploads import Files
 from . import chains
 from .handover import Handover
-from .parts import choice, figure, note, saving, together
+from .parts import PRIMARY, choice, figure, note, saving, together
 from .style import BLUE, ORANGE, corner, hover, legend_above
 
 COMPONENTS = (("fₙ", BLUE), ("fₜ", ORANGE))
@@ -57,9 +57,7 @@ class Frames:
         self.save = Handover(
             self._hand_over, files={"This frame": {"table": "All contacts (CSV)"}}, margin=(4, 10)
         )
-        self.open = pmui.Button(
-            label="Open as a packing", color="primary", size="small", margin=(4, 10)
-        )
+        self.open = pmui.Button(label="Open as a packing", margin=(4, 10), **PRIMARY)
         self.open.on_click(lambda event: on_open(self.frame))
         self.player = pn.widgets.DiscretePlayer(
             label="frame", options=list(first.numbers), value=first.report["frame"],

@@ -1,6 +1,7 @@
 // Marks of what is known: a pin on each contact that is held, open where it has an error bar;
 // numbers on those that would be worth measuring, the best first; and where a contact is pushed, arrows.
 
+import { arrow, circle } from "./pen.js"
 import { plain } from "./plain.js"
 
 const PIN = 17 // px, its height
@@ -20,15 +21,13 @@ export class Pins {
     const { contacts = [], exact = [], ranked = [] } = this.pins
     if (this.model.tab === "perturb" && scene.selected !== null) this.push(context, scene)
     if (!contacts.length && !ranked.length) return
-    const held = new Map(), rank = new Map(), { geometry, ratio } = scene
+    const held = new Map(), rank = new Map(), { ratio } = scene
     for (let k = 0; k < contacts.length; k++) held.set(contacts[k], exact[k])
     for (let k = 0; k < ranked.length; k++) rank.set(ranked[k], k + 1)
     context.save()
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
-    for (let k = 0; k < geometry.contact.length; k++) {
-      const c = geometry.contact[k]
-      if (!held.has(c) && !rank.has(c)) continue
-      const [xa, ya, xb, yb] = scene.ends(k), place = scene.toPixel((xa + xb) / 2, (ya + yb) / 2)
+    for (const { contact: c, middle } of scene.segments((c) => held.has(c) || rank.has(c))) {
+      const place = scene.toPixel(...middle)
       if (held.has(c)) this.pin(context, scene.palette, place, held.get(c))
       else this.badge(context, scene.palette, place, rank.get(c))
     }
@@ -41,14 +40,15 @@ export class Pins {
     context.save()
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
     context.lineCap = context.lineJoin = "round"
-    for (let k = 0; k < geometry.contact.length; k++) {
-      if (geometry.contact[k] !== scene.selected) continue
-      const [xa, ya, xb, yb] = scene.ends(k), a = scene.toPixel(xa, ya), b = scene.toPixel(xb, yb)
+    for (const { k, ...ends } of scene.segments((contact) => contact === scene.selected)) {
+      const a = scene.toPixel(...ends.a), b = scene.toPixel(...ends.b)
       const far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, u = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
       context.globalAlpha = k === first ? 1 : COPY
       context.beginPath()
-      arrow(context, a, u.map((v) => -v), scale * geometry.radius[geometry.i[k]] + ARROW_PX)
-      arrow(context, b, u, scale * geometry.radius[geometry.j[k]] + ARROW_PX)
+      for (const [from, grain, way] of [[a, geometry.i[k], -1], [b, geometry.j[k], 1]]) {
+        const long = way * (scale * geometry.radius[grain] + ARROW_PX)
+        arrow(context, from, from.map((v, d) => v + long * u[d]), 12, 0.7)
+      }
       for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
         context.lineWidth = width
         context.strokeStyle = colour
@@ -60,14 +60,10 @@ export class Pins {
 
   /** In a picture to take along: a spot on each contact that is known, open with an error bar. */
   onSheet(sheet, scene) {
-    const { contacts = [], exact = [] } = this.pins, { contact } = scene.geometry
-    const { known, halo } = scene.palette
+    const { contacts = [], exact = [] } = this.pins, { known, halo } = scene.palette
     for (const [n, held] of [...contacts].entries()) {
-      for (let k = 0; k < contact.length; k++) {
-        if (contact[k] !== held) continue
-        const [xa, ya, xb, yb] = scene.ends(k)
-        sheet.beginPath()
-        sheet.arc((xa + xb) / 2, (ya + yb) / 2, SPOT)
+      for (const { middle } of scene.segments((contact) => contact === held)) {
+        circle(sheet, middle, SPOT)
         sheet.strokeStyle = known
         sheet.lineWidth = SPOT / 2
         sheet.stroke()
@@ -94,8 +90,7 @@ export class Pins {
   }
 
   badge(context, { known, halo }, [x, y], number) {
-    context.beginPath()
-    context.arc(x, y, 9, 0, 2 * Math.PI)
+    circle(context, [x, y], 9)
     context.fillStyle = halo
     context.fill()
     context.lineWidth = 2
@@ -105,16 +100,5 @@ export class Pins {
     context.textAlign = "center"
     context.textBaseline = "middle"
     context.fillText(number, x, y + 0.5)
-  }
-}
-
-/** Adds an arrow to the path, of this length from a point in the direction (ux, uy). */
-function arrow(context, [x, y], [ux, uy], long) {
-  const tip = [x + long * ux, y + long * uy], head = 12
-  context.moveTo(x, y)
-  context.lineTo(...tip)
-  for (const side of [1, -1]) {
-    context.moveTo(tip[0] - head * (ux - 0.7 * side * uy), tip[1] - head * (uy + 0.7 * side * ux))
-    context.lineTo(...tip)
   }
 }

@@ -1,6 +1,5 @@
 """Force space in a plane: the states' path, the state on screen, and the outline of S."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from bokeh.plotting import figure as Figure
 from granforce.records import InputError
 
 from .. import compute, live, planes
-from ..data import Cell, Shown
+from ..data import Shown
 from ..jobs import Job, reading
 from ..looks import PLANES
 from ..planes import Outlined, Plane
@@ -21,7 +20,18 @@ from ..replays import Replay
 from ..state import AppState
 from . import stresses
 from .hints import term
-from .parts import MOVES, PLAIN, TabView, figure, folded, note, question, together
+from .parts import (
+    MOVES,
+    OUTLINED,
+    PLAIN,
+    TabView,
+    figure,
+    folded,
+    note,
+    plotted,
+    question,
+    together,
+)
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above, lines
 
@@ -69,7 +79,7 @@ HELP = (
 class View(TabView):
     """A plane of force space; the player moves the state on screen along the path."""
 
-    name, title = "plane", "Force space"
+    name = "plane"
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "seen", looks=["contact", "pair", "dark"], work=["fourfold"])
@@ -106,7 +116,7 @@ class View(TabView):
         return pn.Column(
             self.lead,
             self.finding,
-            pn.pane.Bokeh(self.figure, sizing_mode="stretch_width", margin=0),
+            plotted(self.figure),
             pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
             self.planes,
             Progress(self.task),
@@ -223,7 +233,11 @@ class View(TabView):
         found, own = planes.beside(state.catalogue, state.cell), state.cell.selection
         kind = "walk" if own.kind == "uniform" else "uniform"
         wanted = own._replace(kind=kind, states=min(own.states, ENOUGH))
-        work = compute.states(state.library, wanted) if found is None else _shown(state, found)
+        work = (
+            compute.states(state.library, wanted)
+            if found is None
+            else lambda job: state.library.shown(found)
+        )
 
         def done(shown: Shown) -> None:
             if state.replay is replay:
@@ -306,7 +320,7 @@ class View(TabView):
             return
         path = found.plane.path[1:]
         part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
-        area = planes.area(planes.hull(path)) / planes.area(found.outer)
+        area = planes.area(path) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
         dots = f"{'All' if inner == 1 else f'{inner:.0%} of the'} {len(path)} dots"
@@ -412,9 +426,7 @@ def _edge(symbol: str, offset: int) -> Node:
 
 def _sweep(label: str, axis: int) -> pmui.Button:
     """A button by which the point goes along an axis and back; pressed again, it stops."""
-    button = pmui.Button(
-        label=label, variant="outlined", color="default", sx=PLAIN, size="small", margin=(4, 6)
-    )
+    button = pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED)
     button.js_on_click(args={"button": button, "axis": axis}, code=SWEEP)
     return button
 
@@ -431,11 +443,6 @@ def _variance(plane: Plane) -> str:
         return ""
     across, up = plane.share
     return f", and {across:.0%} of their variance goes across, {up:.0%} upwards"
-
-
-def _shown(state: AppState, cell: Cell) -> Callable[[Job], Shown]:
-    """Work that reads a cell."""
-    return lambda job: state.library.shown(cell)
 
 
 def _loosest(replay: Replay) -> int:

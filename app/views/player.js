@@ -211,8 +211,7 @@ class Player {
     this.viewed = key
     clearTimeout(this.looking)
     this.looking = setTimeout(() => {
-      const [left, right, low, high] = scene.geometry.window
-      const whole = [(left + right) / 2, (low + high) / 2, (right - left) / 2], now = [x, y, half]
+      const whole = Object.values(scene.whole), now = [x, y, half]
       const rounded = now.map((value) => Number(value.toPrecision(5)))
       model.zoom = now.every((value, k) => Math.abs(value - whole[k]) < 1e-6) ? null : rounded
     }, REST_MS)
@@ -232,6 +231,12 @@ class Player {
     if (held) this.difference.end()
     this.buttons.tellHeld(held)
     if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
+  }
+
+  /** Networks without colour, where it would give something away, or as they were. */
+  dress(plain) {
+    this.look.plain = plain
+    this.again()
   }
 
   again() {
@@ -443,12 +448,9 @@ export function render({ model, view }) {
   view.model.data.player = player
   view.model.data.scene = player.scene // for those who find the model by its name
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
-  for (const name of ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]) {
-    model.on(name, () => player.again())
-  }
-  for (const name of ["tab", "wide"]) {
-    model.on(name, () => player.mark())
-  }
+  const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
+  model.on(looks, () => player.again())
+  model.on(["tab", "wide"], () => player.mark())
   const observer = new ResizeObserver(() => player.scene.resize())
   observer.observe(player.scene.root)
   model.on("msg:custom", (message) => {

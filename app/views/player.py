@@ -1,7 +1,7 @@
 """The player: draws the packing and replays states in the browser; no server work per frame."""
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import param
@@ -9,16 +9,15 @@ import param
 from granforce.records import Floats
 
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
+from ..looks import Seen
 from ..replays import Replay
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
-
-Heard = Callable[[Any], object] | None
+from .scripts import Scripted
 
 SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
 
 
-class Player(Scripted):
+class Player(Scripted, Seen):
     """Packing on canvases, with buttons, scrub slider and live numbers.
 
     Its script is of parts: what is replayed (replay.js), how it looks (look.js), where it is drawn
@@ -49,55 +48,21 @@ class Player(Scripted):
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
     pulled = param.Boolean(doc="whether a network is on screen that was pulled; told by the page")
-    contact = param.Integer(default=None, allow_None=True)
-    frame = param.Integer(default=0)
-    reference = param.Integer(default=0)
-    predict = param.Integer(default=0, doc="1 … 3 while a question is asked, see predict.js")
     free = param.Integer(default=0, doc="dimension h of S")
-    split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
-    beside = param.Number(default=None, allow_None=True, doc="μ that is seen beside in its place")
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
     between = param.List(default=None, allow_None=True)
-    tab = param.String()
-    views = param.Integer(doc="of tabs, so far")
-    wide = param.Boolean(doc="whether force space is on screen, whatever the tab")
-    colour = param.String(default="change")
-    thickness = param.String(default="normal")
-    full = param.Number(default=None, allow_None=True, doc="⟨f_n⟩ at which colours are full")
-    stretch = param.Number(default=1.0, doc="how many times as wide chains are")
-    overlay = param.Boolean()
-    scale = param.String(default="mean")
     displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
-
-    _esm = module("player")
-    _stylesheets: ClassVar = [FOLDER / "player.css"]
-    on_digit: Heard
-    on_live: Heard
-    on_hand: Heard
-    on_wide: Heard
-    on_known: Heard
 
     def __init__(self, **params: Any) -> None:
         super().__init__(**params)
-        self.on_digit = self.on_live = self.on_hand = self.on_wide = self.on_known = None
-
-    def hand_over(self, news: Message) -> None:
-        """Send something of what is being computed, or of what was pulled."""
-        self.tell(news)
+        # Who hears of "tab", "hand", "known", "wide" and "live", each called with what is told.
+        self.hears: dict[str, Callable[[Any], object]] = {}
 
     def _heard(self, message: Message) -> None:
-        """Digits pressed anywhere on the page; what the browser has painted of a computation."""
-        hear: dict[str, Heard] = {
-            "tab": self.on_digit,
-            "hand": self.on_hand,
-            "known": self.on_known,
-            "wide": self.on_wide,
-            "live": self.on_live,
-        }
         for name, part in message.items():
-            if (listener := hear[name]) is not None:
-                listener(part)
+            if name in self.hears:
+                self.hears[name](part)
 
 
 def frames(replay: Replay, room: int = 0) -> dict[str, Any]:

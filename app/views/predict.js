@@ -1,6 +1,8 @@
 // Predict, then look: three questions on the packing on screen, each asked before the page shows what it
 // asks for. In links `predict=2` opens the second one.
 
+import { button } from "./made.js"
+
 const ASKED = [
   {
     words: "Nothing moves. Are the forces at the contacts fixed, too?",
@@ -54,7 +56,7 @@ export class Predict {
     player.difference.end()
     this.step = step
     this.shown = step > 0
-    this.dress(step === 2)
+    player.dress(step === 2)
     if (!step) return this.quiz.replaceChildren()
     player.hand.free()
     player.play(false)
@@ -69,7 +71,7 @@ export class Predict {
     const { step, player } = this
     if (!step || given === null || given === undefined) return
     this.step = 0
-    this.dress(false)
+    player.dress(false)
     const [right, told] = ASKED[step - 1].answer(player, given), next = step < ASKED.length ? step + 1 : 0
     this.tell(`${right ? "Well predicted" : "Not quite"}. ${told}`,
       [[next ? "Next question" : "Done", () => { player.model.predict = next }]])
@@ -78,19 +80,9 @@ export class Predict {
   /** A contact was chosen. */
   guess(contact) { if (this.step === 2) this.answer(contact) }
 
-  /** Without colour while they would tell. */
-  dress(plain) {
-    this.player.look.plain = plain
-    this.player.again()
-  }
-
   tell(words, choices) {
     const row = document.createElement("div")
-    for (const [text, act] of choices) {
-      const made = Object.assign(document.createElement("button"), { type: "button", textContent: text })
-      made.addEventListener("click", act)
-      row.append(made)
-    }
+    row.append(...choices.map(([text, act]) => button(text, act)))
     this.quiz.replaceChildren(words, row)
   }
 }

@@ -7,7 +7,7 @@ export function render({ model, view }) {
   root.className = "task"
   root.innerHTML = `
     <div class="bar" role="progressbar" aria-label="progress" aria-valuemin="0" aria-valuemax="100"><div></div></div>
-    <span></span><button type="button">Stop and keep</button><button type="button">Cancel</button>`
+    <span></span><button type="button" class="soft">Stop and keep</button><button type="button" class="soft">Cancel</button>`
   const [bar, words, stop, cancel] = root.children
 
   function show() {

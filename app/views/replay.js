@@ -1,6 +1,14 @@
 // What is replayed: the frames of a walk, and how far the page has come among them.
 // Between two states the straight line is shown: S is convex, so every point of it is admissible too.
 
+/** Forces a part of the way from network a to network b of `all`, one after the other. */
+export function between(all, a, b, part, out) {
+  const size = out.length, from = a * size, to = b * size
+  for (let c = 0; c < size; c++) {
+    out[c] = part ? (1 - part) * all[from + c] + part * all[to + c] : all[from + c]
+  }
+}
+
 export class Replay {
   constructor(walk, between) {
     this.walk = walk
@@ -42,13 +50,7 @@ export class Replay {
       for (const [name, out] of Object.entries(this.mixed)) out.set(this.held[name])
       return
     }
-    const [a, b, portion] = this.spot, size = this.walk.contacts, from = a * size, to = b * size
-    for (const [name, out] of Object.entries(this.mixed)) {
-      const values = this.walk[name]
-      for (let c = 0; c < size; c++) {
-        out[c] = portion ? (1 - portion) * values[from + c] + portion * values[to + c] : values[from + c]
-      }
-    }
+    for (const [name, out] of Object.entries(this.mixed)) between(this.walk[name], ...this.spot, out)
   }
 
   // What was passed; the original network (frame 0) is no state of the walk

@@ -1,6 +1,8 @@
 // The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
 // chains only. One unit of length is the same number of pixels in x and y by construction.
 
+import { made } from "./made.js"
+import { arrow, circle, line } from "./pen.js"
 import { listen } from "./pointing.js"
 import { PIXELS, Sheet } from "./sheet.js"
 
@@ -15,17 +17,12 @@ const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 export class Scene {
   constructor(onSelect) {
-    this.root = document.createElement("div")
-    this.root.className = "scene"
-    this.root.tabIndex = 0
-    this.root.setAttribute("role", "img")
-    this.root.setAttribute("aria-label", "packing with its force chains")
+    this.root = made("div", { className: "scene", tabIndex: 0, role: "img", ariaLabel: "packing with its force chains" })
     const layer = () => this.root.appendChild(document.createElement("canvas")).getContext("2d")
     this.disks = layer()
     this.chains = layer()
     this.marks = layer()
-    this.tip = this.root.appendChild(document.createElement("div"))
-    this.tip.className = "tip"
+    this.tip = this.root.appendChild(made("div", { className: "tip" }))
     this.root.scene = this
     this.onSelect = onSelect
     this.size = 0
@@ -52,9 +49,14 @@ export class Scene {
     if (moved) this.reset(false)
   }
 
-  reset(paint = true) {
+  /** The view of all of it. */
+  get whole() {
     const [left, right, bottom, top] = this.geometry.window
-    this.view = { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
+    return { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
+  }
+
+  reset(paint = true) {
+    this.view = this.whole
     if (paint) this.changed()
   }
 
@@ -211,6 +213,16 @@ export class Scene {
     ]
   }
 
+  /** Of the contacts that are chosen(contact) each segment k: both ends a and b, and its middle. */
+  *segments(chosen) {
+    const { contact } = this.geometry
+    for (let k = 0; k < contact.length; k++) {
+      if (!chosen(contact[k])) continue
+      const [xa, ya, xb, yb] = this.ends(k)
+      yield { k, contact: contact[k], a: [xa, ya], b: [xb, yb], middle: [(xa + xb) / 2, (ya + yb) / 2] }
+    }
+  }
+
   strokeEach(order, count, colours) {
     const { chains, width, bin } = this
     chains.lineCap = "round"
@@ -255,16 +267,13 @@ export class Scene {
 
   /** Fig. 5 of the paper: strong contacts filled, undetermined ones open; and the selected one. */
   drawMarks(style) {
-    const { marks, scale, palette, geometry } = this
+    const { marks, scale, palette } = this
     this.begin(marks)
-    const { contact } = geometry
     const radius = Math.max(MARK, 2 / scale)
     if (style.strong) {
       for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
         marks.beginPath()
-        for (let k = 0; k < contact.length; k++) {
-          if (!chosen[contact[k]]) continue
-          const [xa, ya, xb, yb] = this.ends(k), x = (xa + xb) / 2, y = (ya + yb) / 2
+        for (const { middle: [x, y] } of this.segments((contact) => chosen[contact])) {
           marks.moveTo(x + radius * size, y)
           marks.arc(x, y, radius * size, 0, 2 * Math.PI)
         }
@@ -293,34 +302,21 @@ export class Scene {
     marks.lineCap = "round"
     marks.beginPath()
     for (const { nx, ny, fx, fy } of forces) {
-      const size = Math.hypot(fx, fy)
-      if (!(size > 1e-3 * most)) continue
-      const ux = fx / size, uy = fy / size, ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
-      marks.moveTo(ex - (long * fx) / most, ey - (long * fy) / most)
-      marks.lineTo(ex, ey)
-      for (const side of [1, -1]) {
-        marks.moveTo(ex - head * (ux - 0.5 * side * uy), ey - head * (uy + 0.5 * side * ux))
-        marks.lineTo(ex, ey)
-      }
+      if (!(Math.hypot(fx, fy) > 1e-3 * most)) continue
+      const ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
+      arrow(marks, [ex - (long * fx) / most, ey - (long * fy) / most], [ex, ey], head, 0.5)
     }
     marks.stroke()
   }
 
   /** A line in the colour of its axis of force space. */
   drawAxis(chosen, colour) {
-    const { marks, scale, palette, geometry } = this
+    const { marks, scale, palette } = this
     marks.lineCap = "round"
     for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
       marks.lineWidth = Math.max(AXIS, 5 / scale) + more
       marks.strokeStyle = paint
-      marks.beginPath()
-      for (let k = 0; k < geometry.contact.length; k++) {
-        if (geometry.contact[k] !== chosen) continue
-        const [xa, ya, xb, yb] = this.ends(k)
-        marks.moveTo(xa, ya)
-        marks.lineTo(xb, yb)
-      }
-      marks.stroke()
+      for (const { a, b } of this.segments((contact) => contact === chosen)) line(marks, a, b)
     }
   }
 
@@ -328,20 +324,14 @@ export class Scene {
     const { marks, scale, palette, geometry } = this
     marks.strokeStyle = palette.selected
     marks.lineCap = "round"
-    for (let k = 0; k < geometry.contact.length; k++) {
-      if (geometry.contact[k] !== selected) continue
-      const [xa, ya, xb, yb] = this.ends(k)
+    for (const { k, a, b } of this.segments((contact) => contact === selected)) {
       marks.lineWidth = 2 / scale
-      for (const [x, y, grain] of [[xa, ya, geometry.i[k]], [xb, yb, geometry.j[k]]]) {
-        marks.beginPath()
-        marks.arc(x, y, geometry.radius[grain], 0, 2 * Math.PI)
+      for (const [at, grain] of [[a, geometry.i[k]], [b, geometry.j[k]]]) {
+        circle(marks, at, geometry.radius[grain])
         marks.stroke()
       }
       marks.lineWidth = Math.max(0.12, 3 / scale)
-      marks.beginPath()
-      marks.moveTo(xa, ya)
-      marks.lineTo(xb, yb)
-      marks.stroke()
+      line(marks, a, b)
     }
   }
 
@@ -407,7 +397,7 @@ export class Scene {
 
   zoom(factor, px, py) {
     if (!this.geometry) return
-    const [left, right] = this.geometry.window, whole = (right - left) / 2
+    const whole = this.whole.half
     const before = this.toPlace(px, py)
     this.view.half = Math.min(ZOOM[1] * whole, Math.max(ZOOM[0] * whole, this.view.half * factor))
     const after = this.toPlace(px, py)

@@ -1,13 +1,13 @@
 """The list of scenes, first of the controls of large packings."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import param
 
 from granforce.packing.scenes import SCENES
 
 from .. import scenes
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 
 class SceneList(Scripted):
@@ -16,9 +16,6 @@ class SceneList(Scripted):
     titles = param.List(doc="[name, title] of every scene")
     shown = param.String(default=scenes.MANY)
     usual = param.Number(doc="μ of the page as it opens, which is not taken along")
-
-    _esm = module("scenelist")
-    _stylesheets: ClassVar = [FOLDER / "scenelist.css"]
 
     def __init__(self, **params: Any) -> None:
         super().__init__(titles=scenes.titles(), usual=SCENES[scenes.MANY].mu, **params)

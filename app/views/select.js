@@ -1,12 +1,10 @@
 // One of several, chosen from the browser's own list, which every keyboard and screen reader knows.
 
+import { made } from "./made.js"
+
 export function render({ model }) {
-  const root = document.createElement("fieldset"), legend = document.createElement("legend")
-  const list = document.createElement("select")
-  root.className = "choice"
-  root.setAttribute("role", "presentation")
-  legend.className = "name"
-  legend.ariaHidden = "true"
+  const root = made("fieldset", { className: "choice", role: "presentation" })
+  const legend = made("legend", { className: "name", ariaHidden: "true" }), list = document.createElement("select")
   root.append(legend, list)
 
   function show() {

@@ -1,10 +1,8 @@
 """One of several, chosen from a list."""
 
-from typing import ClassVar
-
 import param
 
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 
 class Select(Scripted):
@@ -16,6 +14,3 @@ class Select(Scripted):
     label = param.String()
     options = param.Dict(default={}, doc="{words: value}")
     value = param.String()
-
-    _esm = module("select")
-    _stylesheets: ClassVar = [FOLDER / "select.css"]

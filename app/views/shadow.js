@@ -2,6 +2,7 @@
 
 import { dot } from "./body.js"
 import { nameAxis } from "./line.js"
+import { line, polygon } from "./pen.js"
 
 /** The exact interval of a contact's f_n: the shadow of S on that axis. */
 export function drawInterval(space, contact) {
@@ -23,18 +24,10 @@ export function drawInterval(space, contact) {
   g.strokeStyle = look.hand
   g.lineWidth = 1
   g.setLineDash([2, 4])
-  for (const { u } of [...ends, { u: body.u }]) {
-    g.beginPath()
-    g.moveTo(...space.px(space.flat(u)))
-    g.lineTo(...space.px(foot(u)))
-    g.stroke()
-  }
+  for (const { u } of [...ends, { u: body.u }]) line(g, space.px(space.flat(u)), space.px(foot(u)))
   g.setLineDash([])
   g.lineWidth = 4
-  g.beginPath()
-  g.moveTo(...space.px(foot(ends[0].u)))
-  g.lineTo(...space.px(foot(ends[1].u)))
-  g.stroke()
+  line(g, ...ends.map(({ u }) => space.px(foot(u))))
   const interval = body.interval(2 * contact)
   ends.forEach(({ u }, k) => {
     const [x, y] = space.px(foot(u))
@@ -50,9 +43,7 @@ export function drawShadow(space) {
   g.strokeRect(30, 8, w - 40, h - 40)
   const corners = space.corners().map((p) => space.px(p)), { stale } = space.outline
   if (corners.length) {
-    g.beginPath()
-    corners.forEach((p, n) => (n ? g.lineTo(...p) : g.moveTo(...p)))
-    g.closePath()
+    polygon(g, corners)
     g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
     g.fillStyle = look.shade
     g.fill()

@@ -12,6 +12,7 @@ import { lesson, printed } from "./lesson.js"
 import { palette } from "./palette.js"
 import { Push } from "./push.js"
 import { Quest } from "./quest.js"
+import { save } from "./save.js"
 import { counted, forceName, legend, pictured, sentence, special, stopping } from "./saying.js"
 import { Space } from "./space.js"
 import { TourCard } from "./tourcard.js"
@@ -394,11 +395,7 @@ export function render({ model, view }) {
   }
 
   function download(text) {
-    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)), link = document.createElement("a")
-    link.href = URL.createObjectURL(new Blob([bytes]))
-    link.download = `${body.scene.name}.npz`
-    link.click()
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000)
+    save(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]), `${body.scene.name}.npz`)
   }
 
   function key(event) {

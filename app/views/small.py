@@ -1,7 +1,8 @@
 """A small scene and the whole of its S: drawn, cut and pulled in the browser; see small.js."""
 
 import base64
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import Any
 
 import param
 
@@ -11,7 +12,7 @@ from granforce.records import InputError, NotJammedError, UndecidedError
 from .. import scenes
 from ..jobs import Task
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 
 # Title, text, and what the scene shows, of the steps of the tour before those of large packings.
 FIRST_STEPS = (
@@ -59,9 +60,6 @@ class Small(Scripted):
     first = param.Boolean(doc="whether the page was opened without a view to show")
     dark = param.Boolean()
 
-    _esm = module("small")
-    _stylesheets: ClassVar = [FOLDER / "small.css"]
-
     def __init__(self, asked: scenes.Asked, task: Task, all_steps: int, **params: Any) -> None:
         """asked: scenes.Asked. task: a jobs.Task of the page, for scenes that take a while."""
         super().__init__(
@@ -108,31 +106,25 @@ class Small(Scripted):
                 case {"built": built, "mu": mu}:
                     self._show(scenes.OWN, mu, built[: scenes.LONGEST])
                 case {"save": of}:
-                    self._save(**of)
+                    self._answer(scenes.file_of, _as_text, **of)
                 case {"fall": of}:
-                    self._fall(**of)
+                    self._answer(scenes.falling, lambda motion: {"fall": motion.tolist()}, **of)
                 case {"measure": of}:
-                    self._measure(**of)
+                    asked = {"mu": of["mu"], "plane": of["plane"]}
+                    self._answer(scenes.measured, lambda found: {"measured": found} | asked, **of)
         except (InputError, NotJammedError, UndecidedError) as error:
             self.tell({"error": str(error)})
 
-    def _fall(self, mu: float, load: list[float]) -> None:
+    def _answer(
+        self, find: Callable[..., Any], told: Callable[[Any], Message], mu: float, **options: Any
+    ) -> None:
+        """Tell what is found of the scene at this μ, under the loads among the options."""
         name, built = self.scene["name"], self.scene["built"]
         self._task.start(
-            lambda job: scenes.falling(scenes.packing_of(name, mu, built), load).tolist(),
-            lambda motion: self.tell({"fall": motion}),
+            lambda job: find(scenes.packing_of(name, mu, built), **options),
+            lambda found: self.tell(told(found)),
         )
 
-    def _save(self, mu: float, load: list[float]) -> None:
-        name, built = self.scene["name"], self.scene["built"]
-        self._task.start(
-            lambda job: scenes.file_of(scenes.packing_of(name, mu, built), load),
-            lambda file: self.tell({"file": base64.b64encode(file).decode()}),
-        )
 
-    def _measure(self, mu: float, load: list[float], plane: list[int]) -> None:
-        name, built = self.scene["name"], self.scene["built"]
-        self._task.start(
-            lambda job: scenes.measured(scenes.packing_of(name, mu, built), load, plane),
-            lambda found: self.tell({"measured": found, "mu": mu, "plane": plane}),
-        )
+def _as_text(file: bytes) -> Message:
+    return {"file": base64.b64encode(file).decode()}

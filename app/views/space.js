@@ -4,6 +4,7 @@
 import { distance, dot, solve } from "./body.js"
 import { Easel } from "./easel.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
+import { circle, line, polygon } from "./pen.js"
 import { drawName, readBy } from "./reading.js"
 import { drawInterval, drawShadow } from "./shadow.js"
 
@@ -27,10 +28,7 @@ export class Space {
     this.shadow = [0, 2] // forces that are its axes above three dimensions: 2 c for f_n, 2 c + 1 for f_t
     this.outline = { points: [], stale: true } // of S on them, flat, by linear programs
     this.dots = []
-    const at = (event) => {
-      const box = canvas.getBoundingClientRect()
-      return [event.clientX - box.left, event.clientY - box.top]
-    }
+    const at = (event) => this.easel.at(event)
     canvas.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
     canvas.addEventListener("pointermove", (event) => this.moved(...at(event)))
     canvas.addEventListener("pointerleave", () => { if (!this.held) told("side", null) })
@@ -194,8 +192,7 @@ export class Space {
     if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
-    g.beginPath()
-    g.arc(x, y, 8, 0, 7)
+    circle(g, [x, y], 8)
     g.fillStyle = look.hand
     g.fill()
     g.strokeStyle = look.paper
@@ -217,10 +214,7 @@ export class Space {
     const [px, py, words] = places.find(([a, b]) => this.free([a, b], wide, 24)) ?? places[0]
     g.strokeStyle = g.fillStyle = look.hand
     g.lineWidth = 1.5
-    g.beginPath()
-    g.moveTo(x, y)
-    g.lineTo(px - Math.sign(px - x) * (wide / 2 - 4), py)
-    g.stroke()
+    line(g, [x, y], [px - Math.sign(px - x) * (wide / 2 - 4), py])
     g.fillRect(px - wide / 2, py - 11, wide, 21)
     g.textAlign = "center"
     g.textBaseline = "middle"
@@ -285,10 +279,7 @@ export class Space {
     const [ux, uy] = [way[0] / size, -way[1] / size], head = 8 + thick
     g.strokeStyle = g.fillStyle = look.cold
     g.lineWidth = thick
-    g.beginPath()
-    g.moveTo(x, y)
-    g.lineTo(x + (ON - head) * ux, y + (ON - head) * uy)
-    g.stroke()
+    line(g, [x, y], [x + (ON - head) * ux, y + (ON - head) * uy])
     g.beginPath()
     g.moveTo(x + ON * ux, y + ON * uy)
     for (const side of [0.6, -0.6]) g.lineTo(x + (ON - head) * ux - side * head * uy, y + (ON - head) * uy + side * head * ux)
@@ -309,9 +300,7 @@ export class Space {
     }
     const order = [...places.keys()].sort((a, b) =>
       Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
-    g.beginPath()
-    order.forEach((k, n) => (n ? g.lineTo(...places[k]) : g.moveTo(...places[k])))
-    g.closePath()
+    polygon(g, order.map((k) => places[k]))
     g.fillStyle = look.shade
     g.fill()
     const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
@@ -320,10 +309,7 @@ export class Space {
       g.strokeStyle = lit ? look.hand : look.cold
       g.lineWidth = lit ? 5 : 2.5
       g.setLineDash(side.cap ? [3, 7] : [])
-      g.beginPath()
-      g.moveTo(...a)
-      g.lineTo(...b)
-      g.stroke()
+      line(g, a, b)
       g.setLineDash([])
       if (side.cap) for (const part of [0, 0.5, 1]) this.drawOn([0, 1].map((d) => a[d] + part * (b[d] - a[d])), 2)
       const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], long = Math.hypot(a[0] - b[0], a[1] - b[1]) || 1
@@ -378,9 +364,7 @@ export class Space {
     const sides = [...body.sides].sort((a, b) => towards(a) - towards(b)), words = []
     for (const side of sides) {
       const front = towards(side) > 0, lit = this.lit(side)
-      g.beginPath()
-      side.corners.forEach((k, n) => (n ? g.lineTo(...places[k]) : g.moveTo(...places[k])))
-      g.closePath()
+      polygon(g, side.corners.map((k) => places[k]))
       if (front) {
         g.globalAlpha = lit ? 0.5 : 0.15 + 0.35 * towards(side)
         g.fillStyle = lit ? look.hand : look.cold

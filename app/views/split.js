@@ -3,6 +3,7 @@
 // or the pinned state changes.
 
 import { Look } from "./look.js"
+import { made } from "./made.js"
 import { plain } from "./plain.js"
 import { Replay } from "./replay.js"
 import { Scene } from "./scene.js"
@@ -14,8 +15,7 @@ export class Split {
     const twin = new Scene((contact) => { if (!this.other) model.contact = contact })
     this.twin = twin
     this.other = null // the Replay of another packing
-    twin.root.className = "twin"
-    twin.root.setAttribute("aria-label", "the network beside")
+    Object.assign(twin.root, { className: "twin", ariaLabel: "the network beside" })
     this.through = new Through(scene, twin)
     Object.defineProperty(twin, "view", {
       get: () => (this.other ? this.through : scene.view),
@@ -24,12 +24,7 @@ export class Split {
     twin.changed = () => scene.changed()
     twin.reset = (paint = true) => { if (paint) scene.reset() }
     twin.onRepaint = () => {}
-    const own = (root) => {
-      const made = root.appendChild(document.createElement("div"))
-      made.className = "caption"
-      return made
-    }
-    this.captions = [own(twin.root), own(scene.root)]
+    this.captions = [twin, scene].map(({ root }) => root.appendChild(made("div", { className: "caption" })))
     player.buttons.scenes.prepend(twin.root)
   }
 
@@ -123,12 +118,8 @@ export class Split {
     if (!on || !twin.style) return
     twin.selected = other ? null : player.scene.selected
     twin.pair = other ? [] : player.scene.pair
-    const size = twin.root.clientWidth, ratio = window.devicePixelRatio || 1
-    if (!size) return
-    if (size !== twin.size || ratio !== twin.ratio) {
-      Object.assign(twin, { size, ratio })
-      for (const { canvas } of [twin.disks, twin.chains, twin.marks]) canvas.width = canvas.height = Math.round(size * ratio)
-    }
+    twin.resize()
+    if (!twin.size) return
     twin.drawDisks()
     twin.stale = false
     twin.drawChains(twin.style)
@@ -140,17 +131,13 @@ class Through {
   constructor(scene, twin) { Object.assign(this, { scene, twin }) }
 
   /** A packing that moves is seen whole, and so is what is beside it. */
-  get from() { return this.scene.frozen ? this.whole(this.scene) : this.scene.view }
+  get from() { return this.scene.frozen ? this.scene.whole : this.scene.view }
 
-  whole({ geometry: { window: [left, right, bottom, top] } }) {
-    return { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
-  }
+  get ratio() { return this.twin.whole.half / this.scene.whole.half }
 
-  get ratio() { return this.whole(this.twin).half / this.whole(this.scene).half }
+  of(axis) { return this.twin.whole[axis] + (this.from[axis] - this.scene.whole[axis]) * this.ratio }
 
-  of(axis) { return this.whole(this.twin)[axis] + (this.from[axis] - this.whole(this.scene)[axis]) * this.ratio }
-
-  back(axis, value) { this.from[axis] = this.whole(this.scene)[axis] + (value - this.whole(this.twin)[axis]) / this.ratio }
+  back(axis, value) { this.from[axis] = this.scene.whole[axis] + (value - this.twin.whole[axis]) / this.ratio }
 
   get x() { return this.of("x") }
   set x(value) { this.back("x", value) }

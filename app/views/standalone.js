@@ -14,7 +14,8 @@ function unpacked(value) {
 /** Parameters as properties that tell those who listen; nobody is at the other end. */
 function standIn(given) {
   const heard = {}
-  const model = { on: (name, act) => (heard[name] ??= []).push(act), send_msg() {} }
+  const on = (names, act) => { for (const name of [names].flat()) (heard[name] ??= []).push(act) }
+  const model = { on, send_msg() {} }
   return new Proxy(Object.assign(model, given), {
     set(all, name, value) {
       all[name] = value

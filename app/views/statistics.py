@@ -10,6 +10,8 @@ import panel_material_ui as pmui
 from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
 from bokeh.plotting import figure as Figure
 
+from granforce.measures import statistics
+
 from .. import distributions
 from ..data import Cell, Library
 from ..distributions import Row
@@ -19,12 +21,12 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .packing import exact_intervals
-from .parts import TabView, chosen, figure, folded, folded_away, note, question
+from .parts import TabView, choice, figure, folded, folded_away, linked, note, plotted, question
 from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
-LARGEST = 6.0  # ⟨f_n⟩, at most on the axis of P(f_n)
+LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 EACH = (
     "<b>Each dot is one contact:</b> the farther up, the less its force is determined; the farther "
     "right, the stronger it is. Click a dot to find its contact in the packing."
@@ -34,12 +36,12 @@ EACH = (
 class View(TabView):
     """One figure at a time; those over μ are drawn in a thread by granforce.figures."""
 
-    name, title = "statistics", "Statistics"
+    name = "statistics"
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", "exact", "catalogue")
         self.what = question("Question", FIGURES, self.looks, "figure")
-        self.scale = chosen(AXES, self.looks, "axis")
+        self.scale = linked(choice(AXES, self.looks.axis), self.looks, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
         # Always on the page: what React draws must not leave it meanwhile.
         self.folded = [pn.Column(sizing_mode="stretch_width") for _ in studied.FOLDED]
@@ -90,7 +92,7 @@ class View(TabView):
             self.bar.visible = False
             draw = self._scatter if what == "scatter" else self._force
             fig, self.lead.object, self.told.object = draw(state.replay)
-            self.plots.objects = [_pane(fig)]
+            self.plots.objects = [plotted(fig)]
             return
         log = self.scale.value == "log"
         cells = distributions.alike(state.catalogue, state.cell) or [state.cell]
@@ -104,12 +106,12 @@ class View(TabView):
         figures, self.lead.object, self.told.object = found
         for fig in figures:
             self._choosable(fig)
-        first = [_pane(figures[0])]
+        first = [plotted(figures[0])]
         self.plots.objects = first
         yield
         if self.plots.objects == first:  # nothing else was chosen
             for place, fig in zip(self.folded, figures[1:], strict=False):
-                place.objects = [_pane(fig)]
+                place.objects = [plotted(fig)]
 
     def _follow(self, *events: Any) -> None:
         self.bar.visible = self.task.running and self.what.value in DRAWN
@@ -205,9 +207,9 @@ class View(TabView):
         layers = [("as packed", replay.normal[0], ORIGINAL)]
         if several:
             layers.insert(0, ("networks", replay.normal[1:], DARK))
-        largest = min(LARGEST, float(replay.normal.max()))
+        edges = np.linspace(0, min(LARGEST, float(replay.normal.max())), BINS + 1)
         for label, values, colour in layers:
-            edges, density = distributions.histogram(values, largest=largest)
+            density = statistics.density(values.ravel(), edges)
             height = np.where(density > 0, density, np.nan) if log else density
             middle = (edges[1:] + edges[:-1]) / 2
             if label == "networks":
@@ -234,10 +236,6 @@ class View(TabView):
         return fig, lead, folded(text)
 
 
-def _pane(fig: Figure) -> pn.pane.Bokeh:
-    return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
-
-
 def over_friction(
     library: Library, cells: Sequence[Cell], cell: Cell, what: str, log: bool
 ) -> Callable[[Job], Drawn]:
@@ -257,16 +255,9 @@ def over_friction(
     return work
 
 
-def _indeterminacy(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
-    return studied.indeterminacy(rows, exact, here, log)
-
-
-def _extents(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
-    return studied.extents(distributions.groups(rows, here["mu"]), here["mu"], log)
-
-
-def _correlations(rows: list[Row], exact: list[Row], here: Row, log: bool) -> Drawn:
-    return studied.correlations(rows, exact)
-
-
-DRAWN = {"eta": _indeterminacy, "extent": _extents, "correlation": _correlations}
+# Figures over μ, of rows, exact rows, the row on screen, and whether the axis is logarithmic.
+DRAWN: dict[str, Callable[[list[Row], list[Row], Row, bool], Drawn]] = {
+    "eta": studied.indeterminacy,
+    "extent": lambda rows, exact, here, log: studied.extents(rows, here["mu"], log),
+    "correlation": lambda rows, exact, here, log: studied.correlations(rows, exact),
+}

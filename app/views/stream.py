@@ -23,7 +23,7 @@ class Stream:
         self._document = document
         self._sent = self._painted = 0
         self._awake, self._ticking = False, None
-        player.on_live = self.heard
+        player.hears["live"] = self.heard
         self.work.param.watch(self._follow, ["live", "arriving"])
         state.param.watch(self._show, ["missing", "selection", "cell"])
         self.work.param.watch(self._show, "busy")
@@ -67,6 +67,6 @@ class Stream:
             if "picture" in news:
                 self.work.moving = True
             self._sent += 1
-            self.player.hand_over(news | {"number": self._sent})
+            self.player.tell(news | {"number": self._sent})
             if "states" in news:
                 self.work.fourfold = following.fourfold  # type: ignore[union-attr]  # no Arriving

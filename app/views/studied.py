@@ -12,7 +12,7 @@ from bokeh.plotting import figure as Figure
 from granforce.measures import statistics
 from granforce.records import Floats
 
-from .. import studied
+from .. import distributions, studied
 from ..distributions import Row
 from .hints import term
 from .labels import labels
@@ -24,12 +24,13 @@ MEASURES = (
     ("eta2", "distance η2", 1.0),
     ("eta3", "0.15 × range η3", 0.15),
 )
+EXACT = "exact"  # what is, is dashed
 # Parts of the study, and what they are called.
 SAMPLERS = {
     "walk": "random walk",
     "sweeps_1e-3": "by Gauss–Seidel, to 10⁻³",
     "uniform": "uniform in S",
-    "exact": "exact",
+    "exact": EXACT,
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
@@ -106,29 +107,27 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     walks = studied.rows("walk")
     spread = _over_mu("spread", "how much a force varies (mean force = 1)", 330, **kind)
     found = statistics.means(walks, "eta1")
-    _line(spread, found, f"mean of {_packings(walks)} packings", log, COLOURS[0])
-    _own(spread, [(here["mu"], here["eta1"], 0.0)], log, DOT, label=HERE)
+    _line(spread, found, f"mean of {_packings(walks)} packings", log)
+    _own(spread, [(here["mu"], here["eta1"], 0.0)], log, colour=DOT, label=HERE)
     _peak(spread, found)
     etas = _over_mu("indeterminacy", "how undetermined, η", 270, title=FOLDED[1], **kind)
     for k, (name, label, factor) in enumerate(MEASURES):
-        look: dict[str, Any] = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
-        _line(etas, statistics.means(walks, name, factor=factor), label, **look)
+        _line(etas, statistics.means(walks, name, factor=factor), label, log, k)
     for k, (name, _, factor) in enumerate(MEASURES):
-        _own(etas, statistics.means(own, name, factor=factor), log, COLOURS[k], MARKERS[k])
+        _own(etas, statistics.means(own, name, factor=factor), log, k)
     for fig in (spread, etas):
         corner(fig, "measured: in networks found at random")
         legend_above(fig)
     seen = _over_mu("samplers", "0.15 × range η3", 270, title=FOLDED[2], **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
-        look = {"log": log, "colour": COLOURS[k], "marker": MARKERS[k]}
         points = statistics.means(studied.rows(part), "eta3", factor=0.15)
-        _line(seen, points, label, dash="dashed" if part == "exact" else "solid", **look)
-    _own(seen, statistics.means(own, "eta3", factor=0.15), log, COLOURS[0], MARKERS[0])
-    _own(seen, statistics.means(exact, "eta3", factor=0.15), log, COLOURS[3], MARKERS[3])
+        _line(seen, points, label, log, k)
+    _own(seen, statistics.means(own, "eta3", factor=0.15), log)
+    _own(seen, statistics.means(exact, "eta3", factor=0.15), log, 3)
     corner(seen, "dashed exact, others measured")
     z = _over_mu("coordination", "contacts per disk z", 220, title=FOLDED[0])
-    _line(z, statistics.means(studied.rows("walk"), "coordination"), "z", False, COLOURS[0])
-    _own(z, statistics.means(own, "coordination"), False, COLOURS[0])
+    _line(z, statistics.means(studied.rows("walk"), "coordination"), "z")
+    _own(z, statistics.means(own, "coordination"))
     corner(z, "measured: of the packings")
     legend_above(seen, 3)
     z.legend.visible = False
@@ -202,12 +201,10 @@ def correlations(own: list[Row], exact: list[Row]) -> Drawn:
     """corr(f_n, ΔF_n) against μ."""
     fig = _over_mu("correlation", "correlation of fₙ and ΔFₙ", 380)
     for k, part in enumerate(("walk", "uniform", "exact")):
-        look: dict[str, Any] = {"log": False, "colour": COLOURS[k], "marker": MARKERS[k]}
-        points = statistics.means(studied.rows(part), "correlation")
-        _line(fig, points, SAMPLERS[part], dash="dashed" if part == "exact" else "solid", **look)
+        _line(fig, statistics.means(studied.rows(part), "correlation"), SAMPLERS[part], k=k)
     known = [row for row in own if np.isfinite(row["correlation"])]
-    _own(fig, statistics.means(known, "correlation"), False, COLOURS[0], MARKERS[0])
-    _own(fig, statistics.means(exact, "correlation"), False, COLOURS[2], MARKERS[2])
+    _own(fig, statistics.means(known, "correlation"))
+    _own(fig, statistics.means(exact, "correlation"), k=2)
     legend_above(fig)
     corner(fig, "dashed exact, others measured")
     text = (
@@ -232,11 +229,9 @@ def strong_and_undetermined() -> str:
     )
 
 
-def extents(groups: dict[float, list[Floats]], mu: float, log: bool) -> Drawn:
-    """P(ΔF_n) in ⟨f_n⟩ for some μ of the study, and of the packings on the page with this μ.
-
-    groups: {μ: extents} of the packings on the page.
-    """
+def extents(own: list[Row], mu: float, log: bool) -> Drawn:
+    """P(ΔF_n) in ⟨f_n⟩ for some μ of the study, and of the packings on the page with this μ."""
+    groups = distributions.groups(own, mu)
     fig = figure(
         "extents", None, "length ΔFₙ of a contact's interval, in mean forces",
         "how often, P(ΔFₙ)", height=400, y_axis_type="log" if log else "linear",
@@ -288,12 +283,12 @@ def responses(own: list[Row]) -> Drawn:
     lines = {"critical_force": "gives way at (critical force)", "limit_load": "limit load"}
     _against_eta2(force, study, lines)
     for k, name in enumerate(("critical_force", "limit_load")):
-        _own(force, _pairs(own, name), False, COLOURS[k], MARKERS[k])
+        _own(force, _pairs(own, name), k=k)
     title = "How fast the motion fades with distance: |u| ~ r⁻ᵅ"
     alpha = figure("decay", title, across, "decay exponent α", height=280)
     _against_eta2(alpha, study, {"decay_exponent": "α"})
     known = [row for row in own if np.isfinite(row["decay_exponent"])]
-    _own(alpha, _pairs(known, "decay_exponent"), False, COLOURS[0], MARKERS[0])
+    _own(alpha, _pairs(known, "decay_exponent"))
     for fig in (force, alpha):
         if fig.renderers:
             legend_above(fig)
@@ -329,7 +324,7 @@ def _against_eta2(fig: Figure, rows: list[Row], lines: dict[str, str]) -> None:
         mu = [m for m, _, _ in across]
         points = [(x, y, e) for (_, x, _), (_, y, e) in zip(across, up, strict=True)]
         if points:
-            _line(fig, points, label, False, COLOURS[k], MARKERS[k], zero=True, mu=mu)
+            _line(fig, points, label, k=k, mu=mu)
             drawn.append((mu, np.array(points)))
     if not drawn:
         return
@@ -358,17 +353,15 @@ def _line(
     fig: Figure,
     points: Points,
     label: str,
-    log: bool,
-    colour: str,
-    marker: str = "circle",
-    dash: str = "solid",
-    zero: bool = False,
+    log: bool = False,
+    k: int = 0,
     mu: Sequence[float] | None = None,
 ) -> None:
-    """A line with points and error bars; points (x, y, error); mu: of the points, if x is not."""
-    x, y, error = _shown(points, log, zero)
+    """Line k of a figure with points and error bars; points (x, y, error); mu: if x is not."""
+    x, y, error = _shown(points, log, zero=mu is not None)
     if not len(x):
         return
+    colour, marker, dash = COLOURS[k], MARKERS[k], "dashed" if label == EXACT else "solid"
     fig.line(x, y, color=colour, line_width=1.6, line_dash=dash, legend_label=label)
     source = ColumnDataSource({"x": x, "y": y} | ({} if mu is None else {"mu": mu}))
     dots = fig.scatter(
@@ -381,14 +374,19 @@ def _line(
 
 
 def _own(
-    fig: Figure, points: Points, log: bool, colour: str, marker: str = "circle", label: str = OWN
+    fig: Figure,
+    points: Points,
+    log: bool = False,
+    k: int = 0,
+    colour: str = "",
+    label: str = OWN,
 ) -> None:
-    """Rings around the page's own points, over everything."""
+    """Rings around the page's own points of line k, over everything; colour: if another one."""
     x, y, _ = _shown(points, log, zero=fig.xaxis.axis_label != "friction μ")
     if len(x):
         fig.scatter(
-            x, y, size=12, marker=marker, fill_alpha=0, line_color=colour, line_width=2.2,
-            legend_label=label,
+            x, y, size=12, marker=MARKERS[k], fill_alpha=0, line_color=colour or COLOURS[k],
+            line_width=2.2, legend_label=label,
         )  # fmt: skip
 
 

@@ -7,9 +7,8 @@ import panel as pn
 
 from ..live import Summary
 from ..state import AppState
-from .explanation import Foldout
+from .foldout import Foldout
 from .hints import term
-from .parts import of_replay
 
 TILE = """<div class="tile" tabindex="0" data-term="{term}"><div class="name">{name}</div>
 <div>{value}</div><div class="name">{meaning}</div></div>"""
@@ -24,8 +23,6 @@ STYLE = """
   background: #7a4a00; color: #ffffff; }
 .first { font-size: 14px; line-height: 1.45; margin: 8px 2px 0; }
 .rest { font-size: 12px; opacity: 0.85; margin: 6px 2px 0; }
-.term { text-decoration: underline dotted; text-underline-offset: 3px; cursor: help; }
-.term:focus-visible { outline: 2px solid #e8710a; outline-offset: 1px; }
 """
 
 # Words and symbol, name among the summary's numbers, form, key of the glossary, and what it is of.
@@ -141,12 +138,15 @@ def tiles(state: AppState, volume: Any) -> pn.Column:
     within = pn.Column(volume.tiles, volume.measure, visible=False, sizing_mode="stretch_width")
     folded.link(within, open="visible")
 
+    shown = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
+
     def tell(*events: Any) -> None:
-        folded.inside = "" if state.replay is None else checks(state.replay.summary)
+        if state.replay is not None:
+            summary = state.replay.summary
+            shown.object, folded.inside = numbers(summary), checks(summary)
 
     state.param.watch(tell, "replay")
     tell()
-    shown = of_replay(state, numbers, STYLE, margin=(0, 10))
     return pn.Column(shown, folded, within, sizing_mode="stretch_width")
 
 

@@ -1,7 +1,7 @@
 """Six steps over the real page, for those who see it for the first time."""
 
 import re
-from typing import Any, ClassVar
+from typing import Any
 from urllib.parse import parse_qsl
 
 import numpy as np
@@ -9,7 +9,7 @@ import param
 
 from ..state import AppState
 from .messages import Message
-from .scripts import FOLDER, Scripted, module
+from .scripts import Scripted
 from .small import FIRST_STEPS
 
 # Title and two sentences of each step, and the part of the page that it is about, see tour.js.
@@ -70,9 +70,6 @@ class Tour(Scripted):
     before = param.Integer(default=len(FIRST_STEPS), doc="steps of the tour on the page before")
     scene = param.String(default=FIRST_STEPS[-1][2]["scene"], doc="of the last of these")
     first = param.Boolean(doc="whether the page was opened without a view to show")
-
-    _esm = module("tour")
-    _stylesheets: ClassVar = [FOLDER / "tour.css"]
 
     def __init__(self, state: AppState, query: str = "", **params: Any) -> None:
         """query: of the address; `tour=2` opens the second step."""

@@ -15,7 +15,7 @@ from ..state import AppState
 from . import photoelastic as measured
 from .dropper import Dropper
 from .mine import Mine
-from .parts import by_words, note
+from .parts import PRIMARY, by_words, note
 from .progress import Progress
 from .select import Select
 
@@ -46,7 +46,7 @@ SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
 class View:
     """Drop files, see the report; the packing is then on the page."""
 
-    name, title = "upload", "Your packing"
+    name = "upload"
 
     def __init__(self, state: AppState) -> None:
         self.state = state
@@ -65,7 +65,7 @@ class View:
         self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
         self.walls = Select(label="Walls", options=by_words(WALLS), width=150, margin=(4, 8))
         self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
-        self.read = pmui.Button(label="Read", color="primary", size="small", margin=(8, 8))
+        self.read = pmui.Button(label="Read", margin=(8, 8), **PRIMARY)
         self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
         self.waiting = pmui.Alert(severity="info", visible=False, sizing_mode="stretch_width")
         self.report = note()

@@ -9,7 +9,7 @@ import xarray as xr
 from .. import compute
 from ..data import Cell
 from ..state import AppState
-from .parts import PLAIN
+from .parts import OUTLINED, PLAIN
 from .summary import STYLE, as_tiles
 
 # As summary.TILES, of names in the dataset.
@@ -28,12 +28,7 @@ class Volume:
         self.found: xr.Dataset | None = None
         self.tiles = pn.pane.HTML(stylesheets=[STYLE], sizing_mode="stretch_width", margin=(0, 10))
         self.measure = pmui.Button(
-            label="Measure the volume of all networks",
-            variant="outlined",
-            color="default",
-            sx=PLAIN,
-            size="small",
-            margin=(4, 10),
+            label="Measure the volume of all networks", sx=PLAIN, margin=(4, 10), **OUTLINED
         )
         self.measure.on_click(lambda event: self._measure())
         state.param.watch(self._look, "replay")

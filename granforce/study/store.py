@@ -292,10 +292,17 @@ class Store(Mapping[str, xr.Dataset]):
         Raises InputError if the store cannot be written.
         """
         names = [name for name in self._names() if kind in (None, name.rpartition("-")[0])]
+        self.remove(*names)
+        return len(names)
+
+    def remove(self, *names: str) -> None:
+        """Remove the entries of these names, if they are there.
+
+        Raises InputError if the store cannot be written.
+        """
         with self._writing():
             for name in names:
                 self._retire(name)
-        return len(names)
 
     def clean(self) -> int:
         """Remove temporaries that killed writers left behind; returns how many.

@@ -214,19 +214,19 @@ def test_a_force_held_at_nothing_leaves_the_same_contacts(state, wait_for):
     np.testing.assert_array_equal(state.knowledge.narrowed.after["backbone"], state.replay.backbone)
 
 
-def test_bounds_arrive_the_held_contact_first(state, wait_for):
+def test_bounds_arrive_the_held_contact_first(state, wait_for, monkeypatch):
     statements = (Statement(4, float(state.replay.normal[0, 4])),)
     shown, told = state.library.shown(state.cell), []
 
-    def begun(arriving):
+    def add(arriving, bound, whole=known.Underway.add):
+        if not told:
+            told.append(arriving.narrowed)
+        whole(arriving, bound)
         told.append(arriving.narrowed)
-        arriving.add, whole = (
-            lambda bound: (whole(bound), told.append(arriving.narrowed)),
-            arriving.add,
-        )
 
+    monkeypatch.setattr(known.Underway, "add", add)
     found = []
-    state.work.task().start(known.narrowing(state.library, shown, statements, begun), found.append)
+    state.work.task().start(known.narrowing(state.library, shown, statements), found.append)
     wait_for(state)
     lefts = [one.left for one in told]
     assert lefts == sorted(lefts, reverse=True) and lefts[0] == 1 and len(lefts) > 50

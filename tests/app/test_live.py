@@ -26,7 +26,7 @@ class Browser:
         self.state, self.awake, self.got = state, awake, []
         self.player = PackingView(state).player
         self.stream = Stream(state, self.player)
-        self.player.hand_over = self._take
+        self.player.tell = self._take
         self.player.hear({"live": {"anew": True, "seen": awake}})
 
     def _take(self, news):

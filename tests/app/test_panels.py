@@ -105,7 +105,7 @@ def test_the_outline_holds_the_path_and_is_kept(state):
     assert len(view.path.data["x"]) == KEPT + 1
     corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
     path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
-    merged = planes.hull(np.concatenate([corners, path]))
+    merged = np.concatenate([corners, path])
     assert planes.area(merged) == pytest.approx(planes.area(corners), rel=1e-6)
     assert "linear programs" in view.told.object
     assert len(state.library.cache.find("outline")) == 1
@@ -152,9 +152,9 @@ def test_planes_of_unknown_contacts_are_refused(state):
 
 def test_areas():
     square = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 1]], float)
-    assert planes.area(planes.hull(square)) == 4
+    assert planes.area(square) == 4
     line = np.array([[0, 0], [1, 1], [2, 2]], float)
-    assert planes.area(planes.hull(line)) == 0
+    assert planes.area(line) == 0
 
 
 # Bring your own
@@ -364,14 +364,6 @@ def test_groups_spread_over_mu_and_hold_the_one_on_screen():
     chosen = distributions.groups(found, 0.3)
     assert 0.3 in chosen and 0 not in chosen and len(chosen) == distributions.MOST_CURVES
     assert min(chosen) == 0.1 and max(chosen) == 10
-
-
-def test_a_histogram_is_a_density():
-    values = np.random.default_rng(0).exponential(size=10_000)
-    edges, density = distributions.histogram(values)
-    assert (density * np.diff(edges)).sum() == pytest.approx(1)
-    edges, density = distributions.histogram(values, largest=1.0)
-    assert (density * np.diff(edges)).sum() == pytest.approx(1 - np.exp(-1), abs=0.02)
 
 
 @pytest.mark.parametrize("what", ["eta", "extent", "correlation", "scatter", "force"])

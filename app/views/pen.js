@@ -1,0 +1,33 @@
+// Lines and circles on a canvas.
+
+/** Draw a straight line from a to b. */
+export function line(g, a, b) {
+  g.beginPath()
+  g.moveTo(...a)
+  g.lineTo(...b)
+  g.stroke()
+}
+
+/** Begin a path through points, closed. */
+export function polygon(g, points) {
+  g.beginPath()
+  for (const point of points) g.lineTo(...point)
+  g.closePath()
+}
+
+/** Begin a path around a point. */
+export function circle(g, [x, y], r) {
+  g.beginPath()
+  g.arc(x, y, r, 0, 2 * Math.PI)
+}
+
+/** Add an arrow from a to b to the path, with an open head, so long and so wide against that. */
+export function arrow(g, a, b, head, wide) {
+  const size = Math.hypot(b[0] - a[0], b[1] - a[1]), [ux, uy] = [(b[0] - a[0]) / size, (b[1] - a[1]) / size]
+  g.moveTo(...a)
+  g.lineTo(...b)
+  for (const side of [wide, -wide]) {
+    g.moveTo(b[0] - head * (ux - side * uy), b[1] - head * (uy + side * ux))
+    g.lineTo(...b)
+  }
+}

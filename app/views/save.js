@@ -1,0 +1,20 @@
+// What the browser does with what was made for the visitor: it saves a file, or prints a page.
+
+import { made } from "./made.js"
+
+/** Save a blob as a file of this name. */
+export function save(blob, name) {
+  const link = made("a", { href: URL.createObjectURL(blob), download: name })
+  link.click()
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000)
+}
+
+/** Print an HTML document alone; title: of it, for screen readers. */
+export function print(title, html) {
+  const sheet = made("iframe", { title, srcdoc: html, style: "position: fixed; width: 0; height: 0; border: 0" })
+  sheet.addEventListener("load", () => {
+    sheet.contentWindow.addEventListener("afterprint", () => sheet.remove())
+    sheet.contentWindow.print()
+  })
+  document.body.append(sheet)
+}
