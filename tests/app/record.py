@@ -17,9 +17,9 @@ sys.path[:0] = [str(Path(__file__).parents[k]) for k in range(3)]  # tests/app, 
 
 from PIL import Image  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, FLAGS, MANY, MODEL, painted, scene, serve  # noqa: E402
+from serving import CHROMIUM, FLAGS, MANY, MODEL, ask, painted, scene, serve, until  # noqa: E402
 from small_store import ROOT  # noqa: E402
-from test_live_browser import chain, until  # noqa: E402
+from test_live_browser import chain  # noqa: E402
 from test_space_browser import here, place  # noqa: E402
 
 SIZE = {"width": 1500, "height": 880}
@@ -117,8 +117,7 @@ def straight(start, *stops, steps=28):
 def act(page, recorder):
     """What is seen: packing, walking, grabbing."""
     recorder.on = True
-    page.locator("input.typed").fill(ASKED)
-    page.locator("input.typed").press("Enter")
+    ask(page, ASKED)
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 25")
     page.wait_for_timeout(2500)
     recorder.on = False

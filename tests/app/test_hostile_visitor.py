@@ -33,12 +33,12 @@ def served(shipped, tmp_path_factory):
 
 
 @pytest.fixture
-def page(chromium):
+def page(context):
     """An empty page."""
-    page = chromium.new_page()
+    page = context().new_page()
     page.set_default_timeout(PATIENCE)
     yield page
-    page.context.close()
+    page.close()
 
 
 def computing(page):
@@ -79,13 +79,13 @@ def test_pages_that_are_asked_for_and_never_shown_hold_no_thread(page, served):
     computes(page, served, 12)
 
 
-def test_twenty_pages_opened_and_closed_while_computing(page, chromium, served):
+def test_twenty_pages_opened_and_closed_while_computing(page, context, served):
     for number in range(20):
-        visit = chromium.new_page()
+        visit = context().new_page()
         visit.goto(served + LONG.format(20 + number % 7), wait_until="commit", timeout=PATIENCE)
         if number % 10 == 0:
             computing(visit)
-        visit.context.close()
+        visit.close()
     computes(page, served, 13)
 
 

@@ -4,16 +4,20 @@ import signal
 
 import numpy as np
 import pytest
-from serving import free_port, painted, serve
-from small_store import ROOT
+from serving import free_port, painted, picture, searched, serve
 
 import granforce as gf
 from app import scenes
 
-PATIENCE = 60_000  # ms, on a busy machine
-# Pictures to be looked at; ignored by git.
-ARTEFACTS = ROOT / "artefacts" / "scenes"
-WIDTHS = [(390, 844), (1024, 768), (1280, 800), (1440, 900), (1536, 864), (1920, 1080)]
+# Scenes, and windows in which they are opened.
+FITTING = {
+    "groove": (390, 844),
+    "box": (1024, 768),
+    "leaning": (1280, 800),
+    "column": (1440, 900),
+    "pyramid": (1536, 864),
+    "solid": (1920, 1080),
+}
 
 pytestmark = pytest.mark.browser
 
@@ -34,6 +38,11 @@ def desk(page):
     return page.locator(".desk")
 
 
+def choose(page, name):
+    """Choose a scene from the list."""
+    desk(page).get_by_role("combobox", name="Scene").select_option(name)
+
+
 def drawn(page):
     desk(page).wait_for()
     page.wait_for_function("e => e.painted > 0", arg=desk(page).element_handle())
@@ -51,15 +60,18 @@ def until(page, expression):
     )
 
 
-@pytest.mark.parametrize("width, height", WIDTHS)
-@pytest.mark.parametrize("name", ["groove", "box", "leaning", "column"])
-def test_scenes_fit_on_every_screen(look, name, width, height):
-    page = look(f"?scene={name}", width, height)
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert desk(page).locator("canvas.space").bounding_box()["width"] > 300
-    assert desk(page).locator(".count b").inner_text().endswith(("free number", "free numbers"))
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=ARTEFACTS / f"{name}-{width}.png")
+@pytest.mark.parametrize("first", FITTING)
+def test_scenes_fit_on_every_screen(look, first):
+    """Whichever is opened, and whatever is chosen from there."""
+    width, height = FITTING[first]
+    page = look(f"?scene={first}", width, height)
+    for name in dict.fromkeys((first, *FITTING)):
+        choose(page, name)
+        until(page, f"small.body.scene.name === '{name}'")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert desk(page).locator("canvas.space").bounding_box()["width"] > 300
+        assert desk(page).locator(".count b").inner_text().endswith(("free number", "free numbers"))
+        picture(page, f"scenes/{name}-{width}")
 
 
 def test_the_first_visit_goes_on_from_one_disk_over_thirteen_to_400(look):
@@ -71,7 +83,7 @@ def test_the_first_visit_goes_on_from_one_disk_over_thirteen_to_400(look):
         box = card.bounding_box()  # above what it speaks of, not over it
         assert box["y"] + box["height"] <= page.locator("canvas.packing").bounding_box()["y"]
         card.get_by_role("button", name="Next").click()
-    painted(page, PATIENCE)
+    painted(page)
     page.get_by_role("dialog").get_by_text("5 of 10").wait_for()
     page.get_by_role("dialog").get_by_role("button", name="Back").click()
     drawn(page)
@@ -122,7 +134,7 @@ def test_friction_is_changed_under_the_eye(look):
     slider.fill("1")
     until(page, "!small.body.bounded")
     assert "no end" in desk(page).locator(".says").inner_text()
-    page.wait_for_function("() => location.search.includes('mu=1')")
+    searched(page, "mu=1")
 
 
 def test_the_point_is_dragged_and_the_forces_follow(look):
@@ -325,11 +337,11 @@ def test_a_periodic_scene_is_explained_and_its_numbers_are_clear_of_arrows(look)
 
 def test_another_scene_is_chosen_from_the_list(look):
     page = look()
-    desk(page).get_by_role("combobox", name="Scene").select_option("box")
+    choose(page, "box")
     until(page, "small.body.h === 2")
-    page.wait_for_function("() => location.search.includes('scene=box')")
-    desk(page).get_by_role("combobox", name="Scene").select_option("many")
-    painted(page, PATIENCE)
+    searched(page, "scene=box")
+    choose(page, "many")
+    painted(page)
     page.get_by_role("combobox", name="Scene").first.wait_for()
 
 
@@ -407,9 +419,9 @@ def test_what_has_no_end_is_not_filled_and_the_page_says_why(look, name, mu):
 
 def test_back_goes_to_the_scene_before(look):
     page = look("?scene=groove&mu=0.7")
-    desk(page).get_by_role("combobox", name="Scene").select_option("box")
+    choose(page, "box")
     until(page, "small.body.h === 2")
-    page.wait_for_function("() => location.search.includes('scene=box')")
+    searched(page, "scene=box")
     page.go_back()
     until(page, "small.body.scene.name === 'groove' && small.mu === 0.7")
     page.go_forward()
@@ -422,15 +434,15 @@ def test_400_disks_take_the_theme_and_the_friction_along_and_back(look):
     desk(page).get_by_role("textbox", name="μ").press("Enter")
     desk(page).get_by_role("textbox", name="μ").fill("1")
     desk(page).get_by_role("textbox", name="μ").press("Enter")
-    desk(page).get_by_role("combobox", name="Scene").select_option("many")
-    painted(page, PATIENCE)
-    page.wait_for_function("() => /mu=1&/.test(location.search) && /dark=1/.test(location.search)")
+    choose(page, "many")
+    painted(page)
+    searched(page, "mu=1&", "dark=1")
     page.get_by_role("combobox", name="Scene").first.select_option("box")
     drawn(page)
     until(page, "small.body.scene.name === 'box' && small.mu === 1")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(18, 18, 18)"
     page.go_back()
-    painted(page, PATIENCE)
+    painted(page)
 
 
 def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
@@ -443,8 +455,8 @@ def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
         page.get_by_role("alert").get_by_text("Connection lost").wait_for()
         desk(page).get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
         until(page, "Math.abs(small.body.interval(0)[1] - Math.SQRT1_2 / 0.2) < 1e-9")
-        page.wait_for_function("() => location.search.includes('mu=0.8')")
-        desk(page).get_by_role("combobox", name="Scene").select_option("box")
+        searched(page, "mu=0.8")
+        choose(page, "box")
     with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)):
         page.get_by_text("Connection lost").wait_for(state="detached")
         drawn(page)
@@ -512,7 +524,7 @@ def test_a_scene_is_built_under_pressure_and_its_link_carries_it(look, tmp_path)
     page = look("?scene=own")
     desk(page).get_by_role("radio", name="Pressure").click()
     until(page, "small.body.scene.pressing.length === 1 && small.body.h === 1")
-    page.wait_for_function("() => location.search.includes('%7Cp1')")
+    searched(page, "%7Cp1")
     with page.expect_download() as file:
         desk(page).get_by_role("button", name="Download data").click()
     file.value.save_as(tmp_path / "own.npz")
