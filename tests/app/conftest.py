@@ -7,6 +7,8 @@ import pytest
 from serving import CHROMIUM, FLAGS, MANY, PATIENCE, painted, picture, serve
 from small_store import cell_parameters
 
+from app.data import Library
+from app.state import AppState
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
@@ -15,10 +17,12 @@ HERE = re.compile(r"(http|ws)://localhost:|data:|blob:|file:|about:")
 
 
 def pytest_collection_modifyitems(items):
-    """Tests in a browser are left out where there is none."""
+    """Tests in a browser are marked, and left out where there is none."""
     for item in items:
-        if item.get_closest_marker("browser") and not CHROMIUM.exists():
-            item.add_marker(pytest.mark.skip(reason=f"needs chromium at {CHROMIUM}"))
+        if "chromium" in item.fixturenames:
+            item.add_marker("browser")
+            if not CHROMIUM.exists():
+                item.add_marker(pytest.mark.skip(reason=f"needs chromium at {CHROMIUM}"))
 
 
 @pytest.fixture(scope="session")
@@ -158,16 +162,12 @@ def lasting(context, address):
 
 @pytest.fixture
 def library(shipped, tmp_path):
-    from app.data import Library
-
     return Library(shipped, tmp_path / "cache.zarr")
 
 
 @pytest.fixture
 def state(library):
     """The state of a page that has come to rest."""
-    from app.state import AppState
-
     state = AppState(library)
     wait_for(state)
     return state

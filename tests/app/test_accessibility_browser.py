@@ -15,8 +15,6 @@ TABS = {
     "export": "Export",
 }
 
-pytestmark = pytest.mark.browser
-
 
 def findings(page):
     """Serious and critical violations, one line for each element."""

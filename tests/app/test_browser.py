@@ -27,8 +27,6 @@ from small_store import DISKS, KEPT
 from granforce import measures
 from granforce.study.store import open_store
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture
 def visit(visit):

@@ -24,8 +24,6 @@ from small_store import KEPT, ROOT
 
 STATISTICS = "measured: in networks found at random"
 
-pytestmark = pytest.mark.browser
-
 
 # 1: Back and Forward
 

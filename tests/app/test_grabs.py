@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from app import grabs, planes
+from app.exports import contacts, on_screen
 from app.state import AppState
 from app.views.messages import FROM_BROWSER, TO_BROWSER, listed
 from granforce.study import pulls
@@ -186,8 +187,6 @@ def test_a_link_keeps_a_pull_to_the_end_of_an_interval():
 
 def test_the_table_of_contacts_holds_what_was_pulled(page, state):
     """A file with other numbers than the picture would be worse than none."""
-    from app.exports import contacts, on_screen
-
     value = middle(page.hear(grab=4)["rail"])
     page.hear(hold=[4, value])
     replay = state.replay

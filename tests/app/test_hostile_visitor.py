@@ -14,8 +14,6 @@ LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, u
 LIMITS = "n=60,states=20000"
 LARGEST = "9" * 300
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture(scope="module")
 def served(shipped, tmp_path_factory):

@@ -8,6 +8,9 @@ import pytest
 from app import known
 from app.known import Statement
 from app.state import AppState
+from app.views.known import words
+from app.views.packing import PackingView
+from granforce.packing.importers import read_known
 
 
 def held(state, wait_for, *contacts, error=0.0):
@@ -33,8 +36,6 @@ def test_a_held_force_narrows_the_others(state, wait_for):
 
 
 def test_colour_and_width_show_what_measuring_took_away(state, wait_for):
-    from app.views.packing import PackingView
-
     player = PackingView(state).player
     assert player.gone is None
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
@@ -51,8 +52,6 @@ def test_colour_and_width_show_what_measuring_took_away(state, wait_for):
 
 
 def test_what_carries_for_certain_is_counted_by_certified_bounds(state, wait_for):
-    from app.views.known import words
-
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     wait_for(state)
     low = state.knowledge.narrowed.after["low"].values[:, 0] / state.replay.force_scale
@@ -63,8 +62,6 @@ def test_what_carries_for_certain_is_counted_by_certified_bounds(state, wait_for
 
 def test_the_command_holds_what_is_known(state, wait_for, tmp_path):
     """Run in a shell, it writes a file that says the same."""
-    from granforce.packing.importers import read_known
-
     assert "known" not in state.command
     value = float(state.replay.normal[0, 4])
     state.knowledge.hold(4, value, 0.1)

@@ -1,9 +1,6 @@
 """In a browser: forces are held, intervals shrink, stresses."""
 
-import pytest
 from serving import MODEL, column, painted, picture, scene
-
-pytestmark = pytest.mark.browser
 
 
 def select(page, contact):

@@ -36,8 +36,6 @@ WATCH = """e => {
         .observe(hand.player.buttons.root, {attributes: true})
 }"""
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture
 def visit(visit):

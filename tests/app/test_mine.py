@@ -3,7 +3,7 @@
 import pytest
 from small_store import DISKS
 
-from app import mine, names
+from app import mine, names, uploads
 from app.selection import select
 from app.views.mine import Mine
 from granforce.records import InputError
@@ -56,8 +56,6 @@ def test_what_is_not_in_the_list_is_left_alone(computed, wait_for):
 
 
 def test_an_upload_is_called_by_its_files(state, wait_for):
-    from app import uploads
-
     packing = state.library.packing(state.cell.params["packing"])
     brought = uploads.keep(state.library, packing, "NPZ archive: heap.npz")
     task = state.work.task()

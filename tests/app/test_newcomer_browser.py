@@ -18,8 +18,6 @@ from granforce.glossary import TERMS
 
 AT = "?mu=0.1&n=30&states=30&relax=nearest"
 
-pytestmark = pytest.mark.browser
-
 # Whether an element lies over no text of the page's main part.
 COVERS = """(found) => {
     const box = found.getBoundingClientRect()

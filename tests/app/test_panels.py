@@ -20,11 +20,16 @@ from visitor import drop, press
 import granforce as gf
 from app import distributions, exports, movies, perturbations, planes, standalone, studied, uploads
 from app.limits import Limits
+from app.views import export as export_view
 from app.views import labels
+from app.views import perturb as perturb_view
 from app.views import plane as plane_view
+from app.views import statistics as statistics_view
 from app.views import studied as drawn_study
+from app.views import upload as upload_view
 from app.views.controls import Controls
 from app.views.dropper import Dropper
+from app.views.messages import TO_BROWSER, listed
 from app.views.style import palettes
 from granforce import measures
 from granforce.measures import statistics
@@ -93,11 +98,9 @@ def test_the_path_is_where_the_states_lie_in_the_plane(state):
 
 
 def test_the_outline_holds_the_path_and_is_kept(state):
-    from app.views.plane import View
-
     opened(state)
     state.looks.axes = "principal"
-    view = View(state)
+    view = plane_view.View(state)
     assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
     state.looks.tab = view.name
     assert view.placing.running
@@ -112,11 +115,9 @@ def test_the_outline_holds_the_path_and_is_kept(state):
 
 
 def test_one_contact_is_seen_in_its_cone(state):
-    from app.views.plane import View
-
     opened(state)
     state.looks.contact = 4
-    view = View(state)
+    view = plane_view.View(state)
     view.planes.value = "contact"
     state.looks.tab = view.name
     settled(state)
@@ -131,13 +132,11 @@ def test_one_contact_is_seen_in_its_cone(state):
 
 
 def test_a_point_has_no_outline(state):
-    from app.views.plane import View
-
     opened(state)
     state.choose(mu=0)
     settled(state, done=lambda: state.cell.mu == 0)
     state.looks.tab = "plane"
-    view = View(state)
+    view = plane_view.View(state)
     settled(state)
     assert "one point" in view.told.object and not len(view.outer.data["x"])
 
@@ -191,10 +190,8 @@ def test_files_are_known_by_their_content(kind):
 @pytest.mark.parametrize("contacts", [False, True])
 def test_tables_of_tilted_boxes_are_read(state, contacts):
     """Sides and tilt are typed in one field."""
-    from app.views.upload import View
-
     packing = skewed(packed(30, 0.3))[0]
-    view = View(opened(state))
+    view = upload_view.View(opened(state))
     view.files = {"grains": ("g.txt", table(packing))}
     if contacts:
         view.files["joined"] = ("c.txt", table(packing, contacts=True))
@@ -263,10 +260,8 @@ def test_sizes_are_limited():
 
 
 def test_an_upload_is_kept_reported_and_shown(state):
-    from app.views.upload import View
-
     opened(state)
-    view = View(state)
+    view = upload_view.View(state)
     both = dumps()
     drop(view.dropper, [("a", both["particles"][1])])
     assert view.waiting.visible and "dump of the contacts" in view.waiting.title
@@ -280,10 +275,8 @@ def test_an_upload_is_kept_reported_and_shown(state):
 
 
 def test_a_refused_upload_changes_nothing(state):
-    from app.views.upload import View
-
     before = opened(state).replay
-    view = View(state)
+    view = upload_view.View(state)
     drop(view.dropper, [("p.npz", npz(packed(30, 0.3))[:-80])])
     settled(state)
     assert view.error.visible and "NPZ archive" in view.error.title
@@ -291,9 +284,7 @@ def test_a_refused_upload_changes_nothing(state):
 
 
 def test_more_than_allowed_is_not_collected(state):
-    from app.views.upload import View
-
-    view = View(opened(state))
+    view = upload_view.View(opened(state))
     view.dropper.most = 1000
     view.dropper.hear({"begin": True})
     for _ in range(50):
@@ -312,9 +303,7 @@ def test_more_than_allowed_is_not_collected(state):
     ],
 )
 def test_a_drop_of_nothing_but_names_is_not_collected(state, pieces, word):
-    from app.views.upload import View
-
-    view = View(opened(state))
+    view = upload_view.View(opened(state))
     view.dropper.hear({"begin": True})
     for piece in pieces:
         view.dropper.hear(piece)
@@ -377,10 +366,8 @@ def test_a_histogram_is_a_density():
 @pytest.mark.parametrize("what", ["eta", "extent", "correlation", "scatter", "force"])
 @pytest.mark.parametrize("scale", ["linear", "log"])
 def test_every_statistic_is_drawn_from_the_data(state, what, scale):
-    from app.views.statistics import View
-
     opened(state)
-    view = View(state)
+    view = statistics_view.View(state)
     view.what.value, view.scale.value = what, scale
     assert not view.plots.objects and not view.task.running
     state.looks.tab = view.name
@@ -404,11 +391,9 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
 
 
 def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
-    from app.views.statistics import View
-
     opened(state)
     state.looks.tab = "statistics"
-    view = View(state)
+    view = statistics_view.View(state)
     settled(state)
     fig = view.plots.objects[0].object
     means = statistics.means(studied.rows("walk"), "eta1")
@@ -429,10 +414,8 @@ def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
 
 
 def test_a_tap_on_a_point_selects_its_contact(state):
-    from app.views.statistics import View
-
     opened(state)
-    view = View(state)
+    view = statistics_view.View(state)
     view.what.value = "scatter"
     state.looks.tab = view.name
     fig = view.plots.objects[0].object
@@ -441,10 +424,8 @@ def test_a_tap_on_a_point_selects_its_contact(state):
 
 
 def test_a_tap_on_a_mu_shows_its_states(state):
-    from app.views.statistics import View
-
     opened(state)
-    view = View(state)
+    view = statistics_view.View(state)
     state.looks.tab = view.name
     settled(state)
     fig = view.plots.objects[0].object
@@ -525,10 +506,7 @@ def test_parameters_name_what_is_on_screen(state):
 
 
 def test_every_button_hands_a_file_over(state):
-    from app.views.export import View
-    from app.views.messages import TO_BROWSER, listed
-
-    view = View(opened(state))
+    view = export_view.View(opened(state))
     keys = [key for group in view.buttons.files.values() for key in group]
     for key in keys:
         handed = []
@@ -544,9 +522,7 @@ def test_every_button_hands_a_file_over(state):
 
 
 def test_unknown_keys_are_ignored(state):
-    from app.views.export import View
-
-    view = View(opened(state))
+    view = export_view.View(opened(state))
     view.buttons.hear({"key": "../secret"})
     assert not view.task.running
 
@@ -555,11 +531,9 @@ def test_unknown_keys_are_ignored(state):
 
 
 def test_a_pushed_contact_gives_way_between_its_bounds(state):
-    from app.views.perturb import View
-
     opened(state)
     state.looks.tab = "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     assert view.strongest.visible and view.push.disabled and view.guess.disabled
     assert "Click a line" in view.lead.object and "<svg" in view.lead.object
     assert view.lead.object.count("<circle") == 8  # two that are pushed, and those around them
@@ -580,11 +554,9 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
 
 def pushed(state):
     """The view of a push on a contact, with its result."""
-    from app.views.perturb import View
-
     opened(state)
     state.looks.contact, state.looks.tab = 3, "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     press(view.push)
     settled(state, done=lambda: view.pushed is not None)
     return view
@@ -617,19 +589,15 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
 
 
 def test_nothing_is_pushed_without_friction(state):
-    from app.views.perturb import View
-
     opened(state)
     state.choose(mu=0)
     settled(state, done=lambda: state.cell.mu == 0)
     state.looks.contact, state.looks.tab = 3, "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     assert not view.push.visible and "isostatic" in view.lead.object
 
 
 def test_figure_2_takes_what_the_stores_hold(state):
-    from app.views.perturb import View
-
     opened(state)
     library, cells = state.library, list(state.catalogue)
     assert perturbations.over_store(library, cells, state.cell) == []
@@ -646,7 +614,7 @@ def test_figure_2_takes_what_the_stores_hold(state):
     assert all(0 < row["critical_force"] <= row["limit_load"] for row in found)
     assert {row["eta2"] for row in found} == {row["eta2"] for row in distributions.rows(cells[1:])}
     state.looks.tab = "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     view.what.value = "store"
     settled(state)
     assert "like those on screen (2)" in view.told.object and len(view.plots.objects) == 2

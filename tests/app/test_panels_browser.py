@@ -27,8 +27,6 @@ import granforce as gf
 LAMMPS = REFERENCE.parent / "lammps"
 PATIENCE = 60  # s, on a busy machine
 
-pytestmark = pytest.mark.browser
-
 
 def filled(page, source, least=3):
     """Wait until a source has rows."""

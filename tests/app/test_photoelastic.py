@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from frames import NEWTON, file, frame
+from frames import NEWTON, file, frame, solved
+from packing.test_solved import mat
 from test_panels import opened, settled
 from visitor import drop
 
@@ -231,9 +232,6 @@ def test_frames_of_a_series_are_turned(state):
 
 
 def test_a_frame_of_pegs_2_is_dropped_whole(state):
-    from frames import solved
-    from packing.test_solved import mat
-
     opened(state)
     view = dropped(state, [("Step-0012_solved.mat", mat(solved(40)[0]).getvalue())])
     assert view.mu.visible and view.reverse.visible

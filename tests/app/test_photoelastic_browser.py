@@ -15,8 +15,6 @@ PICTURES = """() => {
     .map(model => model.properties.inner_width.is_unset ? 0 : model.inner_width)
 }"""
 
-pytestmark = pytest.mark.browser
-
 
 def dropped(page, tmp_path, numbers=NUMBERS):
     """Drop some frames of one packing, measured anew each time, and wait for the last."""

@@ -19,8 +19,6 @@ FITTING = {
     "solid": (1920, 1080),
 }
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture
 def look(opening):

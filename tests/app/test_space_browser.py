@@ -30,8 +30,6 @@ VIEW_ABOVE = """(() => {
     return pale
 })()"""
 
-pytestmark = pytest.mark.browser
-
 
 def place(page, x, y):
     """Where a point of force space is on the page."""

@@ -15,8 +15,6 @@ from app import movies
 # What was taken along, to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "along"
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture
 def page(visit):

@@ -11,8 +11,6 @@ from granforce.glossary import TERMS
 STEPS = 6
 BEFORE = len(FIRST_STEPS)  # steps on the pages of small scenes
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture
 def visit(visit):

@@ -2,19 +2,17 @@
 
 import pytest
 
+from app.views.volume import Volume
+
 
 @pytest.fixture
 def view(state, wait_for):
-    from app.views.volume import Volume
-
     made = Volume(state)
     wait_for(state)
     return made
 
 
 def test_the_volume_is_measured_once_and_found_again(state, view, wait_for):
-    from app.views.volume import Volume
-
     assert view.measure.visible and not view.tiles.object
     view.measure.clicks += 1
     assert state.work.measuring.running and not view.measure.visible
