@@ -4,7 +4,22 @@ import re
 import time
 
 import pytest
-from serving import CHROMIUM, FLAGS, MANY, PATIENCE, painted, picture, serve
+from serving import (
+    CHROMIUM,
+    FLAGS,
+    MANY,
+    PATIENCE,
+    ask,
+    bars_drawn,
+    more,
+    no_more,
+    painted,
+    picture,
+    scene,
+    serve,
+    shows,
+    until,
+)
 from small_store import cell_parameters
 
 from app.data import Library
@@ -158,6 +173,27 @@ def lasting(context, address):
     for page in pages.values():
         page.close()
     assert not problems
+
+
+@pytest.fixture
+def page(lasting):
+    """One page for many tests, put back to the original network at μ = 0.1, nothing selected."""
+    page = lasting()
+    bars_drawn(page)
+    if scene(page, "scene.geometry.mu") != 0.1:
+        ask(page, 0.1)
+        shows(page, 0.1)
+    if page.locator("button.between.on").count():
+        page.locator("button.between").click()
+    page.locator("button.restart").click()
+    more(page).locator("button.pin").click()
+    scene(page, "(scene.selected !== null && scene.onSelect(null), scene.reset())")
+    page.mouse.move(5, 5)
+    if scene(page, "scene.hand.replay.held !== null"):
+        page.keyboard.press("Escape")
+    until(page, "scene.selected === null && scene.hand.replay.held === null")
+    no_more(page, "pulls=")
+    return page
 
 
 @pytest.fixture

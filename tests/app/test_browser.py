@@ -44,23 +44,6 @@ def plotted(page):
     return page
 
 
-@pytest.fixture
-def page(lasting):
-    """One page for many tests, put back to the original network at μ = 0.1, nothing selected."""
-    shared = plotted(lasting())
-    if scene(shared, "scene.geometry.mu") != 0.1:
-        ask(shared, 0.1)
-        shows(shared, 0.1)
-    if shared.locator("button.between.on").count():
-        shared.locator("button.between").click()
-    shared.locator("button.restart").click()
-    more(shared).locator("button.pin").click()
-    scene(shared, "(scene.selected !== null && scene.onSelect(null), scene.reset())")
-    shared.mouse.move(5, 5)
-    until(shared, "scene.selected === null")
-    return shared
-
-
 def at(page, x, y):
     """Point on the page of a place in the packing."""
     box = page.locator(".scene").bounding_box()

@@ -1,7 +1,5 @@
 """What visitors stumbled over, one test each: the page answers, and says what is so."""
 
-import signal
-
 import numpy as np
 import pytest
 from serving import (
@@ -9,14 +7,11 @@ from serving import (
     ask,
     at_rest,
     column,
-    free_port,
     how_it_is_made,
     looks,
     no_more,
-    painted,
     scene,
     searched,
-    serve,
     shows,
     until,
 )
@@ -52,8 +47,7 @@ def test_back_and_forward_restore_views_and_copied_links(visit):
     page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
 
 
-def test_steps_of_the_player_are_not_gone_back_to(visit):
-    page = visit()
+def test_steps_of_the_player_are_not_gone_back_to(page):
     before = page.evaluate("history.length")
     for _ in range(3):
         page.locator("button.step").click()
@@ -61,36 +55,7 @@ def test_steps_of_the_player_are_not_gone_back_to(visit):
     assert page.evaluate("history.length") == before
 
 
-# 2: A server that is gone
-
-
-def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, shipped, tmp_path):
-    port = free_port()
-    store = {"GRANFORCE_DATA": str(shipped)}
-    expected = ("WebSocket", "Failed to load resource", "not connected")
-    with serve(tmp_path, port=port, **store) as (url, server):
-        page = visit(at=url, wanted=expected)
-        ask(page, 1)
-        shows(page, 1)
-        searched(page, "mu=1&")
-        page.locator("button.step").click()
-        searched(page, "frame=1")
-        server.send_signal(signal.SIGKILL)
-        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
-        painting = scene(page, "scene.painted")
-        page.locator("button.play").click()  # what is in the page still plays
-        until(page, f"scene.painted > {painting} + 3")
-        page.locator(".scale span").first.click()  # μ = 0, of which nobody hears yet
-    with serve(tmp_path, port=port, **store):
-        page.get_by_text("Connection lost").wait_for(state="detached")
-        painted(page)
-        shows(page, 0)
-        searched(page, "mu=0&")
-        ask(page, 1)  # and it listens again
-        shows(page, 1)
-
-
-# 3: What is refused, and fields
+# 2: What is refused, and fields
 
 
 def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
@@ -106,8 +71,7 @@ def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
     told.wait_for()  # the same refusal is told again
 
 
-def test_a_mark_of_the_slider_is_chosen_by_a_click(visit):
-    page = visit()
+def test_a_mark_of_the_slider_is_chosen_by_a_click(page):
     page.locator(".scale span").get_by_text("1", exact=True).click()
     shows(page, 1)
 
@@ -124,8 +88,7 @@ def test_an_error_bar_below_0_holds_nothing(visit):
     searched(page, "known=")
 
 
-def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(visit):
-    page = visit()
+def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(page):
     flung = page.locator(".scene").evaluate(
         """e => {
             const {hand, geometry} = e.scene, [xa, ya, xb, yb] = e.scene.ends(5)
@@ -141,7 +104,7 @@ def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(visit):
     until(page, "scene.hand.replay.held && !scene.hand.active")
 
 
-# 4: Number fields
+# 3: Number fields
 
 
 def test_number_fields_take_typing_after_enter(visit):
@@ -168,7 +131,7 @@ def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
     assert field.input_value() == before
 
 
-# 5: Uploaded packings
+# 4: Uploaded packings
 
 
 def test_uploaded_packings_show_their_own_number_of_disks(visit):
@@ -182,7 +145,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
 
 
-# 6: Keys
+# 5: Keys
 
 
 @pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
@@ -214,7 +177,7 @@ def test_who_goes_by_tab_means_the_widget(visit):
     assert page.locator(".stage.playing").count() == 0
 
 
-# 7: What is not computed yet
+# 6: What is not computed yet
 
 
 def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old(visit):
@@ -235,7 +198,7 @@ def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old
     assert at_rest(plot)["y"] == before["y"]
 
 
-# 8: Two contacts
+# 7: Two contacts
 
 
 def middles(page, count):
@@ -277,7 +240,7 @@ def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     searched(page, f"pair={b}-{a}")
 
 
-# 9: Small things
+# 8: Small things
 
 
 @pytest.mark.parametrize("tab", ["intervals", "statistics"])
@@ -348,8 +311,7 @@ def test_nothing_old_stands_under_a_new_statistic(visit):
 # What is said must be so
 
 
-def test_curves_of_the_shown_states_end_at_their_targets(visit):
-    page = visit()
+def test_curves_of_the_shown_states_end_at_their_targets(page):
     page.wait_for_function(f"() => {MODEL}('growth')?.get_column('eta1')?.length === {KEPT + 1}")
     page.locator("input.scrub").fill(str(KEPT))
     ends = [column(page, "growth", name)[-1] for name in ("eta1", "eta2", "eta3")]

@@ -222,8 +222,7 @@ def pulled(page, up=60):
     return contact, before
 
 
-def test_a_dragged_chain_follows_the_hand_and_stays(visit):
-    page = visit()
+def test_a_dragged_chain_follows_the_hand_and_stays(page):
     contact, before = pulled(page)
     until(page, f"Math.abs(scene.mixed.normal[{contact}] - scene.hand.value) < 1e-6")
     rail = scene(page, "({lower: scene.hand.rail.lower, upper: scene.hand.rail.upper})")
@@ -247,8 +246,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(visit):
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
-def test_at_the_end_of_the_rail_the_page_says_why(visit):
-    page = visit()
+def test_at_the_end_of_the_rail_the_page_says_why(page):
     contact, _ = pulled(page, up=600)
     until(page, "scene.hand.end === 1")
     page.get_by_text("held there by").wait_for()
@@ -257,8 +255,7 @@ def test_at_the_end_of_the_rail_the_page_says_why(visit):
     page.mouse.up()
 
 
-def test_brackets_move_the_selected_force_and_escape_lets_go(visit):
-    page = visit()
+def test_brackets_move_the_selected_force_and_escape_lets_go(page):
     contact, x, y = chain(page)
     page.mouse.click(x, y)
     until(page, f"scene.selected === {contact}")
@@ -272,9 +269,8 @@ def test_brackets_move_the_selected_force_and_escape_lets_go(visit):
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
-def test_a_contact_selected_and_taken_in_one_moment_is_in_the_hand(visit):
+def test_a_contact_selected_and_taken_in_one_moment_is_in_the_hand(page):
     """The server hears of both before it has answered the first."""
-    page = visit()
     contact, _, _ = chain(page)
     for _ in range(5):
         page.locator(".scene").evaluate(
@@ -311,8 +307,7 @@ def moves_the_view(page, x, y):
     assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
 
 
-def test_a_drag_beside_the_chains_moves_the_view(visit):
-    page = visit()
+def test_a_drag_beside_the_chains_moves_the_view(page):
     x, y = page.locator(".scene").evaluate(
         """e => {
             const box = e.getBoundingClientRect(), {scene} = e, side = scene.size
@@ -325,8 +320,7 @@ def test_a_drag_beside_the_chains_moves_the_view(visit):
     moves_the_view(page, x, y)
 
 
-def test_a_drag_moves_the_view_where_every_point_lies_near_a_chain(visit):
-    page = visit()
+def test_a_drag_moves_the_view_where_every_point_lies_near_a_chain(page):
     scene(page, "scene.view.half *= 40, scene.changed()")  # as small as disks are in a crowd
     _, x, y = chain(page)
     moves_the_view(page, x, y)
@@ -358,9 +352,8 @@ def test_a_finger_pulls_the_selected_contact(visit):
     searched(page, "pulls=")
 
 
-def test_a_grip_without_a_pull_leaves_what_is_told(visit):
+def test_a_grip_without_a_pull_leaves_what_is_told(page):
     """Let go before its rail is there, a contact is only selected."""
-    page = visit()
     before = page.locator(".said").inner_text()
     told = page.locator(".scene").evaluate(
         """(e, contact) => {
@@ -375,8 +368,7 @@ def test_a_grip_without_a_pull_leaves_what_is_told(visit):
     assert "Finding" in told and page.locator(".said").inner_text() == before
 
 
-def test_playing_on_lets_go(visit):
-    page = visit()
+def test_playing_on_lets_go(page):
     pulled(page)
     page.mouse.up()
     searched(page, "pulls=")
@@ -403,8 +395,7 @@ def dot(page, contact):
     )
 
 
-def test_a_dot_of_the_intervals_is_dragged_along_its_bar(visit):
-    page = visit()
+def test_a_dot_of_the_intervals_is_dragged_along_its_bar(page):
     page.wait_for_function(f"() => {MODEL}('bars')?.get_column('at').length > 0")
     laid_out(page, "bars_figure")
     contact = column(page, "bars", "at")[-1]
@@ -423,8 +414,7 @@ def test_a_dot_of_the_intervals_is_dragged_along_its_bar(visit):
     searched(page, "pulls=")
 
 
-def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(visit):
-    page = visit()
+def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(page):
     laid_out(page, "bars_figure")
     drawn = f"{MODEL}('bars_figure').renderers.map(r => r.visible)"
     visible = page.evaluate(f"() => JSON.stringify({drawn})")

@@ -1,10 +1,8 @@
 """Small scenes as a visitor has them in hand: S whole, pulled, cut by friction, and empty."""
 
-import signal
-
 import numpy as np
 import pytest
-from serving import free_port, painted, picture, searched, serve
+from serving import painted, picture, searched
 
 import granforce as gf
 from app import scenes
@@ -443,24 +441,6 @@ def test_400_disks_take_the_theme_and_the_friction_along_and_back(look):
     painted(page)
 
 
-def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
-    port = free_port()
-    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)) as (url, server):
-        expected = ("WebSocket", "Failed to load resource", "not connected")
-        page = opening("?scene=groove", 1280, 800, at=url, wanted=expected)
-        drawn(page)
-        server.send_signal(signal.SIGKILL)
-        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
-        desk(page).get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
-        until(page, "Math.abs(small.body.interval(0)[1] - Math.SQRT1_2 / 0.2) < 1e-9")
-        searched(page, "mu=0.8")
-        choose(page, "box")
-    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)):
-        page.get_by_text("Connection lost").wait_for(state="detached")
-        drawn(page)
-        until(page, "small.body.scene.name === 'box'")
-
-
 def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     page = look("?scene=groove")
     quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
@@ -605,14 +585,18 @@ def test_the_lesson_has_three_questions_and_is_printed(look):
     assert page.frames[-1].locator("img").count() == 2  # the disk, and S
 
 
-@pytest.mark.parametrize("mu", [0.6, 0.414, 0.415])
-def test_where_s_has_no_end_the_page_says_the_same_as_the_library(look, mu):
-    page = look(f"?scene=box&mu={mu}")
-    body = gf.body(gf.ensemble(gf.scene("box", mu)))
-    assert ask(page, "small.body.bounded") == body.bounded
-    assert ask(page, "small.body.rays.length") == len(body.rays)
-    every = "small.body.scene.names.map((_, c) => small.body.interval(2 * c).map(String))"
-    seen = np.array(ask(page, every), dtype=str)
-    seen = np.char.replace(seen, "Infinity", "inf").astype(float)
-    expected = np.column_stack([side[:, 0] for side in body.intervals])
-    np.testing.assert_allclose(seen, expected, rtol=1e-6)
+def test_where_s_has_no_end_the_page_says_the_same_as_the_library(look):
+    page = look("?scene=box&mu=0.6")
+    typed = desk(page).get_by_role("textbox", name="μ")
+    for mu in (0.6, 0.414, 0.415):
+        typed.fill(str(mu))
+        typed.press("Enter")
+        until(page, f"small.body.mu === {mu}")
+        body = gf.body(gf.ensemble(gf.scene("box", mu)))
+        assert ask(page, "small.body.bounded") == body.bounded
+        assert ask(page, "small.body.rays.length") == len(body.rays)
+        every = "small.body.scene.names.map((_, c) => small.body.interval(2 * c).map(String))"
+        seen = np.array(ask(page, every), dtype=str)
+        seen = np.char.replace(seen, "Infinity", "inf").astype(float)
+        expected = np.column_stack([side[:, 0] for side in body.intervals])
+        np.testing.assert_allclose(seen, expected, rtol=1e-6)
