@@ -202,11 +202,21 @@ def library(shipped, tmp_path):
 
 
 @pytest.fixture
-def state(library):
+def visited(library):
+    """visited(query, library): the state of a page that a link opened, once it is at rest."""
+
+    def visited(query="", library=library):
+        state = AppState(library, query=query)
+        wait_for(state)
+        return state
+
+    return visited
+
+
+@pytest.fixture
+def state(visited):
     """The state of a page that has come to rest."""
-    state = AppState(library)
-    wait_for(state)
-    return state
+    return visited()
 
 
 @pytest.fixture(name="wait_for")

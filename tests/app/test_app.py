@@ -74,11 +74,10 @@ def test_catalogue_lists_the_shipped_walks_as_one_series(library):
     }
 
 
-def test_missing_stores_leave_a_note_not_an_error(tmp_path, wait_for):
+def test_missing_stores_leave_a_note_not_an_error(tmp_path, visited):
     library = Library(tmp_path / "nowhere", tmp_path / "cache")
     assert "no store" in library.notes[0]
-    state = AppState(library)
-    wait_for(state)
+    state = visited(library=library)
     assert state.replay is None and state.work.message == ""
 
 
@@ -268,26 +267,23 @@ def test_links_to_imported_packings_name_their_hash():
 @pytest.mark.parametrize(
     "query", ["?mu=x", "?mu=-1", "?mu=0.1&n=2", "?mu=0.1&source=oracle", "?mu=.1&radii=/etc/passwd"]
 )
-def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(library, wait_for, query):
-    state = AppState(library, query=query)
-    wait_for(state)
+def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(query, visited):
+    state = visited(query)
     assert state.work.message and "\n" not in state.work.message
     assert state.cell.mu == 0.1
 
 
-def test_the_view_travels_with_the_link(state, library, wait_for):
+def test_the_view_travels_with_the_link(state, visited):
     seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent"}
     state.looks.param.update(**seen, overlay=True, dark=True)
-    again = AppState(library, query=state.link())
-    wait_for(again)
+    again = visited(state.link())
     assert again.selection == state.selection and again.view == state.view
     assert seen.items() <= again.view.items()
 
 
-def test_views_that_make_no_sense_are_left_out(library, wait_for):
+def test_views_that_make_no_sense_are_left_out(visited):
     query = "mu=1&n=30&states=30&relax=nearest&contact=100000&frame=-2&colour=plaid&between=5"
-    state = AppState(library, query=query)
-    wait_for(state)
+    state = visited(query)
     assert state.cell.mu == 1 and state.work.message == ""
     looks = state.looks
     assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
@@ -359,12 +355,11 @@ def test_stored_states_are_found_whatever_was_kept_of_them(state, wait_for):
     assert state.cell.mu == 1 and not state.missing
 
 
-def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library, wait_for):
+def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library, visited):
     """Whether the catalogue was read before or is read only now; a number that is named is kept."""
     link = f"?mu=1&n={DISKS}&relax=nearest"
     for _ in range(2):
-        state = AppState(library, query=link)
-        wait_for(state)
+        state = visited(link)
         assert state.cell.mu == 1 and len(state.replay.number) == KEPT + 1 and not state.missing
         assert not state.work.computation.running and state.selection.states == STATES
     state = AppState(library, query=f"{link}&states=9")
@@ -396,13 +391,11 @@ def test_a_refusal_is_told_until_something_succeeds(state, wait_for, done):
     assert state.work.message == ""
 
 
-def test_what_was_wrong_with_a_link_is_told_on_the_page_that_opens(library, wait_for):
-    state = AppState(library, query="?mu=-1&tab=export")
-    wait_for(state)
+def test_what_was_wrong_with_a_link_is_told_on_the_page_that_opens(visited):
+    state = visited("?mu=-1&tab=export")
     assert state.cell is not None and "friction" in state.work.message
     too_many = f"?mu=1&n={DISKS}&states={10**9}&tab=export&colour=extent"
-    state = AppState(library, query=too_many)
-    wait_for(state)
+    state = visited(too_many)
     assert state.cell is not None and state.looks.colour == "extent"
     assert "states" in state.work.message
 
@@ -453,9 +446,8 @@ def test_too_little_friction_for_a_packing_is_called_that(state, wait_for):
     assert state.cell == before
 
 
-def test_a_link_to_missing_states_computes_them(library, wait_for):
-    state = AppState(library, query="mu=0.2&n=30&states=5")
-    wait_for(state)
+def test_a_link_to_missing_states_computes_them(visited):
+    state = visited("mu=0.2&n=30&states=5")
     assert state.cell.mu == 0.2 and len(state.replay.number) == 6
 
 
@@ -517,12 +509,11 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
     np.testing.assert_array_equal(state.replay.normal[1], first)
 
 
-def test_a_link_keeps_what_single_tabs_show(library, state, wait_for):
+def test_a_link_keeps_what_single_tabs_show(state, visited):
     chosen = {"figure": "force", "axis": "log", "pushing": "all", "axes": "stress"}
     chosen["zoom"] = (3.5, 4.25, 2.0)
     state.looks.param.update(**chosen)
-    again = AppState(library, query=f"?{state.link()}")
-    wait_for(again)
+    again = visited(f"?{state.link()}")
     assert chosen.items() <= again.view.items()
 
 
@@ -853,27 +844,27 @@ def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(
 
 
 @pytest.mark.filterwarnings("ignore:entry walk")
-def test_a_damaged_entry_is_computed_anew(shipped, tmp_path, wait_for):
+def test_a_damaged_entry_is_computed_anew(shipped, tmp_path, visited):
     for where in ("shipped", "cache"):
         stores = {k: tmp_path / where / k for k in ("shipped", "cache")}
         shutil.copytree(shipped, stores[where])
         library = Library(**stores)
         garble(getattr(library, where), cell_at(library, 1).name, "*")
-        state = AppState(library, query=f"mu=1&n={DISKS}&states={STATES}&relax=nearest")
-        wait_for(state)
+        state = visited(f"mu=1&n={DISKS}&states={STATES}&relax=nearest", library)
         assert state.cell.mu == 1 and state.cell.store is library.cache, where
         assert [cell.mu for cell in state.catalogue] == [0, 0.1, 1]
 
 
 @pytest.mark.filterwarnings("ignore:entry packing")
-def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_path, wait_for):
+def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(
+    shipped, tmp_path, wait_for, visited
+):
     shutil.copytree(shipped, tmp_path / "shipped")
     library = Library(tmp_path / "shipped", tmp_path / "cache")
     for entry in library.shipped.find(kind="packing"):
         garble(library.shipped, entry.name, "*")
     assert library.expected_steps(DISKS, 0.1) is None
-    state = AppState(library)
-    wait_for(state)
+    state = visited(library=library)
     assert "no store" in state.work.message and state.cell is None
     state.ask(small(1, 4), at_once=True)
     wait_for(state)

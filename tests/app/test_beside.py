@@ -42,14 +42,13 @@ def test_other_disks_are_no_other_friction(state, wait_for):
     assert state.cell.selection.states == 5 and state.looks.beside is None
 
 
-def test_a_link_holds_both(state, library, wait_for):
+def test_a_link_holds_both(state, wait_for, visited):
     state.looks.split = True
     state.choose(mu=1)
     wait_for(state)
     query = state.link()
     assert "split=1" in query and "beside=0.1" in query
-    again = AppState(library, query=f"?{query}")
-    wait_for(again)
+    again = visited(f"?{query}")
     assert (again.cell.mu, again.looks.beside, again.besides.twin.cell.mu) == (1, 0.1, 0.1)
     # back to a view with one of them
     again.open("?" + query.replace("&beside=0.1", "").replace("mu=1", "mu=0.1"))
@@ -62,9 +61,8 @@ def test_a_link_holds_both(state, library, wait_for):
     )
 
 
-def test_a_link_has_the_other_computed_where_no_store_has_it(library, wait_for):
-    again = AppState(library, query=f"?mu=0.1&n={DISKS}&states=5&relax=nearest&split=1&beside=0.3")
-    wait_for(again)
+def test_a_link_has_the_other_computed_where_no_store_has_it(visited):
+    again = visited(f"?mu=0.1&n={DISKS}&states=5&relax=nearest&split=1&beside=0.3")
     assert (again.cell.mu, again.besides.twin.cell.mu) == (0.1, 0.3)
     assert again.besides.twin.cell.selection == asked(0.3, states=5)
 

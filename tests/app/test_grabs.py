@@ -5,7 +5,6 @@ import pytest
 
 from app import grabs, planes
 from app.exports import contacts, on_screen
-from app.state import AppState
 from app.views.messages import FROM_BROWSER, TO_BROWSER, listed
 from granforce.study import pulls
 
@@ -79,11 +78,10 @@ def test_undo_steps_back_to_the_state(page, state):
     assert page.hear(undo=True) == {"held": None} and not state.hand.pulls
 
 
-def test_pulls_travel_with_the_link(page, state, library, wait_for):
+def test_pulls_travel_with_the_link(page, state, wait_for, visited):
     page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
     held = page.hear(hold=[9, middle(page.hear(grab=9)["rail"])])["held"]
-    other = AppState(library, query=state.link())
-    wait_for(other)
+    other = visited(state.link())
     assert len(other.hand.pulls) == 2
     again = Page(other, wait_for)
     np.testing.assert_allclose(again.told[-1]["held"]["normal"], held["normal"], atol=1e-4)
@@ -167,12 +165,11 @@ def test_the_point_in_force_space_is_pulled_along_both_axes(page, state, pair):
     np.testing.assert_array_equal(again["normal"], held["normal"])
 
 
-def test_a_pulled_point_travels_with_the_link(page, state, library, wait_for):
+def test_a_pulled_point_travels_with_the_link(page, state, wait_for, visited):
     state.plane = planes.components(state.replay, (4, 0), (9, 1))
     fan = page.hear(point=True)["fan"]
     held = page.hear(hold_point=[float(fan["x"].mean()), float(fan["y"].mean())])["held"]
-    other = AppState(library, query=state.link())
-    wait_for(other)
+    other = visited(state.link())
     assert other.hand.pulls[0][0] == "4n-9t"
     np.testing.assert_allclose(
         Page(other, wait_for).told[-1]["held"]["normal"], held["normal"], atol=1e-4

@@ -7,7 +7,6 @@ import pytest
 
 from app import known
 from app.known import Statement
-from app.state import AppState
 from app.views.known import words
 from app.views.packing import PackingView
 from granforce.packing.importers import read_known
@@ -95,11 +94,10 @@ def test_let_go_all_is_as_before(state, wait_for):
     assert state.knowledge.narrowed is None and state.possible is state.exact
 
 
-def test_it_travels_with_the_link(state, library, wait_for):
+def test_it_travels_with_the_link(state, wait_for, visited):
     held(state, wait_for, 4, 9)
     held(state, wait_for, 20, error=0.1)
-    other = AppState(library, query=state.link())
-    wait_for(other)
+    other = visited(state.link())
     assert (
         other.knowledge.known == state.knowledge.known
         and other.knowledge.narrowed.mean == state.knowledge.narrowed.mean
@@ -124,15 +122,14 @@ def test_a_link_cannot_state_more_than_a_page(state):
     state.work.cancel()
 
 
-def test_contradictions_are_one_clear_line_and_taken_back(state, library, wait_for):
+def test_contradictions_are_one_clear_line_and_taken_back(state, wait_for, visited):
     held(state, wait_for, 4)
     before = state.knowledge.known
     state.knowledge.known = [*before, Statement(9, 30.0)]
     wait_for(state)
     assert "agrees with" in state.work.message and "\n" not in state.work.message
     assert state.knowledge.known == before and state.knowledge.narrowed.known == tuple(before)
-    other = AppState(library, query=state.link().split("&known")[0] + "&known=9:30")
-    wait_for(other)
+    other = visited(state.link().split("&known")[0] + "&known=9:30")
     assert "agrees with" in other.work.message and not other.knowledge.known
 
 

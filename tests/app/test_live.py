@@ -9,7 +9,6 @@ from small_store import DISKS
 
 from app import live, planes
 from app.selection import select
-from app.state import AppState
 from app.views import plane
 from app.views.controls import Controls
 from app.views.intervals import View
@@ -140,10 +139,8 @@ def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state, wai
     assert np.isfinite(tab.path.data["x"]).all() and len(tab.outer.data["x"])
 
 
-def test_a_page_that_comes_later_joins_and_both_end_with_the_same(library, wait_for):
-    first, second = AppState(library), AppState(library)
-    for state in (first, second):
-        wait_for(state)
+def test_a_page_that_comes_later_joins_and_both_end_with_the_same(visited):
+    first, second = visited(), visited()
     one, two = Browser(first), Browser(second)
     first.ask(asked(0.24, 400), at_once=True)
     one.run(lambda: len(one.parts("states")) > 0)
@@ -163,10 +160,8 @@ def test_a_page_that_comes_later_joins_and_both_end_with_the_same(library, wait_
 
 
 @pytest.mark.parametrize(("leave", "mu"), [(Work.cancel, 0.33), (Work.close, 0.34)])
-def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, mu):
-    first, second = AppState(library), AppState(library)
-    for state in (first, second):
-        wait_for(state)
+def test_who_leaves_does_not_end_what_others_wait_for(leave, mu, visited):
+    first, second = visited(), visited()
     one, two = Browser(first), Browser(second)
     wanted = asked(mu, 20_000)
     first.ask(wanted, at_once=True)
