@@ -84,8 +84,9 @@ class Recorder:
 def compiled(browser, address):
     """Have the server compile everything before anything is recorded."""
     page = browser.new_page()
+    page.set_default_timeout(300_000)
     page.goto(address + COMPILED)
-    painted(page, 300_000)
+    painted(page)
     until(page, "scene.geometry.mu === 0.3 && !scene.hand.player.grows")
     page.context.close()
 
@@ -163,7 +164,7 @@ def main(path):
             page = context.new_page()
             page.set_default_timeout(300_000)
             page.goto(address + MANY)
-            painted(page, 60_000)
+            painted(page)
             page.get_by_text("All contacts as a table").wait_for()  # the last to come
             page.wait_for_timeout(4000)
             recorder = Recorder(page)

@@ -91,22 +91,20 @@ def _opened(page, name):
     return page
 
 
-def painted(page, timeout=PATIENCE):
+def painted(page):
     """Wait until the packing has been painted; how many frames were."""
-    page.locator(".scene").wait_for(timeout=timeout)
-    scene = page.locator(".scene").element_handle()
-    page.wait_for_function("scene => scene.scene.painted > 0", arg=scene, timeout=timeout)
-    return page.evaluate("scene => scene.scene.painted", scene)
+    page.locator(".scene").wait_for()
+    until(page, "scene.painted > 0")
+    return scene(page, "scene.painted")
 
 
-def laid_out(page, name, timeout=PATIENCE):
+def laid_out(page, name):
     """Wait until a figure has its place on the page."""
     page.wait_for_function(
         f"""() => {{
             const fig = {MODEL}("{name}")
             return fig && !fig.properties.inner_width.is_unset && fig.inner_width > 50
-        }}""",
-        timeout=timeout,
+        }}"""
     )
 
 

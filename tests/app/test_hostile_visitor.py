@@ -112,7 +112,7 @@ VIEW = (
 def test_a_link_with_the_largest_numbers_computes_nothing(page, address, names, given, told):
     """One line says what is too large, and the usual states are seen; each alone: test_app.py."""
     page.goto(f"{address}?{given}{'&'.join(f'{name}={LARGEST}' for name in names)}")
-    painted(page, PATIENCE)
+    painted(page)
     page.get_by_text(told).filter(visible=True).first.wait_for()
     assert page.get_by_role("button", name="Cancel").count() == 0
 

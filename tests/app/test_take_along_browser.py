@@ -37,6 +37,7 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
     assert path.stat().st_size < 10e6
     context = chromium.new_context(viewport={"width": 1280, "height": 1000}, offline=True)
     alone, problems = context.new_page(), []
+    alone.set_default_timeout(PATIENCE)
     alone.on("pageerror", lambda error: problems.append(str(error)))
     alone.on("request", lambda sent: sent.url.startswith("http") and problems.append(sent.url))
     alone.goto(path.as_uri())

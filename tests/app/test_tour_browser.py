@@ -63,11 +63,15 @@ def dragged(page):
 # The tour
 
 
-@pytest.mark.parametrize("width, height", [(1280, 900), (1920, 1080), (390, 844)])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    "width, height, scheme",
+    [
+        *((1280, 900, "light"), (1920, 1080, "light"), (390, 844, "dark")),
+        pytest.param(1280, 900, "dark", marks=pytest.mark.slow),
+        pytest.param(390, 844, "light", marks=pytest.mark.slow),
+    ],
+)
 def test_the_tour_is_walked_through_and_closes_into_the_page(visit, width, height, scheme):
-    if scheme == "dark" and width == 1920:
-        pytest.skip("the same as at 1280")
     page = visit("?dark=1&tour=1" if scheme == "dark" else "", width, height)
     for step in range(1, STEPS + 1):
         at_step(page, step)
