@@ -1,7 +1,6 @@
 """A small store for the app's tests."""
 
 import re
-import time
 
 import pytest
 from serving import (
@@ -21,6 +20,7 @@ from serving import (
     until,
 )
 from small_store import cell_parameters
+from visitor import wait_for
 
 from app.data import Library
 from app.state import AppState
@@ -217,18 +217,3 @@ def visited(library):
 def state(visited):
     """The state of a page that has come to rest."""
     return visited()
-
-
-@pytest.fixture(name="wait_for")
-def wait_for_fixture():
-    """See wait_for."""
-    return wait_for
-
-
-def wait_for(state, seconds=240):
-    """Poll as the page does until no task runs any more; the first ones compile all kernels."""
-    end = time.monotonic() + seconds
-    while state.work.busy and time.monotonic() < end:
-        time.sleep(0.005)
-        state.work.poll()
-    assert not state.work.busy

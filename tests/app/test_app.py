@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from packings import skewed
 from small_store import DISKS, KEPT, STATES, cell_parameters
+from visitor import wait_for
 
 import granforce as gf
 from app import compute, distributions, limits, replays, work
@@ -316,7 +317,7 @@ def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
 # State
 
 
-def test_state_opens_near_mu_0_1_and_follows_the_selection(state, wait_for):
+def test_state_opens_near_mu_0_1_and_follows_the_selection(state):
     assert state.cell.mu == 0.1 and state.replay.summary["mu"] == 0.1
     state.choose(mu=1)
     wait_for(state)
@@ -329,7 +330,7 @@ def test_a_cell_in_memory_is_shown_at_once(state):
     assert state.cell.mu == 1 and not state.work.busy
 
 
-def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatch):
+def test_the_nearest_mu_are_read_ahead_and_no_others(state, monkeypatch):
     asked = []
 
     class Done:
@@ -349,7 +350,7 @@ def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatc
     assert asked == [0]
 
 
-def test_stored_states_are_found_whatever_was_kept_of_them(state, wait_for):
+def test_stored_states_are_found_whatever_was_kept_of_them(state):
     state.ask(small(1, STATES, relax="nearest"))
     wait_for(state)
     assert state.cell.mu == 1 and not state.missing
@@ -370,7 +371,7 @@ def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library,
 
 
 @pytest.mark.parametrize("done", ["another mu", "a force known", "a pull undone", "a look", "Back"])
-def test_a_refusal_is_told_until_something_succeeds(state, wait_for, done):
+def test_a_refusal_is_told_until_something_succeeds(state, done):
     if done == "a pull undone":
         state.hand.pulls = [(3, float(state.replay.normal[0, 3]))]
         wait_for(state)
@@ -400,7 +401,7 @@ def test_what_was_wrong_with_a_link_is_told_on_the_page_that_opens(visited):
     assert "states" in state.work.message
 
 
-def test_states_in_no_store_are_missing_until_computed(state, wait_for):
+def test_states_in_no_store_are_missing_until_computed(state):
     before = state.replay
     state.ask(small(0.3))
     assert state.missing and state.replay is before and not state.work.busy
@@ -412,7 +413,7 @@ def test_states_in_no_store_are_missing_until_computed(state, wait_for):
     assert len(state.catalogue) == 4
 
 
-def test_a_series_without_states_at_a_friction_asks_for_them(state, wait_for):
+def test_a_series_without_states_at_a_friction_asks_for_them(state):
     """What is shown at a μ is of that μ: another series or another μ is not put in its place."""
     before = state.replay
     state.choose(mu=0.3)
@@ -423,7 +424,7 @@ def test_a_series_without_states_at_a_friction_asks_for_them(state, wait_for):
     assert not state.missing and state.cell.mu == 1
 
 
-def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_for):
+def test_exact_intervals_are_offered_only_while_none_are_under_way(state):
     view = View(state)
     assert view.exact.visible
     state.compute_exact()
@@ -437,7 +438,7 @@ def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_f
     assert state.exact is not None and not view.exact.visible
 
 
-def test_too_little_friction_for_a_packing_is_called_that(state, wait_for):
+def test_too_little_friction_for_a_packing_is_called_that(state):
     """ "Not jammed, or contacts are missing" is no help to who has only moved a slider."""
     before = state.cell
     state.ask(small(0.0, packed_mu=1.0), at_once=True)
@@ -451,7 +452,7 @@ def test_a_link_to_missing_states_computes_them(visited):
     assert state.cell.mu == 0.2 and len(state.replay.number) == 6
 
 
-def test_a_shipped_packing_is_not_made_again(state, wait_for):
+def test_a_shipped_packing_is_not_made_again(state):
     state.ask(small(0.1, 5), at_once=True)
     wait_for(state)
     packing = kinds.PACKING.parameters(DISKS, 0.1, 1)
@@ -460,7 +461,7 @@ def test_a_shipped_packing_is_not_made_again(state, wait_for):
     assert cached and np.array_equal(copied.x, shipped.x)
 
 
-def test_exact_intervals_hold_every_state_on_screen(state, wait_for):
+def test_exact_intervals_hold_every_state_on_screen(state):
     state.compute_exact()
     wait_for(state)
     exact = exact_intervals(state.exact, state.replay)
@@ -469,7 +470,7 @@ def test_exact_intervals_hold_every_state_on_screen(state, wait_for):
     assert state.library.exact(state.cell.selection) is not None
 
 
-def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
+def test_cancel_ends_the_computation_and_shows_what_was_there(state):
     before = state.replay
     state.ask(select(200, 0.05, 3, states=100), at_once=True)
     state.work.computation.dismiss()
@@ -479,7 +480,7 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
     assert len(state.catalogue) == 3
 
 
-def test_a_friction_stands_beside_another_one_only(state, wait_for):
+def test_a_friction_stands_beside_another_one_only(state):
     """Back after a comparison once showed 0.1 beside 0.1."""
     first = state.cell.mu
     state.looks.split = True
@@ -495,7 +496,7 @@ def test_a_friction_stands_beside_another_one_only(state, wait_for):
     assert state.looks.beside is None and state.besides.twin is None
 
 
-def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):
+def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state):
     task = state.work.computation
     state.ask(select(20, 0.05, 3, states=9), at_once=True)
     task.job.stop()  # before there is a state: it ends with the first one
@@ -524,7 +525,7 @@ def test_what_is_pale_says_of_which_friction_it_is(state):
     assert line.visible and f"still of μ = {state.cell.mu:g}" in line.object
 
 
-def test_possible_is_in_the_legend_only_where_it_is_drawn(state, wait_for):
+def test_possible_is_in_the_legend_only_where_it_is_drawn(state):
     state.choose(mu=1)
     wait_for(state)
     view = View(state)
@@ -535,7 +536,7 @@ def test_possible_is_in_the_legend_only_where_it_is_drawn(state, wait_for):
     assert view.exact_item.visible and view.exact_item.label.value == "possible"
 
 
-def test_one_bar_says_what_it_shows_where_it_hides_none(state, wait_for):
+def test_one_bar_says_what_it_shows_where_it_hides_none(state):
     view = View(state)
     assert not view.key[-1].visible  # no exact intervals yet
     state.compute_exact()
@@ -585,7 +586,7 @@ def test_closing_the_page_ends_its_computation(state):
     assert job.wait(30) and job.result is None and job.error == ""
 
 
-def test_progress_grows_and_estimates_the_rest(state, wait_for):
+def test_progress_grows_and_estimates_the_rest(state):
     fractions = []
 
     def note(event):
@@ -678,7 +679,7 @@ def once_both_are_there(begin, work):
     return run
 
 
-def test_a_later_job_replaces_an_earlier_one(wait_for):
+def test_a_later_job_replaces_an_earlier_one():
     release, done = threading.Event(), []
     task = Task()
     task.start(lambda job: release.wait(10) and "first", done.append)
@@ -781,7 +782,7 @@ def test_a_job_that_waits_for_another_page_can_be_cancelled():
     assert first.wait(10) and first.error == second.error == ""
 
 
-def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
+def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
     task = state.work.task()
     progress, told = Progress(task), threading.Event()
     assert not progress.running
@@ -823,9 +824,7 @@ def garble(store, name, array):
 
 
 @pytest.mark.parametrize("array", ["states", "*"])
-def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(
-    shipped, tmp_path, wait_for, array, caplog
-):
+def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(shipped, tmp_path, array, caplog):
     shutil.copytree(shipped, tmp_path / "shipped")
     library = Library(tmp_path / "shipped", tmp_path / "cache")
     best = cell_at(library, 0.1)
@@ -856,9 +855,7 @@ def test_a_damaged_entry_is_computed_anew(shipped, tmp_path, visited):
 
 
 @pytest.mark.filterwarnings("ignore:entry packing")
-def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(
-    shipped, tmp_path, wait_for, visited
-):
+def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_path, visited):
     shutil.copytree(shipped, tmp_path / "shipped")
     library = Library(tmp_path / "shipped", tmp_path / "cache")
     for entry in library.shipped.find(kind="packing"):
@@ -983,7 +980,7 @@ def test_player_gets_flat_frames(library):
 
 
 @pytest.mark.parametrize("by", ["original", "extent", "exact", "position"])
-def test_contacts_are_sorted_by_what_is_named(state, wait_for, by):
+def test_contacts_are_sorted_by_what_is_named(state, by):
     state.compute_exact()
     wait_for(state)
     replay, exact = state.replay, exact_intervals(state.exact, state.replay)
@@ -999,7 +996,7 @@ def test_contacts_are_sorted_by_what_is_named(state, wait_for, by):
     assert np.all(np.diff(value[order]) >= 0)
 
 
-def test_intervals_take_nothing_over_while_hidden(state, wait_for):
+def test_intervals_take_nothing_over_while_hidden(state):
     state.looks.tab = "statistics"
     view = View(state)
     state.choose(mu=1)
