@@ -673,7 +673,7 @@ def once_both_are_there(begin, work):
 
     def run(job):
         if not met:
-            met.append(begin.wait(10))
+            met.append(begin.wait(60))
         return work(job)
 
     return run
@@ -682,7 +682,7 @@ def once_both_are_there(begin, work):
 def test_a_later_job_replaces_an_earlier_one():
     release, done = threading.Event(), []
     task = Task()
-    task.start(lambda job: release.wait(10) and "first", done.append)
+    task.start(lambda job: release.wait(60) and "first", done.append)
     task.start(lambda job: "second", done.append)
     release.set()
     while task.running:
@@ -709,7 +709,7 @@ def test_a_job_that_waits_is_cancelled_at_once():
     second.cancel()
     assert second.ended and not first.ended
     release.set()
-    assert first.wait(10) and Job(lambda job: None, pool).wait(10) and begun == []
+    assert first.wait(60) and Job(lambda job: None, pool).wait(60) and begun == []
 
 
 def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
@@ -720,7 +720,7 @@ def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
         return gf.pack(20_000, mu=0.5, seed=1)  # for minutes
 
     job = Job(work)
-    assert begun.wait(10) and not job.wait(0.3)
+    assert begun.wait(60) and not job.wait(0.3)
     job.cancel()
     assert job.wait(60) and job.result is None and job.error == ""
 
@@ -770,16 +770,16 @@ def test_a_job_that_waits_for_another_page_can_be_cancelled():
 
     pool = Pool(2, "test")
     first = Job(work, pool)
-    assert inside.wait(10)
+    assert inside.wait(60)
     second = Job(work, pool)
     late = time.monotonic() + 30
     while "already under way" not in second.stage and time.monotonic() < late:
         time.sleep(0.01)
     assert "already under way" in second.stage
     second.cancel()
-    assert second.wait(10) and not first.ended
+    assert second.wait(60) and not first.ended
     release.set()
-    assert first.wait(10) and first.error == second.error == ""
+    assert first.wait(60) and first.error == second.error == ""
 
 
 def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
@@ -798,7 +798,7 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
             time.sleep(0.01)
 
     task.start(work)
-    assert told.wait(10)
+    assert told.wait(60)
     state.work.poll()
     assert progress.running and progress.fraction == 0.25
     assert progress.words == "counting — about 20 min more"
@@ -811,7 +811,7 @@ def test_a_job_wakes_the_page_when_it_ends():
     woken = threading.Event()
     task = Task(wake=lambda function: woken.set())
     task.start(lambda job: None)
-    assert woken.wait(10)
+    assert woken.wait(60)
 
 
 # Damaged stores
@@ -894,7 +894,7 @@ class Panic(BaseException):
 def test_a_pool_survives_what_its_jobs_raise(error):
     pool = Pool(1, "test")
     job = Job(raising(error), pool)
-    assert job.wait(10) and type(error).__name__ in job.error and "\n" not in job.error
+    assert job.wait(60) and type(error).__name__ in job.error and "\n" not in job.error
     assert next_on(pool)
 
 
@@ -902,9 +902,9 @@ def test_a_pool_survives_jobs_whose_end_fails():
     pool = Pool(1, "test")
     for _ in range(3):
         job = Job(lambda job: "done", pool, raising(NameError("partial")))
-        assert job.wait(10) and job.result == "done"
+        assert job.wait(60) and job.result == "done"
     release = threading.Event()
-    Job(lambda job: release.wait(10), pool)
+    Job(lambda job: release.wait(60), pool)
     waiting = Job(lambda job: None, pool, raising(NameError("partial")))
     waiting.cancel()  # by the thread of the page, which goes on as well
     release.set()
@@ -930,9 +930,9 @@ def test_a_pool_survives_pages_that_are_gone(library):
     for task in tasks:
         task.start(work)
     jobs = [task.job for task in tasks]
-    assert begun.wait(10)
+    assert begun.wait(60)
     state.work.close()
-    assert all(job.wait(10) for job in jobs) and next_on(pool)
+    assert all(job.wait(60) for job in jobs) and next_on(pool)
 
 
 def test_nothing_begins_for_a_page_that_was_closed(state):
@@ -962,11 +962,11 @@ def test_who_waits_for_another_page_leaves_the_thread_to_others():
 
     pool = Pool(2, "test")
     first = Job(work, pool)
-    assert inside.wait(10)
+    assert inside.wait(60)
     others = [Job(work, pool) for _ in range(3)]
     assert next_on(pool) and not any(job.ended for job in (first, *others))
     release.set()
-    assert all(job.wait(10) and job.result for job in (first, *others))
+    assert all(job.wait(60) and job.result for job in (first, *others))
 
 
 # Views

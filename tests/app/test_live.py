@@ -172,7 +172,7 @@ def test_who_leaves_does_not_end_what_others_wait_for(leave, mu, visited):
     walk = live.shared(live.Walking, wanted.parameters())
     run, found = walk.run, len(walk.parts)
     leave(first.work)
-    one.run(seconds=1)  # at once for who leaves
+    one.run(seconds=20)  # long before the others have what they want
     assert not first.work.busy and not second.work.computation.message
     two.run(lambda: len(walk.parts) > found + 20)
     assert walk.run == run and second.work.computation.running  # not begun anew
