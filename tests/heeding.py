@@ -26,6 +26,24 @@ def computed(running):
     return (int(told[11]) + int(told[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def until_it_left(folder, pattern, count, running, patience=300):
+    """Wait until a process has left so many entries in a folder."""
+    end = time.monotonic() + patience
+    while len(list(folder.glob(pattern))) < count:
+        assert time.monotonic() < end and running.poll() is None
+        time.sleep(0.01)
+
+
+def interrupted(running):
+    """Ctrl-C, as a terminal sends it to workers too: all end quietly, what is finished is kept."""
+    os.killpg(running.pid, signal.SIGINT)
+    out, err = running.communicate(timeout=300)
+    assert running.returncode == 130
+    assert out == ""
+    assert "Traceback" not in err
+    assert "finished entries are kept" in err
+
+
 def until_it_computes(running, seconds=0.3, patience=300):
     """Wait until a process has computed for so many seconds from now on, at whatever load."""
     end, before = time.monotonic() + patience, computed(running)

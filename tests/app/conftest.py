@@ -1,23 +1,43 @@
 """A small store for the app's tests."""
 
-import time
+import re
 
 import pytest
-from serving import CHROMIUM, FLAGS, MANY, painted, serve
+from serving import (
+    CHROMIUM,
+    FLAGS,
+    MANY,
+    PATIENCE,
+    ask,
+    bars_drawn,
+    more,
+    no_more,
+    painted,
+    picture,
+    scene,
+    serve,
+    shows,
+    until,
+)
 from small_store import cell_parameters
+from visitor import wait_for
 
+from app.data import Library
+from app.state import AppState
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
 
-PATIENCE = 60_000  # ms, on a busy machine
+HERE = re.compile(r"(http|ws)://localhost:|data:|blob:|file:|about:")
 
 
 def pytest_collection_modifyitems(items):
-    """Tests in a browser are left out where there is none."""
+    """Tests in a browser are marked, and left out where there is none."""
     for item in items:
-        if item.get_closest_marker("browser") and not CHROMIUM.exists():
-            item.add_marker(pytest.mark.skip(reason=f"needs chromium at {CHROMIUM}"))
+        if "chromium" in item.fixturenames:
+            item.add_marker("browser")
+            if not CHROMIUM.exists():
+                item.add_marker(pytest.mark.skip(reason=f"needs chromium at {CHROMIUM}"))
 
 
 @pytest.fixture(scope="session")
@@ -30,58 +50,102 @@ def shipped(tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope="module")
-def address(shipped, tmp_path_factory):
-    """The app, served with stores of its own, once for each module."""
-    with serve(tmp_path_factory.mktemp("served"), GRANFORCE_DATA=str(shipped)) as (url, _):
-        yield url
+@pytest.fixture(scope="session")
+def served(shipped, tmp_path_factory):
+    """Address and folder of the app, served with stores of its own, once for each worker."""
+    folder = tmp_path_factory.mktemp("served")
+    with serve(folder, GRANFORCE_DATA=str(shipped)) as (url, _):
+        yield url, folder
+
+
+@pytest.fixture(scope="session")
+def address(served):
+    """Address of the app."""
+    return served[0]
 
 
 @pytest.fixture(scope="module")
 def chromium():
-    """Debian's chromium, once for each module."""
+    """Debian's chromium, once for each module: no asyncio works beside it in the same process."""
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as context:
         browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        browser.fresh_context = browser.new_context  # of somebody who was never here
-        browser.new_context = lambda **options: _returning(browser, **options)
-        browser.new_page = lambda **options: browser.new_context(**options).new_page()
         yield browser
         browser.close()
 
 
-def _returning(browser, **options):
-    """A context of somebody who knows the page: no tour, and nothing moves by itself."""
-    context = browser.fresh_context(**{"reduced_motion": "reduce"} | options)
-    context.add_init_script("try { localStorage.setItem('granforce.tour', 'seen') } catch {}")
+@pytest.fixture(scope="module")
+def context(chromium):
+    """context(first=False, **options): the module's one browser context with these options.
+
+    Its pages are those of somebody who knows the page: no tour, and nothing moves by itself; or of
+    somebody who was never here, each of them. They share the scripts that were fetched and, as a
+    blank page keeps it open, a window: a page alone costs twice as much.
+    """
+    made = {}
+
+    def context(first=False, **options):
+        key = first, *sorted(options.items())
+        if key not in made:
+            if not first:
+                options = {"reduced_motion": "reduce"} | options
+            made[key] = chromium.new_context(**options)
+            made[key].grant_permissions(["clipboard-read", "clipboard-write"])
+            made[key].set_default_timeout(PATIENCE)
+            made[key].add_init_script(f"try {{ {FORGET if first else KNOW} }} catch {{}}")
+            made[key].new_page()
+        return made[key]
+
     return context
 
 
+# What a tab does as it begins: once, or each time that it goes to another page.
+FORGET = "sessionStorage.begun || localStorage.clear(); sessionStorage.begun = true"
+KNOW = "localStorage.setItem('granforce.tour', 'seen')"
+
+
+def begun(context, problems, width, height):
+    """A new page, whose errors and requests to elsewhere are added to a list."""
+    page = context.new_page()
+    page.set_viewport_size({"width": width, "height": height})
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on("console", lambda told: told.type == "error" and problems.append(told.text))
+    page.on("request", lambda sent: HERE.match(sent.url) or problems.append(sent.url))
+    return page
+
+
+def with_tabs(page):
+    """Wait until a page has its picture and its tabs; the page."""
+    painted(page)
+    page.locator("[role=tab]").first.wait_for(state="attached")  # unseen while a tour begins
+    return page
+
+
 @pytest.fixture
-def opening(chromium, address):
-    """opening(query, width, height, …): a page on its way; at the end no error was told.
+def opening(context, address, request):
+    """opening(query, width, height, …): a page on its way.
 
-    first: whether it is of somebody who was never here; at: another server's address; wanted: what
-    errors may say; further options are of its context.
+    At the end no error was told and nothing was asked of the net, and with PICTURES set the page is
+    kept as a picture. first: whether it is of somebody who was never here; at: another server's
+    address; wanted: what errors may say; prepare(page): done before it goes anywhere; further
+    options are of its context.
     """
-    errors, contexts, allowed = [], [], ["favicon"]
+    problems, pages, allowed = [], [], ["favicon"]
 
-    def opening(query, width, height, first=False, at=None, wanted=(), **options):
-        begin = chromium.fresh_context if first else chromium.new_context
-        context = begin(viewport={"width": width, "height": height}, **options)
-        contexts.append(context)
-        context.set_default_timeout(PATIENCE)
-        page = context.new_page()
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda told: told.type == "error" and errors.append(told.text))
+    def opening(query, width, height, *, first=False, at=None, wanted=(), prepare=None, **options):
+        page = begun(context(first, **options), problems, width, height)
+        pages.append(page)
         allowed.extend(wanted)
+        if prepare:
+            prepare(page)
         page.goto((at or address) + query)
         return page
 
     yield opening
-    for context in contexts:
-        context.close()
-    assert not [error for error in errors if not any(words in error for words in allowed)]
+    for number, page in enumerate(pages):
+        picture(page, f"{request.module.__name__}/{request.node.name}-{number}", full_page=True)
+        page.close()
+    assert not [told for told in problems if not any(words in told for words in allowed)]
 
 
 @pytest.fixture
@@ -89,41 +153,67 @@ def visit(opening):
     """visit(query, width, height, …): a page with its tabs, by `opening`."""
 
     def visit(query="", width=1280, height=900, **options):
-        page = opening(query or MANY, width, height, **options)
-        painted(page, PATIENCE)
-        page.locator("[role=tab]").first.wait_for(state="attached")  # unseen while a tour begins
-        return page
+        return with_tabs(opening(query or MANY, width, height, **options))
 
     return visit
 
 
+@pytest.fixture(scope="module")
+def lasting(context, address):
+    """lasting(query): a page with its tabs for all tests of the module, which leave it as it is."""
+    problems, pages = [], {}
+
+    def lasting(query=MANY):
+        if query not in pages:
+            pages[query] = begun(context(), problems, 1280, 900)
+            pages[query].goto(address + query)
+        return with_tabs(pages[query])
+
+    yield lasting
+    for page in pages.values():
+        page.close()
+    assert not problems
+
+
+@pytest.fixture
+def page(lasting):
+    """One page for many tests, put back to the original network at μ = 0.1, nothing selected."""
+    page = lasting()
+    bars_drawn(page)
+    if scene(page, "scene.geometry.mu") != 0.1:
+        ask(page, 0.1)
+        shows(page, 0.1)
+    if page.locator("button.between.on").count():
+        page.locator("button.between").click()
+    page.locator("button.restart").click()
+    more(page).locator("button.pin").click()
+    scene(page, "(scene.selected !== null && scene.onSelect(null), scene.reset())")
+    page.mouse.move(5, 5)
+    if scene(page, "scene.hand.replay.held !== null"):
+        page.keyboard.press("Escape")
+    until(page, "scene.selected === null && scene.hand.replay.held === null")
+    no_more(page, "pulls=")
+    return page
+
+
 @pytest.fixture
 def library(shipped, tmp_path):
-    from app.data import Library
-
     return Library(shipped, tmp_path / "cache.zarr")
 
 
 @pytest.fixture
-def state(library):
+def visited(library):
+    """visited(query, library): the state of a page that a link opened, once it is at rest."""
+
+    def visited(query="", library=library):
+        state = AppState(library, query=query)
+        wait_for(state)
+        return state
+
+    return visited
+
+
+@pytest.fixture
+def state(visited):
     """The state of a page that has come to rest."""
-    from app.state import AppState
-
-    state = AppState(library)
-    wait_for(state)
-    return state
-
-
-@pytest.fixture(name="wait_for")
-def wait_for_fixture():
-    """See wait_for."""
-    return wait_for
-
-
-def wait_for(state, seconds=240):
-    """Poll as the page does until no task runs any more; the first ones compile all kernels."""
-    end = time.monotonic() + seconds
-    while state.work.busy and time.monotonic() < end:
-        time.sleep(0.005)
-        state.work.poll()
-    assert not state.work.busy
+    return visited()

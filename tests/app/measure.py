@@ -16,10 +16,24 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
+sys.path[:0] = [str(Path(__file__).parents[k]) for k in range(3)]  # tests/app, tests, and above
 
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, CLOSED, FLAGS, MANY, MODEL, how_it_is_made, painted, scene, serve  # noqa: E402
+from serving import (  # noqa: E402
+    CHROMIUM,
+    CLOSED,
+    FLAGS,
+    MANY,
+    MODEL,
+    ask,
+    how_it_is_made,
+    painted,
+    scene,
+    serve,
+    until,
+)  # fmt: skip
+from test_live_browser import chain  # noqa: E402
+from test_space_browser import here, place  # noqa: E402
 
 SIZE = {"width": 1280, "height": 900}
 # A place in the packing where a drag moves the view, and pulls nothing.
@@ -43,10 +57,11 @@ class Stage:
         """
         motion = "reduce" if still else "no-preference"
         page = self.browser.new_context(viewport=SIZE, reduced_motion=motion).new_page()
+        page.set_default_timeout(1_000_000)
         page.bytes = 0
         page.on("websocket", lambda ws: ws.on("framereceived", lambda data: _count(page, data)))
         page.goto(self.address + (query or MANY))
-        painted(page, 120_000)
+        painted(page)
         mark = "performance.getEntriesByName('packing painted')[0].startTime"
         return page, page.evaluate(mark) / 1000  # since the page was asked for
 
@@ -104,7 +119,7 @@ def crowd(stage):
     page, _ = stage.open(query)
     player = "Bokeh.documents[0].get_model_by_name('player')?.player"
     contacts = f"() => {player}?.replay?.walk.contacts > 10000"
-    page.wait_for_function(contacts, timeout=1_000_000)
+    page.wait_for_function(contacts)
     page.context.close()
     _play(stage, query, "10,000 disks")
 
@@ -160,13 +175,10 @@ def stalls(stage):
         page.get_by_role("tab", name=tab).click()
         page.wait_for_timeout(3000)
     print(f"longest stall while tabs are opened: {_longest(log)}")
-    page.locator("input.typed").fill("0.17")
-    page.locator("input.typed").press("Enter")
-    page.get_by_text("μ = 0.17, N = 400").first.wait_for(timeout=300_000)
+    ask(page, "0.17")
+    page.get_by_text("μ = 0.17, N = 400").first.wait_for()
     print(f"longest stall while packing and walk are computed: {_longest(log)}")
-    page.get_by_role("button", name="Compute exact intervals").wait_for(
-        state="hidden", timeout=120_000
-    )
+    page.get_by_role("button", name="Compute exact intervals").wait_for(state="hidden")
     page.wait_for_timeout(1000)
     print(f"longest stall while exact intervals are computed: {_longest(log)}")
 
@@ -197,15 +209,10 @@ def watching(stage):
     page, _ = stage.open()
     page.wait_for_timeout(4000)
     for mu in ("0.17", "0.18"):
-        page.locator("input.typed").fill(mu)
         page.locator(".scene").evaluate(LOG)
         before = page.bytes
-        page.locator("input.typed").press("Enter")
-        page.wait_for_function(
-            "([e, mu]) => e.scene.geometry.mu === mu && !e.scene.hand.player.grows",
-            arg=[page.locator(".scene").element_handle(), float(mu)],
-            timeout=300_000,
-        )
+        ask(page, mu)
+        until(page, f"scene.geometry.mu === {mu} && !scene.hand.player.grows")
         log = page.evaluate("log")
         pictures, states = log["pictures"], log["states"]
         seconds = (pictures[-1] - pictures[0]) / 1000
@@ -230,7 +237,7 @@ def _watch_many(stage, disks=5000, seconds=20):
     how_it_is_made(page)
     page.get_by_label("Disks N").first.fill(str(disks))
     page.get_by_label("Disks N").first.press("Enter")
-    page.wait_for_function("() => log.pictures.length > 0", timeout=120_000)
+    page.wait_for_function("() => log.pictures.length > 0")
     page.wait_for_timeout(1000 * seconds)
     pictures = page.evaluate("log.pictures")
     spent = (pictures[-1] - pictures[0]) / 1000
@@ -285,35 +292,20 @@ def dragging(stage):
     """A force in the hand at 400 disks: time to its rail, frames a second, hand to picture."""
     page, _ = stage.open()
     page.wait_for_timeout(4000)
-    x, y = page.locator(".scene").evaluate(
-        """e => {
-            const {scene} = e, {geometry: g, size} = scene, box = e.getBoundingClientRect()
-            const middle = (k) => scene.toPixel((g.x0[k] + g.x1[k]) / 2, (g.y0[k] + g.y1[k]) / 2)
-            const found = Array.from(g.contact.keys()).filter((k) => scene.width[k] > 0.4 &&
-                middle(k).every((v) => v > 0.4 * size && v < 0.6 * size))
-            const [px, py] = middle(found[0])
-            return [box.x + px, box.y + py]
-        }"""
-    )
+    _, x, y = chain(page)
     page.locator(".scene").evaluate(GRABBED)
     for visit in ("first", "second"):
         _drag(page, x, y, "scene.hand.rail", f"rail of the {visit} contact")
     page.get_by_role("tab", name="Force space").click()
-    page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 4", timeout=120_000)
+    page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 4")
     page.wait_for_timeout(1500)
     for visit in ("first", "second"):
-        x, y = page.evaluate(HERE)
-        _drag(page, x, y, "scene.hand.spot.fan", f"networks around the point, the {visit} time")
-
-
-# Where the point in force space is on the page.
-HERE = """() => {
-    const page = Bokeh.documents[0], here = page.get_model_by_name("here")
-    const view = page.views_manager.find_one(page.get_model_by_name("path_figure"))
-    const box = view.canvas_view.el.getBoundingClientRect(), {x_scale, y_scale} = view.frame
-    return [box.x + x_scale.compute(here.get_column("x")[0]),
-            box.y + y_scale.compute(here.get_column("y")[0])]
-}"""
+        _drag(
+            page,
+            *place(page, *here(page)),
+            "scene.hand.spot.fan",
+            f"networks around the point, the {visit} time",
+        )
 
 
 # A hand that moves once a frame, as a mouse does; moved from outside, it would be the slower one.
@@ -338,11 +330,7 @@ def _drag(page, x, y, ready, words):
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x, y - 6)
-    page.wait_for_function(
-        f"e => {{ const {{scene}} = e; return {ready} !== null }}",
-        arg=page.locator(".scene").element_handle(),
-        timeout=120_000,
-    )
+    until(page, f"{ready} !== null")
     print(f"{words}: {time.perf_counter() - begin:.2f} s")
 
     rate = page.locator(".scene").evaluate(TO_AND_FRO, [x, y - 6])
@@ -376,18 +364,14 @@ def visitors(stage, count=10):
     """
     pages = [stage.open(still=True)[0] for _ in range(count)]
     for page, mu in zip(pages, ("0.15", "0.25"), strict=False):
-        page.locator("input.typed").fill(mu)
-        page.locator("input.typed").press("Enter")
+        ask(page, mu)
     time.sleep(1)
     _longest(stage.folder / "stalls")
     spent = []
     for page in pages[2:]:
         before, begin = scene(page, "scene.geometry.mu"), time.perf_counter()
         page.locator(".friction input[type=range]").press("ArrowRight")
-        page.wait_for_function(
-            "([element, mu]) => element.scene.geometry.mu !== mu",
-            arg=[page.locator(".scene").element_handle(), before],
-        )
+        until(page, f"scene.geometry.mu !== {before}")
         spent.append(time.perf_counter() - begin)
     print(
         f"{count} visitors, 2 computing: change of μ mean {1000 * sum(spent) / len(spent):.0f} ms, "

@@ -17,9 +17,9 @@ sys.path[:0] = [str(Path(__file__).parents[k]) for k in range(3)]  # tests/app, 
 
 from PIL import Image  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, FLAGS, MANY, MODEL, painted, scene, serve  # noqa: E402
+from serving import CHROMIUM, FLAGS, MANY, MODEL, ask, painted, scene, serve, until  # noqa: E402
 from small_store import ROOT  # noqa: E402
-from test_live_browser import chain, until  # noqa: E402
+from test_live_browser import chain  # noqa: E402
 from test_space_browser import here, place  # noqa: E402
 
 SIZE = {"width": 1500, "height": 880}
@@ -84,8 +84,9 @@ class Recorder:
 def compiled(browser, address):
     """Have the server compile everything before anything is recorded."""
     page = browser.new_page()
+    page.set_default_timeout(300_000)
     page.goto(address + COMPILED)
-    painted(page, 300_000)
+    painted(page)
     until(page, "scene.geometry.mu === 0.3 && !scene.hand.player.grows")
     page.context.close()
 
@@ -117,8 +118,7 @@ def straight(start, *stops, steps=28):
 def act(page, recorder):
     """What is seen: packing, walking, grabbing."""
     recorder.on = True
-    page.locator("input.typed").fill(ASKED)
-    page.locator("input.typed").press("Enter")
+    ask(page, ASKED)
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 25")
     page.wait_for_timeout(2500)
     recorder.on = False
@@ -164,7 +164,7 @@ def main(path):
             page = context.new_page()
             page.set_default_timeout(300_000)
             page.goto(address + MANY)
-            painted(page, 60_000)
+            painted(page)
             page.get_by_text("All contacts as a table").wait_for()  # the last to come
             page.wait_for_timeout(4000)
             recorder = Recorder(page)

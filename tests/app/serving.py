@@ -5,7 +5,6 @@ import socket
 import subprocess
 import sys
 import time
-import urllib.error
 import urllib.request
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +14,7 @@ from small_store import ROOT
 CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 # Of 400 disks, as a page opened that says no more: an address without a view begins with a scene.
 MANY = "?scene=many"
+PATIENCE = 60_000  # ms, on a busy machine
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
 # Closed pages are soon given up, but not too soon for a busy machine: a session given
 # up before its page has connected comes back without what panel serve knows of it.
@@ -55,14 +55,14 @@ def free_port():
 
 
 def wait_until_served(url, server, log):
-    """Wait until an address answers; RuntimeError with the log where the server ends."""
-    for _ in range(300):
+    """Wait until an address answers, however busy the machine; RuntimeError if the server ends."""
+    for _ in range(6000):
         if server.poll() is not None:
             raise RuntimeError(f"the server ended: {log.read_text()}")
         try:
             urllib.request.urlopen(url, timeout=30).close()
             return
-        except (urllib.error.URLError, ConnectionError):
+        except OSError:
             time.sleep(0.1)
     raise RuntimeError(f"nothing served: {log.read_text()}")
 
@@ -91,23 +91,38 @@ def _opened(page, name):
     return page
 
 
-def painted(page, timeout=30_000):
+def painted(page):
     """Wait until the packing has been painted; how many frames were."""
-    page.locator(".scene").wait_for(timeout=timeout)
-    scene = page.locator(".scene").element_handle()
-    page.wait_for_function("scene => scene.scene.painted > 0", arg=scene, timeout=timeout)
-    return page.evaluate("scene => scene.scene.painted", scene)
+    page.locator(".scene").wait_for()
+    until(page, "scene.painted > 0")
+    return scene(page, "scene.painted")
 
 
-def laid_out(page, name, timeout=60_000):
+def laid_out(page, name):
     """Wait until a figure has its place on the page."""
     page.wait_for_function(
         f"""() => {{
             const fig = {MODEL}("{name}")
             return fig && !fig.properties.inner_width.is_unset && fig.inner_width > 50
-        }}""",
-        timeout=timeout,
+        }}"""
     )
+
+
+def at_rest(place):
+    """The box of a place, once it has been the same in twenty frames."""
+    place.evaluate(
+        """element => new Promise((done) => {
+            let before = "", same = 0
+            const look = () => {
+                const now = JSON.stringify(element.getBoundingClientRect())
+                same = now === before ? same + 1 : 0
+                before = now
+                same < 20 ? requestAnimationFrame(look) : done()
+            }
+            look()
+        })"""
+    )
+    return place.bounding_box()
 
 
 def bars_drawn(page):
@@ -127,6 +142,37 @@ def scene(page, expression):
     )
 
 
-def picture(page, name):
-    """What is seen of a page, as artefacts/NAME.png."""
-    page.screenshot(path=ROOT / "artefacts" / f"{name}.png")
+def until(page, expression):
+    """Wait for an expression of `scene`."""
+    page.wait_for_function(
+        f"element => {{ const {{scene}} = element; return {expression} }}",
+        arg=page.locator(".scene").element_handle(),
+    )
+
+
+def shows(page, mu):
+    """Wait until the packing at μ is on screen."""
+    until(page, f"scene.geometry.mu === {mu}")
+
+
+def ask(page, mu):
+    """Ask for a friction by typing it."""
+    typed = page.locator("input.typed")
+    typed.fill(str(mu))
+    typed.press("Enter")
+
+
+def searched(page, *parts):
+    """Wait until the address has all these parts after its "?"."""
+    page.wait_for_function("parts => parts.every((s) => location.search.includes(s))", arg=parts)
+
+
+def no_more(page, part):
+    """Wait until the address has no such part after its "?"."""
+    page.wait_for_function("part => !location.search.includes(part)", arg=part)
+
+
+def picture(page, name, **options):
+    """What is seen of a page, as artefacts/NAME.png, where PICTURES is set: to be looked at."""
+    if "PICTURES" in os.environ:
+        page.screenshot(path=ROOT / "artefacts" / f"{name}.png", **options)

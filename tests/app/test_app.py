@@ -12,9 +12,39 @@ import numpy as np
 import pytest
 from packings import skewed
 from small_store import DISKS, KEPT, STATES, cell_parameters
+from visitor import wait_for
 
 import granforce as gf
+from app import compute, distributions, limits, replays, work
+from app.data import Library
+from app.garbage import settle
+from app.geometry import MARGIN
+from app.jobs import Job, Pool, Task
+from app.limits import LIMITS, NAMES, Limits, read_limits
+from app.links import read_view
+from app.looks import Looks
+from app.page import TABS, _turns
+from app.replays import make_replay
+from app.selection import (
+    OPTIONS,
+    SOLVERS,
+    Selection,
+    command,
+    differing,
+    link,
+    read_link,
+    select,
+    selected,
+)
+from app.state import AppState
+from app.views.controls import Controls
+from app.views.intervals import KEY, SOME, View, sorted_contacts
+from app.views.packing import PackingView, exact_intervals
+from app.views.player import frames
+from app.views.progress import Progress
+from app.views.summary import left_out, of_which
 from granforce import measures
+from granforce.cli import parser
 from granforce.records import Cancelled, InputError
 from granforce.study import cells as study
 from granforce.study import kinds
@@ -31,8 +61,6 @@ def replay_at(library, mu):
 
 def small(mu, states=8, **details):
     """A Selection of the small store's packings."""
-    from app.selection import select
-
     return select(DISKS, mu, 1, states=states, **details)
 
 
@@ -47,14 +75,10 @@ def test_catalogue_lists_the_shipped_walks_as_one_series(library):
     }
 
 
-def test_missing_stores_leave_a_note_not_an_error(tmp_path, wait_for):
-    from app.data import Library
-    from app.state import AppState
-
+def test_missing_stores_leave_a_note_not_an_error(tmp_path, visited):
     library = Library(tmp_path / "nowhere", tmp_path / "cache")
     assert "no store" in library.notes[0]
-    state = AppState(library)
-    wait_for(state)
+    state = visited(library=library)
     assert state.replay is None and state.work.message == ""
 
 
@@ -123,9 +147,6 @@ def test_mu_zero_is_one_point_without_relaxation(library):
 @pytest.mark.parametrize("basis", [((2, 1), (1, 1)), ((1, 1), (0, 1)), ((1, 3), (0, 1))])
 def test_tilted_cells_are_drawn_with_their_images(library, basis):
     """The same disks and contacts as in the straight cell, up to whole cells, and all images."""
-    from app.geometry import MARGIN
-    from app.replays import make_replay
-
     cell = cell_at(library, 0.1)
     packing, dataset = library.packing(cell.params["packing"]), library.dataset(cell)
     tilted, turn = skewed(packing, basis)
@@ -161,8 +182,6 @@ def test_tilted_cells_are_drawn_with_their_images(library, basis):
 
 def test_open_boxes_have_no_images(library):
     """Imported packings may be open; then nothing is drawn twice."""
-    from app.replays import make_replay
-
     cell = library.cells()[1]
     packing = library.packing(cell.params["packing"])
     open_packing = packing._replace(box=np.full(2, np.inf))
@@ -171,9 +190,6 @@ def test_open_boxes_have_no_images(library):
 
 
 def test_frames_beyond_the_budget_are_left_out_and_counted(library):
-    from app import replays
-    from app.views.summary import left_out
-
     cell = cell_at(library, 0.1)
     packing, dataset = library.packing(cell.params["packing"]), library.dataset(cell)
     whole = replays.make_replay(packing, dataset, cell.mu)
@@ -191,8 +207,6 @@ def test_table_has_a_row_for_each_mu(state):
 
 
 def test_the_last_cells_are_kept_in_memory_and_no_more(shipped, tmp_path):
-    from app.data import Library
-
     library = Library(shipped, tmp_path / "cache.zarr", kept=2)
     cells = library.cells()
     for cell in cells:
@@ -220,9 +234,6 @@ def test_expected_steps_come_from_the_nearest_packing(library):
     ],
 )
 def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
-    from app import limits
-    from app.selection import command, link, read_link, select
-
     made = select(120, mu, 7, packed, kind=kind, relax="nearest", states=33, seed=4)
     made = made._replace(packing=made.packing | extra)
     read, view = read_link("?" + link(made, {"tab": "perturb"}))
@@ -236,17 +247,11 @@ def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
 
 
 def test_older_links_to_a_renamed_tab_open_it():
-    from app.links import read_view
-    from app.looks import Looks
-    from app.page import TABS
-
     (tab,) = read_view({"tab": "projection"}, Looks.param).values()
     assert TABS[tab] == "Force space"
 
 
 def test_a_button_names_all_that_is_to_be_computed_anew():
-    from app.selection import differing, select
-
     shown = select(30, 0.1, 1, states=30)
     assert differing(select(30, 0.4, 1, states=30), shown) == "μ = 0.4"
     assert differing(select(40, 0.1, 2, states=31), shown) == "N = 40, seed 2, 31 states"
@@ -256,8 +261,6 @@ def test_a_button_names_all_that_is_to_be_computed_anew():
 
 
 def test_links_to_imported_packings_name_their_hash():
-    from app.selection import Selection, link, read_link
-
     made = Selection({"imported": "a1b2c3", "mu": 0.2}, 0.5, states=10)
     assert read_link(link(made, {}))[0] == made
 
@@ -265,40 +268,29 @@ def test_links_to_imported_packings_name_their_hash():
 @pytest.mark.parametrize(
     "query", ["?mu=x", "?mu=-1", "?mu=0.1&n=2", "?mu=0.1&source=oracle", "?mu=.1&radii=/etc/passwd"]
 )
-def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(library, wait_for, query):
-    from app.state import AppState
-
-    state = AppState(library, query=query)
-    wait_for(state)
+def test_wrong_links_are_told_in_one_line_and_open_the_usual_page(query, visited):
+    state = visited(query)
     assert state.work.message and "\n" not in state.work.message
     assert state.cell.mu == 0.1
 
 
-def test_the_view_travels_with_the_link(state, library, wait_for):
-    from app.state import AppState
-
+def test_the_view_travels_with_the_link(state, visited):
     seen = {"contact": 3, "frame": 5, "between": (2, 7), "colour": "extent"}
     state.looks.param.update(**seen, overlay=True, dark=True)
-    again = AppState(library, query=state.link())
-    wait_for(again)
+    again = visited(state.link())
     assert again.selection == state.selection and again.view == state.view
     assert seen.items() <= again.view.items()
 
 
-def test_views_that_make_no_sense_are_left_out(library, wait_for):
-    from app.state import AppState
-
+def test_views_that_make_no_sense_are_left_out(visited):
     query = "mu=1&n=30&states=30&relax=nearest&contact=100000&frame=-2&colour=plaid&between=5"
-    state = AppState(library, query=query)
-    wait_for(state)
+    state = visited(query)
     assert state.cell.mu == 1 and state.work.message == ""
     looks = state.looks
     assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
 
 
 def test_a_page_by_night_is_dark_before_its_states_are_there(library):
-    from app.state import AppState
-
     state = AppState(library, query="mu=0.3&n=30&states=4&dark=1")
     assert state.replay is None and state.looks.dark
     state.work.close()
@@ -307,10 +299,6 @@ def test_a_page_by_night_is_dark_before_its_states_are_there(library):
 @pytest.mark.parametrize("packed", [None, 0.0])
 def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
     """The command line reads the words back as the parameters of the cell."""
-    from app.selection import command, select
-    from granforce.cli import parser as cli
-    from granforce.study import cells, kinds
-
     wanted = select(31, 0.25, 3, packed, relax="accelerated", states=9, seed=2)
     wanted = wanted._replace(packing=wanted.packing | {"sweeps": 60})
     found = []
@@ -320,8 +308,8 @@ def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
         raise Cancelled
 
     monkeypatch.setattr(kinds, "get_packing", lambda *given, **options: (None, True))
-    monkeypatch.setattr(cells, "get", note)
-    assert cli.main(command(wanted).split()[1:]) == 130
+    monkeypatch.setattr(study, "get", note)
+    assert parser.main(command(wanted).split()[1:]) == 130
     expected = wanted.parameters()
     assert found[0] | {"keep": None} == expected | {"keep": None}
 
@@ -329,7 +317,7 @@ def test_the_copied_command_makes_the_states_on_screen(packed, monkeypatch):
 # State
 
 
-def test_state_opens_near_mu_0_1_and_follows_the_selection(state, wait_for):
+def test_state_opens_near_mu_0_1_and_follows_the_selection(state):
     assert state.cell.mu == 0.1 and state.replay.summary["mu"] == 0.1
     state.choose(mu=1)
     wait_for(state)
@@ -342,9 +330,7 @@ def test_a_cell_in_memory_is_shown_at_once(state):
     assert state.cell.mu == 1 and not state.work.busy
 
 
-def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatch):
-    from app import work as module
-
+def test_the_nearest_mu_are_read_ahead_and_no_others(state, monkeypatch):
     asked = []
 
     class Done:
@@ -354,7 +340,7 @@ def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatc
         def cancel(self):
             pass
 
-    monkeypatch.setattr(module, "Job", Done)
+    monkeypatch.setattr(work, "Job", Done)
     state.choose(mu=1)
     wait_for(state)
     assert asked == []  # 0.1 is in memory, and 0 is no neighbour
@@ -364,20 +350,17 @@ def test_the_nearest_mu_are_read_ahead_and_no_others(state, wait_for, monkeypatc
     assert asked == [0]
 
 
-def test_stored_states_are_found_whatever_was_kept_of_them(state, wait_for):
+def test_stored_states_are_found_whatever_was_kept_of_them(state):
     state.ask(small(1, STATES, relax="nearest"))
     wait_for(state)
     assert state.cell.mu == 1 and not state.missing
 
 
-def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library, wait_for):
+def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library, visited):
     """Whether the catalogue was read before or is read only now; a number that is named is kept."""
-    from app.state import AppState
-
     link = f"?mu=1&n={DISKS}&relax=nearest"
     for _ in range(2):
-        state = AppState(library, query=link)
-        wait_for(state)
+        state = visited(link)
         assert state.cell.mu == 1 and len(state.replay.number) == KEPT + 1 and not state.missing
         assert not state.work.computation.running and state.selection.states == STATES
     state = AppState(library, query=f"{link}&states=9")
@@ -388,7 +371,7 @@ def test_a_link_without_a_number_of_states_opens_those_that_a_store_has(library,
 
 
 @pytest.mark.parametrize("done", ["another mu", "a force known", "a pull undone", "a look", "Back"])
-def test_a_refusal_is_told_until_something_succeeds(state, wait_for, done):
+def test_a_refusal_is_told_until_something_succeeds(state, done):
     if done == "a pull undone":
         state.hand.pulls = [(3, float(state.replay.normal[0, 3]))]
         wait_for(state)
@@ -409,20 +392,16 @@ def test_a_refusal_is_told_until_something_succeeds(state, wait_for, done):
     assert state.work.message == ""
 
 
-def test_what_was_wrong_with_a_link_is_told_on_the_page_that_opens(library, wait_for):
-    from app.state import AppState
-
-    state = AppState(library, query="?mu=-1&tab=export")
-    wait_for(state)
+def test_what_was_wrong_with_a_link_is_told_on_the_page_that_opens(visited):
+    state = visited("?mu=-1&tab=export")
     assert state.cell is not None and "friction" in state.work.message
     too_many = f"?mu=1&n={DISKS}&states={10**9}&tab=export&colour=extent"
-    state = AppState(library, query=too_many)
-    wait_for(state)
+    state = visited(too_many)
     assert state.cell is not None and state.looks.colour == "extent"
     assert "states" in state.work.message
 
 
-def test_states_in_no_store_are_missing_until_computed(state, wait_for):
+def test_states_in_no_store_are_missing_until_computed(state):
     before = state.replay
     state.ask(small(0.3))
     assert state.missing and state.replay is before and not state.work.busy
@@ -434,7 +413,7 @@ def test_states_in_no_store_are_missing_until_computed(state, wait_for):
     assert len(state.catalogue) == 4
 
 
-def test_a_series_without_states_at_a_friction_asks_for_them(state, wait_for):
+def test_a_series_without_states_at_a_friction_asks_for_them(state):
     """What is shown at a μ is of that μ: another series or another μ is not put in its place."""
     before = state.replay
     state.choose(mu=0.3)
@@ -445,9 +424,7 @@ def test_a_series_without_states_at_a_friction_asks_for_them(state, wait_for):
     assert not state.missing and state.cell.mu == 1
 
 
-def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_for):
-    from app.views.intervals import View
-
+def test_exact_intervals_are_offered_only_while_none_are_under_way(state):
     view = View(state)
     assert view.exact.visible
     state.compute_exact()
@@ -461,7 +438,7 @@ def test_exact_intervals_are_offered_only_while_none_are_under_way(state, wait_f
     assert state.exact is not None and not view.exact.visible
 
 
-def test_too_little_friction_for_a_packing_is_called_that(state, wait_for):
+def test_too_little_friction_for_a_packing_is_called_that(state):
     """ "Not jammed, or contacts are missing" is no help to who has only moved a slider."""
     before = state.cell
     state.ask(small(0.0, packed_mu=1.0), at_once=True)
@@ -470,15 +447,12 @@ def test_too_little_friction_for_a_packing_is_called_that(state, wait_for):
     assert state.cell == before
 
 
-def test_a_link_to_missing_states_computes_them(library, wait_for):
-    from app.state import AppState
-
-    state = AppState(library, query="mu=0.2&n=30&states=5")
-    wait_for(state)
+def test_a_link_to_missing_states_computes_them(visited):
+    state = visited("mu=0.2&n=30&states=5")
     assert state.cell.mu == 0.2 and len(state.replay.number) == 6
 
 
-def test_a_shipped_packing_is_not_made_again(state, wait_for):
+def test_a_shipped_packing_is_not_made_again(state):
     state.ask(small(0.1, 5), at_once=True)
     wait_for(state)
     packing = kinds.PACKING.parameters(DISKS, 0.1, 1)
@@ -487,9 +461,7 @@ def test_a_shipped_packing_is_not_made_again(state, wait_for):
     assert cached and np.array_equal(copied.x, shipped.x)
 
 
-def test_exact_intervals_hold_every_state_on_screen(state, wait_for):
-    from app.views.packing import exact_intervals
-
+def test_exact_intervals_hold_every_state_on_screen(state):
     state.compute_exact()
     wait_for(state)
     exact = exact_intervals(state.exact, state.replay)
@@ -498,9 +470,7 @@ def test_exact_intervals_hold_every_state_on_screen(state, wait_for):
     assert state.library.exact(state.cell.selection) is not None
 
 
-def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
-    from app.selection import select
-
+def test_cancel_ends_the_computation_and_shows_what_was_there(state):
     before = state.replay
     state.ask(select(200, 0.05, 3, states=100), at_once=True)
     state.work.computation.dismiss()
@@ -510,7 +480,7 @@ def test_cancel_ends_the_computation_and_shows_what_was_there(state, wait_for):
     assert len(state.catalogue) == 3
 
 
-def test_a_friction_stands_beside_another_one_only(state, wait_for):
+def test_a_friction_stands_beside_another_one_only(state):
     """Back after a comparison once showed 0.1 beside 0.1."""
     first = state.cell.mu
     state.looks.split = True
@@ -526,9 +496,7 @@ def test_a_friction_stands_beside_another_one_only(state, wait_for):
     assert state.looks.beside is None and state.besides.twin is None
 
 
-def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state, wait_for):
-    from app.selection import select
-
+def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state):
     task = state.work.computation
     state.ask(select(20, 0.05, 3, states=9), at_once=True)
     task.job.stop()  # before there is a state: it ends with the first one
@@ -542,29 +510,22 @@ def test_a_walk_stopped_is_kept_and_goes_on_when_more_states_are_asked_for(state
     np.testing.assert_array_equal(state.replay.normal[1], first)
 
 
-def test_a_link_keeps_what_single_tabs_show(library, state, wait_for):
-    from app.state import AppState
-
+def test_a_link_keeps_what_single_tabs_show(state, visited):
     chosen = {"figure": "force", "axis": "log", "pushing": "all", "axes": "stress"}
     chosen["zoom"] = (3.5, 4.25, 2.0)
     state.looks.param.update(**chosen)
-    again = AppState(library, query=f"?{state.link()}")
-    wait_for(again)
+    again = visited(f"?{state.link()}")
     assert chosen.items() <= again.view.items()
 
 
 def test_what_is_pale_says_of_which_friction_it_is(state):
-    from app.views.summary import of_which
-
     line = of_which(state)
     assert not line.visible
     state.param.update(missing=True)
     assert line.visible and f"still of μ = {state.cell.mu:g}" in line.object
 
 
-def test_possible_is_in_the_legend_only_where_it_is_drawn(state, wait_for):
-    from app.views.intervals import View
-
+def test_possible_is_in_the_legend_only_where_it_is_drawn(state):
     state.choose(mu=1)
     wait_for(state)
     view = View(state)
@@ -575,9 +536,7 @@ def test_possible_is_in_the_legend_only_where_it_is_drawn(state, wait_for):
     assert view.exact_item.visible and view.exact_item.label.value == "possible"
 
 
-def test_one_bar_says_what_it_shows_where_it_hides_none(state, wait_for):
-    from app.views.intervals import KEY, View
-
+def test_one_bar_says_what_it_shows_where_it_hides_none(state):
     view = View(state)
     assert not view.key[-1].visible  # no exact intervals yet
     state.compute_exact()
@@ -594,8 +553,6 @@ def test_one_bar_says_what_it_shows_where_it_hides_none(state, wait_for):
 
 
 def test_another_friction_is_packed_as_is_usual_there(state):
-    from app.views.controls import Controls
-
     controls, usual = Controls(state), kinds.PACKING.parameters(DISKS, 2.0, 1)
     first = state.cell.selection
     assert usual["dt"] != first.packing["dt"] and first.at(2.0).packing == usual
@@ -605,8 +562,6 @@ def test_another_friction_is_packed_as_is_usual_there(state):
 
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
-    from app.views.packing import PackingView
-
     view = PackingView(state)
     assert "change since the disks came to rest" in view.player.legend
     view.player.pulled = True
@@ -614,8 +569,6 @@ def test_the_legend_says_what_colours_mean_in_the_hand(state):
 
 
 def test_what_is_refused_does_not_stay_in_its_box(state):
-    from app.views.controls import Controls
-
     controls = Controls(state)
     controls.mu.hear({"typed": "1e9"})
     assert "friction" in state.work.message.lower() and controls.mu.mu == state.cell.mu
@@ -625,8 +578,6 @@ def test_what_is_refused_does_not_stay_in_its_box(state):
 
 
 def test_closing_the_page_ends_its_computation(state):
-    from app.selection import select
-
     state.ask(select(200, 0.05, 3, states=100), at_once=True)
     job = state.work.computation.job
     while job.fraction is None:
@@ -635,9 +586,7 @@ def test_closing_the_page_ends_its_computation(state):
     assert job.wait(30) and job.result is None and job.error == ""
 
 
-def test_progress_grows_and_estimates_the_rest(state, wait_for):
-    from app.selection import select
-
+def test_progress_grows_and_estimates_the_rest(state):
     fractions = []
 
     def note(event):
@@ -652,9 +601,6 @@ def test_progress_grows_and_estimates_the_rest(state, wait_for):
 
 
 def test_sizes_beyond_the_limits_are_refused(state):
-    from app.limits import LIMITS
-    from app.selection import select
-
     large = select(LIMITS.n + 1, 0.2, 1, states=5)
     for asked, word in ((small(0.2, LIMITS.states + 1), "states"), (large, "N must lie")):
         state.ask(asked, at_once=True)
@@ -685,8 +631,6 @@ BEYOND = {
 @pytest.mark.parametrize("name", BEYOND)
 def test_links_beyond_the_limits_compute_nothing_and_say_so(state, name):
     """Whatever a link asks for: one line, at most 300 characters, and what was there stays."""
-    from app.selection import read_link
-
     before, selection = state.replay, state.selection
     for value in BEYOND[name]:
         given = {"mu": "0.2", "n": "30", "states": "5"} | {name: value}
@@ -703,16 +647,11 @@ def test_links_beyond_the_limits_compute_nothing_and_say_so(state, name):
 
 def test_all_that_a_link_may_name_is_limited():
     """A new option of a packing needs a limit, too."""
-    from app.limits import NAMES
-    from app.selection import OPTIONS
-
     named = {*kinds.PACKING.parameters(3, 0, 0), *OPTIONS}
     assert named <= {*NAMES, "radii", "box", "version"}  # which no link names
 
 
 def test_limits_are_read_and_wrong_ones_refused():
-    from app.limits import Limits, read_limits
-
     assert read_limits("") == Limits()
     assert read_limits("n=500, states=20,upload=3,computations=1") == Limits(500, 20, 3, 1)
     wrong = "n=0", "disks=4", "n=", "n=1e3", "n=²", f"n={'9' * 5000}", "computations=65", "9" * 5000
@@ -734,18 +673,16 @@ def once_both_are_there(begin, work):
 
     def run(job):
         if not met:
-            met.append(begin.wait(10))
+            met.append(begin.wait(60))
         return work(job)
 
     return run
 
 
-def test_a_later_job_replaces_an_earlier_one(wait_for):
-    from app.jobs import Task
-
+def test_a_later_job_replaces_an_earlier_one():
     release, done = threading.Event(), []
     task = Task()
-    task.start(lambda job: release.wait(10) and "first", done.append)
+    task.start(lambda job: release.wait(60) and "first", done.append)
     task.start(lambda job: "second", done.append)
     release.set()
     while task.running:
@@ -754,8 +691,6 @@ def test_a_later_job_replaces_an_earlier_one(wait_for):
 
 
 def test_errors_of_a_job_are_told_not_raised():
-    from app.jobs import Task
-
     def fail(job):
         raise ZeroDivisionError("no such thing")
 
@@ -767,8 +702,6 @@ def test_errors_of_a_job_are_told_not_raised():
 
 
 def test_a_job_that_waits_is_cancelled_at_once():
-    from app.jobs import Job, Pool
-
     release, begun = threading.Event(), []
     pool = Pool(1, "test")
     first = Job(lambda job: release.wait(30), pool)
@@ -776,12 +709,10 @@ def test_a_job_that_waits_is_cancelled_at_once():
     second.cancel()
     assert second.ended and not first.ended
     release.set()
-    assert first.wait(10) and Job(lambda job: None, pool).wait(10) and begun == []
+    assert first.wait(60) and Job(lambda job: None, pool).wait(60) and begun == []
 
 
 def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
-    from app.jobs import Job
-
     begun = threading.Event()
 
     def work(job):
@@ -789,16 +720,12 @@ def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
         return gf.pack(20_000, mu=0.5, seed=1)  # for minutes
 
     job = Job(work)
-    assert begun.wait(10) and not job.wait(0.3)
+    assert begun.wait(60) and not job.wait(0.3)
     job.cancel()
     assert job.wait(60) and job.result is None and job.error == ""
 
 
 def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
-    from app import compute
-    from app.jobs import Job, Pool
-    from app.selection import selected
-
     made, walk, begin = [], kinds.states.walk, threading.Barrier(2)
     monkeypatch.setattr(kinds.states, "walk", lambda *a, **k: made.append(1) or walk(*a, **k))
     work = compute.states(library, selected("walk", cell_parameters(0.2)))
@@ -809,10 +736,6 @@ def test_what_two_pages_ask_for_is_computed_once(library, monkeypatch):
 
 
 def test_a_packing_that_two_pages_need_is_made_once(library, monkeypatch):
-    from app import compute
-    from app.jobs import Job, Pool
-    from app.selection import select
-
     made, pack, begin = [], kinds.packings.pack, threading.Barrier(2)
     monkeypatch.setattr(kinds.packings, "pack", lambda *a, **k: made.append(1) or pack(*a, **k))
     pool, jobs = Pool(2, "test"), []
@@ -824,8 +747,6 @@ def test_a_packing_that_two_pages_need_is_made_once(library, monkeypatch):
 
 
 def test_what_was_imported_is_spared_by_collections_once():
-    from app.garbage import settle
-
     settle()
     kept = [[] for _ in range(1000)]
     before = gc.get_freeze_count()
@@ -840,9 +761,6 @@ def test_what_was_imported_is_spared_by_collections_once():
 
 
 def test_a_job_that_waits_for_another_page_can_be_cancelled():
-    from app import compute
-    from app.jobs import Job, Pool
-
     inside, release = threading.Event(), threading.Event()
 
     def work(job):
@@ -852,21 +770,19 @@ def test_a_job_that_waits_for_another_page_can_be_cancelled():
 
     pool = Pool(2, "test")
     first = Job(work, pool)
-    assert inside.wait(10)
+    assert inside.wait(60)
     second = Job(work, pool)
     late = time.monotonic() + 30
     while "already under way" not in second.stage and time.monotonic() < late:
         time.sleep(0.01)
     assert "already under way" in second.stage
     second.cancel()
-    assert second.wait(10) and not first.ended
+    assert second.wait(60) and not first.ended
     release.set()
-    assert first.wait(10) and first.error == second.error == ""
+    assert first.wait(60) and first.error == second.error == ""
 
 
-def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
-    from app.views.progress import Progress
-
+def test_progress_tells_how_far_a_task_is_and_cancels_it(state):
     task = state.work.task()
     progress, told = Progress(task), threading.Event()
     assert not progress.running
@@ -882,7 +798,7 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
             time.sleep(0.01)
 
     task.start(work)
-    assert told.wait(10)
+    assert told.wait(60)
     state.work.poll()
     assert progress.running and progress.fraction == 0.25
     assert progress.words == "counting — about 20 min more"
@@ -892,12 +808,10 @@ def test_progress_tells_how_far_a_task_is_and_cancels_it(state, wait_for):
 
 
 def test_a_job_wakes_the_page_when_it_ends():
-    from app.jobs import Task
-
     woken = threading.Event()
     task = Task(wake=lambda function: woken.set())
     task.start(lambda job: None)
-    assert woken.wait(10)
+    assert woken.wait(60)
 
 
 # Damaged stores
@@ -910,13 +824,7 @@ def garble(store, name, array):
 
 
 @pytest.mark.parametrize("array", ["states", "*"])
-def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(
-    shipped, tmp_path, wait_for, array, caplog
-):
-    from app import distributions
-    from app.data import Library
-    from app.state import AppState
-
+def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(shipped, tmp_path, array, caplog):
     shutil.copytree(shipped, tmp_path / "shipped")
     library = Library(tmp_path / "shipped", tmp_path / "cache")
     best = cell_at(library, 0.1)
@@ -935,33 +843,25 @@ def test_a_damaged_entry_is_one_line_and_the_next_best_is_shown(
 
 
 @pytest.mark.filterwarnings("ignore:entry walk")
-def test_a_damaged_entry_is_computed_anew(shipped, tmp_path, wait_for):
-    from app.data import Library
-    from app.state import AppState
-
+def test_a_damaged_entry_is_computed_anew(shipped, tmp_path, visited):
     for where in ("shipped", "cache"):
         stores = {k: tmp_path / where / k for k in ("shipped", "cache")}
         shutil.copytree(shipped, stores[where])
         library = Library(**stores)
         garble(getattr(library, where), cell_at(library, 1).name, "*")
-        state = AppState(library, query=f"mu=1&n={DISKS}&states={STATES}&relax=nearest")
-        wait_for(state)
+        state = visited(f"mu=1&n={DISKS}&states={STATES}&relax=nearest", library)
         assert state.cell.mu == 1 and state.cell.store is library.cache, where
         assert [cell.mu for cell in state.catalogue] == [0, 0.1, 1]
 
 
 @pytest.mark.filterwarnings("ignore:entry packing")
-def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_path, wait_for):
-    from app.data import Library
-    from app.state import AppState
-
+def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_path, visited):
     shutil.copytree(shipped, tmp_path / "shipped")
     library = Library(tmp_path / "shipped", tmp_path / "cache")
     for entry in library.shipped.find(kind="packing"):
         garble(library.shipped, entry.name, "*")
     assert library.expected_steps(DISKS, 0.1) is None
-    state = AppState(library)
-    wait_for(state)
+    state = visited(library=library)
     assert "no store" in state.work.message and state.cell is None
     state.ask(small(1, 4), at_once=True)
     wait_for(state)
@@ -973,8 +873,6 @@ def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_pa
 
 def next_on(pool, seconds=10):
     """Whether the pool still runs what it is given."""
-    from app.jobs import Job
-
     job = Job(lambda job: "done", pool)
     return job.wait(seconds) and job.result == "done"
 
@@ -994,23 +892,19 @@ class Panic(BaseException):
     "error", [NameError("partial"), SystemExit(3), KeyboardInterrupt(), Panic("two\nlines")]
 )
 def test_a_pool_survives_what_its_jobs_raise(error):
-    from app.jobs import Job, Pool
-
     pool = Pool(1, "test")
     job = Job(raising(error), pool)
-    assert job.wait(10) and type(error).__name__ in job.error and "\n" not in job.error
+    assert job.wait(60) and type(error).__name__ in job.error and "\n" not in job.error
     assert next_on(pool)
 
 
 def test_a_pool_survives_jobs_whose_end_fails():
-    from app.jobs import Job, Pool
-
     pool = Pool(1, "test")
     for _ in range(3):
         job = Job(lambda job: "done", pool, raising(NameError("partial")))
-        assert job.wait(10) and job.result == "done"
+        assert job.wait(60) and job.result == "done"
     release = threading.Event()
-    Job(lambda job: release.wait(10), pool)
+    Job(lambda job: release.wait(60), pool)
     waiting = Job(lambda job: None, pool, raising(NameError("partial")))
     waiting.cancel()  # by the thread of the page, which goes on as well
     release.set()
@@ -1018,8 +912,6 @@ def test_a_pool_survives_jobs_whose_end_fails():
 
 
 def test_a_pool_survives_what_is_no_job():
-    from app.jobs import Pool
-
     pool = Pool(1, "test")
     pool.submit(None)
     assert next_on(pool)
@@ -1027,9 +919,6 @@ def test_a_pool_survives_what_is_no_job():
 
 def test_a_pool_survives_pages_that_are_gone(library):
     """All work of a page whose thread cannot be reached any more is ended, one after the other."""
-    from app.jobs import Pool
-    from app.state import AppState
-
     pool, state = Pool(1, "test"), AppState(library, raising(RuntimeError("page destroyed")))
     begun, tasks = threading.Event(), [state.work.task(pool) for _ in range(3)]
 
@@ -1041,9 +930,9 @@ def test_a_pool_survives_pages_that_are_gone(library):
     for task in tasks:
         task.start(work)
     jobs = [task.job for task in tasks]
-    assert begun.wait(10)
+    assert begun.wait(60)
     state.work.close()
-    assert all(job.wait(10) for job in jobs) and next_on(pool)
+    assert all(job.wait(60) for job in jobs) and next_on(pool)
 
 
 def test_nothing_begins_for_a_page_that_was_closed(state):
@@ -1056,8 +945,6 @@ def test_nothing_begins_for_a_page_that_was_closed(state):
 
 
 def test_a_result_that_cannot_be_shown_is_told_in_one_line():
-    from app.jobs import Task
-
     task = Task()
     task.start(lambda job: 5, raising(KeyError("states\nand more")))
     while task.running:
@@ -1066,9 +953,6 @@ def test_a_result_that_cannot_be_shown_is_told_in_one_line():
 
 
 def test_who_waits_for_another_page_leaves_the_thread_to_others():
-    from app import compute
-    from app.jobs import Job, Pool
-
     release, inside = threading.Event(), threading.Event()
 
     def work(job):
@@ -1078,19 +962,17 @@ def test_who_waits_for_another_page_leaves_the_thread_to_others():
 
     pool = Pool(2, "test")
     first = Job(work, pool)
-    assert inside.wait(10)
+    assert inside.wait(60)
     others = [Job(work, pool) for _ in range(3)]
     assert next_on(pool) and not any(job.ended for job in (first, *others))
     release.set()
-    assert all(job.wait(10) and job.result for job in (first, *others))
+    assert all(job.wait(60) and job.result for job in (first, *others))
 
 
 # Views
 
 
 def test_player_gets_flat_frames(library):
-    from app.views.player import frames
-
     shipped = frames(replay_at(library, 1))
     assert shipped["normal"].size == (KEPT + 1) * shipped["contacts"]
     assert shipped["normal"].dtype == np.float32
@@ -1098,10 +980,7 @@ def test_player_gets_flat_frames(library):
 
 
 @pytest.mark.parametrize("by", ["original", "extent", "exact", "position"])
-def test_contacts_are_sorted_by_what_is_named(state, wait_for, by):
-    from app.views.intervals import sorted_contacts
-    from app.views.packing import exact_intervals
-
+def test_contacts_are_sorted_by_what_is_named(state, by):
     state.compute_exact()
     wait_for(state)
     replay, exact = state.replay, exact_intervals(state.exact, state.replay)
@@ -1117,9 +996,7 @@ def test_contacts_are_sorted_by_what_is_named(state, wait_for, by):
     assert np.all(np.diff(value[order]) >= 0)
 
 
-def test_intervals_take_nothing_over_while_hidden(state, wait_for):
-    from app.views.intervals import View
-
+def test_intervals_take_nothing_over_while_hidden(state):
     state.looks.tab = "statistics"
     view = View(state)
     state.choose(mu=1)
@@ -1130,8 +1007,6 @@ def test_intervals_take_nothing_over_while_hidden(state, wait_for):
 
 
 def test_few_bars_are_drawn_evenly_and_the_selected_one_among_them(state):
-    from app.views.intervals import SOME, View
-
     view, all_of_them = View(state), len(state.replay.order)
     shown = view.bars.data["at"]
     assert SOME / 2 <= len(shown) <= SOME < all_of_them
@@ -1144,8 +1019,6 @@ def test_few_bars_are_drawn_evenly_and_the_selected_one_among_them(state):
 
 
 def test_a_tap_on_a_bar_selects_its_contact(state):
-    from app.views.intervals import View
-
     view = View(state)
     state.looks.drawn = "all"
     view.bars.selected.indices = [4]
@@ -1154,8 +1027,6 @@ def test_a_tap_on_a_bar_selects_its_contact(state):
 
 
 def test_left_out_work_is_counted(library):
-    from app.views.summary import left_out
-
     text = left_out(replay_at(library, 0).summary)
     assert "forces along contacts" in text and f"{STATES} <span" in text
     assert 'data-term="no_friction"' in text and 'data-term="determined"' in text
@@ -1163,16 +1034,10 @@ def test_left_out_work_is_counted(library):
 
 
 def test_every_relaxation_has_a_name_on_screen():
-    from app.selection import SOLVERS
-
     assert set(SOLVERS) == set(kinds.RELAXATIONS)
 
 
 def test_a_walk_in_the_store_is_found_not_computed(library):
-    from app import compute
-    from app.jobs import Job
-    from app.selection import selected
-
     chosen = selected("walk", cell_parameters(1))
     stored = library.find("walk", cell_parameters(1))
     job = Job(compute.states(library, chosen))
@@ -1182,8 +1047,6 @@ def test_a_walk_in_the_store_is_found_not_computed(library):
 
 def test_states_of_older_packings_in_a_cache_are_not_offered(tmp_path):
     """Packings of version 1 named neither accuracy nor version; a page once failed over them."""
-    from app.data import Library
-
     shipped = Library(cache=tmp_path / "none")
     cell = next(cell for cell in shipped.cells() if cell.kind == "walk")
     older = dict(cell.params["packing"])
@@ -1198,8 +1061,6 @@ def test_states_of_older_packings_in_a_cache_are_not_offered(tmp_path):
 
 def test_a_page_is_only_called_within_the_loop_and_while_it_is_there():
     """Jobs end in other threads; asked there, a page could end between question and call."""
-    from app.page import _turns
-
     called = []
 
     class Page:

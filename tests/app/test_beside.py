@@ -2,6 +2,7 @@
 
 import pytest
 from small_store import DISKS, STATES
+from visitor import wait_for
 
 from app.selection import select
 from app.state import AppState
@@ -12,7 +13,7 @@ def asked(mu, **others):
     return select(DISKS, mu, 1, **{"states": STATES, "relax": "nearest"} | others)
 
 
-def test_with_the_view_split_another_mu_leaves_the_first_beside_it(state, wait_for):
+def test_with_the_view_split_another_mu_leaves_the_first_beside_it(state):
     player = PackingView(state).player
     state.ask(asked(1))
     wait_for(state)
@@ -35,21 +36,20 @@ def test_with_the_view_split_another_mu_leaves_the_first_beside_it(state, wait_f
     assert state.looks.beside is None and state.besides.twin is None
 
 
-def test_other_disks_are_no_other_friction(state, wait_for):
+def test_other_disks_are_no_other_friction(state):
     state.looks.split = True
     state.ask(asked(0.1, states=5), at_once=True)
     wait_for(state)
     assert state.cell.selection.states == 5 and state.looks.beside is None
 
 
-def test_a_link_holds_both(state, library, wait_for):
+def test_a_link_holds_both(state, visited):
     state.looks.split = True
     state.choose(mu=1)
     wait_for(state)
     query = state.link()
     assert "split=1" in query and "beside=0.1" in query
-    again = AppState(library, query=f"?{query}")
-    wait_for(again)
+    again = visited(f"?{query}")
     assert (again.cell.mu, again.looks.beside, again.besides.twin.cell.mu) == (1, 0.1, 0.1)
     # back to a view with one of them
     again.open("?" + query.replace("&beside=0.1", "").replace("mu=1", "mu=0.1"))
@@ -62,15 +62,14 @@ def test_a_link_holds_both(state, library, wait_for):
     )
 
 
-def test_a_link_has_the_other_computed_where_no_store_has_it(library, wait_for):
-    again = AppState(library, query=f"?mu=0.1&n={DISKS}&states=5&relax=nearest&split=1&beside=0.3")
-    wait_for(again)
+def test_a_link_has_the_other_computed_where_no_store_has_it(visited):
+    again = visited(f"?mu=0.1&n={DISKS}&states=5&relax=nearest&split=1&beside=0.3")
     assert (again.cell.mu, again.besides.twin.cell.mu) == (0.1, 0.3)
     assert again.besides.twin.cell.selection == asked(0.3, states=5)
 
 
 @pytest.mark.parametrize("mu", ["1e9", "-1", "nan", "many"])
-def test_frictions_of_a_link_that_cannot_be_are_passed_over(library, wait_for, mu):
+def test_frictions_of_a_link_that_cannot_be_are_passed_over(library, mu):
     again = AppState(
         library, query=f"?mu=0.1&n={DISKS}&states=30&relax=nearest&split=1&beside={mu}"
     )

@@ -2,103 +2,46 @@
 
 import base64
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import MANY, MODEL, column, how_it_is_made, looks, more, painted, scene, serve
-from small_store import DISKS, KEPT, ROOT
+from serving import (
+    MANY,
+    MODEL,
+    ask,
+    at_rest,
+    column,
+    how_it_is_made,
+    looks,
+    more,
+    no_more,
+    painted,
+    picture,
+    scene,
+    searched,
+    shows,
+    until,
+)
+from small_store import DISKS, KEPT
 
 from granforce import measures
 from granforce.study.store import open_store
 
-# Pictures to be looked at; ignored by git.
-ARTEFACTS = ROOT / "artefacts"
 
-pytestmark = pytest.mark.browser
+@pytest.fixture
+def visit(visit):
+    """The same once its plots are there, and nothing moves any more."""
 
+    def drawn(*query, **options):
+        return plotted(visit(*query, **options))
 
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    """Where the app of `address` keeps what it computes."""
-    return tmp_path_factory.mktemp("served") / "cache"
-
-
-@pytest.fixture(scope="module")
-def address(shipped, cache):
-    """The app, served from the repository's root on a free port, with stores of its own."""
-    stores = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_CACHE": str(cache)}
-    with serve(cache.parent, **stores) as (url, _):
-        yield url
+    return drawn
 
 
-def _context(chromium, width):
-    """A browser context, and a list that fills with errors and requests to elsewhere."""
-    context, problems = chromium.new_context(viewport={"width": width, "height": 900}), []
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
-    context.on("weberror", lambda error: problems.append(str(error.error)))
-    context.on("console", lambda told: told.type == "error" and problems.append(told.text))
-    context.on("request", lambda sent: _is_foreign(sent.url) and problems.append(sent.url))
-    return context, problems
-
-
-def _open(context, address):
-    page = context.new_page()
-    page.goto(address if "?" in address else address + MANY)
-    painted(page)
+def plotted(page):
     page.wait_for_function(f"() => {MODEL}('bars') || {MODEL}('path')")
-    page.wait_for_timeout(300)  # until the layout is at rest
+    at_rest(page.locator(".scene"))
     return page
-
-
-@pytest.fixture
-def visit(chromium, address):
-    """visit(query, width): a page of its own; at the end no error and no request elsewhere."""
-    visits = []
-
-    def visit(query="", width=1280):
-        visits.append(_context(chromium, width))
-        return _open(visits[-1][0], address + query)
-
-    yield visit
-    for context, problems in visits:
-        context.close()
-        assert not problems
-
-
-@pytest.fixture(scope="module")
-def shared(chromium, address):
-    """One page for all tests that leave it as they find it, or as `page` can put it back."""
-    context, problems = _context(chromium, 1280)
-    page = _open(context, address)
-    yield page
-    context.close()
-    assert not problems
-
-
-@pytest.fixture
-def page(shared):
-    """The shared page at the original network at μ = 0.1, nothing selected."""
-    if scene(shared, "scene.geometry.mu") != 0.1:
-        shared.locator("input.typed").fill("0.1")
-        shared.locator("input.typed").press("Enter")
-        shared.wait_for_function(
-            "e => e.scene.geometry.mu === 0.1", arg=shared.locator(".scene").element_handle()
-        )
-    if shared.locator("button.between.on").count():
-        shared.locator("button.between").click()
-    shared.locator("button.restart").click()
-    more(shared).locator("button.pin").click()
-    scene(shared, "(scene.selected !== null && scene.onSelect(null), scene.reset())")
-    shared.mouse.move(5, 5)
-    shared.wait_for_function(
-        "e => e.scene.selected === null", arg=shared.locator(".scene").element_handle()
-    )
-    return shared
-
-
-def _is_foreign(url):
-    return not url.startswith(("http://localhost:", "ws://localhost:", "data:", "blob:"))
 
 
 def at(page, x, y):
@@ -250,9 +193,8 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
     page.get_by_text("+0.2 × mean force").wait_for()
     page.get_by_text("4.35 × mean").wait_for()
-    page.locator("input.typed").fill("1")  # another μ
-    page.locator("input.typed").press("Enter")
-    page.wait_for_function("() => location.search.includes('mu=1&')")
+    ask(page, 1)
+    searched(page, "mu=1&")
     assert "full=0.2" in page.url and "stretch=2" in page.url
     looks(page)
     page.get_by_label("Width, times").fill("-3")
@@ -260,7 +202,7 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
     page.get_by_text("a number from 0.1 to 10, got '-3'").first.wait_for()
     page.get_by_label("Full colour, in mean forces").fill("")
     page.get_by_label("Full colour, in mean forces").press("Enter")
-    page.wait_for_function("() => !location.search.includes('full=')")
+    no_more(page, "full=")
     page.get_by_text("+0.5 × mean force").wait_for()
 
 
@@ -271,7 +213,7 @@ def test_a_click_selects_the_contact_everywhere(page):
     rank = column(page, "chosen", "rank")[0]
     ranks, which = column(page, "bars", "rank"), column(page, "bars", "at")
     assert which[ranks.index(rank)] == contact
-    page.wait_for_function(f"() => location.search.includes('contact={contact}')")
+    searched(page, f"contact={contact}")
     page.mouse.click(*at(page, x, y))
     page.wait_for_function(f"() => {MODEL}('chosen').get_column('rank').length === 0")
 
@@ -292,7 +234,7 @@ def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
     place = at(page, *free)
     outside = scene(page, "scene.counts.outside")
     assert outside > 0 and f"({outside} out of view" in page.locator(".skips").text_content()
-    page.wait_for_function("() => location.search.includes('zoom=')")  # links keep it
+    searched(page, "zoom=")  # links keep it
     page.mouse.down()
     page.mouse.move(x + 40, y + 25)
     page.mouse.up()
@@ -300,7 +242,7 @@ def test_wheel_and_drag_change_the_view_and_doubleclick_resets_it(page):
     page.mouse.dblclick(x, y)
     page.wait_for_timeout(100)
     assert scene(page, "scene.view.half") == whole
-    page.wait_for_function("() => !location.search.includes('zoom=')")
+    no_more(page, "zoom=")
 
 
 def test_leaving_out_thin_and_unseen_chains_changes_no_pixel(page):
@@ -358,7 +300,6 @@ def test_strong_and_undetermined_contacts_are_marked(visit):
     for marked, values in ((strong, original), (loose, extent)):
         assert marked.sum() == max(1, round(0.1 * len(values)))
         assert values[marked].min() >= values[~marked].max()
-    page.screenshot(path=_artefact("overlay.png"))
 
 
 # Playing
@@ -408,11 +349,8 @@ def test_a_pause_goes_to_the_nearest_state(visit, motion):
     page.locator("button.play").click()
     page.wait_for_timeout(700)
     page.locator("button.play").click()
-    page.wait_for_function(
-        "e => { const {playing, replay} = e.scene.hand.player;"
-        " return !playing && replay.position % 1 === 0 }",
-        arg=page.locator(".scene").element_handle(),
-    )
+    player = "scene.hand.player"
+    until(page, f"!{player}.playing && {player}.replay.position % 1 === 0")
     shown, frames, frame, told = scene(
         page,
         "[scene.mixed.normal, scene.geometry.normal, scene.hand.player.replay.frame,"
@@ -451,9 +389,9 @@ def test_keys_play_step_and_change_tabs(page):
     page.keyboard.press(" ")
     page.locator(".stage:not(.playing)").wait_for()
     page.keyboard.press("2")
-    page.wait_for_function("() => /tab=/.test(location.search)")
+    searched(page, "tab=")
     page.keyboard.press("1")
-    page.wait_for_function("() => !/tab=/.test(location.search)")
+    no_more(page, "tab=")
 
 
 def test_keys_typed_into_a_field_stay_there(page):
@@ -507,7 +445,7 @@ def test_to_and_fro_between_the_pinned_state_and_this_one(page):
     more(page).locator("button.pin").click()
     page.locator("input.scrub").fill("9")
     page.locator("button.between").click()
-    page.wait_for_function("() => location.search.includes('between=3-9')")
+    searched(page, "between=3-9")
     page.locator("button.play").click()
     page.locator("input.scrub").fill("0.5")
     mixed = np.array(scene(page, "Array.from(scene.mixed.normal)"))
@@ -515,7 +453,7 @@ def test_to_and_fro_between_the_pinned_state_and_this_one(page):
     np.testing.assert_allclose(mixed, (normal[3] + normal[9]) / 2, atol=1e-5)
     assert "50 % of the way" in page.locator("b.state").inner_text()
     page.locator("button.between").click()
-    page.wait_for_function("() => !location.search.includes('between')")
+    no_more(page, "between")
 
 
 # Selecting and computing
@@ -536,53 +474,40 @@ SLOW_TO_ANSWER = """
 """
 
 
-def test_states_computed_while_the_page_is_on_its_way_are_shown(chromium, address, cache):
+def test_states_computed_while_the_page_is_on_its_way_are_shown(opening, served):
     """The browser has fetched the page, and says so only when the states have been computed."""
-    context, problems = _context(chromium, 1280)
-    context.add_init_script(SLOW_TO_ANSWER)
-    page = context.new_page()
-    page.goto(address + "?mu=0.1&n=30&states=5&walkseed=77")
-    painted(page, 60_000)
+    query, cache = "?mu=0.1&n=30&states=5&walkseed=77", served[1] / "cache"
+    page = opening(query, 1280, 900, prepare=lambda page: page.add_init_script(SLOW_TO_ANSWER))
+    painted(page)
     for _ in range(600):
-        if cache.is_dir() and open_store(cache).find("walk"):
+        if cache.is_dir() and open_store(cache).find("walk", seed=77):
             break
         page.wait_for_timeout(100)
     page.wait_for_timeout(500)  # until the page's thread knows
     page.evaluate("answer()")
-    page.wait_for_function(
-        "e => e.scene.geometry.states === 5",
-        arg=page.locator(".scene").element_handle(),
-        timeout=20_000,
-    )
+    until(page, "scene.geometry.states === 5")
     assert "5 networks" in page.locator(".source").text_content()
-    context.close()
-    assert not problems
 
 
 def test_another_stored_mu_is_shown_by_a_key(page):
     page.locator(".friction input[type=range]").press("ArrowRight")
     page.get_by_text("μ = 1, 30 disks").wait_for()
-    page.wait_for_function(
-        "e => e.scene.geometry.mu === 1", arg=page.locator(".scene").element_handle()
-    )
+    shows(page, 1)
 
 
 def test_mu_typed_is_computed_and_shown_with_exact_intervals(page):
-    typed = page.locator("input.typed")
-    typed.fill("0.4")
-    typed.press("Enter")
-    page.get_by_text("μ = 0.4, 30 disks").wait_for(timeout=60_000)
+    ask(page, 0.39)
+    page.get_by_text("μ = 0.39, 30 disks").wait_for(timeout=60_000)
     page.wait_for_function(  # they follow by themselves
         f"() => {MODEL}('bars').get_column('exact_high').every(Number.isFinite)", timeout=60_000
     )
     high, seen = (np.array(column(page, "bars", name)) for name in ("exact_high", "high"))
     assert np.all(high >= seen - 1e-5)
-    page.screenshot(path=_artefact("intervals.png"))
+    picture(page, "intervals")
 
 
 def test_wrong_mu_is_one_clear_line(page):
-    page.locator("input.typed").fill("-2")
-    page.locator("input.typed").press("Enter")
+    ask(page, -2)
     told = page.get_by_text("friction coefficient must be finite and ≥ 0").filter(visible=True)
     told.wait_for(timeout=10_000)
 
@@ -609,15 +534,11 @@ def test_a_copied_link_reopens_the_view(page, visit):
     contact, x, y = link_of(page)
     page.mouse.click(*at(page, x, y))
     page.get_by_role("button", name="zoom in").click()
-    page.wait_for_function(
-        "() => ['frame=4', 'contact', 'zoom'].every((part) => location.search.includes(part))"
-    )
+    searched(page, "frame=4", "contact", "zoom")
     page.get_by_role("button", name="Copy link").click()
     link = page.evaluate("navigator.clipboard.readText()")
     again = visit(link[link.index("?") :])
-    again.wait_for_function(
-        "e => e.scene.selected !== null", arg=again.locator(".scene").element_handle()
-    )
+    until(again, "scene.selected !== null")
     assert scene(again, "scene.selected") == contact
     assert scene(again, "scene.view.half") == pytest.approx(scene(page, "scene.view.half"), 1e-4)
     assert again.locator("b.state").inner_text() == page.locator("b.state").inner_text()
@@ -640,11 +561,3 @@ def test_pictures_by_day_and_by_night(visit, width, dark):
     brightness = sum(int(value) for value in re.findall(r"\d+", background)[:3]) / 3
     assert (brightness < 80) == bool(dark)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    page.screenshot(
-        path=_artefact(f"page-{width}-{'dark' if dark else 'light'}.png"), full_page=True
-    )
-
-
-def _artefact(name):
-    ARTEFACTS.mkdir(exist_ok=True)
-    return str(Path(ARTEFACTS) / name)

@@ -1,91 +1,23 @@
 """What visitors stumbled over, one test each: the page answers, and says what is so."""
 
-import signal
-
 import numpy as np
 import pytest
 from serving import (
-    MANY,
     MODEL,
+    ask,
+    at_rest,
     column,
-    free_port,
     how_it_is_made,
     looks,
-    painted,
+    no_more,
     scene,
-    serve,
+    searched,
+    shows,
+    until,
 )
 from small_store import KEPT, ROOT
 
-# Pictures to be looked at; ignored by git.
 STATISTICS = "measured: in networks found at random"
-ARTEFACTS = ROOT / "artefacts" / "defects"
-PATIENCE = 60_000  # ms, on a busy machine
-
-pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Where the app of `address` keeps its cache and its log."""
-    return tmp_path_factory.mktemp("served")
-
-
-@pytest.fixture(scope="module")
-def address(shipped, folder):
-    """The app with stores of its own."""
-    with serve(folder, GRANFORCE_DATA=str(shipped)) as (url, _):
-        yield url
-
-
-@pytest.fixture
-def visit(chromium, address, request):
-    """visit(query, width, height): a page at rest; at the end a picture, and no error was told."""
-    errors, contexts = [], []
-
-    def visit(query="", width=1280, height=900, at=None, wanted=()):
-        context = chromium.new_context(
-            viewport={"width": width, "height": height}, reduced_motion="reduce"
-        )
-        context.grant_permissions(["clipboard-read", "clipboard-write"])
-        context.set_default_timeout(PATIENCE)
-        page = context.new_page()
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on(
-            "console",
-            lambda told: (
-                told.type == "error"
-                and not any(word in told.text for word in wanted)
-                and errors.append(told.text)
-            ),
-        )
-        page.goto((at or address) + (query or MANY))
-        painted(page, PATIENCE)
-        page.get_by_role("tab").first.wait_for()
-        contexts.append((context, page))
-        return page
-
-    yield visit
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    for number, (context, page) in enumerate(contexts):
-        page.screenshot(path=ARTEFACTS / f"{request.node.name}-{number}.png", full_page=True)
-        context.close()
-    assert not [error for error in errors if "favicon" not in error]
-
-
-def shows(page, mu):
-    """Wait until the packing at μ is on screen."""
-    handle = page.locator(".scene").element_handle()
-    page.wait_for_function(f"e => e.scene.geometry.mu === {mu}", arg=handle)
-
-
-def ask_for_mu(page, mu):
-    page.locator("input.typed").fill(str(mu))
-    page.locator("input.typed").press("Enter")
-
-
-def searched(page, text):
-    page.wait_for_function(f"() => location.search.includes({text!r})")
 
 
 # 1: Back and Forward
@@ -94,13 +26,13 @@ def searched(page, text):
 def test_back_and_forward_restore_views_and_copied_links(visit):
     page = visit()
     shows(page, 0.1)
-    ask_for_mu(page, 1)
+    ask(page, 1)
     shows(page, 1)
     searched(page, "mu=1&")
     page.get_by_role("tab", name="Friction").click()
     searched(page, "tab=statistics")
     page.go_back()
-    page.wait_for_function("() => !location.search.includes('tab=')")
+    no_more(page, "tab=")
     page.locator("[role=tab][aria-selected=true]", has_text="How far?").wait_for()
     page.go_back()
     shows(page, 0.1)
@@ -115,8 +47,7 @@ def test_back_and_forward_restore_views_and_copied_links(visit):
     page.locator("[role=tab][aria-selected=true]", has_text="Friction").wait_for()
 
 
-def test_steps_of_the_player_are_not_gone_back_to(visit):
-    page = visit()
+def test_steps_of_the_player_are_not_gone_back_to(page):
     before = page.evaluate("history.length")
     for _ in range(3):
         page.locator("button.step").click()
@@ -124,55 +55,23 @@ def test_steps_of_the_player_are_not_gone_back_to(visit):
     assert page.evaluate("history.length") == before
 
 
-# 2: A server that is gone
-
-
-def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, shipped, tmp_path):
-    port = free_port()
-    store = {"GRANFORCE_DATA": str(shipped)}
-    expected = ("WebSocket", "Failed to load resource", "not connected")
-    with serve(tmp_path, port=port, **store) as (url, server):
-        page = visit(at=url, wanted=expected)
-        ask_for_mu(page, 1)
-        shows(page, 1)
-        searched(page, "mu=1&")
-        page.locator("button.step").click()
-        searched(page, "frame=1")
-        server.send_signal(signal.SIGKILL)
-        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
-        painting = scene(page, "scene.painted")
-        page.locator("button.play").click()  # what is in the page still plays
-        page.wait_for_function(
-            f"e => e.scene.painted > {painting} + 3", arg=page.locator(".scene").element_handle()
-        )
-        page.locator(".scale span").first.click()  # μ = 0, of which nobody hears yet
-    with serve(tmp_path, port=port, **store):
-        page.get_by_text("Connection lost").wait_for(state="detached")
-        painted(page, PATIENCE)
-        shows(page, 0)
-        searched(page, "mu=0&")
-        ask_for_mu(page, 1)  # and it listens again
-        shows(page, 1)
-
-
-# 3: What is refused, and fields
+# 2: What is refused, and fields
 
 
 def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
     page = visit(width=390, height=844)
-    ask_for_mu(page, "10e9")
+    ask(page, "10e9")
     told = page.get_by_role("alert").filter(has_text="friction coefficient must lie")
     told.wait_for()
     edges = told.bounding_box()
     assert edges["y"] + edges["height"] <= 844 and edges["x"] >= 0
     told.get_by_role("button", name="Close").click()
     told.wait_for(state="hidden")
-    ask_for_mu(page, "10e9")
+    ask(page, "10e9")
     told.wait_for()  # the same refusal is told again
 
 
-def test_a_mark_of_the_slider_is_chosen_by_a_click(visit):
-    page = visit()
+def test_a_mark_of_the_slider_is_chosen_by_a_click(page):
     page.locator(".scale span").get_by_text("1", exact=True).click()
     shows(page, 1)
 
@@ -189,8 +88,7 @@ def test_an_error_bar_below_0_holds_nothing(visit):
     searched(page, "known=")
 
 
-def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(visit):
-    page = visit()
+def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(page):
     flung = page.locator(".scene").evaluate(
         """e => {
             const {hand, geometry} = e.scene, [xa, ya, xb, yb] = e.scene.ends(5)
@@ -203,11 +101,10 @@ def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(visit):
     )
     assert flung[0]  # let go before it could be pulled
     searched(page, f"pulls={flung[1]}%3A")
-    scene = page.locator(".scene").element_handle()
-    page.wait_for_function("e => e.scene.hand.replay.held && !e.scene.hand.active", arg=scene)
+    until(page, "scene.hand.replay.held && !scene.hand.active")
 
 
-# 4: Number fields
+# 3: Number fields
 
 
 def test_number_fields_take_typing_after_enter(visit):
@@ -234,7 +131,7 @@ def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
     assert field.input_value() == before
 
 
-# 5: Uploaded packings
+# 4: Uploaded packings
 
 
 def test_uploaded_packings_show_their_own_number_of_disks(visit):
@@ -248,7 +145,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
 
 
-# 6: Keys
+# 5: Keys
 
 
 @pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
@@ -280,17 +177,7 @@ def test_who_goes_by_tab_means_the_widget(visit):
     assert page.locator(".stage.playing").count() == 0
 
 
-# 7: What is not computed yet
-
-
-def at_rest(place):
-    """The box of a place, once it has been the same for a second."""
-    seen = []
-    while len(seen) < 10 or seen[-10:] != seen[-1:] * 10:
-        assert len(seen) < 600
-        seen.append(place.bounding_box())
-        place.page.wait_for_timeout(100)
-    return seen[-1]
+# 6: What is not computed yet
 
 
 def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old(visit):
@@ -300,7 +187,7 @@ def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old
     page.wait_for_function(f"() => {MODEL}('bars')?.get_length() > 0")
     before = at_rest(plot)
     page.evaluate(MOST_BARS)
-    ask_for_mu(page, 0.4)
+    ask(page, 0.4)
     shows(page, 0.4)
     assert len(page.evaluate("window.mostBars")) <= 1
     page.locator(".task").first.wait_for(state="hidden")
@@ -311,7 +198,7 @@ def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old
     assert at_rest(plot)["y"] == before["y"]
 
 
-# 8: Two contacts
+# 7: Two contacts
 
 
 def middles(page, count):
@@ -336,12 +223,11 @@ def middles(page, count):
 
 def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     page = visit("?tab=plane")
-    handle = page.locator(".scene").element_handle()
-    page.wait_for_function("e => e.scene.pair.length === 2", arg=handle)
+    until(page, "scene.pair.length === 2")
     green, a = scene(page, "scene.pair")
     b, *place = next(found for found in middles(page, 3) if found[0] not in (green, a))
     page.mouse.click(*place)
-    page.wait_for_function(f"e => `${{e.scene.pair}}` === '{b},{a}'", arg=handle)
+    until(page, f"`${{scene.pair}}` === '{b},{a}'")
     assert scene(page, "scene.selected") == b
     page.wait_for_function(f"() => {MODEL}('outer').get_column('x').length > 3")
     backbone = scene(page, "Array.from(scene.geometry.backbone)")
@@ -354,12 +240,12 @@ def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     searched(page, f"pair={b}-{a}")
 
 
-# 9: Small things
+# 8: Small things
 
 
 @pytest.mark.parametrize("tab", ["intervals", "statistics"])
-def test_legends_lie_where_no_curve_goes(visit, tab):
-    page = visit(f"?tab={tab}")
+def test_legends_lie_where_no_curve_goes(lasting, tab):
+    page = lasting(f"?tab={tab}")
     page.wait_for_function(
         """() => [...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "Figure" &&
@@ -376,8 +262,8 @@ def test_legends_lie_where_no_curve_goes(visit, tab):
     assert sum(within for within, _ in places) == 0 and sum(above for _, above in places) >= 2
 
 
-def test_ticks_of_friction_stand_apart(visit):
-    page = visit("?tab=statistics")
+def test_ticks_of_friction_stand_apart(lasting):
+    page = lasting("?tab=statistics")
     page.get_by_text("Forces are freest at friction").wait_for()
     page.wait_for_function(
         "() => [...Bokeh.documents[0].all_models]"
@@ -394,13 +280,13 @@ def test_ticks_of_friction_stand_apart(visit):
     assert width / ticks > 40  # px for each label of at most five letters
 
 
-def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, folder):
+def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, served):
     page = visit("?tab=perturb&contact=5")
     page.get_by_role("button", name="Push", exact=True).click()
     page.get_by_text("the packing gives way:").wait_for()
     page.get_by_role("tab", name="Friction").click()
     page.get_by_text("Forces are freest at friction").wait_for()
-    assert "already known" not in (folder / "log").read_text()
+    assert "already known" not in (served[1] / "log").read_text()
 
 
 def test_the_report_goes_when_another_file_is_dropped(visit):
@@ -425,8 +311,7 @@ def test_nothing_old_stands_under_a_new_statistic(visit):
 # What is said must be so
 
 
-def test_curves_of_the_shown_states_end_at_their_targets(visit):
-    page = visit()
+def test_curves_of_the_shown_states_end_at_their_targets(page):
     page.wait_for_function(f"() => {MODEL}('growth')?.get_column('eta1')?.length === {KEPT + 1}")
     page.locator("input.scrub").fill(str(KEPT))
     ends = [column(page, "growth", name)[-1] for name in ("eta1", "eta2", "eta3")]
@@ -438,8 +323,8 @@ def test_curves_of_the_shown_states_end_at_their_targets(visit):
     assert sorted(targets) == pytest.approx(sorted(ends), rel=1e-3)
 
 
-def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
-    page = visit("?tab=statistics")
+def test_statistics_show_the_finished_study_with_claims_and_verdicts(lasting):
+    page = lasting("?tab=statistics")
     page.get_by_text("Forces are freest at friction").wait_for()
     page.get_by_text("What Shaebani, Unger and Kertész found, and what was found here").click()
     assert page.get_by_role("cell", name="reproduced").count() >= 5
@@ -458,8 +343,8 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],
 )
-def test_plots_say_whether_they_show_exact_seen_or_measured_values(visit, tab, words):
-    page = visit(f"?tab={tab}")
+def test_plots_say_whether_they_show_exact_seen_or_measured_values(lasting, tab, words):
+    page = lasting(f"?tab={tab}")
     for line in words:
         page.wait_for_function(
             """line => [...Bokeh.documents[0].all_models]
@@ -473,11 +358,10 @@ def test_plots_say_whether_they_show_exact_seen_or_measured_values(visit, tab, w
 
 def test_limit_loads_are_shown_as_colour_and_width(visit):
     page = visit("?colour=load&thickness=load")
-    handle = page.locator(".scene").element_handle()
     page.wait_for_function(
         f"() => {MODEL}('player').loads?.length > 0 || {MODEL}('player').data?.loads?.length > 0"
     )
-    page.wait_for_function("e => e.scene.style.width.some((w) => w > 0)", arg=handle)
+    until(page, "scene.style.width.some((w) => w > 0)")
     widths = np.array(scene(page, "Array.from(scene.style.width)"))
     bins = np.array(scene(page, "Array.from(scene.style.bin)"))
     assert (np.diff(bins[np.argsort(widths)]) >= 0).all() and bins.max() == 32

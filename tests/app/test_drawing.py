@@ -4,25 +4,19 @@ import json
 
 import numpy as np
 import pytest
-from serving import CHROMIUM, FLAGS
 
 from app.views.scripts import FOLDER
 
-pytestmark = pytest.mark.browser
 ADDRESS = "http://scripts/"
 
 
 @pytest.fixture(scope="module")
-def blank():
+def blank(chromium):
     """A page that imports scripts as the modules they are, and nothing else."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as context:
-        browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        page = browser.new_page()
-        page.route(f"{ADDRESS}**", _answer)
-        page.goto(ADDRESS)
-        yield page
-        browser.close()
+    page = chromium.new_page()
+    page.route(f"{ADDRESS}**", _answer)
+    page.goto(ADDRESS)
+    return page
 
 
 def _answer(route):

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from visitor import wait_for
 
 from app import grabs, planes
-from app.state import AppState
+from app.exports import contacts, on_screen
 from app.views.messages import FROM_BROWSER, TO_BROWSER, listed
 from granforce.study import pulls
 
@@ -12,10 +13,10 @@ from granforce.study import pulls
 class Page:
     """A page's hand, and what its player is told."""
 
-    def __init__(self, state, wait_for):
-        self.state, self.told, self._wait = state, [], lambda: wait_for(state)
+    def __init__(self, state):
+        self.state, self.told = state, []
         self.hand, state.hand.tell = state.hand, self._tell
-        self._wait()
+        wait_for(self.state)
         self.hear(anew=True)  # as a player that is drawn
 
     def _tell(self, message):
@@ -25,13 +26,13 @@ class Page:
     def hear(self, **message):
         assert listed(FROM_BROWSER, "Player", {"hand": message}), message
         self.hand.heard(message)
-        self._wait()
+        wait_for(self.state)
         return self.told[-1] if self.told else None
 
 
 @pytest.fixture
-def page(state, wait_for):
-    return Page(state, wait_for)
+def page(state):
+    return Page(state)
 
 
 def test_a_contact_that_is_taken_is_selected_and_gets_a_rail(page, state):
@@ -78,13 +79,12 @@ def test_undo_steps_back_to_the_state(page, state):
     assert page.hear(undo=True) == {"held": None} and not state.hand.pulls
 
 
-def test_pulls_travel_with_the_link(page, state, library, wait_for):
+def test_pulls_travel_with_the_link(page, state, visited):
     page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
     held = page.hear(hold=[9, middle(page.hear(grab=9)["rail"])])["held"]
-    other = AppState(library, query=state.link())
-    wait_for(other)
+    other = visited(state.link())
     assert len(other.hand.pulls) == 2
-    again = Page(other, wait_for)
+    again = Page(other)
     np.testing.assert_allclose(again.told[-1]["held"]["normal"], held["normal"], atol=1e-4)
 
 
@@ -103,7 +103,7 @@ def test_what_was_pulled_is_gone_with_another_state_on_screen(page, state):
     assert not state.hand.pulls and page.told[-1] == {"held": None}
 
 
-def test_what_was_pulled_stays_when_exact_intervals_come(page, state, wait_for):
+def test_what_was_pulled_stays_when_exact_intervals_come(page, state):
     page.hear(hold=[4, middle(page.hear(grab=4)["rail"])])
     state.compute_exact()
     wait_for(state)
@@ -166,16 +166,13 @@ def test_the_point_in_force_space_is_pulled_along_both_axes(page, state, pair):
     np.testing.assert_array_equal(again["normal"], held["normal"])
 
 
-def test_a_pulled_point_travels_with_the_link(page, state, library, wait_for):
+def test_a_pulled_point_travels_with_the_link(page, state, visited):
     state.plane = planes.components(state.replay, (4, 0), (9, 1))
     fan = page.hear(point=True)["fan"]
     held = page.hear(hold_point=[float(fan["x"].mean()), float(fan["y"].mean())])["held"]
-    other = AppState(library, query=state.link())
-    wait_for(other)
+    other = visited(state.link())
     assert other.hand.pulls[0][0] == "4n-9t"
-    np.testing.assert_allclose(
-        Page(other, wait_for).told[-1]["held"]["normal"], held["normal"], atol=1e-4
-    )
+    np.testing.assert_allclose(Page(other).told[-1]["held"]["normal"], held["normal"], atol=1e-4)
 
 
 def test_a_link_keeps_a_pull_to_the_end_of_an_interval():
@@ -186,8 +183,6 @@ def test_a_link_keeps_a_pull_to_the_end_of_an_interval():
 
 def test_the_table_of_contacts_holds_what_was_pulled(page, state):
     """A file with other numbers than the picture would be worse than none."""
-    from app.exports import contacts, on_screen
-
     value = middle(page.hear(grab=4)["rail"])
     page.hear(hold=[4, value])
     replay = state.replay

@@ -7,18 +7,18 @@ import re
 import urllib.request
 
 import pytest
-from serving import CLOSED, free_port, painted, serve
+from serving import CLOSED, ask, free_port, painted, scene, searched, serve, shows, until
+from test_scenes_browser import choose, desk, drawn
+from test_scenes_browser import until as becomes
 
 PATIENCE = 180_000  # ms, on a busy machine
 LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, unless it is ended
 LIMITS = "n=60,states=20000"
 LARGEST = "9" * 300
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture(scope="module")
-def served(shipped, tmp_path_factory):
+def address(shipped, tmp_path_factory):
     """Address of the app, which soon gives closed pages up; at the end all its threads are there.
 
     Warmed up: there, too, a page is made and ended before its work.
@@ -33,12 +33,12 @@ def served(shipped, tmp_path_factory):
 
 
 @pytest.fixture
-def page(chromium):
+def page(context):
     """An empty page."""
-    page = chromium.new_page()
+    page = context().new_page()
     page.set_default_timeout(PATIENCE)
     yield page
-    page.context.close()
+    page.close()
 
 
 def computing(page):
@@ -63,30 +63,30 @@ def computes(page, address, seed):
     page.locator("option", has_text=there).first.wait_for(state="attached")
 
 
-def test_after_three_reloads_while_computing_another_computation_succeeds(page, served):
-    page.goto(served + LONG.format(1))
+def test_after_three_reloads_while_computing_another_computation_succeeds(page, address):
+    page.goto(address + LONG.format(1))
     computing(page)
     for _ in range(3):
         page.reload()
         computing(page)
-    computes(page, served, 11)
+    computes(page, address, 11)
 
 
-def test_pages_that_are_asked_for_and_never_shown_hold_no_thread(page, served):
+def test_pages_that_are_asked_for_and_never_shown_hold_no_thread(page, address):
     """Their work is ended when the server gives the pages up."""
     for seed in range(2, 6):
-        urllib.request.urlopen(served + LONG.format(seed), timeout=60).close()
-    computes(page, served, 12)
+        urllib.request.urlopen(address + LONG.format(seed), timeout=60).close()
+    computes(page, address, 12)
 
 
-def test_twenty_pages_opened_and_closed_while_computing(page, chromium, served):
+def test_twenty_pages_opened_and_closed_while_computing(page, context, address):
     for number in range(20):
-        visit = chromium.new_page()
-        visit.goto(served + LONG.format(20 + number % 7), wait_until="commit", timeout=PATIENCE)
+        visit = context().new_page()
+        visit.goto(address + LONG.format(20 + number % 7), wait_until="commit", timeout=PATIENCE)
         if number % 10 == 0:
             computing(visit)
-        visit.context.close()
-    computes(page, served, 13)
+        visit.close()
+    computes(page, address, 13)
 
 
 SELECTION = (
@@ -109,47 +109,67 @@ VIEW = (
     ],
     ids=["every parameter", "every number", "sweeps", "every choice of the view"],
 )
-def test_a_link_with_the_largest_numbers_computes_nothing(page, served, names, given, told):
+def test_a_link_with_the_largest_numbers_computes_nothing(page, address, names, given, told):
     """One line says what is too large, and the usual states are seen; each alone: test_app.py."""
-    page.goto(f"{served}?{given}{'&'.join(f'{name}={LARGEST}' for name in names)}")
-    painted(page, PATIENCE)
+    page.goto(f"{address}?{given}{'&'.join(f'{name}={LARGEST}' for name in names)}")
+    painted(page)
     page.get_by_text(told).filter(visible=True).first.wait_for()
     assert page.get_by_role("button", name="Cancel").count() == 0
 
 
-def test_the_largest_allowed_of_everything_can_be_cancelled(page, served):
+def test_the_largest_allowed_of_everything_can_be_cancelled(page, address):
     # But of μ: at 1000 a packing may have one network only, whose walk ends before it is seen.
     largest = {
         "n": 60, "states": 20_000, "mu": 0.2, "relax": "gauss_seidel_only",
         "seed": 2**53 - 1, "walkseed": 2**53 - 1,
         "sweeps": 1000, "dt": 0.1, "box_mass": 10_000, "pressure": 1e6, "radii": "uniform:1,20",
     }  # fmt: skip
-    page.goto(f"{served}?{'&'.join(f'{key}={value}' for key, value in largest.items())}")
+    page.goto(f"{address}?{'&'.join(f'{key}={value}' for key, value in largest.items())}")
     page.get_by_role("button", name="Cancel").first.click()
     page.get_by_role("button", name="Cancel").first.wait_for(state="hidden")
-    computes(page, served, 15)
+    computes(page, address, 15)
 
 
-def test_a_killed_server_comes_back_and_a_reloaded_page_works(page, shipped, tmp_path):
-    port, variables = free_port(), {"GRANFORCE_DATA": str(shipped)}
-    with serve(tmp_path, port=port, **variables) as (url, server):
+def test_a_killed_server_comes_back_and_every_page_with_it(page, visit, opening, shipped, tmp_path):
+    """One that computes, one at rest and a small scene: each tells of it, goes on, and is back."""
+    port, store = free_port(), {"GRANFORCE_DATA": str(shipped)}
+    with serve(tmp_path, port=port, **store) as (url, server):
+        options = {"at": url, "wanted": ("WebSocket", "Failed to load resource", "not connected")}
+        small, many = opening("?scene=groove", 1280, 800, **options), visit(**options)
+        drawn(small)
+        ask(many, 1)
+        shows(many, 1)
+        searched(many, "mu=1&")
+        many.locator("button.step").click()
+        searched(many, "frame=1")
         page.goto(url + LONG.format(3))
         computing(page)
         server.kill()
         server.wait(20)
-        with serve(tmp_path, port=port, **variables) as (again, _):
-            assert again == url
-            reloaded(page)
-            computing(page)
-            computes(page, url, 16)
-
-
-def test_a_server_that_is_told_to_end_does_so_while_it_computes(page, shipped, tmp_path):
-    with serve(tmp_path, GRANFORCE_DATA=str(shipped)) as (url, server):
-        page.goto(url + LONG.format(4))
+        for lost in (small, many):
+            lost.get_by_role("alert").get_by_text("Connection lost").wait_for()
+        painting = scene(many, "scene.painted")
+        many.locator("button.play").click()  # what is in the page still plays
+        until(many, f"scene.painted > {painting} + 3")
+        many.locator(".scale span").first.click()  # μ = 0, of which nobody hears yet
+        desk(small).get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
+        becomes(small, "Math.abs(small.body.interval(0)[1] - Math.SQRT1_2 / 0.2) < 1e-9")
+        searched(small, "mu=0.8")
+        choose(small, "box")
+    with serve(tmp_path, port=port, **store) as (again, _):
+        assert again == url
+        for lost in (small, many):
+            lost.get_by_text("Connection lost").wait_for(state="detached")
+        drawn(small)
+        becomes(small, "small.body.scene.name === 'box'")
+        painted(many)
+        shows(many, 0)
+        searched(many, "mu=0&")
+        ask(many, 1)  # and it listens again
+        shows(many, 1)
+        reloaded(page)
         computing(page)
-        server.terminate()
-        assert server.wait(20) == 0
+        computes(page, url, 16)
 
 
 def test_a_server_with_threads_of_panel_is_refused_at_its_start(tmp_path):

@@ -4,21 +4,24 @@ import subprocess
 
 import numpy as np
 import pytest
+from visitor import wait_for
 
 from app import known
 from app.known import Statement
-from app.state import AppState
+from app.views.known import words
+from app.views.packing import PackingView
+from granforce.packing.importers import read_known
 
 
-def held(state, wait_for, *contacts, error=0.0):
+def held(state, *contacts, error=0.0):
     """Contacts held at their original force, one after the other."""
     for contact in contacts:
         state.knowledge.hold(contact, float(state.replay.normal[0, contact]), error)
         wait_for(state)
 
 
-def test_a_held_force_narrows_the_others(state, wait_for):
-    held(state, wait_for, 4)
+def test_a_held_force_narrows_the_others(state):
+    held(state, 4)
     found = state.knowledge.narrowed
     assert not state.work.message and found.known == tuple(state.knowledge.known)
     (h, fewer), (mean, less) = found.dimension, found.mean
@@ -26,15 +29,13 @@ def test_a_held_force_narrows_the_others(state, wait_for):
     assert np.all(found.extents[1] <= found.extents[0] + 1e-6)
     assert found.extents[1][4] < 1e-6 and found.shortened[4] == 0 < found.shortened.max()
     assert state.possible is found.after
-    held(state, wait_for, 9)
+    held(state, 9)
     assert (
         state.knowledge.narrowed.dimension == (h, h - 2) and state.knowledge.narrowed.mean[1] < less
     )
 
 
-def test_colour_and_width_show_what_measuring_took_away(state, wait_for):
-    from app.views.packing import PackingView
-
+def test_colour_and_width_show_what_measuring_took_away(state):
     player = PackingView(state).player
     assert player.gone is None
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
@@ -50,9 +51,7 @@ def test_colour_and_width_show_what_measuring_took_away(state, wait_for):
     assert player.gone is None
 
 
-def test_what_carries_for_certain_is_counted_by_certified_bounds(state, wait_for):
-    from app.views.known import words
-
+def test_what_carries_for_certain_is_counted_by_certified_bounds(state):
     state.knowledge.hold(4, float(state.replay.normal[0, 4]))
     wait_for(state)
     low = state.knowledge.narrowed.after["low"].values[:, 0] / state.replay.force_scale
@@ -61,10 +60,8 @@ def test_what_carries_for_certain_is_counted_by_certified_bounds(state, wait_for
     assert f"{state.knowledge.narrowed.carrying} of {len(low)} contacts" in told
 
 
-def test_the_command_holds_what_is_known(state, wait_for, tmp_path):
+def test_the_command_holds_what_is_known(state, tmp_path):
     """Run in a shell, it writes a file that says the same."""
-    from granforce.packing.importers import read_known
-
     assert "known" not in state.command
     value = float(state.replay.normal[0, 4])
     state.knowledge.hold(4, value, 0.1)
@@ -79,17 +76,17 @@ def test_the_command_holds_what_is_known(state, wait_for, tmp_path):
     assert bounds == pytest.approx([value - 0.1, value + 0.1], abs=1e-6)
 
 
-def test_an_error_bar_narrows_less_and_leaves_the_dimension(state, wait_for):
-    held(state, wait_for, 4, error=0.05)
+def test_an_error_bar_narrows_less_and_leaves_the_dimension(state):
+    held(state, 4, error=0.05)
     h, same = state.knowledge.narrowed.dimension
     wide = state.knowledge.narrowed.mean[1]
     assert h == same and wide < state.knowledge.narrowed.mean[0]
-    held(state, wait_for, 4)  # says it anew
+    held(state, 4)  # says it anew
     assert len(state.knowledge.known) == 1 and state.knowledge.narrowed.mean[1] < wide
 
 
-def test_let_go_all_is_as_before(state, wait_for):
-    held(state, wait_for, 4, 9)
+def test_let_go_all_is_as_before(state):
+    held(state, 4, 9)
     state.knowledge.release(9)
     wait_for(state)
     assert [one.contact for one in state.knowledge.narrowed.known] == [4]
@@ -98,11 +95,10 @@ def test_let_go_all_is_as_before(state, wait_for):
     assert state.knowledge.narrowed is None and state.possible is state.exact
 
 
-def test_it_travels_with_the_link(state, library, wait_for):
-    held(state, wait_for, 4, 9)
-    held(state, wait_for, 20, error=0.1)
-    other = AppState(library, query=state.link())
-    wait_for(other)
+def test_it_travels_with_the_link(state, visited):
+    held(state, 4, 9)
+    held(state, 20, error=0.1)
+    other = visited(state.link())
     assert (
         other.knowledge.known == state.knowledge.known
         and other.knowledge.narrowed.mean == state.knowledge.narrowed.mean
@@ -127,20 +123,19 @@ def test_a_link_cannot_state_more_than_a_page(state):
     state.work.cancel()
 
 
-def test_contradictions_are_one_clear_line_and_taken_back(state, library, wait_for):
-    held(state, wait_for, 4)
+def test_contradictions_are_one_clear_line_and_taken_back(state, visited):
+    held(state, 4)
     before = state.knowledge.known
     state.knowledge.known = [*before, Statement(9, 30.0)]
     wait_for(state)
     assert "agrees with" in state.work.message and "\n" not in state.work.message
     assert state.knowledge.known == before and state.knowledge.narrowed.known == tuple(before)
-    other = AppState(library, query=state.link().split("&known")[0] + "&known=9:30")
-    wait_for(other)
+    other = visited(state.link().split("&known")[0] + "&known=9:30")
     assert "agrees with" in other.work.message and not other.knowledge.known
 
 
-def test_what_is_left_no_room_for_is_refused_at_once(state, wait_for):
-    held(state, wait_for, 4)
+def test_what_is_left_no_room_for_is_refused_at_once(state):
+    held(state, 4)
     low, high = (
         state.knowledge.narrowed.after["low"].values[:, 0],
         state.knowledge.narrowed.after["high"].values[:, 0],
@@ -164,17 +159,17 @@ def test_messages_of_browsers_that_make_no_sense_are_ignored(state):
     assert not state.knowledge.known and "must lie between" in state.work.message
 
 
-def test_another_packing_has_its_own(state, wait_for):
-    held(state, wait_for, 4)
+def test_another_packing_has_its_own(state):
+    held(state, 4)
     state.choose(mu=1)
     wait_for(state)
     assert not state.knowledge.known and state.knowledge.narrowed is None
 
 
-def test_pulls_keep_what_is_held(state, wait_for):
+def test_pulls_keep_what_is_held(state):
     told = []
     hand, state.hand.tell = state.hand, told.append
-    held(state, wait_for, 4)
+    held(state, 4)
     hand.heard({"grab": 9})
     wait_for(state)
     rail = told[-1]["rail"]
@@ -185,7 +180,7 @@ def test_pulls_keep_what_is_held(state, wait_for):
     assert told[-1] == {"rail": None} and "let it go" in state.work.message
 
 
-def test_what_was_pulled_can_be_held(state, wait_for):
+def test_what_was_pulled_can_be_held(state):
     told = []
     hand, state.hand.tell = state.hand, told.append
     hand.heard({"grab": 9})
@@ -200,7 +195,7 @@ def test_what_was_pulled_can_be_held(state, wait_for):
     np.testing.assert_allclose(told[-1]["held"]["normal"], pulled, atol=1e-4)
 
 
-def test_a_force_held_at_nothing_leaves_the_same_contacts(state, wait_for):
+def test_a_force_held_at_nothing_leaves_the_same_contacts(state):
     state.compute_exact()
     wait_for(state)
     low = state.exact["low"].values[:, 0]
@@ -214,7 +209,7 @@ def test_a_force_held_at_nothing_leaves_the_same_contacts(state, wait_for):
     np.testing.assert_array_equal(state.knowledge.narrowed.after["backbone"], state.replay.backbone)
 
 
-def test_bounds_arrive_the_held_contact_first(state, wait_for, monkeypatch):
+def test_bounds_arrive_the_held_contact_first(state, monkeypatch):
     statements = (Statement(4, float(state.replay.normal[0, 4])),)
     shown, told = state.library.shown(state.cell), []
 
@@ -237,14 +232,14 @@ def test_bounds_arrive_the_held_contact_first(state, wait_for, monkeypatch):
         np.testing.assert_allclose(told[-1].after[side], found[0].after[side], atol=1e-9)
 
 
-def test_which_to_measure_next_is_in_order_and_worth_it(state, wait_for):
-    held(state, wait_for, 4)
+def test_which_to_measure_next_is_in_order_and_worth_it(state):
+    held(state, 4)
     state.knowledge.rank()
     wait_for(state)
     best = state.knowledge.ranked
     assert best.known == tuple(state.knowledge.known) and 4 not in best.contacts
     assert np.all(np.diff(best.after) >= 0) and best.after[0] < best.before
     assert best.before == pytest.approx(state.knowledge.narrowed.mean[1], abs=1e-6)
-    held(state, wait_for, int(best.contacts[0]))
+    held(state, int(best.contacts[0]))
     assert state.knowledge.ranked is None  # of what was known before
     assert state.knowledge.narrowed.mean[1] < best.before

@@ -1,11 +1,6 @@
 """In a browser: forces are held, intervals shrink, stresses."""
 
-import pytest
 from serving import MODEL, column, painted, picture, scene
-
-PATIENCE = 60_000  # ms, on a busy machine
-
-pytestmark = pytest.mark.browser
 
 
 def select(page, contact):
@@ -45,7 +40,7 @@ def test_held_forces_are_pinned_narrow_the_rest_and_survive_a_reload(visit):
     picture(page, "known/held")
     page.wait_for_url("**known=4*~9*")
     page.reload()
-    painted(page, PATIENCE)
+    painted(page)
     chips(page, 2)
     assert scene(page, "scene.hand.player.pins.has(9)")
     page.locator(".chip .release").first.click()

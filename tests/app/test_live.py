@@ -6,10 +6,10 @@ import time
 import numpy as np
 import pytest
 from small_store import DISKS
+from visitor import wait_for
 
 from app import live, planes
 from app.selection import select
-from app.state import AppState
 from app.views import plane
 from app.views.controls import Controls
 from app.views.intervals import View
@@ -98,7 +98,7 @@ def test_what_is_computed_at_once_is_never_offered_to_be_computed(state):
     assert not offered and state.replay.summary["mu"] == 0.38
 
 
-def test_force_space_has_axes_of_the_states_found_so_far(state, wait_for):
+def test_force_space_has_axes_of_the_states_found_so_far(state):
     """New ones when the walk has grown fourfold; those of all states and an outline at its end."""
     state.looks.param.update(tab="plane", axes="principal")
     browser, tab = Browser(state), plane.View(state)
@@ -122,7 +122,7 @@ def test_force_space_has_axes_of_the_states_found_so_far(state, wait_for):
     np.testing.assert_allclose(np.abs(same), 1, atol=1e-6)
 
 
-def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state, wait_for):
+def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state):
     state.looks.tab = "plane"
     browser, tab = Browser(state), plane.View(state)
     wait_for(state)
@@ -140,10 +140,8 @@ def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state, wai
     assert np.isfinite(tab.path.data["x"]).all() and len(tab.outer.data["x"])
 
 
-def test_a_page_that_comes_later_joins_and_both_end_with_the_same(library, wait_for):
-    first, second = AppState(library), AppState(library)
-    for state in (first, second):
-        wait_for(state)
+def test_a_page_that_comes_later_joins_and_both_end_with_the_same(visited):
+    first, second = visited(), visited()
     one, two = Browser(first), Browser(second)
     first.ask(asked(0.24, 400), at_once=True)
     one.run(lambda: len(one.parts("states")) > 0)
@@ -163,10 +161,8 @@ def test_a_page_that_comes_later_joins_and_both_end_with_the_same(library, wait_
 
 
 @pytest.mark.parametrize(("leave", "mu"), [(Work.cancel, 0.33), (Work.close, 0.34)])
-def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, mu):
-    first, second = AppState(library), AppState(library)
-    for state in (first, second):
-        wait_for(state)
+def test_who_leaves_does_not_end_what_others_wait_for(leave, mu, visited):
+    first, second = visited(), visited()
     one, two = Browser(first), Browser(second)
     wanted = asked(mu, 20_000)
     first.ask(wanted, at_once=True)
@@ -176,7 +172,7 @@ def test_who_leaves_does_not_end_what_others_wait_for(library, wait_for, leave, 
     walk = live.shared(live.Walking, wanted.parameters())
     run, found = walk.run, len(walk.parts)
     leave(first.work)
-    one.run(seconds=1)  # at once for who leaves
+    one.run(seconds=20)  # long before the others have what they want
     assert not first.work.busy and not second.work.computation.message
     two.run(lambda: len(walk.parts) > found + 20)
     assert walk.run == run and second.work.computation.running  # not begun anew
@@ -231,7 +227,7 @@ def test_a_browser_that_stops_painting_is_sent_no_more(state):
     assert 1 <= len(browser.got) <= 2
 
 
-def test_cancelled_the_old_picture_is_back_and_says_what_is_not_computed(state, wait_for):
+def test_cancelled_the_old_picture_is_back_and_says_what_is_not_computed(state):
     browser, old = Browser(state), state.replay
     state.ask(asked(0.27, 20_000), at_once=True)
     browser.run(lambda: state.growing)
@@ -253,7 +249,7 @@ def test_another_question_takes_the_place_of_the_first(state):
     assert state.replay.summary["mu"] == 0.29 and not state.missing
 
 
-def test_what_is_in_the_store_ends_what_is_computed(state, wait_for):
+def test_what_is_in_the_store_ends_what_is_computed(state):
     state.ask(asked(0.31, 20_000), at_once=True)
     state.choose(mu=1)
     wait_for(state)

@@ -3,12 +3,25 @@
 import numpy as np
 import pytest
 from packings import reference, skewed
-from serving import MODEL, bars_drawn, column, how_it_is_made, laid_out, picture, scene
+from serving import (
+    MODEL,
+    ask,
+    at_rest,
+    bars_drawn,
+    column,
+    how_it_is_made,
+    laid_out,
+    no_more,
+    picture,
+    scene,
+    searched,
+    shows,
+    until,
+)
 from small_store import KEPT
 
 from app import geometry
 
-PATIENCE = 60_000  # ms, on a busy machine
 WATCH = """e => {
     const {hand} = e.scene, {live} = hand.player, {hear} = live
     window.seen = {pictures: [], states: 0, pale: 0}
@@ -23,8 +36,6 @@ WATCH = """e => {
         .observe(hand.player.buttons.root, {attributes: true})
 }"""
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture
 def visit(visit):
@@ -36,20 +47,6 @@ def visit(visit):
         return page
 
     return drawn
-
-
-def handle(page):
-    return page.locator(".scene").element_handle()
-
-
-def until(page, expression):
-    """Wait for an expression of the page's `scene`."""
-    page.wait_for_function(f"e => {{ const {{scene}} = e; return {expression} }}", arg=handle(page))
-
-
-def ask(page, mu):
-    page.locator("input.typed").fill(mu)
-    page.locator("input.typed").press("Enter")
 
 
 def ask_for_many_states(page):
@@ -130,7 +127,7 @@ def test_a_new_mu_is_seen_to_jam_and_to_walk(visit):
     ask_for_many_states(page)
     ask(page, "0.41")
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 5")
-    until(page, "scene.geometry.mu === 0.41")
+    shows(page, 0.41)
     seen = page.evaluate("seen")
     assert seen["pale"] and len(seen["pictures"]) >= 12 and seen["states"]
     assert seen["pictures"][0] > 1.1 * seen["pictures"][-1]
@@ -161,7 +158,7 @@ def test_discarded_the_old_packing_is_back_with_its_friction(visit):
     until(page, "scene.hand.player.grows && scene.geometry.mu === 0.47")
     page.get_by_role("button", name="Discard").click()
     until(page, "!scene.hand.player.grows && scene.geometry.states === 30")
-    page.wait_for_function("() => !location.search.includes('0.47')")
+    no_more(page, "0.47")
     assert page.locator(".stage.pale").count() == 0
     assert page.locator("input.typed").first.input_value() == "0.1"
 
@@ -172,7 +169,7 @@ def test_stopped_a_walk_is_kept_with_the_states_it_has(visit):
     page.get_by_role("button", name="Stop and keep").click()
     until(page, "!scene.hand.player.grows && scene.geometry.states < 20000")
     states = scene(page, "scene.geometry.states")
-    page.wait_for_function(f"() => location.search.includes('states={states}')")
+    searched(page, f"states={states}")
     assert f"{states} networks" in page.locator(".source").text_content()
     assert page.locator(".stage.pale").count() == 0
 
@@ -203,7 +200,7 @@ def test_a_hidden_tab_is_sent_nothing(visit):
         document.dispatchEvent(new Event("visibilitychange"))
     }""")
     ask(page, "0.43")
-    until(page, "scene.geometry.mu === 0.43")
+    shows(page, 0.43)
     seen = page.evaluate("seen")
     assert not seen["pictures"] and not seen["states"]
 
@@ -221,12 +218,11 @@ def pulled(page, up=60):
     until(page, "scene.hand.rail !== null")
     for k in range(6):
         page.mouse.move(x, y - 5 - up * (k + 1) / 6)
-    page.wait_for_function("e => e.scene.hand.frames > 0", arg=handle(page))
+    until(page, "scene.hand.frames > 0")
     return contact, before
 
 
-def test_a_dragged_chain_follows_the_hand_and_stays(visit):
-    page = visit()
+def test_a_dragged_chain_follows_the_hand_and_stays(page):
     contact, before = pulled(page)
     until(page, f"Math.abs(scene.mixed.normal[{contact}] - scene.hand.value) < 1e-6")
     rail = scene(page, "({lower: scene.hand.rail.lower, upper: scene.hand.rail.upper})")
@@ -236,7 +232,7 @@ def test_a_dragged_chain_follows_the_hand_and_stays(visit):
     assert "pulled to" in page.locator(".said").inner_text()
     picture(page, "live/dragging")
     page.mouse.up()
-    page.wait_for_function("() => location.search.includes('pulls=')")
+    searched(page, "pulls=")
     assert normal(page)[contact] == pytest.approx(during[contact], abs=1e-5)
     assert float(page.locator("b.residual").text_content()) < 1e-9
     until(page, f"scene.selected === {contact}")
@@ -245,13 +241,12 @@ def test_a_dragged_chain_follows_the_hand_and_stays(visit):
     shown = np.array(scene(page, "Array.from(scene.style.bin)"))
     np.testing.assert_allclose(shown, 32 * np.clip(0.5 + change, 0, 1), atol=0.51)
     page.keyboard.press("z")
-    page.wait_for_function("() => !location.search.includes('pulls=')")
+    no_more(page, "pulls=")
     until(page, "scene.hand.player.replay.held === null")
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
-def test_at_the_end_of_the_rail_the_page_says_why(visit):
-    page = visit()
+def test_at_the_end_of_the_rail_the_page_says_why(page):
     contact, _ = pulled(page, up=600)
     until(page, "scene.hand.end === 1")
     page.get_by_text("held there by").wait_for()
@@ -260,24 +255,22 @@ def test_at_the_end_of_the_rail_the_page_says_why(visit):
     page.mouse.up()
 
 
-def test_brackets_move_the_selected_force_and_escape_lets_go(visit):
-    page = visit()
+def test_brackets_move_the_selected_force_and_escape_lets_go(page):
     contact, x, y = chain(page)
     page.mouse.click(x, y)
     until(page, f"scene.selected === {contact}")
     before = normal(page)
     for key in "[[":
         page.keyboard.press(key)
-    page.wait_for_function("() => location.search.includes('pulls=')")
+    searched(page, "pulls=")
     assert normal(page)[contact] < before[contact]
     page.keyboard.press("Escape")
-    page.wait_for_function("() => !location.search.includes('pulls=')")
+    no_more(page, "pulls=")
     np.testing.assert_allclose(normal(page), before, atol=1e-6)
 
 
-def test_a_contact_selected_and_taken_in_one_moment_is_in_the_hand(visit):
+def test_a_contact_selected_and_taken_in_one_moment_is_in_the_hand(page):
     """The server hears of both before it has answered the first."""
-    page = visit()
     contact, _, _ = chain(page)
     for _ in range(5):
         page.locator(".scene").evaluate(
@@ -297,7 +290,7 @@ def test_a_link_holds_what_was_pulled(visit):
     page = visit()
     pulled(page)
     page.mouse.up()
-    page.wait_for_function("() => location.search.includes('pulls=')")
+    searched(page, "pulls=")
     until(page, "scene.hand.player.replay.held.pull !== undefined")
     again = visit(page.evaluate("location.search"))
     until(again, "scene.hand.player.replay.held !== null")
@@ -314,8 +307,7 @@ def moves_the_view(page, x, y):
     assert scene(page, "scene.view.x") < before and scene(page, "!scene.hand.active")
 
 
-def test_a_drag_beside_the_chains_moves_the_view(visit):
-    page = visit()
+def test_a_drag_beside_the_chains_moves_the_view(page):
     x, y = page.locator(".scene").evaluate(
         """e => {
             const box = e.getBoundingClientRect(), {scene} = e, side = scene.size
@@ -328,8 +320,7 @@ def test_a_drag_beside_the_chains_moves_the_view(visit):
     moves_the_view(page, x, y)
 
 
-def test_a_drag_moves_the_view_where_every_point_lies_near_a_chain(visit):
-    page = visit()
+def test_a_drag_moves_the_view_where_every_point_lies_near_a_chain(page):
     scene(page, "scene.view.half *= 40, scene.changed()")  # as small as disks are in a crowd
     _, x, y = chain(page)
     moves_the_view(page, x, y)
@@ -358,12 +349,11 @@ def test_a_finger_pulls_the_selected_contact(visit):
         touch("touchMove", (x, y - 2 * k))
     until(page, f"scene.mixed.normal[{contact}] > {before[contact] + 1e-3}")
     touch("touchEnd")
-    page.wait_for_function("() => location.search.includes('pulls=')")
+    searched(page, "pulls=")
 
 
-def test_a_grip_without_a_pull_leaves_what_is_told(visit):
+def test_a_grip_without_a_pull_leaves_what_is_told(page):
     """Let go before its rail is there, a contact is only selected."""
-    page = visit()
     before = page.locator(".said").inner_text()
     told = page.locator(".scene").evaluate(
         """(e, contact) => {
@@ -378,13 +368,12 @@ def test_a_grip_without_a_pull_leaves_what_is_told(visit):
     assert "Finding" in told and page.locator(".said").inner_text() == before
 
 
-def test_playing_on_lets_go(visit):
-    page = visit()
+def test_playing_on_lets_go(page):
     pulled(page)
     page.mouse.up()
-    page.wait_for_function("() => location.search.includes('pulls=')")
+    searched(page, "pulls=")
     page.locator("button.step").click()
-    page.wait_for_function("() => !location.search.includes('pulls=')")
+    no_more(page, "pulls=")
     until(page, "scene.hand.player.replay.held === null")
     frames = np.array(scene(page, "Array.from(scene.geometry.normal)")).reshape(KEPT + 1, -1)
     np.testing.assert_allclose(normal(page), frames[1], atol=1e-6)
@@ -406,8 +395,7 @@ def dot(page, contact):
     )
 
 
-def test_a_dot_of_the_intervals_is_dragged_along_its_bar(visit):
-    page = visit()
+def test_a_dot_of_the_intervals_is_dragged_along_its_bar(page):
     page.wait_for_function(f"() => {MODEL}('bars')?.get_column('at').length > 0")
     laid_out(page, "bars_figure")
     contact = column(page, "bars", "at")[-1]
@@ -423,11 +411,10 @@ def test_a_dot_of_the_intervals_is_dragged_along_its_bar(visit):
     if scene(page, "scene.hand.value") > low + 1e-3:  # the dot is where the hand is
         assert dot(page, contact)[1] == pytest.approx(y + 15, abs=3)
     page.mouse.up()
-    page.wait_for_function("() => location.search.includes('pulls=')")
+    searched(page, "pulls=")
 
 
-def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(visit):
-    page = visit()
+def test_while_it_plays_bokeh_draws_nothing_and_at_rest_the_same_is_drawn(page):
     laid_out(page, "bars_figure")
     drawn = f"{MODEL}('bars_figure').renderers.map(r => r.visible)"
     visible = page.evaluate(f"() => JSON.stringify({drawn})")
@@ -490,15 +477,18 @@ def test_packing_force_space_and_intervals_side_by_side_on_a_wide_screen(visit):
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
 
 
-@pytest.mark.parametrize("width, height", [(1280, 800), (1440, 900), (1536, 864), (1700, 900)])
-def test_the_tabs_are_beside_a_packing_that_the_window_holds(visit, width, height):
-    page = visit("", width, height)
+@pytest.mark.parametrize("sizes", [[(1280, 800), (1536, 864)], [(1700, 900), (1440, 900)]])
+def test_the_tabs_are_beside_a_packing_that_the_window_holds(visit, sizes):
+    """One that it was opened with, and one that it is given."""
+    page = visit("", *sizes[0])
     first, last = (page.get_by_role("tab", name=name) for name in ("How far?", "Export"))
-    last.wait_for()
-    packing = page.locator(".scene").first.bounding_box()
-    assert first.bounding_box()["x"] > packing["x"] + 0.9 * packing["width"]
-    assert inside(page, ".scene") and last.bounding_box()["y"] < 0.4 * height
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for width, height in sizes:
+        page.set_viewport_size({"width": width, "height": height})
+        last.wait_for()
+        packing = at_rest(page.locator(".scene").first)
+        assert first.bounding_box()["x"] > packing["x"] + 0.9 * packing["width"]
+        assert inside(page, ".scene") and last.bounding_box()["y"] < 0.4 * height
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 @pytest.mark.parametrize("width", [700, 1024, 1170])

@@ -2,15 +2,16 @@
 
 import pytest
 from small_store import DISKS
+from visitor import wait_for
 
-from app import mine, names
+from app import mine, names, uploads
 from app.selection import select
 from app.views.mine import Mine
 from granforce.records import InputError
 
 
 @pytest.fixture
-def computed(state, wait_for):
+def computed(state):
     """A page with two computations of one packing in its cache."""
     for states in (3, 4):
         state.ask(select(DISKS, 0.3, 2, states=states), at_once=True)
@@ -18,7 +19,7 @@ def computed(state, wait_for):
     return state
 
 
-def test_computations_are_listed_named_opened_and_deleted(computed, wait_for):
+def test_computations_are_listed_named_opened_and_deleted(computed):
     state, view = computed, Mine(computed)
     wait_for(state)
     newest, older = sorted(view.rows, key=lambda row: "3 states" in row["what"])
@@ -41,7 +42,7 @@ def test_computations_are_listed_named_opened_and_deleted(computed, wait_for):
     assert state.replay is not None and state.work.message == ""  # what is on screen stays there
 
 
-def test_what_is_not_in_the_list_is_left_alone(computed, wait_for):
+def test_what_is_not_in_the_list_is_left_alone(computed):
     state, view = computed, Mine(computed)
     wait_for(state)
     before = sorted(state.library.own)
@@ -55,9 +56,7 @@ def test_what_is_not_in_the_list_is_left_alone(computed, wait_for):
         mine.delete(state.library, packing)
 
 
-def test_an_upload_is_called_by_its_files(state, wait_for):
-    from app import uploads
-
+def test_an_upload_is_called_by_its_files(state):
     packing = state.library.packing(state.cell.params["packing"])
     brought = uploads.keep(state.library, packing, "NPZ archive: heap.npz")
     task = state.work.task()

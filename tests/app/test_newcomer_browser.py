@@ -1,14 +1,22 @@
 """What somebody stumbled over who saw the page for the first time, one test each."""
 
 import pytest
-from serving import MODEL, how_it_is_made, more, painted, picture, scene
+from serving import (
+    MODEL,
+    ask,
+    how_it_is_made,
+    more,
+    painted,
+    picture,
+    scene,
+    searched,
+    shows,
+    until,
+)
 
 from granforce.glossary import TERMS
 
-# Pictures to be looked at; ignored by git.
 AT = "?mu=0.1&n=30&states=30&relax=nearest"
-
-pytestmark = pytest.mark.browser
 
 # Whether an element lies over no text of the page's main part.
 COVERS = """(found) => {
@@ -18,12 +26,6 @@ COVERS = """(found) => {
     const main = all(document).find((e) => e.matches(".main-content")).getBoundingClientRect()
     return box.height > 0 && box.bottom > main.top && box.top < main.bottom
 }"""
-
-
-def shows(page, mu):
-    """Wait until the packing at μ is on screen."""
-    handle = page.locator(".scene").element_handle()
-    page.wait_for_function(f"e => e.scene.geometry.mu === {mu}", arg=handle)
 
 
 def computing(page):
@@ -69,8 +71,7 @@ def test_the_explanation_stays_open_when_another_packing_comes(visit):
     why = page.locator("details[open] p").first
     why.wait_for()
     before = why.inner_text()
-    page.locator("input.typed").fill("1")
-    page.locator("input.typed").press("Enter")
+    ask(page, 1)
     shows(page, 1)
     page.wait_for_function("([e, text]) => e.isConnected ? e.innerText !== text : true",
         arg=[why.element_handle(), before])  # fmt: skip
@@ -146,8 +147,7 @@ def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height)
     card = page.get_by_role("dialog").bounding_box()
     assert ring(page)[3] <= card["y"] or ring(page)[0] >= card["x"] + card["width"]
     picture(page, f"newcomer/tour-5-{width}")
-    page.locator("input.typed").fill("1")  # what the step asks for can be done at once
-    page.locator("input.typed").press("Enter")
+    ask(page, 1)  # what the step asks for can be done at once
     shows(page, 1)
     page.get_by_role("dialog").get_by_role("button", name="Close").click()
     page.locator(".ring").wait_for(state="hidden")
@@ -156,22 +156,21 @@ def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height)
 # 8: words are explained where they stand
 
 
-@pytest.mark.parametrize(
-    "where, term",
-    [
+def test_words_that_were_not_understood_are_explained(visit):
+    page = visit(AT + "&frame=5")
+    more(page)
+    page.get_by_text("In numbers").click()
+    tip = page.get_by_role("tooltip").filter(visible=True)
+    for where, term in (
         (".skips", "segment"),
         (".rest .term", "rattler"),
         (".tile[data-term=eta3]", "eta3"),
         (".read [data-term=eta3]", "eta3"),
-    ],
-)
-def test_words_that_were_not_understood_are_explained(visit, where, term):
-    page = visit(AT + "&frame=5")
-    more(page)
-    page.get_by_text("In numbers").click()
-    page.locator(where).first.hover()
-    tip = page.get_by_role("tooltip").filter(visible=True)
-    tip.get_by_text(TERMS[term].sentence).wait_for()
+    ):
+        page.locator(where).first.hover()
+        tip.get_by_text(TERMS[term].sentence).wait_for()
+        page.mouse.move(5, 5)
+        tip.wait_for(state="hidden")
 
 
 # 9: colour and width by what was measured
@@ -182,9 +181,8 @@ def test_what_is_known_colours_the_chains_and_goes_into_pictures(visit):
     value = scene(page, "scene.mixed.normal[4]")
     link = f"{AT}&known=4:{value:.6f}~9:{scene(page, 'scene.mixed.normal[9]'):.6f}:0.05"
     page = visit(link + "&colour=known&thickness=known&tab=export")
-    handle = page.locator(".scene").element_handle()
-    page.wait_for_function("e => e.scene.style.width.some((w) => w > 0)", arg=handle)
-    page.wait_for_function("e => e.scene.style.bin[4] === 32", arg=handle)  # held: all of it
+    until(page, "scene.style.width.some((w) => w > 0)")
+    until(page, "scene.style.bin[4] === 32")  # held: all of it
     page.get_by_text("colour: what is known").wait_for()
     picture(page, "newcomer/known")
     text = scene(
@@ -205,13 +203,11 @@ def test_what_is_known_colours_the_chains_and_goes_into_pictures(visit):
 
 def test_embedded_there_is_the_packing_with_its_player_alone(opening):
     page = opening(f"{AT}&embed=1", 600, 700)
-    painted(page, 60_000)
+    painted(page)
     page.get_by_text("width: normal force").wait_for()
     assert page.locator(".header, [role=tab]").filter(visible=True).count() == 0
     page.locator("button.step").click()
-    page.wait_for_function(
-        "e => e.scene.hand.player.replay.frame === 1", arg=page.locator(".scene").element_handle()
-    )
+    until(page, "scene.hand.player.replay.frame === 1")
     picture(page, "newcomer/embedded")
 
 
@@ -235,14 +231,9 @@ def test_contacts_are_chosen_by_keyboard_and_found_in_a_table(visit):
     rows.first.focus()
     page.keyboard.press("ArrowDown")
     second = int(rows.nth(1).get_attribute("data-contact"))
-    page.wait_for_function(
-        f"e => e.scene.selected === {second}", arg=page.locator(".scene").element_handle()
-    )
+    until(page, f"scene.selected === {second}")
     page.get_by_text("All contacts as a table").click()
-    page.wait_for_function(
-        "e => e.scene.hand.player.look.only === null",
-        arg=page.locator(".scene").element_handle(),
-    )
+    until(page, "scene.hand.player.look.only === null")
 
 
 def test_the_difference_of_two_networks_is_spotted(visit):
@@ -273,11 +264,11 @@ def test_questions_are_asked_before_the_page_shows_the_answers(visit):
     scene(page, f"scene.onSelect({order[4]})")
     told.get_by_text(f"place 5 of {len(order)}").wait_for()
     assert scene(page, "scene.selected") == order[0]
-    page.wait_for_function("() => /colour=extent/.test(location.search)")  # told to the page, too
+    searched(page, "colour=extent")  # told to the page, too
     told.get_by_role("button", name="Next question").click()
     told.get_by_role("button", name="More at first, then less").click()
     told.get_by_text("Well predicted").wait_for()
-    page.wait_for_function("() => /tab=statistics/.test(location.search)")
+    searched(page, "tab=statistics")
     told.get_by_role("button", name="Done").click()
     told.wait_for(state="hidden")
     more(page).get_by_role("button", name="Predict, then look").click()

@@ -2,7 +2,6 @@
 
 import io
 import json
-import time
 
 import numpy as np
 import pytest
@@ -15,16 +14,21 @@ from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
 from PIL import Image
 from small_store import KEPT, STATES
-from visitor import drop, press
+from visitor import drop, press, wait_for
 
 import granforce as gf
 from app import distributions, exports, movies, perturbations, planes, standalone, studied, uploads
 from app.limits import Limits
+from app.views import export as export_view
 from app.views import labels
+from app.views import perturb as perturb_view
 from app.views import plane as plane_view
+from app.views import statistics as statistics_view
 from app.views import studied as drawn_study
+from app.views import upload as upload_view
 from app.views.controls import Controls
 from app.views.dropper import Dropper
+from app.views.messages import TO_BROWSER, listed
 from app.views.style import palettes
 from granforce import measures
 from granforce.measures import statistics
@@ -33,22 +37,6 @@ from granforce.study import cells as study
 from granforce.study import kinds
 
 LAMMPS = REFERENCE.parent / "lammps"
-
-
-def opened(state, seconds=240):
-    """The state once its first picture is there."""
-    return settled(state, seconds, lambda: state.replay is not None)
-
-
-def settled(state, seconds=240, done=lambda: True):
-    """Poll as the page does until no task runs; the first ones compile all kernels."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        state.work.poll()
-        if not any(task.running for task in state.work.tasks) and done():
-            return state
-        time.sleep(0.02)
-    raise AssertionError("a task did not end")
 
 
 def npz(packing):
@@ -80,7 +68,7 @@ def dumps():
 
 
 def test_the_path_is_where_the_states_lie_in_the_plane(state):
-    replay = opened(state).replay
+    replay = state.replay
     plane = planes.components(replay, (3, 0), (5, 1))
     np.testing.assert_array_equal(plane.path[:, 0], replay.normal[:, 3])
     np.testing.assert_array_equal(plane.path[:, 1], replay.tangential[:, 5])
@@ -93,15 +81,12 @@ def test_the_path_is_where_the_states_lie_in_the_plane(state):
 
 
 def test_the_outline_holds_the_path_and_is_kept(state):
-    from app.views.plane import View
-
-    opened(state)
     state.looks.axes = "principal"
-    view = View(state)
+    view = plane_view.View(state)
     assert not view.path.data["x"] and not view.task.running  # hidden: nothing is computed
     state.looks.tab = view.name
     assert view.placing.running
-    settled(state)
+    wait_for(state)
     assert len(view.path.data["x"]) == KEPT + 1
     corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
     path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
@@ -112,38 +97,32 @@ def test_the_outline_holds_the_path_and_is_kept(state):
 
 
 def test_one_contact_is_seen_in_its_cone(state):
-    from app.views.plane import View
-
-    opened(state)
     state.looks.contact = 4
-    view = View(state)
+    view = plane_view.View(state)
     view.planes.value = "contact"
     state.looks.tab = view.name
-    settled(state)
+    wait_for(state)
     normal, tangential = np.array(view.outer.data["x"]), np.array(view.outer.data["y"])
     assert np.all(np.abs(tangential) <= state.replay.summary["mu"] * normal + 1e-3)
     assert str(state.replay.backbone[4]) in view.figure.xaxis.axis_label
     assert len(view.cone.data["x"]) == 3
     before = normal
     state.looks.contact = 7
-    settled(state)
+    wait_for(state)
     assert not np.array_equal(before, view.outer.data["x"])
 
 
 def test_a_point_has_no_outline(state):
-    from app.views.plane import View
-
-    opened(state)
     state.choose(mu=0)
-    settled(state, done=lambda: state.cell.mu == 0)
+    wait_for(state, lambda: state.cell.mu == 0)
     state.looks.tab = "plane"
-    view = View(state)
-    settled(state)
+    view = plane_view.View(state)
+    wait_for(state)
     assert "one point" in view.told.object and not len(view.outer.data["x"])
 
 
 def test_planes_of_unknown_contacts_are_refused(state):
-    replay = opened(state).replay
+    replay = state.replay
     with pytest.raises(InputError, match="counted from 0"):
         planes.components(replay, (10**6, 0), (0, 0))
     with pytest.raises(InputError, match="different"):
@@ -191,16 +170,14 @@ def test_files_are_known_by_their_content(kind):
 @pytest.mark.parametrize("contacts", [False, True])
 def test_tables_of_tilted_boxes_are_read(state, contacts):
     """Sides and tilt are typed in one field."""
-    from app.views.upload import View
-
     packing = skewed(packed(30, 0.3))[0]
-    view = View(opened(state))
+    view = upload_view.View(state)
     view.files = {"grains": ("g.txt", table(packing))}
     if contacts:
         view.files["joined"] = ("c.txt", table(packing, contacts=True))
     view.box.value = ", ".join(map(repr, [*packing.box.tolist(), packing.tilt]))
     press(view.read)
-    settled(state, done=lambda: state.selection.imported or view.error.visible)
+    wait_for(state, lambda: state.selection.imported or view.error.visible)
     read = state.library.packing(state.selection.packing)
     assert read.tilt == packing.tilt and len(read.contacts.i) >= len(packing.contacts.i)
     for wrong, message in (
@@ -263,10 +240,7 @@ def test_sizes_are_limited():
 
 
 def test_an_upload_is_kept_reported_and_shown(state):
-    from app.views.upload import View
-
-    opened(state)
-    view = View(state)
+    view = upload_view.View(state)
     both = dumps()
     drop(view.dropper, [("a", both["particles"][1])])
     assert view.waiting.visible and "dump of the contacts" in view.waiting.title
@@ -274,26 +248,22 @@ def test_an_upload_is_kept_reported_and_shown(state):
     pieces = both["contacts"][1][:middle], both["contacts"][1][middle:]
     drop(view.dropper, [("<b>c", piece) for piece in pieces])
     assert view.task.running and not view.waiting.visible
-    settled(state, 120, lambda: state.cell is not None and state.cell.selection.imported)
+    wait_for(state, lambda: state.cell is not None and state.cell.selection.imported)
     assert "604" in view.report.object and "&lt;b&gt;c" in view.report.object
     assert state.replay.summary["contacts"] == 604 and state.work.message == ""
 
 
 def test_a_refused_upload_changes_nothing(state):
-    from app.views.upload import View
-
-    before = opened(state).replay
-    view = View(state)
+    before = state.replay
+    view = upload_view.View(state)
     drop(view.dropper, [("p.npz", npz(packed(30, 0.3))[:-80])])
-    settled(state)
+    wait_for(state)
     assert view.error.visible and "NPZ archive" in view.error.title
     assert state.replay is before and not state.library.cache.find("packing")
 
 
 def test_more_than_allowed_is_not_collected(state):
-    from app.views.upload import View
-
-    view = View(opened(state))
+    view = upload_view.View(state)
     view.dropper.most = 1000
     view.dropper.hear({"begin": True})
     for _ in range(50):
@@ -312,9 +282,7 @@ def test_more_than_allowed_is_not_collected(state):
     ],
 )
 def test_a_drop_of_nothing_but_names_is_not_collected(state, pieces, word):
-    from app.views.upload import View
-
-    view = View(opened(state))
+    view = upload_view.View(state)
     view.dropper.hear({"begin": True})
     for piece in pieces:
         view.dropper.hear(piece)
@@ -333,7 +301,6 @@ def test_empty_pieces_take_no_memory():
 
 
 def test_rows_are_those_of_the_study_and_unlike_cells_stay_out(state):
-    opened(state)
     cells = distributions.alike(state.catalogue, state.cell)
     assert [cell.mu for cell in cells] == [0, 0.1, 1]
     found = distributions.rows(cells)
@@ -351,10 +318,10 @@ def test_rows_are_those_of_the_study_and_unlike_cells_stay_out(state):
 
 
 def test_exact_rows_come_from_kept_intervals(state):
-    cell = opened(state).cell
+    cell = state.cell
     assert distributions.exact_rows(state.library, [cell]) == []
     state.compute_exact()
-    settled(state, done=lambda: state.exact is not None)
+    wait_for(state, lambda: state.exact is not None)
     (row,) = distributions.exact_rows(state.library, [cell])
     assert row["eta3"] == state.exact["eta3"].item() > distributions.rows([cell])[0]["eta3"]
 
@@ -369,14 +336,11 @@ def test_groups_spread_over_mu_and_hold_the_one_on_screen():
 @pytest.mark.parametrize("what", ["eta", "extent", "correlation", "scatter", "force"])
 @pytest.mark.parametrize("scale", ["linear", "log"])
 def test_every_statistic_is_drawn_from_the_data(state, what, scale):
-    from app.views.statistics import View
-
-    opened(state)
-    view = View(state)
+    view = statistics_view.View(state)
     view.what.value, view.scale.value = what, scale
     assert not view.plots.objects and not view.task.running
     state.looks.tab = view.name
-    settled(state)
+    wait_for(state)
     figures = [pane.object for pane in [*view.plots.select(Bokeh), *view.more.select(Bokeh)]]
     assert len(figures) == (4 if what == "eta" else 1)
     columns = [r.data_source.data for fig in figures for r in fig.renderers]
@@ -396,12 +360,9 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
 
 
 def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
-    from app.views.statistics import View
-
-    opened(state)
     state.looks.tab = "statistics"
-    view = View(state)
-    settled(state)
+    view = statistics_view.View(state)
+    wait_for(state)
     fig = view.plots.objects[0].object
     means = statistics.means(studied.rows("walk"), "eta1")
     most = max(means, key=lambda point: point[1])
@@ -413,7 +374,7 @@ def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
     assert fig.legend[0].items[-1].label.value == "this packing"
     points = line.data_source
     points.selected.indices = [list(points.data["x"]).index(1)]
-    settled(state)
+    wait_for(state)
     assert state.cell.mu == 1 and not state.missing  # the store has it
     points.selected.indices = [list(points.data["x"]).index(0.3)]
     assert state.selection.mu == 0.3 and state.work.computation.running
@@ -421,10 +382,7 @@ def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
 
 
 def test_a_tap_on_a_point_selects_its_contact(state):
-    from app.views.statistics import View
-
-    opened(state)
-    view = View(state)
+    view = statistics_view.View(state)
     view.what.value = "scatter"
     state.looks.tab = view.name
     fig = view.plots.objects[0].object
@@ -433,24 +391,21 @@ def test_a_tap_on_a_point_selects_its_contact(state):
 
 
 def test_a_tap_on_a_mu_shows_its_states(state):
-    from app.views.statistics import View
-
-    opened(state)
-    view = View(state)
+    view = statistics_view.View(state)
     state.looks.tab = view.name
-    settled(state)
+    wait_for(state)
     fig = view.plots.objects[0].object
     source = next(r.data_source for r in fig.renderers if r.glyph.__class__.__name__ == "Scatter")
     mus = list(next(iter(source.data.values())))
     source.selected.indices = [mus.index(1)]
-    settled(state, done=lambda: state.cell.mu == 1)
+    wait_for(state, lambda: state.cell.mu == 1)
 
 
 # Export
 
 
 def test_a_movie_keeps_the_colours_that_its_first_network_has_not(state):
-    replay = opened(state).replay
+    replay = state.replay
     view = {"colour": "change", "thickness": "normal", "reference": 0, "dark": False}
     look = movies.shades(replay, {}, palettes(False), most=1.0, full=1e-3, **view)
     told = {"ink": "#000000", "bar": {"low": "less", "high": "more"}, "lines": ["width", "from"]}
@@ -464,9 +419,9 @@ def test_a_movie_keeps_the_colours_that_its_first_network_has_not(state):
 
 
 def test_the_table_of_contacts_holds_what_is_on_screen(state):
-    replay = opened(state).replay
+    replay = state.replay
     state.compute_exact()
-    settled(state, done=lambda: state.exact is not None)
+    wait_for(state, lambda: state.exact is not None)
     table = exports.csv(exports.contacts(replay, state.exact, 3)).decode().splitlines()
     names = table[0].split(",")
     rows = np.array([line.split(",") for line in table[1:]], dtype=float)
@@ -484,7 +439,6 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
 
 @pytest.mark.parametrize("kind", ["netcdf", "zarr"])
 def test_datasets_come_back_with_packing_states_and_units(state, tmp_path, kind):
-    opened(state)
     states = state.library.dataset(state.cell)
     packing = state.library.packing(state.cell.params["packing"])
     whole = exports.dataset(packing, states)
@@ -502,14 +456,13 @@ def test_datasets_come_back_with_packing_states_and_units(state, tmp_path, kind)
 
 
 def test_the_packing_comes_back_to_the_last_bit(state):
-    packing = state.library.packing(opened(state).cell.params["packing"])
+    packing = state.library.packing(state.cell.params["packing"])
     again = gf.load_packing(io.BytesIO(exports.npz(packing)))
     np.testing.assert_array_equal(again.x, packing.x)
     np.testing.assert_array_equal(again.forces, packing.forces)
 
 
 def test_parameters_name_what_is_on_screen(state):
-    opened(state)
     told = json.loads(exports.parameters(state.cell, state.link(), {"frame": 0}))
     assert told["kind"] == "walk" and told["command"].startswith("granforce walk -n 30")
     found = state.library.find("walk", told["parameters"])
@@ -517,16 +470,13 @@ def test_parameters_name_what_is_on_screen(state):
 
 
 def test_every_button_hands_a_file_over(state):
-    from app.views.export import View
-    from app.views.messages import TO_BROWSER, listed
-
-    view = View(opened(state))
+    view = export_view.View(state)
     keys = [key for group in view.buttons.files.values() for key in group]
     for key in keys:
         handed = []
         view.buttons.tell = handed.append
         view.buttons.hear({"key": key})
-        settled(state)
+        wait_for(state)
         assert all(listed(TO_BROWSER, "Handover", given) for given in handed), key
         (file,) = (given for given in handed if "name" in given)
         assert "/" not in file["name"], key
@@ -536,9 +486,7 @@ def test_every_button_hands_a_file_over(state):
 
 
 def test_unknown_keys_are_ignored(state):
-    from app.views.export import View
-
-    view = View(opened(state))
+    view = export_view.View(state)
     view.buttons.hear({"key": "../secret"})
     assert not view.task.running
 
@@ -547,18 +495,15 @@ def test_unknown_keys_are_ignored(state):
 
 
 def test_a_pushed_contact_gives_way_between_its_bounds(state):
-    from app.views.perturb import View
-
-    opened(state)
     state.looks.tab = "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     assert view.strongest.visible and view.push.disabled and view.guess.disabled
     assert "Click a line" in view.lead.object and "<svg" in view.lead.object
     assert view.lead.object.count("<circle") == 8  # two that are pushed, and those around them
     press(view.strongest)
     assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and not view.push.disabled
     press(view.push)
-    settled(state, done=lambda: view.pushed is not None)
+    wait_for(state, lambda: view.pushed is not None)
     pushed = view.pushed[0]
     assert 0 < pushed.low <= pushed.high <= pushed.limit + 0.02
     backbone = int((state.replay.disks.contacts[~state.replay.disks.image] > 0).sum())
@@ -572,13 +517,10 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
 
 def pushed(state):
     """The view of a push on a contact, with its result."""
-    from app.views.perturb import View
-
-    opened(state)
     state.looks.contact, state.looks.tab = 3, "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     press(view.push)
-    settled(state, done=lambda: view.pushed is not None)
+    wait_for(state, lambda: view.pushed is not None)
     return view
 
 
@@ -602,27 +544,21 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     view.what.value = "all"
     assert not view.plots.objects
     press(view.push)
-    settled(state, done=lambda: view.loads is not None)
+    wait_for(state, lambda: view.loads is not None)
     assert view.loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
     view.plots.objects[0].object.renderers[0].data_source.selected.indices = [8]
     assert state.looks.contact == 8 and view.chosen.data["y"] == [view.loads.load[8]]
 
 
 def test_nothing_is_pushed_without_friction(state):
-    from app.views.perturb import View
-
-    opened(state)
     state.choose(mu=0)
-    settled(state, done=lambda: state.cell.mu == 0)
+    wait_for(state, lambda: state.cell.mu == 0)
     state.looks.contact, state.looks.tab = 3, "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     assert not view.push.visible and "isostatic" in view.lead.object
 
 
 def test_figure_2_takes_what_the_stores_hold(state):
-    from app.views.perturb import View
-
-    opened(state)
     library, cells = state.library, list(state.catalogue)
     assert perturbations.over_store(library, cells, state.cell) == []
     for cell in cells[1:]:
@@ -638,9 +574,9 @@ def test_figure_2_takes_what_the_stores_hold(state):
     assert all(0 < row["critical_force"] <= row["limit_load"] for row in found)
     assert {row["eta2"] for row in found} == {row["eta2"] for row in distributions.rows(cells[1:])}
     state.looks.tab = "perturb"
-    view = View(state)
+    view = perturb_view.View(state)
     view.what.value = "store"
-    settled(state)
+    wait_for(state)
     assert "like those on screen (2)" in view.told.object and len(view.plots.objects) == 2
     force = view.plots.objects[0].object
     drawn = [r.data_source.data for r in force.renderers]
@@ -673,7 +609,7 @@ def test_finished_results_say_where_they_have_states_and_where_there_are_none(st
     assert "none with μ = 0.3" not in controls.series.options
 
 
-def test_colours_and_widths_are_offered_once_there_is_what_they_show(state, wait_for):
+def test_colours_and_widths_are_offered_once_there_is_what_they_show(state):
     controls = Controls(state)
     assert not {"sign", "known"} & set(controls.colour.options.values())
     assert not {"difference", "known"} & set(controls.thickness.options.values())
@@ -730,7 +666,7 @@ def test_the_inner_half_of_an_outline_has_a_quarter_of_its_area():
     assert planes.inner_share(points[inside], corners[::-1]) == pytest.approx(0.25, abs=0.01)
 
 
-def test_walk_and_uniform_states_are_shown_together(state, wait_for):
+def test_walk_and_uniform_states_are_shown_together(state):
     state.looks.tab = "plane"
     view = plane_view.View(state)
     wait_for(state)
@@ -758,7 +694,6 @@ def test_walk_and_uniform_states_are_shown_together(state, wait_for):
 def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
     served = Document()
     served.js_on_event("document_ready", CustomJS(code="ofAnotherPage()"))
-    opened(state)
     view = state.view
     told = {"link": "", "command": "", "source": ""}
     with patch_curdoc(served):

@@ -9,44 +9,23 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from packings import REFERENCE, reference, skewed
-from serving import CLOSED, MANY, MODEL, bars_drawn, column, painted, scene, serve
-from small_store import DISKS, KEPT, ROOT
+from serving import (
+    CLOSED,
+    MODEL,
+    bars_drawn,
+    column,
+    picture,
+    scene,
+    searched,
+    serve,
+    until,
+)
+from small_store import DISKS, KEPT
 
 import granforce as gf
 
-# Pictures to be looked at; ignored by git.
-ARTEFACTS = ROOT / "artefacts" / "panels"
 LAMMPS = REFERENCE.parent / "lammps"
-PATIENCE = 60_000  # ms, on a busy machine
-
-pytestmark = pytest.mark.browser
-
-
-@pytest.fixture
-def visit(chromium, address, request):
-    """visit(query, width, height, slower): a page; at the end a picture, and no error was told."""
-    errors, pages = [], []
-
-    def visit(query, width=1280, height=1000, slower=1):
-        page = chromium.new_page(viewport={"width": width, "height": height})
-        session = page.context.new_cdp_session(page)
-        session.send("Emulation.setCPUThrottlingRate", {"rate": slower})
-        page.set_default_timeout(PATIENCE)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda told: told.type == "error" and errors.append(told.text))
-        page.goto(address + (query or MANY))
-        painted(page, PATIENCE)
-        pages.append(page)
-        return page
-
-    yield visit
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    for number, page in enumerate(pages):
-        page.keyboard.press("Escape")  # a sidebar above a narrow page
-        page.wait_for_timeout(300)
-        page.screenshot(path=ARTEFACTS / f"{request.node.name}-{number}.png", full_page=True)
-        page.close()
-    assert not [error for error in errors if "favicon" not in error]
+PATIENCE = 60  # s, on a busy machine
 
 
 def filled(page, source, least=3):
@@ -113,8 +92,13 @@ def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
     assert np.all(path.max(axis=0) <= outer.max(axis=0) + 1e-6)
 
 
+def slow(page):
+    """Have a page compute four times as slowly."""
+    page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": 4})
+
+
 def test_a_window_may_change_its_size_while_a_slow_browser_still_builds_the_page(visit):
-    page = visit("?tab=plane", 400, 2200, slower=4)
+    page = visit("?tab=plane", 400, 2200, prepare=slow)
     page.evaluate(
         """() => setInterval(() => {
             document.body.style.width = document.body.style.width === "396px" ? "398px" : "396px"
@@ -147,8 +131,7 @@ def test_statistics_are_drawn_one_after_another(visit):
         page.get_by_role("combobox", name="Question").select_option(what)
         page.get_by_text(text).wait_for()
         drawn(page)
-        ARTEFACTS.mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=ARTEFACTS / f"statistics-{what}.png")
+        picture(page, f"statistics-{what}")
     page.get_by_text("How was this computed?").click()
     page.get_by_text("by how much a contact's force scatters").wait_for()
 
@@ -163,21 +146,15 @@ def test_statistics_by_night_on_a_narrow_screen(visit):
 
 def test_a_contact_is_pushed_and_its_field_seen(visit):
     page = visit("?tab=perturb&contact=5")
-    before = page.locator(".scene").evaluate("element => element.scene.offset")
+    before = scene(page, "scene.offset")
     page.get_by_role("button", name="Push", exact=True).click()
     page.get_by_text("the packing gives way:").wait_for()
     assert before is None
-    page.wait_for_function(
-        "scene => Math.abs(scene.scene.offset?.amplitude) > 0.001",
-        arg=page.locator(".scene").element_handle(),
-    )
-    field = page.locator(".scene").evaluate("element => element.scene.offset.field.length")
-    assert field == 2 * DISKS
+    until(page, "Math.abs(scene.offset?.amplitude) > 0.001")
+    assert scene(page, "scene.offset.field.length") == 2 * DISKS
     drawn(page)
     page.get_by_label("animate the first motion").click()
-    page.wait_for_function(
-        "scene => scene.scene.offset === null", arg=page.locator(".scene").element_handle()
-    )
+    until(page, "scene.offset === null")
 
 
 def test_dumps_are_dropped_reported_and_shown(visit):
@@ -188,7 +165,7 @@ def test_dumps_are_dropped_reported_and_shown(visit):
     page.locator("input[type=file]").set_input_files(files[1:])
     page.get_by_text("dimension h of S").wait_for()
     page.locator(".source", has_text="lammps_n400").wait_for(state="attached")
-    page.wait_for_function("() => /packing=/.test(location.search)")
+    searched(page, "packing=")
 
 
 def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
@@ -198,9 +175,7 @@ def test_a_tilted_packing_is_seen_whole(visit, tmp_path):
     page = visit("?tab=upload")
     page.locator("input[type=file]").set_input_files(tmp_path / "tilted.npz")
     page.locator(".source", has_text="tilted").wait_for(state="attached")
-    page.wait_for_function(
-        "e => e.scene.geometry.tilt !== 0", arg=page.locator(".scene").element_handle()
-    )
+    until(page, "scene.geometry.tilt !== 0")
     page.get_by_text(f"tilted by {packing.tilt:.2f}".replace("-", "−")).first.wait_for(
         state="attached"
     )
@@ -327,22 +302,18 @@ def test_plots_are_saved_as_svg(visit, tmp_path, tab, number):
     assert path.suffix == ".svg" and len(list(svg.iter())) > 30
 
 
-def test_closed_pages_are_forgotten(chromium, shipped, tmp_path):
+def test_closed_pages_are_forgotten(visit, shipped, tmp_path):
     alive, setup = tmp_path / "alive", Path(__file__).with_name("alive.py")
     variables = {"GRANFORCE_DATA": str(shipped), "ALIVE": str(alive)}
 
     def wait_for(count):
-        end = time.monotonic() + PATIENCE / 1000
+        end = time.monotonic() + PATIENCE
         while not (alive.exists() and int(alive.read_text() or -1) in count):
             assert time.monotonic() < end, alive.read_text()
             time.sleep(0.1)
 
     with serve(tmp_path, "--setup", str(setup), *CLOSED, **variables) as (url, _):
-        pages = []
-        for _ in range(3):
-            pages.append(chromium.new_page())
-            pages[-1].goto(url + MANY)
-            painted(pages[-1], PATIENCE)
+        pages = [visit(at=url) for _ in range(3)]
         for tab in ("Friction", "Force space", "Push", "Your packing", "Export"):
             pages[0].get_by_role("tab", name=tab).click()
             pages[0].wait_for_timeout(500)

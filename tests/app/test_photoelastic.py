@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from frames import NEWTON, file, frame
-from test_panels import opened, settled
-from visitor import drop
+from frames import NEWTON, file, frame, solved
+from packing.test_solved import mat
+from visitor import drop, wait_for
 
 import granforce as gf
 from app import photoelastic, uploads
@@ -45,11 +45,10 @@ def dropped(state, new):
 
 
 def test_exact_measurements_are_taken_as_they_are(state):
-    opened(state)
     new, _ = files()
     view = dropped(state, new)
     assert view.task.running and view.reverse.visible and not view.pressure.visible
-    settled(state, done=lambda: len(view.frame) > 0)
+    wait_for(state, lambda: len(view.frame) > 0)
     player, *body = view.frame
     account, _, _, _, _, _, compared, stress, save = body
     assert not player.visible and "σₓₓ" in stress.object and save.files
@@ -60,8 +59,7 @@ def test_exact_measurements_are_taken_as_they_are(state):
         np.testing.assert_allclose(source.data["x"], source.data["y"], atol=1e-3)
 
 
-def test_missing_contacts_are_filled_in_and_told(state, wait_for):
-    opened(state)
+def test_missing_contacts_are_filled_in_and_told(state):
     new, truth = files(n=100, missing=0.1, noise=0.05)
     task, found = state.work.task(), []
     given = uploads.added({}, new)
@@ -87,18 +85,16 @@ def test_missing_contacts_are_filled_in_and_told(state, wait_for):
 
 
 def test_what_does_not_fit_is_one_clear_line(state):
-    opened(state)
     (positions, _), _ = files()
     other = ("adjacency.txt", b"2,3,13,0.001,0.01\n2,13,23,0.001,0.01\n")
     view = dropped(state, [positions, other])
-    settled(state, done=lambda: view.error.visible)
+    wait_for(state, lambda: view.error.visible)
     assert "no frame in common" in view.error.title and not len(view.frame)
 
 
-def test_it_can_be_cancelled(state, wait_for):
+def test_it_can_be_cancelled(state):
     import time
 
-    opened(state)
     new, _ = files(n=150, missing=0.1, noise=0.2)
     view = dropped(state, new)
     begin = time.monotonic()
@@ -110,10 +106,9 @@ def test_it_can_be_cancelled(state, wait_for):
 
 
 def test_the_picture_shows_measured_inferred_and_differences(state):
-    opened(state)
     new, _ = files(n=80, missing=0.2, noise=0.2)
     view = dropped(state, new)
-    settled(state, done=lambda: len(view.frame) > 0)
+    wait_for(state, lambda: len(view.frame) > 0)
     _, *body = view.frame
     choice, pictures = body[1], body[2]
     picture, seen = pictures[0].object, {}
@@ -167,7 +162,7 @@ def test_a_frame_is_opened_as_a_packing(state):
     frame = made(60, missing=0.1, noise=0.05)
     view = View(state)
     view.open(frame)
-    settled(state, done=lambda: state.replay is not None and state.selection.imported)
+    wait_for(state, lambda: state.replay is not None and state.selection.imported)
     S = ensemble(frame.packing)
     assert frame.packing.r.max() == 1  # as chains of the page are drawn for
     assert S.dimension == state.replay.summary["dimension"] > 0
@@ -215,28 +210,23 @@ def test_all_that_was_found_is_one_table():
 
 
 def test_frames_of_a_series_are_turned(state):
-    opened(state)
     both = [files(n=40, number=k, noise=0.05, seed=k)[0] for k in (3, 4)]
     joined = [(one[0], one[1] + b"\n" + two[1]) for one, two in zip(*both, strict=True)]
     view = dropped(state, joined)
-    settled(state, done=lambda: len(view.frame) > 0)
+    wait_for(state, lambda: len(view.frame) > 0)
     player, *body = view.frame
     assert player.visible and player.options == [3, 4] and player.value == 4
     assert "frame 4" in body[0].object
     player.value = 3
-    settled(state, done=lambda: "frame 3" in body[0].object)
+    wait_for(state, lambda: "frame 3" in body[0].object)
     assert "frame 3" in body[0].object
     player.value = 4  # known by now
     assert "frame 4" in body[0].object
 
 
 def test_a_frame_of_pegs_2_is_dropped_whole(state):
-    from frames import solved
-    from packing.test_solved import mat
-
-    opened(state)
     view = dropped(state, [("Step-0012_solved.mat", mat(solved(40)[0]).getvalue())])
     assert view.mu.visible and view.reverse.visible
-    settled(state, done=lambda: len(view.frame) > 0)
+    wait_for(state, lambda: len(view.frame) > 0)
     account = view.frame[1][0].object
     assert "frame 12" in account and "directions of" in account

@@ -4,10 +4,8 @@ from itertools import chain
 
 import pytest
 from frames import frame, write
-from serving import laid_out, scene
-from small_store import ROOT
+from serving import laid_out, picture, scene, until
 
-ARTEFACTS = ROOT / "artefacts" / "photoelastic"
 NUMBERS = 1, 2, 3
 # Widths in pixels of the pictures of the frame that the browser shows.
 PICTURES = """() => {
@@ -16,8 +14,6 @@ PICTURES = """() => {
     .filter(model => model.name === "photoelastic_network" && views_manager.find_one(model))
     .map(model => model.properties.inner_width.is_unset ? 0 : model.inner_width)
 }"""
-
-pytestmark = pytest.mark.browser
 
 
 def dropped(page, tmp_path, numbers=NUMBERS):
@@ -46,9 +42,8 @@ def test_pictures_are_seen_and_saved(visit, tmp_path, width):
             "return all.length === count && all.every(w => w > 100)}",
             arg=count,
         )
-        ARTEFACTS.mkdir(parents=True, exist_ok=True)
         page.get_by_role("button", name="Both").evaluate("e => e.scrollIntoView()")
-        page.screenshot(path=ARTEFACTS / f"{width}_{name.split()[0]}.png")
+        picture(page, f"photoelastic/{width}_{name.split()[0]}")
     # Nothing is wider than the page.
     wide = page.evaluate("() => document.scrollingElement.scrollWidth")
     assert wide <= width
@@ -77,10 +72,5 @@ def test_a_frame_is_opened_and_pulled_like_any_packing(visit, tmp_path):
     dropped(page, tmp_path, (1,))
     page.get_by_role("button", name="Open as a packing").click()
     page.get_by_text("coordination z").wait_for()
-    page.wait_for_function(
-        "e => e.scene.geometry.grain && new Set(e.scene.geometry.grain).size === 40",
-        arg=page.locator(".scene").element_handle(),
-    )
+    until(page, "scene.geometry.grain && new Set(scene.geometry.grain).size === 40")
     assert scene(page, "scene.painted") > 0
-    page.locator(".scene").scroll_into_view_if_needed()
-    page.screenshot(path=ARTEFACTS / "opened.png")

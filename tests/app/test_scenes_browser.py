@@ -1,21 +1,21 @@
 """Small scenes as a visitor has them in hand: S whole, pulled, cut by friction, and empty."""
 
-import signal
-
 import numpy as np
 import pytest
-from serving import free_port, painted, serve
-from small_store import ROOT
+from serving import painted, picture, searched
 
 import granforce as gf
 from app import scenes
 
-PATIENCE = 60_000  # ms, on a busy machine
-# Pictures to be looked at; ignored by git.
-ARTEFACTS = ROOT / "artefacts" / "scenes"
-WIDTHS = [(390, 844), (1024, 768), (1280, 800), (1440, 900), (1536, 864), (1920, 1080)]
-
-pytestmark = pytest.mark.browser
+# Scenes, and windows in which they are opened.
+FITTING = {
+    "groove": (390, 844),
+    "box": (1024, 768),
+    "leaning": (1280, 800),
+    "column": (1440, 900),
+    "pyramid": (1536, 864),
+    "solid": (1920, 1080),
+}
 
 
 @pytest.fixture
@@ -32,6 +32,11 @@ def look(opening):
 
 def desk(page):
     return page.locator(".desk")
+
+
+def choose(page, name):
+    """Choose a scene from the list."""
+    desk(page).get_by_role("combobox", name="Scene").select_option(name)
 
 
 def drawn(page):
@@ -51,15 +56,46 @@ def until(page, expression):
     )
 
 
-@pytest.mark.parametrize("width, height", WIDTHS)
-@pytest.mark.parametrize("name", ["groove", "box", "leaning", "column"])
-def test_scenes_fit_on_every_screen(look, name, width, height):
-    page = look(f"?scene={name}", width, height)
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert desk(page).locator("canvas.space").bounding_box()["width"] > 300
-    assert desk(page).locator(".count b").inner_text().endswith(("free number", "free numbers"))
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=ARTEFACTS / f"{name}-{width}.png")
+def says(page):
+    return desk(page).locator(".says").inner_text()
+
+
+def forces(page):
+    """The network on screen (contacts, 2)."""
+    return np.reshape(ask(page, "[...small.body.forces()]"), (-1, 2))
+
+
+def at(page, canvas, place):
+    """Where on the page a canvas has a place: an expression of its pixels."""
+    box, (x, y) = desk(page).locator(f"canvas.{canvas}").bounding_box(), ask(page, place)
+    return box["x"] + x, box["y"] + y
+
+
+def drag(page, start, *ways):
+    """Take what is there, and go so far from it, again and again; it is not let go."""
+    x, y = start
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for across, down in ways:
+        page.mouse.move(x + across, y + down, steps=5)
+
+
+# The point in S.
+POINT = "small.space.px(small.space.flat(small.body.u))"
+
+
+@pytest.mark.parametrize("first", FITTING)
+def test_scenes_fit_on_every_screen(look, first):
+    """Whichever is opened, and whatever is chosen from there."""
+    width, height = FITTING[first]
+    page = look(f"?scene={first}", width, height)
+    for name in dict.fromkeys((first, *FITTING)):
+        choose(page, name)
+        until(page, f"small.body.scene.name === '{name}'")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert desk(page).locator("canvas.space").bounding_box()["width"] > 300
+        assert desk(page).locator(".count b").inner_text().endswith(("free number", "free numbers"))
+        picture(page, f"scenes/{name}-{width}")
 
 
 def test_the_first_visit_goes_on_from_one_disk_over_thirteen_to_400(look):
@@ -71,7 +107,7 @@ def test_the_first_visit_goes_on_from_one_disk_over_thirteen_to_400(look):
         box = card.bounding_box()  # above what it speaks of, not over it
         assert box["y"] + box["height"] <= page.locator("canvas.packing").bounding_box()["y"]
         card.get_by_role("button", name="Next").click()
-    painted(page, PATIENCE)
+    painted(page)
     page.get_by_role("dialog").get_by_text("5 of 10").wait_for()
     page.get_by_role("dialog").get_by_role("button", name="Back").click()
     drawn(page)
@@ -113,7 +149,7 @@ def test_friction_is_changed_under_the_eye(look):
     slider = desk(page).get_by_role("slider", name="friction μ")
     slider.fill("0")
     until(page, "small.body.corners.length === 1")
-    assert "one point" in desk(page).locator(".says").inner_text()
+    assert "one point" in says(page)
     slider.fill("0.8")
     until(page, "small.body.corners.length === 2 && small.body.bounded")
     low, high = ask(page, "small.body.interval(0)")
@@ -121,41 +157,31 @@ def test_friction_is_changed_under_the_eye(look):
     assert high == pytest.approx(np.sqrt(0.5) / 0.2, abs=1e-9)
     slider.fill("1")
     until(page, "!small.body.bounded")
-    assert "no end" in desk(page).locator(".says").inner_text()
-    page.wait_for_function("() => location.search.includes('mu=1')")
+    assert "no end" in says(page)
+    searched(page, "mu=1")
 
 
 def test_the_point_is_dragged_and_the_forces_follow(look):
     page = look("?scene=box")
-    before = ask(page, "[...small.body.forces()]")
-    box = desk(page).locator("canvas.space").bounding_box()
-    x, y = ask(page, "small.space.px(small.space.flat(small.body.u))")
-    page.mouse.move(box["x"] + x, box["y"] + y)
-    page.mouse.down()
-    page.mouse.move(box["x"] + x + 60, box["y"] + y, steps=5)
-    after = np.array(ask(page, "[...small.body.forces()]"))
-    assert np.abs(after - before).max() > 0.1
-    page.mouse.move(box["x"] + x + 5000, box["y"] + y, steps=3)  # far outside: up to the side
+    before, (x, y) = forces(page), at(page, "space", POINT)
+    drag(page, (x, y), (60, 0))
+    assert np.abs(forces(page) - before).max() > 0.1
+    page.mouse.move(x + 5000, y, steps=3)  # far outside: up to the side
     page.mouse.up()
-    S = gf.ensemble(gf.scene("box"))
-    forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
-    assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-6
+    S, after = gf.ensemble(gf.scene("box")), forces(page)
+    assert S.residual(after) < 1e-9 and S.violation(after) < 1e-6
     page.keyboard.press("z")
-    np.testing.assert_allclose(ask(page, "[...small.body.forces()]"), before, atol=1e-9)
+    np.testing.assert_allclose(forces(page), before, atol=1e-9)
 
 
 def test_an_arrow_is_pulled_within_its_cone(look):
     page = look("?scene=groove&mu=0.5")
-    box = desk(page).locator("canvas.packing").bounding_box()
     tip = """(() => { const { arrows, body } = small, F = body.forces()
         const end = arrows.ends()[0], [x, y] = arrows.px(...end.at)
         const unit = arrows.unit * arrows.forceUnit
         const along = k => F[0] * end.inward[k] + F[1] * end.across[k]
         return [x + unit * along(0), y - unit * along(1)] })()"""
-    x, y = ask(page, tip)
-    page.mouse.move(box["x"] + x, box["y"] + y)
-    page.mouse.down()
-    page.mouse.move(box["x"] + x + 300, box["y"] + y - 10, steps=6)
+    drag(page, at(page, "packing", tip), (300, -10))
     page.mouse.up()
     assert ask(page, "small.body.forces()[0]") == pytest.approx(np.sqrt(2), abs=1e-6)
     assert "1.414" in desk(page).locator(".bars .value").first.inner_text()
@@ -164,10 +190,9 @@ def test_an_arrow_is_pulled_within_its_cone(look):
 def test_hover_lights_the_contact_and_keys_go_through_s(look):
     page = look("?scene=box")
     assert ask(page, "[...small.now.contacts]") == []
-    box = desk(page).locator("canvas.space").bounding_box()
     until(page, "small.space.labels.length === 5")
-    a, b = ask(page, "[small.space.labels[0].a, small.space.labels[0].b]")
-    page.mouse.move(box["x"] + (a[0] + b[0]) / 2, box["y"] + (a[1] + b[1]) / 2)
+    middle = "[0, 1].map(k => (small.space.labels[0].a[k] + small.space.labels[0].b[k]) / 2)"
+    page.mouse.move(*at(page, "space", middle))
     stops = "small.space.labels[0].side.stops.map(stop => stop[0])"
     until(page, f"[...small.now.contacts].join() === {stops}.join()")
     desk(page).locator("canvas.space").focus()
@@ -216,18 +241,16 @@ def test_the_first_gesture_is_pointed_out_until_it_was_made(look):
 def test_what_is_pointed_at_lights_up_everywhere(look):
     """The point: the forces it is read by; a bar: its contact; nothing else, and not for long."""
     page = look("?scene=box")
-    box = desk(page).locator("canvas.space").bounding_box()
     lit = "[...small.now.contacts, ...small.now.read].sort().join()"
-    x, y = ask(page, "small.space.px(small.space.flat(small.body.u))")
-    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.move(*at(page, "space", POINT))
     until(page, f"{lit} === [...small.space.read].sort().join()")
     rows = desk(page).locator(".bars > .lit")
     assert rows.count() == 2
-    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.move(*at(page, "space", "[5, 5]"))
     until(page, f"{lit} === ''")
     desk(page).locator(".bars > div").nth(2).hover()
     until(page, f"{lit} === '2'")
-    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.move(*at(page, "space", "[5, 5]"))
     until(page, f"{lit} === ''")
 
 
@@ -246,9 +269,8 @@ def test_the_walls_grip_the_disk_only_while_friction_points_down(look):
 
 def test_the_forces_on_a_disk_close(look):
     page = look("?scene=box")
-    box = desk(page).locator("canvas.packing").bounding_box()
-    x, y = ask(page, "small.arrows.px(small.body.scene.x[0], small.body.scene.x[1] + 0.8)")
-    page.mouse.move(box["x"] + x, box["y"] + y)
+    above = "small.arrows.px(small.body.scene.x[0], small.body.scene.x[1] + 0.8)"
+    page.mouse.move(*at(page, "packing", above))
     assert ask(page, "small.now.disk") == 0
     total = """[0, 1].map(k => small.arrows.ends().reduce((sum, end) => {
         if (end.disk !== 0) return sum
@@ -264,7 +286,7 @@ def test_what_falls_is_proved_by_a_motion(look):
     motion = np.reshape(ask(page, "[...small.now.fall]"), (-1, 3))
     packing = scenes.packing_of("pyramid", 0.2)
     np.testing.assert_allclose(motion, np.reshape(scenes.falling(packing), (-1, 3)), atol=1e-9)
-    assert "Nothing balances" in desk(page).locator(".says").inner_text()
+    assert "Nothing balances" in says(page)
     assert "free" not in desk(page).locator(".count b").inner_text()
     # Least μ of the pyramid: tan 15°, see tests of the scenes; the page offers the next hundredth.
     desk(page).get_by_role("button", name="Set μ = 0.27").click()
@@ -274,14 +296,12 @@ def test_what_falls_is_proved_by_a_motion(look):
 def test_a_push_shrinks_s_until_nothing_balances(look):
     page = look("?scene=pyramid")
     desk(page).get_by_role("button", name="Test push").click()
-    box = desk(page).locator("canvas.packing").bounding_box()
-    x, y = ask(page, "small.arrows.px(small.body.scene.x[4], small.body.scene.x[5] + 0.3)")
-    page.mouse.move(box["x"] + x, box["y"] + y)
-    page.mouse.down()
-    page.mouse.move(box["x"] + x + 4, box["y"] + y, steps=3)
+    top = "small.arrows.px(small.body.scene.x[4], small.body.scene.x[5] + 0.3)"
+    x, y = at(page, "packing", top)
+    drag(page, (x, y), (4, 0))
     assert not ask(page, "small.body.empty")
-    assert "limit load" in desk(page).locator(".says").inner_text()
-    page.mouse.move(box["x"] + x + 400, box["y"] + y, steps=3)
+    assert "limit load" in says(page)
+    page.mouse.move(x + 400, y, steps=3)
     until(page, "small.body.empty")
     page.mouse.up()
     desk(page).get_by_role("button", name="Test push").click()
@@ -291,11 +311,8 @@ def test_a_push_shrinks_s_until_nothing_balances(look):
 def test_six_disks_are_packed_and_their_body_turns(look):
     page = look("?scene=solid")
     assert ask(page, "small.body.h") == 3
-    box = desk(page).locator("canvas.space").bounding_box()
     view = ask(page, "small.space.view")
-    page.mouse.move(box["x"] + 20, box["y"] + 20)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 120, box["y"] + 60, steps=4)
+    drag(page, at(page, "space", "[20, 20]"), (100, 40))
     page.mouse.up()
     assert ask(page, "small.space.view") != view
     desk(page).get_by_role("button", name="Random points").click()
@@ -325,11 +342,11 @@ def test_a_periodic_scene_is_explained_and_its_numbers_are_clear_of_arrows(look)
 
 def test_another_scene_is_chosen_from_the_list(look):
     page = look()
-    desk(page).get_by_role("combobox", name="Scene").select_option("box")
+    choose(page, "box")
     until(page, "small.body.h === 2")
-    page.wait_for_function("() => location.search.includes('scene=box')")
-    desk(page).get_by_role("combobox", name="Scene").select_option("many")
-    painted(page, PATIENCE)
+    searched(page, "scene=box")
+    choose(page, "many")
+    painted(page)
     page.get_by_role("combobox", name="Scene").first.wait_for()
 
 
@@ -347,8 +364,7 @@ def test_a_column_has_a_shadow_and_exact_bounds(look):
     assert ask(page, "small.body.h") == 10
     until(page, "small.now.bounds")
     S = bounds_are_exact(page, "column", 1e-7)
-    forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
-    assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-9
+    assert S.residual(forces(page)) < 1e-9 and S.violation(forces(page)) < 1e-9
 
 
 def test_thirteen_disks_have_a_shadow_whose_two_forces_light_up(look):
@@ -356,20 +372,15 @@ def test_thirteen_disks_have_a_shadow_whose_two_forces_light_up(look):
     assert ask(page, "small.body.h") == 8
     until(page, "small.now.bounds && !small.space.outline.stale")
     S = bounds_are_exact(page, "thirteen", 1e-6)
-    box = desk(page).locator("canvas.space").bounding_box()
-    x, y = ask(page, "small.space.px(small.space.flat(small.body.u))")
-    page.mouse.move(box["x"] + x, box["y"] + y)
-    page.mouse.down()
-    page.mouse.move(box["x"] + x + 30, box["y"] + y - 20, steps=4)
+    drag(page, at(page, "space", POINT), (30, -20))
     page.mouse.up()
     assert ask(page, "small.now.read") == [0, 1] == ask(page, "small.space.read")
-    forces = np.array(ask(page, "[...small.body.forces()]")).reshape(-1, 2)
-    assert S.residual(forces) < 1e-9 and S.violation(forces) < 1e-6
+    assert S.residual(forces(page)) < 1e-9 and S.violation(forces(page)) < 1e-6
 
 
 def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
     page = look("?scene=column")
-    assert "a shadow of S" in desk(page).locator(".says").inner_text()
+    assert "a shadow of S" in says(page)
     desk(page).get_by_role("combobox", name="force shown upwards").select_option(
         "tangential force between 1 and 2"
     )
@@ -407,9 +418,9 @@ def test_what_has_no_end_is_not_filled_and_the_page_says_why(look, name, mu):
 
 def test_back_goes_to_the_scene_before(look):
     page = look("?scene=groove&mu=0.7")
-    desk(page).get_by_role("combobox", name="Scene").select_option("box")
+    choose(page, "box")
     until(page, "small.body.h === 2")
-    page.wait_for_function("() => location.search.includes('scene=box')")
+    searched(page, "scene=box")
     page.go_back()
     until(page, "small.body.scene.name === 'groove' && small.mu === 0.7")
     page.go_forward()
@@ -422,33 +433,15 @@ def test_400_disks_take_the_theme_and_the_friction_along_and_back(look):
     desk(page).get_by_role("textbox", name="μ").press("Enter")
     desk(page).get_by_role("textbox", name="μ").fill("1")
     desk(page).get_by_role("textbox", name="μ").press("Enter")
-    desk(page).get_by_role("combobox", name="Scene").select_option("many")
-    painted(page, PATIENCE)
-    page.wait_for_function("() => /mu=1&/.test(location.search) && /dark=1/.test(location.search)")
+    choose(page, "many")
+    painted(page)
+    searched(page, "mu=1&", "dark=1")
     page.get_by_role("combobox", name="Scene").first.select_option("box")
     drawn(page)
     until(page, "small.body.scene.name === 'box' && small.mu === 1")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(18, 18, 18)"
     page.go_back()
-    painted(page, PATIENCE)
-
-
-def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
-    port = free_port()
-    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)) as (url, server):
-        expected = ("WebSocket", "Failed to load resource", "not connected")
-        page = opening("?scene=groove", 1280, 800, at=url, wanted=expected)
-        drawn(page)
-        server.send_signal(signal.SIGKILL)
-        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
-        desk(page).get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
-        until(page, "Math.abs(small.body.interval(0)[1] - Math.SQRT1_2 / 0.2) < 1e-9")
-        page.wait_for_function("() => location.search.includes('mu=0.8')")
-        desk(page).get_by_role("combobox", name="Scene").select_option("box")
-    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)):
-        page.get_by_text("Connection lost").wait_for(state="detached")
-        drawn(page)
-        until(page, "small.body.scene.name === 'box'")
+    painted(page)
 
 
 def test_the_question_of_a_scene_is_answered_by_the_hand(look):
@@ -479,13 +472,11 @@ def test_a_finger_drags_the_point(look):
 def test_a_scene_is_built_by_hand_and_its_link_carries_it(look, tmp_path):
     page = look("?scene=own")
     until(page, "small.body.h === 2")
-    box = desk(page).locator("canvas.packing").bounding_box()
 
-    def at(x, y):
-        across, down = ask(page, f"small.arrows.px({x}, {y})")
-        return box["x"] + across, box["y"] + down
+    def place(x, y):
+        return at(page, "packing", f"small.arrows.px({x}, {y})")
 
-    page.mouse.click(*at(2.1, 2.8))  # near two disks: it snaps onto both
+    page.mouse.click(*place(2.1, 2.8))  # near two disks: it snaps onto both
     until(page, "small.body.h === 3 && small.body.count === 6")
     # The link follows once hands rest; before, it has the two disks that were there.
     disks = "new URLSearchParams(location.search).get('built')?.split('|')[0].split(';').length"
@@ -497,14 +488,14 @@ def test_a_scene_is_built_by_hand_and_its_link_carries_it(look, tmp_path):
     page.reload()
     drawn(page)
     until(page, "small.body.count === 6")
-    page.mouse.move(*at(2, 2.7))  # taken into the air, it falls
+    page.mouse.move(*place(2, 2.7))  # taken into the air, it falls
     page.mouse.down()
-    page.mouse.move(*at(5.5, 3.5), steps=6)
+    page.mouse.move(*place(5.5, 3.5), steps=6)
     page.mouse.up()
     until(page, "small.body.empty && small.now.fall")
-    assert "disk 3 gives way" in desk(page).locator(".says").inner_text()
+    assert "disk 3 gives way" in says(page)
     desk(page).get_by_role("radio", name="Remove").click()
-    page.mouse.click(*at(5.5, 3.5))
+    page.mouse.click(*place(5.5, 3.5))
     until(page, "small.body.h === 2 && !small.body.empty")
 
 
@@ -512,7 +503,7 @@ def test_a_scene_is_built_under_pressure_and_its_link_carries_it(look, tmp_path)
     page = look("?scene=own")
     desk(page).get_by_role("radio", name="Pressure").click()
     until(page, "small.body.scene.pressing.length === 1 && small.body.h === 1")
-    page.wait_for_function("() => location.search.includes('%7Cp1')")
+    searched(page, "%7Cp1")
     with page.expect_download() as file:
         desk(page).get_by_role("button", name="Download data").click()
     file.value.save_as(tmp_path / "own.npz")
@@ -526,12 +517,11 @@ def test_a_scene_is_built_under_pressure_and_its_link_carries_it(look, tmp_path)
     seen = np.array(ask(page, "small.body.scene.names.map((_, c) => small.body.interval(2 * c))"))
     np.testing.assert_allclose(seen, np.column_stack([low[:, 0], high[:, 0]]), atol=1e-7)
     desk(page).get_by_role("radio", name="Make a wall press").click()
-    box = desk(page).locator("canvas.packing").bounding_box()
-    across, down = ask(page, "small.arrows.px(0.6, 3.73)")
-    page.mouse.click(box["x"] + across, box["y"] + down)
+    wall = at(page, "packing", "small.arrows.px(0.6, 3.73)")
+    page.mouse.click(*wall)
     desk(page).get_by_text("Nothing presses on these disks yet").wait_for()
     assert "empty" not in desk(page).locator(".what").inner_text()  # of what is not certified
-    page.mouse.click(box["x"] + across, box["y"] + down)
+    page.mouse.click(*wall)
     until(page, "small.body.h === 1 && !small.body.empty")
     desk(page).get_by_role("slider", name="friction μ").fill("0.1")
     desk(page).get_by_text("the wall that presses give way").wait_for()
@@ -557,7 +547,7 @@ def test_a_scene_is_built_and_pushed_by_keyboard(look):
         page.keyboard.press("n")
     page.keyboard.press("ArrowRight")
     assert ask(page, "[small.pushed.disk, small.body.load[6]]") == [2, pytest.approx(0.02)]
-    assert "limit load" in desk(page).locator(".says").inner_text()
+    assert "limit load" in says(page)
     for _ in range(70):
         page.keyboard.press("ArrowRight")
     until(page, "small.body.empty")
@@ -566,14 +556,14 @@ def test_a_scene_is_built_and_pushed_by_keyboard(look):
 def test_a_disk_in_the_air_falls_and_a_wall_that_presses_on_no_disk_is_told(look):
     page = look("?scene=own&built=2,3,1%7C0,0,4,0")
     until(page, "small.body.empty && small.now.fall")
-    assert "disk 1 gives way" in desk(page).locator(".says").inner_text()
+    assert "disk 1 gives way" in says(page)
     page = look("?scene=own&built=2,1,1%7C0,0,4,0;0,4,4,4%7Cp1")
-    assert "presses on no disk" in desk(page).locator(".says").inner_text()
+    assert "presses on no disk" in says(page)
 
 
 def test_a_link_that_cannot_be_built_says_so_and_begins_anew(look):
     page = look("?scene=own&built=1,1,1;1.5,1,1%7C0,0,3,0")
-    assert "two disks overlap" in desk(page).locator(".says").inner_text()
+    assert "two disks overlap" in says(page)
     until(page, "small.body.h === 2 && !small.body.empty")
 
 
@@ -595,14 +585,18 @@ def test_the_lesson_has_three_questions_and_is_printed(look):
     assert page.frames[-1].locator("img").count() == 2  # the disk, and S
 
 
-@pytest.mark.parametrize("mu", [0.6, 0.414, 0.415])
-def test_where_s_has_no_end_the_page_says_the_same_as_the_library(look, mu):
-    page = look(f"?scene=box&mu={mu}")
-    body = gf.body(gf.ensemble(gf.scene("box", mu)))
-    assert ask(page, "small.body.bounded") == body.bounded
-    assert ask(page, "small.body.rays.length") == len(body.rays)
-    every = "small.body.scene.names.map((_, c) => small.body.interval(2 * c).map(String))"
-    seen = np.array(ask(page, every), dtype=str)
-    seen = np.char.replace(seen, "Infinity", "inf").astype(float)
-    expected = np.column_stack([side[:, 0] for side in body.intervals])
-    np.testing.assert_allclose(seen, expected, rtol=1e-6)
+def test_where_s_has_no_end_the_page_says_the_same_as_the_library(look):
+    page = look("?scene=box&mu=0.6")
+    typed = desk(page).get_by_role("textbox", name="μ")
+    for mu in (0.6, 0.414, 0.415):
+        typed.fill(str(mu))
+        typed.press("Enter")
+        until(page, f"small.body.mu === {mu}")
+        body = gf.body(gf.ensemble(gf.scene("box", mu)))
+        assert ask(page, "small.body.bounded") == body.bounded
+        assert ask(page, "small.body.rays.length") == len(body.rays)
+        every = "small.body.scene.names.map((_, c) => small.body.interval(2 * c).map(String))"
+        seen = np.array(ask(page, every), dtype=str)
+        seen = np.char.replace(seen, "Infinity", "inf").astype(float)
+        expected = np.column_stack([side[:, 0] for side in body.intervals])
+        np.testing.assert_allclose(seen, expected, rtol=1e-6)

@@ -2,8 +2,21 @@
 
 import numpy as np
 import pytest
-from serving import MODEL, bars_drawn, column, laid_out, more, scene
-from test_live_browser import ask, normal, pulled, until
+from serving import (
+    MODEL,
+    ask,
+    at_rest,
+    bars_drawn,
+    column,
+    laid_out,
+    more,
+    no_more,
+    scene,
+    searched,
+    shows,
+    until,
+)
+from test_live_browser import normal, pulled
 
 # The outermost element of force space that is ever made pale.
 VIEW_ABOVE = """(() => {
@@ -16,8 +29,6 @@ VIEW_ABOVE = """(() => {
     }
     return pale
 })()"""
-
-pytestmark = pytest.mark.browser
 
 
 def place(page, x, y):
@@ -40,7 +51,7 @@ def here(page):
 def ready(page):
     page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 4")
     laid_out(page, "path_figure")
-    page.wait_for_timeout(200)  # the axes take their place
+    at_rest(page.locator(".scene"))  # and so are the axes
     until(page, "scene.hand.player.plots.plane.xn?.length > 0")
 
 
@@ -51,7 +62,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     if "axes" in query:  # a chain first; in the plane of a pair it would become one of the two
         pulled(page)
         page.mouse.up()
-        page.wait_for_function("() => location.search.includes('pulls=')")
+        searched(page, "pulls=")
         until(page, "scene.hand.player.replay.held.pull !== undefined")
     before, start = normal(page), here(page)
     middle = [np.mean(column(page, "outer", name)) for name in "xy"]
@@ -155,7 +166,7 @@ def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
 def test_two_networks_side_by_side_with_one_player(visit):
     page = visit("?frame=3&reference=1")
     more(page).locator("button.split").click()
-    page.wait_for_function("() => location.search.includes('split=1')")
+    searched(page, "split=1")
     until(page, "scene.hand.player.split.twin.painted > 0 && scene.hand.player.split.on")
     boxes = [page.locator(f".{name}").bounding_box() for name in ("twin", "scene")]
     assert boxes[0]["width"] == pytest.approx(boxes[1]["width"], abs=1)
@@ -175,7 +186,7 @@ def test_two_networks_side_by_side_with_one_player(visit):
     until(page, "scene.hand.player.replay.frame === 4")
     assert scene(page, widths) == pinned
     more(page).locator("button.pin").click()
-    page.wait_for_function("() => location.search.includes('reference=4')")
+    searched(page, "reference=4")
     until(page, f"scene.hand.player.split.twin.style.width.some((v, k) => v !== {pinned}[k])")
     more(page).locator("button.split").click()
     until(page, "!scene.hand.player.split.on")
@@ -192,7 +203,7 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
     more(page).locator("button.split").click()
     until(page, f"scene.hand.player.split.on && {twin}.painted > 0")
     ask(page, "1")
-    page.wait_for_function("() => /split=1&beside=0.1/.test(location.search)")
+    searched(page, "split=1&beside=0.1")
     until(page, f"scene.geometry.mu === 1 && {twin}.geometry.mu === 0.1")
     query = page.evaluate("location.search")
     for at in (page, visit(query)):
@@ -221,7 +232,7 @@ def test_another_mu_comes_beside_the_packing_of_the_first(visit):
         assert scene(at, part.format(twin)) == pytest.approx(scene(at, part.format("scene")))
     # pinned, a state of this packing is beside it again
     more(page).locator("button.pin").click()
-    page.wait_for_function("() => !location.search.includes('beside')")
+    no_more(page, "beside")
     until(page, f"{twin}.geometry.mu === 1 && scene.hand.player.split.other === null")
     assert page.locator(".twin .caption").inner_text() == "pinned: network 1"
 
@@ -251,7 +262,7 @@ def test_a_new_mu_is_seen_to_jam_beside_the_old_one(visit):
         }"""
     )
     ask(page, "10")  # takes longest to jam
-    until(page, "scene.geometry.mu === 10")
+    shows(page, 10)
     seen = page.evaluate("beside")
     assert seen and all(on and mu == 0.1 and drawn > 20 for on, mu, drawn in seen)
     assert page.locator(".twin").is_visible()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_panels import opened, settled
+from visitor import wait_for
 
 import granforce as gf
 from app import planes
@@ -10,7 +10,7 @@ from app.views.plane import View
 
 
 def test_states_lie_in_the_plane_where_their_stress_says(state):
-    replay = opened(state).replay
+    replay = state.replay
     packing = state.library.packing(state.cell.params["packing"])
     S = gf.ensemble(packing, state.cell.mu)
     plane = planes.stress(state.library, state.cell.selection, replay)
@@ -22,11 +22,10 @@ def test_states_lie_in_the_plane_where_their_stress_says(state):
 
 
 def test_the_outline_of_stresses_holds_all_and_is_kept(state):
-    opened(state)
     view = View(state)
     view.planes.value = "stress"
     state.looks.tab = view.name
-    settled(state, done=lambda: "shear" in view.told.object)
+    wait_for(state, lambda: "shear" in view.told.object)
     corners = np.stack([view.outer.data["x"], view.outer.data["y"]], axis=1)
     path = np.stack([view.path.data["x"], view.path.data["y"]], axis=1)
     merged = np.concatenate([corners, path])
@@ -40,22 +39,21 @@ def test_the_outline_of_stresses_holds_all_and_is_kept(state):
 
 
 def test_the_point_is_pulled_among_stresses_and_keeps_what_is_held(state):
-    opened(state)
     view, told = View(state), []
     hand, state.hand.tell = state.hand, told.append
     view.planes.value = "stress"
     state.looks.tab = view.name
-    settled(state, done=lambda: "shear" in view.told.object)
+    wait_for(state, lambda: "shear" in view.told.object)
     value = float(state.replay.normal[0, 4])
     state.knowledge.hold(4, value)
-    settled(state)
+    wait_for(state)
     hand.heard({"point": True})
-    settled(state)
+    wait_for(state)
     fan = told[-1]["fan"]
     here = state.plane.path[0]
     there = (0.5 * (here[0] + fan["x"].mean()), 0.5 * (here[1] + fan["y"].mean()))
     hand.heard({"hold_point": [float(there[0]), float(there[1])]})
-    settled(state)
+    wait_for(state)
     held = told[-1]["held"]
     network = np.stack([held["normal"], held["tangential"]], axis=1)
     np.testing.assert_allclose(

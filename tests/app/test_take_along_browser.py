@@ -7,30 +7,19 @@ import numpy as np
 import pytest
 import xarray as xr
 from PIL import Image
-from serving import column, painted, scene
+from serving import PATIENCE, column, painted, picture, scene, searched
 from small_store import KEPT, ROOT, STATES
 
 from app import movies
 
-# Pictures to be looked at; ignored by git.
+# What was taken along, to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "along"
-PATIENCE = 60_000  # ms, on a busy machine
-
-pytestmark = pytest.mark.browser
 
 
 @pytest.fixture
-def page(chromium, address):
-    """A page with the buttons; at the end no error was told."""
-    errors = []
-    page = chromium.new_page(viewport={"width": 1280, "height": 1000})
-    page.set_default_timeout(PATIENCE)
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(address + "?tab=export&frame=3&colour=extent")
-    painted(page, PATIENCE)
-    yield page
-    page.context.close()
-    assert not errors
+def page(visit):
+    """A page with the buttons."""
+    return visit("?tab=export&frame=3&colour=extent", 1280, 1000)
 
 
 def taken(page, words, folder):
@@ -48,10 +37,11 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
     assert path.stat().st_size < 10e6
     context = chromium.new_context(viewport={"width": 1280, "height": 1000}, offline=True)
     alone, problems = context.new_page(), []
+    alone.set_default_timeout(PATIENCE)
     alone.on("pageerror", lambda error: problems.append(str(error)))
     alone.on("request", lambda sent: sent.url.startswith("http") and problems.append(sent.url))
     alone.goto(path.as_uri())
-    painted(alone, PATIENCE)
+    painted(alone)
     assert scene(alone, "Array.from(scene.mixed.normal)") == pytest.approx(normal, abs=1e-6)
     assert alone.locator("b.state").inner_text() != "as packed"  # the state that was on screen
     alone.locator("button.restart").click()
@@ -62,8 +52,7 @@ def test_the_page_as_one_file_works_without_server_and_network(page, chromium, t
     assert len(column(alone, "outer", "x")) > 3  # the exact outline of S
     alone.locator("button.play").click()
     alone.locator(".stage.playing").wait_for()
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
-    alone.screenshot(path=ARTEFACTS / "standalone.png", full_page=True)
+    picture(alone, "along/standalone", full_page=True)
     context.close()
     assert problems == []
 
@@ -75,7 +64,7 @@ def test_a_movie_is_recorded_in_the_browser(page, tmp_path):
     assert path.suffix == ".webm" and content[:4] == b"\x1a\x45\xdf\xa3" and len(content) > 5000
     assert page.get_by_role("button", name="Movie (WebM)", exact=True).is_visible()
     # The player is where it was; the movie has its caption, and says how long it is.
-    page.wait_for_function("() => location.search.includes('frame=3')")
+    searched(page, "frame=3")
     assert scene(page, "scene.hand.player.replay.position") == 3
     assert scene(page, "scene.disks.canvas.width === Math.round(scene.root.clientWidth)")
     width, height, duration, picture = page.evaluate(

@@ -3,19 +3,13 @@
 from functools import partial
 
 import pytest
-from serving import MANY, how_it_is_made, painted, scene
-from small_store import ROOT
+from serving import MANY, how_it_is_made, painted, picture, scene, searched, until
 
 from app.views.small import FIRST_STEPS
 from granforce.glossary import TERMS
 
-# Pictures to be looked at; ignored by git.
-ARTEFACTS = ROOT / "artefacts" / "tour"
-PATIENCE = 60_000  # ms, on a busy machine
 STEPS = 6
 BEFORE = len(FIRST_STEPS)  # steps on the pages of small scenes
-
-pytestmark = pytest.mark.browser
 
 
 @pytest.fixture
@@ -32,8 +26,11 @@ def press(page, name):
     card(page).get_by_role("button", name=name, exact=True).click()
 
 
-def handle(page):
-    return page.locator(".scene").element_handle()
+def plays(page, playing=True):
+    """Wait until the player plays, or rests."""
+    until(
+        page, f"element.closest('.stage').classList.contains('playing') === {str(playing).lower()}"
+    )
 
 
 def at_step(page, number):
@@ -56,11 +53,9 @@ def dragged(page):
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x, y - 12, steps=3)
-    page.wait_for_function("e => e.scene.hand.rail !== null", arg=handle(page))
+    until(page, "scene.hand.rail !== null")
     page.mouse.move(x, y - 60, steps=6)
-    page.wait_for_function(
-        f"e => Math.abs(e.scene.mixed.normal[{contact}] - {before}) > 1e-3", arg=handle(page)
-    )
+    until(page, f"Math.abs(scene.mixed.normal[{contact}] - {before}) > 1e-3")
     page.mouse.up()
     page.keyboard.press("z")
 
@@ -68,29 +63,30 @@ def dragged(page):
 # The tour
 
 
-@pytest.mark.parametrize("width, height", [(1280, 900), (1920, 1080), (390, 844)])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    "width, height, scheme",
+    [
+        *((1280, 900, "light"), (1920, 1080, "light"), (390, 844, "dark")),
+        pytest.param(1280, 900, "dark", marks=pytest.mark.slow),
+        pytest.param(390, 844, "light", marks=pytest.mark.slow),
+    ],
+)
 def test_the_tour_is_walked_through_and_closes_into_the_page(visit, width, height, scheme):
-    if scheme == "dark" and width == 1920:
-        pytest.skip("the same as at 1280")
     page = visit("?dark=1&tour=1" if scheme == "dark" else "", width, height)
-    ARTEFACTS.mkdir(parents=True, exist_ok=True)
     for step in range(1, STEPS + 1):
         at_step(page, step)
         assert card(page).bounding_box()["height"] < 0.5 * height
         if step == 2:  # it goes to another network and back
-            page.wait_for_function(
-                "e => e.closest('.stage').classList.contains('playing')", arg=handle(page)
-            )
-            page.wait_for_function("() => location.search.includes('between=0-')")
+            plays(page)
+            searched(page, "between=0-")
         if step == 3:
-            page.wait_for_function("e => e.scene.selected !== null", arg=handle(page))
+            until(page, "scene.selected !== null")
             if width > 400:  # what the step asks for can be done at once
                 dragged(page)
         if step in (4, 5, 6):
             tab = {4: "plane", 5: "statistics", 6: "perturb"}[step]
             if tab != "plane" or width < 1800:  # on a wide page it is seen anyway
-                page.wait_for_function(f"() => location.search.includes('tab={tab}')")
+                searched(page, f"tab={tab}")
         page.locator(".ring").filter(visible=True).wait_for()
         if width >= 1200:  # beside what it speaks of: where nothing else is, or over the controls
             box, scene_box = card(page).bounding_box(), page.locator(".scene").bounding_box()
@@ -98,8 +94,7 @@ def test_the_tour_is_walked_through_and_closes_into_the_page(visit, width, heigh
                 assert scene_box["x"] + scene_box["width"] < box["x"] < width - box["width"]
             else:
                 assert box["x"] + box["width"] <= scene_box["x"]
-        page.wait_for_timeout(700)  # what scrolls comes to rest: for the picture only
-        page.screenshot(path=ARTEFACTS / f"{width}-{scheme}-{step}.png")
+        picture(page, f"tour/{width}-{scheme}-{step}")
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         press(page, "Next" if step < STEPS else "Finish")
     card(page).wait_for(state="hidden")
@@ -126,7 +121,7 @@ def test_the_tour_comes_once_by_itself_and_then_by_its_button(visit):
     press(page, "Close")
     card(page).wait_for(state="hidden")
     page.goto(page.url.split("?")[0] + MANY)
-    painted(page, PATIENCE)
+    painted(page)
     button = page.get_by_role("button", name="Tour", exact=True)
     button.wait_for()
     assert not card(page).is_visible()
@@ -163,34 +158,26 @@ def test_the_tour_goes_by_keyboard_and_is_told_to_screen_readers(visit):
 
 def test_the_page_plays_slowly_until_it_is_touched(visit):
     page = visit("?mu=0.1&n=30&states=30&relax=nearest")
-    page.wait_for_function(
-        "e => e.closest('.stage').classList.contains('playing')", arg=handle(page)
-    )
+    plays(page)
     assert page.locator(".rate").inner_text() == "1.0 /s"
     page.locator(".lead").click()
-    page.wait_for_function(
-        "e => !e.closest('.stage').classList.contains('playing')", arg=handle(page)
-    )
+    plays(page, False)
     assert page.locator(".rate").inner_text() == "1.0 /s"  # nor does the speed jump
 
 
 @pytest.mark.parametrize("action", ["button", "space"])
 def test_what_pauses_does_not_start_again(visit, action):
     page = visit("?mu=0.1&n=30&states=30&relax=nearest")
-    page.wait_for_function(
-        "e => e.closest('.stage').classList.contains('playing')", arg=handle(page)
-    )
+    plays(page)
     if action == "button":
         page.locator("button.play").click()
     else:
         page.keyboard.press(" ")
-    page.wait_for_function(
-        "e => !e.closest('.stage').classList.contains('playing')", arg=handle(page)
-    )
+    plays(page, False)
     # A pause goes on to the nearest network, and rests there.
     still = """e => { const before = window.painted; window.painted = e.scene.painted
         return before === window.painted }"""
-    page.wait_for_function(still, arg=handle(page), polling=500)
+    page.wait_for_function(still, arg=page.locator(".scene").element_handle(), polling=500)
     count = scene(page, "scene.painted")
     page.wait_for_timeout(1000)  # longer than the page rests at an end
     assert scene(page, "scene.painted") <= count + 2

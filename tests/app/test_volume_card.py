@@ -1,20 +1,19 @@
 """The card with the volume of S: offered, measured in the background, found again."""
 
 import pytest
+from visitor import wait_for
+
+from app.views.volume import Volume
 
 
 @pytest.fixture
-def view(state, wait_for):
-    from app.views.volume import Volume
-
+def view(state):
     made = Volume(state)
     wait_for(state)
     return made
 
 
-def test_the_volume_is_measured_once_and_found_again(state, view, wait_for):
-    from app.views.volume import Volume
-
+def test_the_volume_is_measured_once_and_found_again(state, view):
     assert view.measure.visible and not view.tiles.object
     view.measure.clicks += 1
     assert state.work.measuring.running and not view.measure.visible
@@ -26,7 +25,7 @@ def test_the_volume_is_measured_once_and_found_again(state, view, wait_for):
     assert again.tiles.object == view.tiles.object
 
 
-def test_it_is_that_of_the_packing_on_screen(state, view, wait_for):
+def test_it_is_that_of_the_packing_on_screen(state, view):
     view.measure.clicks += 1
     state.choose(mu=0)
     wait_for(state)

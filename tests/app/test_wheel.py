@@ -9,7 +9,7 @@ import tomllib
 import urllib.request
 
 import pytest
-from serving import CHROMIUM, FLAGS, MANY, free_port, painted, wait_until_served
+from serving import CHROMIUM, FLAGS, MANY, PATIENCE, free_port, painted, wait_until_served
 from small_store import ROOT
 
 SOURCES = ("app", "data", "granforce", "LICENSE", "README.md", "pyproject.toml")
@@ -94,6 +94,7 @@ def _look(address):
     with playwright.sync_playwright() as context:
         browser = context.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
         page = browser.new_page()
+        page.set_default_timeout(2 * PATIENCE)
         page.goto(address + MANY)
-        assert painted(page, 120_000) > 0
+        assert painted(page) > 0
         browser.close()

@@ -1,5 +1,17 @@
 """What a visitor does on a page, for tests without a browser."""
 
+import time
+
+
+def wait_for(state, done=lambda: True, seconds=240):
+    """Poll as the page does until no task runs and it is done; the first compile all kernels."""
+    end = time.monotonic() + seconds
+    state.work.poll()
+    while state.work.busy or not done():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+        state.work.poll()
+
 
 def press(button):
     """Press a button of panel-material-ui's."""

@@ -6,12 +6,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from heeding import heed, heeding, until_it_computes
+from heeding import heed, heeding, interrupted, until_it_computes, until_it_left
 
 import granforce as gf
 from granforce.cli import commands
@@ -329,15 +328,8 @@ def test_interrupt_ends_quietly_and_keeps_what_is_finished(tmp_path):
     words = ["scan", "--mu", "0.3", "--seeds", "400", "-n", "20", "--states", "40"]
     words += ["--out", str(tmp_path / "s.zarr")]
     running = heeding("-m", "granforce.cli", *words, start_new_session=True)
-    deadline = time.time() + 120
-    while not list((tmp_path / "s.zarr").glob("walk-*")) and time.time() < deadline:
-        time.sleep(0.02)
-    os.killpg(running.pid, signal.SIGINT)  # as a terminal does: workers get it too
-    out, err = running.communicate(timeout=60)
-    assert running.returncode == 130
-    assert out == ""
-    assert "Traceback" not in err
-    assert "finished entries are kept" in err
+    until_it_left(tmp_path / "s.zarr", "walk-*", 1, running)
+    interrupted(running)
 
 
 def swallowed(arguments):

@@ -184,18 +184,23 @@ def test_chi_square_is_that_of_its_degrees_of_freedom(S, uniform_states):
     assert abs(np.mean(scores)) < 5 / np.sqrt(30)
 
 
-@pytest.mark.parametrize("errors", [(0.2, 0.1), (1e-3, 1e-2), (5.0, 1.0)])
-def test_another_solver_finds_the_same_network(S, uniform_states, errors):
-    """By PIQP, everything measured, so that the network is unique."""
-    m, sigma = measurement(S, uniform_states.flat[9], 9, errors, missing=0)
+def by_piqp(S, m, sigma):
+    """The likeliest network by another solver, where every force was measured."""
     A, b, T = S.scaled_form
-    weights = sparse.diags(np.tile(S.force_scale / sigma, len(m)) ** 2 * min(errors) ** 2)
+    weights = sparse.diags(np.tile(np.min(sigma) / sigma, len(m)) ** 2)
     solver = programs.quadratic_solver(400)
     target = S.to_vector(m) / S.force_scale
     quadratic = sparse.csc_matrix(T.T @ weights @ T)
     solver.setup(quadratic, -(T.T @ weights @ target), A, b, x_l=np.zeros(A.shape[1]))
     solver.solve()
-    other = S.to_forces(T @ np.maximum(solver.result.x, 0.0)) * S.force_scale
+    return S.to_forces(T @ np.maximum(solver.result.x, 0.0)) * S.force_scale
+
+
+@pytest.mark.parametrize("errors", [(0.2, 0.1), (1e-3, 1e-2), (5.0, 1.0)])
+def test_another_solver_finds_the_same_network(S, uniform_states, errors):
+    """By PIQP, everything measured, so that the network is unique."""
+    m, sigma = measurement(S, uniform_states.flat[9], 9, errors, missing=0)
+    other = by_piqp(S, m, sigma)
     assert np.abs(infer(S, m, sigma).forces - other).max() < 1e-6 * S.force_scale
 
 
@@ -291,12 +296,4 @@ def test_what_is_prescribed_or_known_holds_in_every_draw(conditions):
     found = infer(body, m, sigma, states=80)
     assert body.admits(found.forces, violation=1e-6)
     assert found.draws.residual.max() < 1e-10 and found.draws.violation.max() < 1e-9
-    A, b, T = body.scaled_form
-    weights = sparse.diags(np.tile(body.force_scale / sigma, len(m)) ** 2 * sigma.min() ** 2)
-    solver = programs.quadratic_solver(400)
-    target = body.to_vector(m) / body.force_scale
-    quadratic = sparse.csc_matrix(T.T @ weights @ T)
-    solver.setup(quadratic, -(T.T @ weights @ target), A, b, x_l=np.zeros(A.shape[1]))
-    solver.solve()
-    other = body.to_forces(T @ np.maximum(solver.result.x, 0.0)) * body.force_scale
-    assert np.abs(found.forces - other).max() < 1e-4 * body.force_scale
+    assert np.abs(found.forces - by_piqp(body, m, sigma)).max() < 1e-4 * body.force_scale

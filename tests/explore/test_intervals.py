@@ -16,7 +16,7 @@ from granforce.forces.ensemble import ensemble
 from granforce.numerics import certified_values, linear_programs
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing
-from granforce.records import InputError, make_contacts, make_packing
+from granforce.records import InputError
 from granforce.study import slices
 from granforce.tolerances import INTERVAL_GAP
 
@@ -40,23 +40,6 @@ def first():
 def agree(system, found, lower, upper, tolerance=1e-6):
     assert np.abs(found.lower - lower).max() <= tolerance * system.force_scale
     assert np.abs(found.upper - upper).max() <= tolerance * system.force_scale
-
-
-def square_lattice(side, mu):
-    grid = np.arange(side)
-    i, j, normal = [], [], []
-    for a in grid:
-        for b in grid:
-            for step in ((1, 0), (0, 1)):
-                i.append(a * side + b)
-                j.append((a + step[0]) % side * side + (b + step[1]) % side)
-                normal.append(step)
-    x = np.stack(np.meshgrid(grid + 0.5, grid + 0.5, indexing="ij"), axis=-1).reshape(-1, 2)
-    r = np.full(side * side, 0.5)
-    contacts = make_contacts(i, j, np.array(normal, float), np.ones(len(i)), r)
-    forces = np.zeros((len(i), 2))
-    forces[:, 0] = 1.0
-    return make_packing(x, r, [side, side], contacts, forces, mu, 1.0)
 
 
 def test_what_frozen_surroundings_leave_open_is_certified():
@@ -262,7 +245,7 @@ def test_forces_scale_with_the_pressure(first, factor):
 def test_a_square_lattice_without_friction_loads_one_line():
     """At μ = 0 the force on each line of contacts is constant; one line may carry everything."""
     side = 5
-    system = ensemble(square_lattice(side, 0.0))
+    system = ensemble(lattice(side, side, 0.0))
     found = intervals(system)
     assert found.converged
     line = 2 * side * side / side
@@ -274,7 +257,7 @@ def test_a_square_lattice_without_friction_loads_one_line():
 
 
 def test_a_square_lattice_with_friction_is_certified():
-    system = ensemble(square_lattice(6, 0.3))
+    system = ensemble(lattice(6, 6, 0.3))
     found, loads = intervals(system), limit_load_bounds(system)
     assert found.converged and loads.converged
     # All contacts of a direction are alike.

@@ -2,11 +2,9 @@
 
 import io
 import json
-from functools import partial
 
 import numpy as np
 import pytest
-from mutants import refusals
 from packings import packed
 
 from granforce.cli.parser import main
@@ -157,34 +155,3 @@ def test_tables_with_columns_of_any_name():
     for text in ("x", "x=", "speed=a"):
         with pytest.raises(InputError):
             read_table(*given(grains, contacts), mu=0.3, columns=read_columns(text))
-
-
-FILES = {
-    "yade": (lambda: yade(header=True), read_yade),
-    "mercury": (lambda: mercury(steps=1), read_mercury),
-    "mercury, flat": (lambda: mercury(flat=True, both=False), read_mercury),
-}
-
-
-def whole(packing):
-    c = packing.contacts
-    assert all(np.isfinite(array).all() for array in (packing.x, packing.forces, *c))
-    assert np.all(packing.r > 0) and np.all(c.i != c.j)
-
-
-def mutants(kind, count, seed):
-    """How many of so many mutants were refused."""
-    (make, read), box = FILES[kind], packed(N, MU).box
-    return refusals(make(), partial(read, mu=MU, box=box), count, seed, whole)
-
-
-@pytest.mark.parametrize("kind", FILES)
-def test_mutants_are_refused_or_whole(kind):
-    assert mutants(kind, 100, 1) > 10
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("kind", FILES)
-@pytest.mark.parametrize("seed", range(10, 20))
-def test_ten_thousand_mutants_are_refused_or_whole(kind, seed):
-    assert mutants(kind, 1000, seed) > 100

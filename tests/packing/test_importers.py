@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mutants import refusals
 from packings import skewed
 
 from granforce.forces.balance import stress_of
@@ -915,64 +914,6 @@ def test_options_of_a_table_are_judged_before_it_is_read(tmp_path):
     for options in ({"pressure": np.nan}, {"box": (0, 1)}, {"mu": -1}):
         with pytest.raises(InputError, match=r"pressure|box|friction"):
             read_table(tmp_path / "nowhere.csv", **{"mu": 0.5, **options})
-
-
-# Mutants: files with a few bytes changed
-
-
-def small_files():
-    """{kind: (contents of its files, how they are read)} of a packing of a few grains."""
-    part = cluster(load_packing(SMALL), 2.6)
-    pair = [file.getvalue().encode() for file in tables(part)]
-    loads = dict(zip(("fx", "fy", "torque"), part.load.T, strict=True))
-    found = [file.getvalue().encode() for file in tables(part, forces=False, **loads)]
-    archive = io.BytesIO()
-    save_packing(part, archive)
-    read = lambda *files: read_table(*files, mu=part.mu)  # noqa: E731
-    return {
-        "npz": ([archive.getvalue()], load_packing),
-        "table": (pair, read),
-        "found": (found, read),
-        "lammps": (small_dumps(), lambda *files: read_lammps(*files, 0.3)),
-    }
-
-
-def small_dumps():
-    """Three grains in a row under forces that walls hold, as dumps."""
-    head = "ITEM: TIMESTEP\n7\nITEM: NUMBER OF {}\n{}\nITEM: BOX BOUNDS ff ff pp\n"
-    box = "0 10\n0 10\n-0.5 0.5\nITEM: {}\n{}\n"
-    atoms = "1 1 5 1\n2 3 5 1\n3 5 5 1"
-    pairs = "1 2 2 -1.5 0 0 0.25\n2 3 2 -1.5 0 0 0.25"
-    dumps = (
-        head.format("ATOMS", 3) + box.format("ATOMS id x y radius", atoms),
-        head.format("ENTRIES", 2) + box.format("ENTRIES atom1 atom2 distance fx fy px py", pairs),
-    )
-    return [dump.encode() for dump in dumps]
-
-
-def whole(packing):
-    """What is taken must be a packing throughout."""
-    c, r = packing.contacts, packing.r
-    arrays = (packing.x, r, packing.forces, packing.load, *c)
-    assert all(np.all(np.isfinite(array)) for array in arrays)
-    assert np.all(r > 0) and np.all(packing.box > 2 * r.max()) and packing.mu >= 0
-    assert np.all((c.i != c.j) & (np.minimum(c.i, c.j) >= 0) & (np.maximum(c.i, c.j) < len(r)))
-    assert np.all(np.abs(np.hypot(*c.normal.T) - 1) < 1e-6)
-    assert np.all(np.abs(c.gap) <= 0.2001 * np.minimum(r[c.i], r[c.j]))
-
-
-@pytest.mark.parametrize("kind", small_files())
-def test_mutants_are_refused_or_whole(kind):
-    """200 of each kind."""
-    assert 20 < refusals(*small_files()[kind], 200, 1, whole)
-
-
-@pytest.mark.stress
-@pytest.mark.parametrize("kind", small_files())
-@pytest.mark.parametrize("seed", range(100, 110))
-def test_a_hundred_thousand_mutants_are_refused_or_whole(kind, seed):
-    """2500 of each kind and seed: 100,000 tried, none let through, no other error than the one."""
-    assert 250 < refusals(*small_files()[kind], 2500, seed, whole)
 
 
 @pytest.mark.parametrize("soft", [False, True])

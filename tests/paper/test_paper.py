@@ -5,11 +5,10 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from heeding import heeding
+from heeding import heeding, interrupted, until_it_left
 
 from granforce import measures
 from granforce.cli.parser import main
@@ -370,17 +369,10 @@ def running_study(folder):
     return heeding("-m", "granforce.cli", *words, start_new_session=True)
 
 
-def wait_for(folder, pattern, count, running):
-    deadline = time.time() + 200
-    while len(list((folder / "cells.zarr").glob(pattern))) < count and time.time() < deadline:
-        assert running.poll() is None
-        time.sleep(0.01)
-
-
 @pytest.mark.slow
 def test_a_killed_study_goes_on_where_it_was(done, tmp_path):
     running = running_study(tmp_path)
-    wait_for(tmp_path, "walk-*", 3, running)
+    until_it_left(tmp_path / "cells.zarr", "walk-*", 3, running)
     os.killpg(running.pid, signal.SIGKILL)
     running.wait()
     kept = {
@@ -404,13 +396,8 @@ def test_a_killed_study_goes_on_where_it_was(done, tmp_path):
 @pytest.mark.slow
 def test_an_interrupted_study_keeps_what_is_finished(tmp_path):
     running = running_study(tmp_path)
-    wait_for(tmp_path, "walk-*", 1, running)
-    os.killpg(running.pid, signal.SIGINT)
-    out, err = running.communicate(timeout=60)
-    assert running.returncode == 130
-    assert out == ""
-    assert "Traceback" not in err
-    assert "finished entries are kept" in err
+    until_it_left(tmp_path / "cells.zarr", "walk-*", 1, running)
+    interrupted(running)
     assert all(verdict.ok for verdict in open_store(tmp_path / "cells.zarr").verify())
 
 

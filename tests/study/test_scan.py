@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from heeding import until_it_left
 from test_cells import cell
 
 from granforce.records import InputError
@@ -53,9 +54,7 @@ def test_a_killed_scan_loses_only_the_cells_under_way(tmp_path):
     script = tmp_path / "run.py"
     script.write_text(code)
     running = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
-    deadline = time.time() + 120
-    while len(list(path.glob("walk-*"))) < 2 and time.time() < deadline:
-        time.sleep(0.02)
+    until_it_left(path, "walk-*", 2, running)
     os.killpg(running.pid, signal.SIGKILL)
     running.wait()
     store = open_store(path)
@@ -99,9 +98,7 @@ def kill_parent_alone(path, seeds):
         f"    scan.scan({str(path)!r}, {cells!r}, workers=2)\n"
     )
     parent = subprocess.Popen([sys.executable, str(script)], start_new_session=True)
-    deadline = time.monotonic() + 120
-    while not list(path.glob("packing-*")) and time.monotonic() < deadline:
-        time.sleep(0.02)
+    until_it_left(path, "packing-*", 1, parent)
     workers = workers_of(parent.pid)
     assert len(workers) == 2
     os.kill(parent.pid, signal.SIGKILL)
