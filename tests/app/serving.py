@@ -14,7 +14,7 @@ from small_store import ROOT
 CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 # Of 400 disks, as a page opened that says no more: an address without a view begins with a scene.
 MANY = "?scene=many"
-PATIENCE = 60_000  # ms, on a busy machine
+PATIENCE = 180_000  # ms, on a busy machine
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
 # Closed pages are soon given up, but not too soon for a busy machine: a session given
 # up before its page has connected comes back without what panel serve knows of it.

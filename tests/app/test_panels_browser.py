@@ -25,7 +25,7 @@ from small_store import DISKS, KEPT
 import granforce as gf
 
 LAMMPS = REFERENCE.parent / "lammps"
-PATIENCE = 60  # s, on a busy machine
+PATIENCE = 180  # s, on a busy machine
 
 
 def filled(page, source, least=3):

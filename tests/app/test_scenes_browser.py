@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from serving import painted, picture, searched
+from serving import free_port, painted, picture, searched, serve
 
 import granforce as gf
 from app import scenes
@@ -459,6 +459,24 @@ def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     page = look("?scene=box")
     until(page, "small.body.h === 2")
     assert "four times the weight" in desk(page).locator(".quest").inner_text()
+
+
+def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
+    port = free_port()
+    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)) as (url, server):
+        expected = ("WebSocket", "Failed to load resource", "not connected")
+        page = opening("?scene=groove", 1280, 800, at=url, wanted=expected)
+        drawn(page)
+        server.kill()
+        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
+        desk(page).get_by_role("slider", name="friction μ").fill("0.8")  # S is cut all the same
+        until(page, "Math.abs(small.body.interval(0)[1] - Math.SQRT1_2 / 0.2) < 1e-9")
+        searched(page, "mu=0.8")
+        choose(page, "box")
+    with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)):
+        page.get_by_text("Connection lost").wait_for(state="detached")
+        drawn(page)
+        until(page, "small.body.scene.name === 'box'")
 
 
 def test_a_finger_drags_the_point(look):
