@@ -74,7 +74,7 @@ def download(page, action, folder):
 
 @pytest.mark.parametrize("width, dark", [(1280, 0), (1280, 1), (400, 0)])
 def test_force_space_is_to_scale_and_follows_the_player(visit, width, dark):
-    page = visit(f"?tab=plane&dark={dark}", width, 1000 if width > 400 else 2200)
+    page = visit(f"?tab=plane&axes=principal&dark={dark}", width, 1000 if width > 400 else 2200)
     filled(page, "outer")
     page.wait_for_timeout(500)
     across, up = figure_of(page, "path")
@@ -108,7 +108,7 @@ def test_a_window_may_change_its_size_while_a_slow_browser_still_builds_the_page
 
 
 def test_one_contact_in_its_cone(visit):
-    page = visit("?tab=projection&contact=3")
+    page = visit("?tab=projection&axes=principal&contact=3")
     filled(page, "outer")
     page.get_by_role("combobox", name="Shown").select_option("contact")
     page.wait_for_function(f"() => {MODEL}('outer').get_column('x')?.every((x) => x > -1e-6)")
@@ -133,7 +133,7 @@ def test_statistics_are_drawn_one_after_another(visit):
         drawn(page)
         picture(page, f"statistics-{what}")
     page.get_by_text("How was this computed?").click()
-    page.get_by_text("by how much a contact's force scatters").wait_for()
+    page.get_by_text("by how much a contact's force varies").wait_for()
 
 
 def test_statistics_by_night_on_a_narrow_screen(visit):
