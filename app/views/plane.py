@@ -134,13 +134,13 @@ class View(TabView):
         if replay is None:
             return
         free = replay.summary["dimension"]
-        pair = self.planes.value == "pair"
+        pair = self.kind == "pair"
         self.lead.object = LEAD + (OF_A_PAIR if pair else TOUCH)
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)
         for line, colour in zip(self.lines, lines(self.looks.dark), strict=True):
             line.update(visible=pair, text_color=colour)
-        wanted = replay, self.planes.value, *self._depends()
+        wanted = replay, self.kind, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
             return
@@ -158,9 +158,15 @@ class View(TabView):
             self._clear()
             self.told.object = str(error)
 
+    @property
+    def kind(self) -> str:
+        """The plane chosen; while a walk goes on, that of its states stands for the first pair."""
+        first = self.planes.value == "pair" and self.looks.pair is None
+        return "principal" if first and self.state.growing else self.planes.value
+
     def _depends(self) -> tuple[Any, ...]:
         """What a plane of the kind chosen depends on, beside the states."""
-        state, kind = self.state, self.planes.value
+        state, kind = self.state, self.kind
         if kind == "pair":
             return (self.looks.pair,)
         if kind == "contact":

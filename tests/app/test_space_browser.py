@@ -129,7 +129,7 @@ def test_a_sweep_goes_to_both_ends_of_s_and_comes_back(visit, button, axis):
 @pytest.mark.parametrize(("query", "width"), [("&tab=plane", 1280), ("", 1920)])
 def test_force_space_fills_while_the_walk_goes_on(visit, query, width):
     """Every state that has arrived has its place, on axes of those found before."""
-    page = visit(f"?mu=0.44&n=100&states=20000&relax=nearest{query}", width, 1000)
+    page = visit(f"?mu=0.44&n=30&states=20000&relax=nearest{query}", width, 1000)
     until(page, "scene.hand.player.grows && scene.hand.player.replay.last > 30")
     there = f"{MODEL}('path')?.get_column('x')?.filter(Number.isFinite).length"
     page.wait_for_function(f"() => {there} > 20")
