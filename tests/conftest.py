@@ -10,9 +10,9 @@ from hypothesis import settings
 
 from granforce.system.compiled import are_kept
 
-# The same examples in every run, as all other random numbers here; HYPOTHESIS_PROFILE=default
-# looks for new ones.
-settings.register_profile("same", derandomize=True)
+# The same examples in every run, as all other random numbers here, however long a busy machine
+# takes; HYPOTHESIS_PROFILE=default looks for new ones.
+settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 # What makes and pushes packings, and all else: each takes half of the time to compile.

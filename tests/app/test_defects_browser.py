@@ -7,11 +7,14 @@ from serving import (
     ask,
     at_rest,
     column,
+    free_port,
     how_it_is_made,
     looks,
     no_more,
+    painted,
     scene,
     searched,
+    serve,
     shows,
     until,
 )
@@ -55,7 +58,36 @@ def test_steps_of_the_player_are_not_gone_back_to(page):
     assert page.evaluate("history.length") == before
 
 
-# 2: What is refused, and fields
+# 2: A server that is gone
+
+
+def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, shipped, tmp_path):
+    port = free_port()
+    store = {"GRANFORCE_DATA": str(shipped)}
+    expected = ("WebSocket", "Failed to load resource", "not connected")
+    with serve(tmp_path, port=port, **store) as (url, server):
+        page = visit(at=url, wanted=expected)
+        ask(page, 1)
+        shows(page, 1)
+        searched(page, "mu=1&")
+        page.locator("button.step").click()
+        searched(page, "frame=1")
+        server.kill()
+        page.get_by_role("alert").get_by_text("Connection lost").wait_for()
+        painting = scene(page, "scene.painted")
+        page.locator("button.play").click()  # what is in the page still plays
+        until(page, f"scene.painted > {painting} + 3")
+        page.locator(".scale span").first.click()  # μ = 0, of which nobody hears yet
+    with serve(tmp_path, port=port, **store):
+        page.get_by_text("Connection lost").wait_for(state="detached")
+        painted(page)
+        shows(page, 0)
+        searched(page, "mu=0&")
+        ask(page, 1)  # and it listens again
+        shows(page, 1)
+
+
+# 3: What is refused, and fields
 
 
 def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
@@ -104,7 +136,7 @@ def test_a_force_that_is_let_go_at_once_goes_where_it_was_flung(page):
     until(page, "scene.hand.replay.held && !scene.hand.active")
 
 
-# 3: Number fields
+# 4: Number fields
 
 
 def test_number_fields_take_typing_after_enter(visit):
@@ -131,7 +163,7 @@ def test_what_is_no_whole_number_is_one_line_and_changes_nothing(visit):
     assert field.input_value() == before
 
 
-# 4: Uploaded packings
+# 5: Uploaded packings
 
 
 def test_uploaded_packings_show_their_own_number_of_disks(visit):
@@ -145,7 +177,7 @@ def test_uploaded_packings_show_their_own_number_of_disks(visit):
     page.get_by_role("spinbutton", name="Seed").wait_for(state="hidden")
 
 
-# 5: Keys
+# 6: Keys
 
 
 @pytest.mark.parametrize("focused", ["tab", "toggle", "switch"])
@@ -177,7 +209,7 @@ def test_who_goes_by_tab_means_the_widget(visit):
     assert page.locator(".stage.playing").count() == 0
 
 
-# 6: What is not computed yet
+# 7: What is not computed yet
 
 
 def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old(visit):
@@ -198,7 +230,7 @@ def test_what_is_asked_for_moves_nothing_and_stays_pale_no_longer_than_it_is_old
     assert at_rest(plot)["y"] == before["y"]
 
 
-# 7: Two contacts
+# 8: Two contacts
 
 
 def middles(page, count):
@@ -240,7 +272,7 @@ def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     searched(page, f"pair={b}-{a}")
 
 
-# 8: Small things
+# 9: Small things
 
 
 @pytest.mark.parametrize("tab", ["intervals", "statistics"])
