@@ -14,7 +14,7 @@ import numpy as np
 Array = np.ndarray
 Message = dict[str, Any]
 
-LOADED = {"mu": float, "load": [float, ...]}  # a small scene under loads (3 N) on its disks
+LIST = [float, ...]
 
 # {component: messages that its script sends}; contacts are positions in the backbone.
 FROM_BROWSER = {
@@ -47,13 +47,13 @@ FROM_BROWSER = {
         {"scene": str, "mu": float},
         {"query": str},  # gone back or forward to
         {"built": str, "mu": float},  # by hand
-        {"save": LOADED},
-        {"fall": LOADED},
-        {"measure": LOADED | {"plane": [int, int]}},
+        # "file", "fall" or "measured", of a scene under loads (3 N) on its disks
+        {"find": str, "scene": str, "built": str, "mu": float, "load": LIST, "plane": [int, int]},
     ),
     "Tour": ({"step": int},),
 }
 
+MEASURED = {"scene": str, "mu": float, "plane": [int, int]}  # of a small scene
 NETWORK = {"normal": Array, "tangential": Array, "residual": float}
 NETWORKS = NETWORK | {"residual": Array}  # several, one after the other
 # The networks through which f_n of a contact can be pulled, and what stops it at both ends.
@@ -67,6 +67,7 @@ PICTURE |= {"normal": Array, "tangential": Array}
 STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
 STATES |= {"acceptance": Array, "eta1": Array, "eta2": Array, "eta3": Array}
 
+LIST = [float, ...]
 # {component: messages that its script is sent}; forces in ⟨f_n⟩, arrays flat.
 TO_BROWSER = {
     "FrictionSlider": ({"settled": True},),  # what was typed is taken, or refused
@@ -91,8 +92,8 @@ TO_BROWSER = {
         {"error": str},
         {"fall": [float, ...]},  # motion (3 N) of the disks; empty where nothing falls
         {"file": str},  # base64
-        {"measured": {"endless": True}, "mu": float, "plane": [int, int]},
-        {"measured": {"bounds": list, "outline": list}, "mu": float, "plane": [int, int]},
+        {"measured": {"endless": True}, **MEASURED},
+        {"measured": {"bounds": list, "outline": list}, **MEASURED},
     ),
 }
 

@@ -164,13 +164,18 @@ export function render({ model, view }) {
     address() // first: where the server is gone, asking it fails
     if (!body.empty && now.filled && !space.dots.length && body.bounded) { space.fill(); soon() }
     if (body.empty && !body.scene.idle && !now.enough) { now.enough = body.enough(MOST_MU); say(); soon() }
-    if (body.empty && !body.scene.idle) ask(model, view, { fall: { mu, load: [...body.load] } })
+    if (body.empty && !body.scene.idle) find("fall")
     measure()
+  }
+
+  /** Ask the server for a file, how the disks fall, or what is exact, of what is in hand. */
+  function find(what) {
+    ask(model, view, { find: what, scene: body.scene.name, built: body.scene.built, mu, load: [...body.load], plane: space.shadow })
   }
 
   /** Above three dimensions, what only linear programs tell. */
   function measure() {
-    if (!body.empty && !body.whole) ask(model, view, { measure: { mu, load: [...body.load], plane: space.shadow } })
+    if (!body.empty && !body.whole) find("measured")
   }
 
   function measured({ bounds, outline, endless }, plane) {
@@ -362,7 +367,7 @@ export function render({ model, view }) {
       soon()
     })
   }
-  part("save").addEventListener("click", () => ask(model, view, { save: { mu, load: [...body.load] } }))
+  part("save").addEventListener("click", () => find("file"))
   part("lesson").querySelector("article").innerHTML = lesson()
   for (const button of root.querySelectorAll(".print")) {
     button.addEventListener("click", () => printed(pictures(), button.classList.contains("answered")))
@@ -439,9 +444,9 @@ export function render({ model, view }) {
   model.on("dark", () => { dress(); soon(); if (body) address() })
   model.on("msg:custom", (news) => {
     if (news.fall && body.empty) { now.fall = news.fall.length ? news.fall : null; say(); soon() }
-    if (news.measured && news.mu === mu && !body.whole) measured(news.measured, news.plane)
+    if (news.measured && news.scene === body.scene.name && news.mu === mu && !body.whole) measured(news.measured, news.plane)
     if (news.file) download(news.file)
-    if (news.error) { returning = false; say(news.error) }
+    if (news.error) { returning = false; part("name").value = body.scene.name; say(news.error) }
   })
   Object.defineProperty(root, "small", { get: () => ({ body, now, space, arrows, builder, pushed, mu }) })
   dress()

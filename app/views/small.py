@@ -1,7 +1,6 @@
 """A small scene and the whole of its S: drawn, cut and pulled in the browser; see small.js."""
 
 import base64
-from collections.abc import Callable
 from typing import Any
 
 import param
@@ -10,7 +9,7 @@ from granforce.packing import scenes as made
 from granforce.records import InputError, NotJammedError, UndecidedError
 
 from .. import scenes
-from ..jobs import Task
+from ..jobs import Job, Task
 from .messages import Message
 from .scripts import Scripted
 
@@ -69,13 +68,16 @@ class Small(Scripted):
             **params,
         )
         self._task = task
+        self._made = True  # the scene that was asked for last
         task.param.watch(self._failed, "message")
         self._show(asked.scene, asked.mu, asked.built)
 
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
         if name == scenes.MANY:  # has a page of its own
             return
-        if name in made.SCENES and made.SCENES[name].packed:
+        self._task.cancel()  # what was still to be told of the scene before
+        self._made = name not in made.SCENES or not made.SCENES[name].packed
+        if not self._made:
             self._task.start(lambda job: scenes.drawn(name, mu), self._put)
             return
         try:
@@ -88,16 +90,27 @@ class Small(Scripted):
                 self._show(name)
 
     def _put(self, scene: dict[str, Any]) -> None:
+        self._made = True
         self.scene = scene
 
     def _failed(self, event: Any) -> None:
         if event.new:
+            self._made = True
             self.tell({"error": event.new})
 
     def _heard(self, message: Message) -> None:
-        """Another scene, another μ, or the question how it falls."""
+        """Another scene, another μ, or a question about what is shown."""
         try:
             match message:
+                case {
+                    "find": what,
+                    "scene": scene,
+                    "built": built,
+                    "mu": mu,
+                    "load": load,
+                    "plane": plane,
+                }:
+                    self._find(what, scene, built, mu, load, plane)
                 case {"scene": name} if name in (*made.SCENES, scenes.OWN):
                     self._show(name, message.get("mu"))
                 case {"query": query}:
@@ -105,26 +118,30 @@ class Small(Scripted):
                     self._show(asked.scene, asked.mu, asked.built)
                 case {"built": built, "mu": mu}:
                     self._show(scenes.OWN, mu, built[: scenes.LONGEST])
-                case {"save": of}:
-                    self._answer(scenes.file_of, _as_text, **of)
-                case {"fall": of}:
-                    self._answer(scenes.falling, lambda motion: {"fall": motion.tolist()}, **of)
-                case {"measure": of}:
-                    asked = {"mu": of["mu"], "plane": of["plane"]}
-                    self._answer(scenes.measured, lambda found: {"measured": found} | asked, **of)
         except (InputError, NotJammedError, UndecidedError) as error:
             self.tell({"error": str(error)})
 
-    def _answer(
-        self, find: Callable[..., Any], told: Callable[[Any], Message], mu: float, **options: Any
+    def _find(
+        self, what: str, scene: str, built: str, mu: float, load: list[float], plane: list[int]
     ) -> None:
-        """Tell what is found of the scene at this μ, under the loads among the options."""
-        name, built = self.scene["name"], self.scene["built"]
-        self._task.start(
-            lambda job: find(scenes.packing_of(name, mu, built), **options),
-            lambda found: self.tell(told(found)),
-        )
+        """Tell what is asked of a scene at this μ, under these loads.
 
+        Nothing of a scene that has been replaced, or is about to be: an answer would end the making
+        of the next.
+        """
+        if not self._made or (scene, built) != (self.scene["name"], self.scene["built"]):
+            return
 
-def _as_text(file: bytes) -> Message:
-    return {"file": base64.b64encode(file).decode()}
+        def found(job: Job) -> Message:
+            packing = scenes.packing_of(scene, mu, built)
+            match what:
+                case "file":
+                    file = base64.b64encode(scenes.file_of(packing, load))
+                    return {"file": file.decode()}
+                case "fall":
+                    return {"fall": scenes.falling(packing, load).tolist()}
+                case _:
+                    asked = {"scene": scene, "mu": mu, "plane": plane}
+                    return {"measured": scenes.measured(packing, load, plane), **asked}
+
+        self._task.start(found, self.tell)

@@ -7,6 +7,8 @@ import pytest
 
 import granforce as gf
 from app import scenes
+from app.jobs import Task
+from app.views.small import Small
 from granforce.records import InputError
 from granforce.study import hulls
 
@@ -149,3 +151,48 @@ def test_a_disk_in_the_air_falls_and_the_others_stay():
 def test_what_cannot_be_built_is_refused(text):
     with pytest.raises(InputError):
         scenes.own(text)
+
+
+@pytest.fixture
+def page():
+    """The page of the column of disks, and the list of what it is told."""
+    view = Small(scenes.asked("?scene=column"), Task(), 10)
+    told = []
+    view.tell = told.append
+    _at_rest(view)
+    return view, told
+
+
+def _at_rest(view):
+    while view._task.running:
+        view._task.job and view._task.job.wait(240)
+        view._task.poll()
+
+
+def _measure(scene):
+    """What a page asks of a scene once friction has rested."""
+    of = {"built": scene["built"], "mu": scene["mu"], "load": [*scene["load"]]}
+    return {"find": "measured", "scene": scene["name"], "plane": [0, 2], **of}
+
+
+def test_what_is_asked_of_a_scene_does_not_end_the_making_of_the_next(page):
+    view, told = page
+    late = _measure(view.scene)
+    view.hear({"scene": "solid"})  # is packed, which takes a while
+    view.hear(late)
+    _at_rest(view)
+    assert view.scene["name"] == "solid" and not told
+
+
+def test_what_is_found_of_a_scene_is_not_told_of_the_next(page):
+    view, told = page
+    late = _measure(view.scene)
+    view.hear(late)
+    view.hear({"scene": "box"})
+    view.hear(late)
+    _at_rest(view)
+    assert view.scene["name"] == "box" and not told
+    view.hear({"scene": "column"})
+    view.hear(late)
+    _at_rest(view)
+    assert [message["scene"] for message in told] == ["column"]
