@@ -119,6 +119,8 @@ def _plane(
 
 def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
     """Titles of the two axes, in words."""
+    if plane.pair:  # whose lines have colours
+        return ("normal force (mean force = 1)",) * 2
     if plane.components:
         return tuple(
             f"{'normal force fₙ' if component == 0 else 'tangential force fₜ'} of contact "

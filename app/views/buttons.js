@@ -51,7 +51,7 @@ const BUTTONS = `
   <div class="quiz" role="status"></div>
   <div class="read">
     <span>network <b class="state"></b></span>
-    <span class="differs">forces changed by <b class="apart"></b> of the mean force</span>
+    <span class="differs">on average <b class="apart"></b> of the mean force away from as packed</span>
     <span class="said"></span>
   </div>
   <div class="scenes">

@@ -33,9 +33,10 @@ BARS += ("whole_low", "whole_high")  # exact intervals without what is known
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
 # What one bar says, and at which part of the axis, from its least force to its largest; and where.
 KEY = {
-    "smallest possible": 0.55,
-    "seen so far": 0.68,
-    "now; drag it up or down": 0.77,
+    "smallest possible": 0.50,
+    "seen so far": 0.60,
+    "as packed": 0.69,
+    "now; drag it up or down": 0.79,
     "largest possible": 0.93,
 }
 KEY_AT = 2.5
@@ -49,6 +50,7 @@ LEAD = (
     "<b>How far can each force go?</b> Each bar is one contact. Drag a dot: all other forces "
     "follow."
 )
+FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
 Pale: every force that a contact can have in any network in balance
 ({term("exact", "possible")}); dark: what the networks passed so far had: chance rarely goes to the
@@ -69,7 +71,9 @@ class View(TabView):
         self.bars = _source("bars", BARS)
         self.growth = _source("growth", ("state", *ETAS))
         self.chosen = _source("chosen", ("rank", "low", "high"))
-        self.example = _source("example", ("rank", "low", "high", "seen_low", "seen_high", "now"))
+        self.example = _source(
+            "example", ("rank", "low", "high", "seen_low", "seen_high", "packed", "now")
+        )
         self.words = _source("words", ("rank", "at", "words"))
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
@@ -83,7 +87,7 @@ class View(TabView):
             question("Scale", SCALES, self.looks, "scale", **SMALL),
         ]
         self.exact = pmui.Button(label="Compute exact intervals", margin=(14, 8, 2, 8), **OUTLINED)
-        self.told = note(HELP)
+        self.lead, self.told = note(LEAD), note(HELP)
         self._connect()
         self.catch_up()
 
@@ -91,7 +95,7 @@ class View(TabView):
         """Choices and bars; growth, to be opened."""
         choices = pn.FlexBox(*self.choices, sizing_mode="stretch_width")
         return pn.Column(
-            note(LEAD),
+            self.lead,
             plotted(self.figure),
             choices,
             self.exact,  # below, as the plot must not move when the button goes
@@ -120,6 +124,7 @@ class View(TabView):
         state, looks, replay = self.state, self.looks, self.state.seen
         if replay is None:
             return
+        self.lead.object = LEAD if replay.summary["dimension"] else FIXED
         exact = exact_intervals(state.possible, replay)
         order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
         named = [one.contact for one in state.knowledge.known]
@@ -168,7 +173,8 @@ class View(TabView):
         if self.state.growing:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
-        self._show_key(top, few and bool(exact) and self.looks.sort == "original")
+        shown = few and bool(exact) and self.looks.sort == "original"
+        self._show_key(top, shown and replay.summary["dimension"] > 0)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
         self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
@@ -177,12 +183,12 @@ class View(TabView):
         """One bar that says what it shows, up to a part of the axis; only where it hides none."""
         for part in self.key:
             part.visible = shown
+        self.figure.legend[0].visible = not shown  # which says the same
         heights = [level * top for level in KEY.values()]
-        low, _, now, high = heights
-        self.example.data = {
-            "rank": [KEY_AT], "low": [low], "high": [high], "now": [now],
-            "seen_low": [0.7 * low + 0.3 * high], "seen_high": [0.3 * low + 0.7 * high],
-        }  # fmt: skip
+        low, seen, packed, now, high = ([height] for height in heights)
+        columns = {"low": low, "high": high, "packed": packed, "now": now}
+        columns |= {"seen_low": [0.97 * seen[0]], "seen_high": [1.07 * now[0]]}
+        self.example.data = {"rank": [KEY_AT]} | columns
         self.words.data = {"rank": [KEY_AT] * len(KEY), "at": heights, "words": list(KEY)}
 
     def _show_growth(self, replay: Replay) -> None:
@@ -287,12 +293,16 @@ class View(TabView):
         bar: dict[str, Any] = {"x": "rank", "source": self.example, "line_color": None}
         pale = fig.vbar(bottom="low", top="high", width=FEW[1], fill_color=PALE, **bar)
         dark = fig.vbar(bottom="seen_low", top="seen_high", width=FEW[2], fill_color=DARK, **bar)
+        packed = fig.scatter(
+            "rank", "packed", source=self.example, marker="dash", color=ORIGINAL, size=18,
+            line_width=2,
+        )  # fmt: skip
         dot = fig.scatter("rank", "now", source=self.example, color=DOT, size=FEW[3])
         words = fig.text(
             "rank", "at", "words", source=self.words, x_offset=12, text_baseline="middle",
             text_font_size="12px", text_color="#808080", name="key",
         )  # fmt: skip
-        return pale, dark, dot, words
+        return pale, dark, packed, dot, words
 
     def _growth_figure(self) -> Figure:
         fig = figure(

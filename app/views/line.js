@@ -15,6 +15,8 @@ export function drawSegment(space) {
   g.lineWidth = 7
   g.lineCap = "butt"
   line(g, ends[0], ends[1] ?? ends[0])
+  const [a, b] = [ends[0], ends.at(-1)]
+  if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
   g.font = "13px sans-serif"
   let before = null // words of the other end
   for (const side of ends.length > 1 ? body.sides : []) {
@@ -67,7 +69,9 @@ export function drawAxis(space, index, at, d = 0) {
   }
   g.setLineDash([])
   marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) write(x, number(v), colour, 12) })
-  const name = forceName(body.scene, index), words = slope > 0 ? `${name} →` : `← ${name}`
+  const { r, load } = body.scene, one = r.length === 1 && Math.abs(Math.hypot(load[0], load[1]) - 1) < 1e-9
+  const unit = one ? " (weight of the disk = 1)" : ""
+  const name = forceName(body.scene, index) + unit, words = slope > 0 ? `${name} →` : `← ${name}`
   nameAxis(space, words, own ?? look.ink, d ? null : at + 33)
 }
 

@@ -234,7 +234,7 @@ class View(TabView):
         self.other = None
         if not self.also.value or state.cell is None or state.growing:
             self.beside.data = {"x": [], "y": []}
-            self.marks.visible = False
+            self.figure.legend[0].visible = False
             return
         found, own = planes.beside(state.catalogue, state.cell), state.cell.selection
         kind = "walk" if own.kind == "uniform" else "uniform"
@@ -261,7 +261,8 @@ class View(TabView):
             return
         x, y = planes.points(plane, replay, self.other).T
         self.beside.data = {"x": x.astype(np.float32), "y": y.astype(np.float32)}
-        self.marks.update(visible=True, label=value(CALLED[self.other_kind]))
+        legend = self.figure.legend[0]
+        legend.items[0].label, legend.visible = value(CALLED[self.other_kind]), True
         if self.found is not None and self.found.plane is plane:
             self._tell(self.found)
 
@@ -342,7 +343,9 @@ class View(TabView):
             f"{_variance(found.plane)}."
         )
         self.finding.object = words + "."
-        self.told.object = folded(HELP + share + COMPUTED.format(found=found))
+        named = [self.state.replay.backbone[contact] for contact in found.plane.pair]
+        which = " Green: contact {}; violet: contact {}.".format(*named) if named else ""
+        self.told.object = folded(HELP + which + share + COMPUTED.format(found=found))
 
     @property
     def other_kind(self) -> str:
@@ -371,7 +374,7 @@ class View(TabView):
         )
         fig.patch(
             "x", "y", source=self.outer, fill_color=PALE, fill_alpha=0.35, line_color=DARK,
-            line_width=1.6, legend_label="possible",
+            line_width=1.6,
         )  # fmt: skip
         fig.patch("x", "y", source=self.inner, fill_alpha=0, line_color=DARK, line_alpha=0.4)
         outlines = list(fig.renderers)
@@ -388,15 +391,18 @@ class View(TabView):
             size=5,
             color=STATES,
             alpha=0.9,
-            legend_label="found",
         )
         fig.scatter(
             "x", "y", source=self.original, marker="diamond", size=15, color=ORIGINAL,
-            line_color="#333333", legend_label="as packed",
+            line_color="#333333",
+        )  # fmt: skip
+        fig.text(
+            "x", "y", source=self.original, text=value("as packed"), x_offset=-9,
+            y_offset=-6, text_align="right", text_font_size="12px", text_font_style="bold",
+            text_color=ORIGINAL,
         )  # fmt: skip
         here = fig.scatter(
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
-            legend_label="now",
         )  # fmt: skip
         fig.text(
             "x", "y", source=self.here, text=value("↙ drag me"), x_offset=6, y_offset=-8,
@@ -406,9 +412,8 @@ class View(TabView):
         here.tags, fig.name = MOVES, "path_figure"
         # The state on screen moves too often to be looked at for the range.
         fig.x_range.renderers = fig.y_range.renderers = [*outlines, states]
-        legend_above(fig, 5)
-        (self.marks,) = (item for item in fig.legend[0].items if item.label == value("beside"))
-        self.marks.visible = False
+        legend_above(fig)
+        fig.legend[0].visible = False
         corner(fig, "outline: exact; dots: found at random; lines: one after another")
         fig.add_tools(hover([states], ("network", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig

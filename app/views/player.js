@@ -57,7 +57,7 @@ class Player {
     this.listeners = new Set() // functions to be called when other numbers are on screen
     this.invite = new Invitation(this.scene)
     this.scene.onMarks = (context, scene) => {
-      this.invite.place(this.replay?.mixed, this.inviting, this.pushes)
+      this.invite.place(this.replay?.mixed, this.inviting)
       this.pins.draw(context, scene)
       this.hand.draw(context, scene)
       this.difference.draw(context, scene)
@@ -75,10 +75,14 @@ class Player {
     }
   }
 
-  /** Whether nothing was dragged yet, and a line can be; where force space is turned to, its point. */
+  /** What can be done first, see invite.js: nothing was dragged yet, and a line can be, or the point; or null. */
   get inviting() {
     const { model, live, difference, predict } = this
-    return (this.pushes || !this.took) && this.replay !== null && !live.moves && !this.points && (model.contact ?? null) === null && !difference.on && !predict.shown
+    if (this.replay === null || live.moves || difference.on || predict.shown) return null
+    if (this.points) return this.plots.invites ? "point" : null
+    if ((model.contact ?? null) !== null) return null
+    if (this.pushes) return "choose"
+    return this.took || !this.replay.walk.free ? null : "drag"
   }
 
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
@@ -187,7 +191,7 @@ class Player {
     const { model, plots, replay } = this
     this.told = now
     if (model.tab === "intervals") plots.show(replay, model.scale)
-    plots.invite(this.points && !this.took && !this.grows)
+    plots.invite(this.points && !this.took && !this.grows && replay.walk.free > 0)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
     for (const listener of this.listeners) listener()

@@ -97,7 +97,7 @@ export function pictured(body) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point`
-  return h > 3 ? `all pairs of values that these two forces can have; dots: random samples, few of which come near the edge`
+  return h > 3 ? "shadow of S: all pairs of values that these two forces can have; dots: random samples, few of which come near the edge"
     : `${S} ${["", "a line", "a polygon; its axes are two of the forces", "a body; drag beside the point to turn it"][h]}`
 }
 

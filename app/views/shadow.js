@@ -53,6 +53,8 @@ export function drawShadow(space) {
     g.stroke()
     g.setLineDash([])
     g.globalAlpha = 1
+    const [x, y] = corners.reduce((one, other) => (other[0] - other[1] > one[0] - one[1] ? other : one)) // where no dots are
+    space.write(x + 18, y - 8, "S", look.cold, 22)
   }
   const ends = [0, 1].map((k) => { const all = space.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
   for (const v of ends[0]) space.write(space.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)

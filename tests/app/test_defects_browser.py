@@ -263,12 +263,8 @@ def test_a_line_that_is_clicked_takes_the_place_of_the_green_one(visit):
     assert scene(page, "scene.selected") == b
     page.wait_for_function(f"() => {MODEL}('outer').get_column('x').length > 3")
     backbone = scene(page, "Array.from(scene.geometry.backbone)")
-    axes = page.evaluate(
-        """() => [...Bokeh.documents[0].all_models]
-            .filter((m) => m.type === "LinearAxis").map((m) => m.axis_label)"""
-    )
-    assert f"normal force fₙ of contact {backbone[a]} (mean force = 1)" in axes
-    assert f"normal force fₙ of contact {backbone[b]} (mean force = 1)" in axes
+    which = f"Green: contact {backbone[b]}; violet: contact {backbone[a]}."
+    page.get_by_text(which).wait_for(state="attached")  # among what is to be opened
     searched(page, f"pair={b}-{a}")
 
 
