@@ -681,14 +681,14 @@ def test_walk_and_uniform_states_are_shown_together(state):
     # in the store from now on: shown at once, in any plane, and the walk beside them
     view.planes.value = "contact"
     wait_for(state)
-    assert len(view.beside.data["x"]) == count and view.marks.visible
+    assert len(view.beside.data["x"]) == count and view.figure.legend[0].visible
     other = planes.beside(state.catalogue, state.cell)
     state.show(other)
     wait_for(state)
     assert state.cell.kind == "uniform" and view.other_kind == "walk"
     assert view.also.value and len(view.beside.data["x"]) == KEPT
     view.also.value = False
-    assert not len(view.beside.data["x"]) and not view.marks.visible
+    assert not len(view.beside.data["x"]) and not view.figure.legend[0].visible
 
 
 def test_a_page_as_a_file_has_nothing_of_pages_that_are_served_meanwhile(state):
