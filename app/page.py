@@ -1,9 +1,7 @@
 """One visitor's page, from the first picture to its end, when nothing more is computed for it."""
 
-import importlib
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from types import ModuleType
 from typing import Any
 from urllib.parse import parse_qsl
 
@@ -18,7 +16,7 @@ from . import garbage, scenes
 from .data import Library
 from .jobs import Task, computing
 from .state import AppState
-from .views import explanation, figure
+from .views import explanation, export, figure, intervals, perturb, plane, statistics, upload
 from .views.address import Address
 from .views.controls import Controls
 from .views.hints import Hints
@@ -96,14 +94,15 @@ GONE_MS = (
     3000  # without a browser, after which a page's work is ended; the page itself stays longer
 )
 
-# The tabs: name in links → title, module of app.views whose `View(state)` fills it when first seen.
-TABS = {
-    "intervals": "How far?",
-    "statistics": "Friction",
-    "plane": "Force space",  # the third: see TAB_LESS
-    "perturb": "Push",
-    "upload": "Your packing",
-    "export": "Export",
+# The tabs: name in links → title, and view, made when it is first seen. Their components are known
+# before any page is: those that are defined while pages are open, the first page alone learns of.
+TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
+    "intervals": ("How far?", intervals.View),
+    "statistics": ("Friction", statistics.View),
+    "plane": ("Force space", plane.View),  # the third: see TAB_LESS
+    "perturb": ("Push", perturb.View),
+    "upload": ("Your packing", upload.View),
+    "export": ("Export", export.View),
 }
 
 TAB = {"& .MuiTab-root": {"minWidth": 0, "padding": "12px 8px", **PLAIN}}
@@ -293,7 +292,7 @@ class Tabs:
         if self.looks.tab not in self.names:
             self.looks.tab = self.names[0]
         self.tabs = pmui.Tabs(
-            *((TABS[name], self.pages[name]) for name in self.names),
+            *((TABS[name][0], self.pages[name]) for name in self.names),
             active=self.names.index(self.looks.tab),
             sx=TAB,
             sizing_mode="stretch_width",
@@ -325,10 +324,10 @@ class Tabs:
             self._begun.add("plane")
             self._leave(page)
             yield  # two plots of one name must not be in one message
-            view = self._space = _module("plane").View(self.state)
+            view = self._space = TABS["plane"][1](self.state)
             yield
             place[:] = [
-                pmui.Typography(TABS["plane"], variant="h6", margin=(8, 10, 0, 10)),
+                pmui.Typography(TABS["plane"][0], variant="h6", margin=(8, 10, 0, 10)),
                 view.panel(),
             ]
         else:
@@ -347,7 +346,7 @@ class Tabs:
         if name not in self._begun and not self._has_place(name):
             self._begun.add(name)
             yield
-            view = _module(name).View(self.state)
+            view = TABS[name][1](self.state)
             if name == "plane":
                 self._space = view
             yield
@@ -363,11 +362,6 @@ class Tabs:
     def _has_place(self, name: str) -> bool:
         """Whether a tab's view is beside the packing instead, where there may be but one of it."""
         return self.looks.wide and name == "plane"
-
-
-def _module(name: str) -> ModuleType:
-    # Relative: `panel serve` names the package after the folder, without a place to find it by.
-    return importlib.import_module(f".views.{name}", __package__)
 
 
 def _pale_when_old(parts: Iterable[tuple[str, Any]]) -> None:

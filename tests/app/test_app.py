@@ -248,7 +248,7 @@ def test_links_reopen_what_they_were_made_from(mu, packed, kind, extra):
 
 def test_older_links_to_a_renamed_tab_open_it():
     (tab,) = read_view({"tab": "projection"}, Looks.param).values()
-    assert TABS[tab] == "Force space"
+    assert TABS[tab][0] == "Force space"
 
 
 def test_a_button_names_all_that_is_to_be_computed_anew():

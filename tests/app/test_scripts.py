@@ -4,9 +4,17 @@ Names that nobody declared, imports that nobody exports and circles are oxlint's
 """
 
 import re
+import subprocess
+import sys
 
 from app.views.scripts import EXPORT, FOLDER, IMPORT
 
+# Names of the modules of all components, as far as the page has imported them before it is shown.
+IMPORTED = """
+import app.page
+from app.views.scripts import Scripted
+print(*(one.__module__.rpartition(".")[2] for one in Scripted.__subclasses__()))
+"""
 SCRIPTS = {path.stem: path.read_text() for path in FOLDER.glob("*.js")}
 ENTRIES = {"render", "begin"}  # called by Panel, and by a page that was saved
 
@@ -34,3 +42,11 @@ def test_the_table_of_who_calls_whom_has_every_script():
     rows = [row for row in text[text.index("## Scripts") :].splitlines() if row.startswith("|")]
     told = set(re.findall(r"`(\w+)\.js`", "\n".join(rows)))
     assert told == set(SCRIPTS)
+
+
+def test_every_component_is_known_before_a_page_is():
+    """Those that are defined while pages are open, only the first of these would learn of."""
+    given = {"capture_output": True, "text": True, "check": True}
+    told = subprocess.run([sys.executable, "-c", IMPORTED], cwd=FOLDER.parent.parent, **given)
+    files = {path.stem for path in FOLDER.glob("*.py") if "(Scripted):" in path.read_text()}
+    assert set(told.stdout.split()) == files and len(files) > 15
