@@ -51,7 +51,6 @@ const BUTTONS = `
   <div class="quiz" role="status"></div>
   <div class="read">
     <span>network <b class="state"></b></span>
-    <span class="differs">on average <b class="apart"></b> of the mean force away from as packed</span>
     <span class="said"></span>
   </div>
   <div class="scenes">
@@ -83,6 +82,7 @@ const BUTTONS = `
   </div>
   <div class="game">Made: <span class="source"></span></div>
   <div class="read">Check:
+    <span class="differs">from as packed, on average, <b class="apart"></b> of the mean force</span>
     <span tabindex="0" data-term="residual">unbalanced <b class="residual"></b> of the mean force</span>
     <span tabindex="0" data-term="accepted">accepted <b class="acceptance"></b></span>
     <span tabindex="0" data-term="distance">from the centre of all networks <b class="distance"></b> mean forces</span>

@@ -33,11 +33,12 @@ BARS += ("whole_low", "whole_high")  # exact intervals without what is known
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
 # What one bar says, and at which part of the axis, from its least force to its largest; and where.
 KEY = {
-    "smallest possible": 0.50,
-    "seen so far": 0.60,
-    "as packed": 0.69,
-    "now; drag it up or down": 0.79,
-    "largest possible": 0.93,
+    "smallest possible": 0.47,
+    "seen so far": 0.57,
+    "as packed (when the disks came to rest)": 0.66,
+    "now; drag it up or down": 0.75,
+    "largest possible": 0.86,
+    "How to read a bar": 0.96,
 }
 KEY_AT = 2.5
 ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
@@ -185,7 +186,7 @@ class View(TabView):
             part.visible = shown
         self.figure.legend[0].visible = not shown  # which says the same
         heights = [level * top for level in KEY.values()]
-        low, seen, packed, now, high = ([height] for height in heights)
+        low, seen, packed, now, high, _ = ([height] for height in heights)
         columns = {"low": low, "high": high, "packed": packed, "now": now}
         columns |= {"seen_low": [0.97 * seen[0]], "seen_high": [1.07 * now[0]]}
         self.example.data = {"rank": [KEY_AT]} | columns

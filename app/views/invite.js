@@ -8,9 +8,10 @@ const NEAR = 0.45 // of half the view, from its middle
 const FINGER = matchMedia("(pointer: coarse)").matches
 // What the tag says, if there is one, and what stands above.
 const WORDS = {
-  drag: [FINGER ? "↙ tap, then drag" : "↙ drag me", "<b>Your turn: how strong can you make this force?</b> Drag the line and find out."],
+  drag: [FINGER ? "↙ tap, then drag" : "↙ drag me", "<b>Your turn: how strong can you make this force?</b> Drag the line: playing pauses."],
   choose: ["↙ click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in force space, and watch the lines."],
+  click: ["", "<b>Your turn: at which friction are forces freest?</b> Click a point of the curve to see such a packing."],
 }
 
 export class Invitation {
@@ -25,7 +26,7 @@ export class Invitation {
   place(mixed, what) {
     const { turn, tag } = this, at = what ? this.middle(mixed) : null
     turn.hidden = at === null
-    tag.hidden = at === null || what === "point"
+    tag.hidden = at === null || !WORDS[what][0]
     if (at === null) return
     tag.style.transform = `translate(${at[0]}px, ${at[1]}px) translateY(-100%)`
     if (this.what !== what) [tag.textContent, turn.innerHTML] = WORDS[what]

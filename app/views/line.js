@@ -44,7 +44,8 @@ export function drawAxis(space, index, at, d = 0) {
   const place = (v) => space.px(d ? [0, (v - rest) / slope] : [(v - rest) / slope, 0])[d]
   const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
   const sorted = [...body.corners].sort((a, b) => change(a.u) - change(b.u)), extreme = [sorted[0], sorted.at(-1)]
-  const marked = [...extreme.filter(({ cap }) => !cap).map(({ u }) => [u, look.cold]), [body.u, look.hand]]
+  const told = look.fresh ? [] : extreme.filter(({ cap }) => !cap) // once something was dragged: they are there to be found
+  const marked = [...told.map(({ u }) => [u, look.cold]), [body.u, look.hand]]
     .map(([u, colour]) => ({ v: change(u) + rest, place: space.px(space.flat(u)), colour }))
     .map((mark) => ({ ...mark, x: mark.place[d] }))
   const own = look.axes?.get(index) // the colour that its arrows have

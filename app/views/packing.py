@@ -25,12 +25,13 @@ Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; emp
 
 SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
+LARGE = 4.0  # ⟨f_n⟩, up to which widths are shown: few forces are larger
 LEGEND = """
 <span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
 <span tabindex="0" data-term="{width_term}">width: {width}, up to
- <svg width="40" height="12"><polygon points="0,5.5 40,0 40,12 0,6.5"
+ <svg width="40" height="12"><polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5"
   fill="currentColor" fill-opacity="0.65"/></svg>
- {widest:.3g} × mean force</span>
+ {shown:.3g} × mean force</span>
 <span tabindex="0" data-term="rattler">pale disks: carry nothing</span>
 {marks}
 """
@@ -250,9 +251,13 @@ def legend(state: AppState, pulled: bool = False) -> str:
         bar = "(none at μ = 0)"
     if looks.colour == "known" and not pulled and state.knowledge.narrowed is None:
         bar = "(nothing is known: select a contact and press H)"
+    widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
+    shown = min(widest, LARGE)
     return LEGEND.format(
         width=WIDTHS[looks.thickness],
-        widest=2 / (CHAIN_WIDTH * looks.stretch),
+        shown=shown,
+        high=6 + 6 * shown / widest,
+        low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
         colour=DEFINED.get("" if pulled else looks.colour, colour_words(looks, pulled)),

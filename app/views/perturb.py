@@ -19,7 +19,7 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .hints import term
-from .parts import PLAIN, PRIMARY, TabView, figure, folded, note, plotted, question
+from .parts import OUTLINED, PLAIN, PRIMARY, TabView, figure, folded, note, plotted, question
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
@@ -49,8 +49,9 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <text x="40" y="46">holds</text><text x="280" y="46">holds</text></g>
 </svg>"""
 LEAD = (
-    "<b>Two disks that touch are pushed apart, harder and harder.</b> Their neighbours hold "
-    "them, until balance is no longer possible and the packing gives way."
+    "<b>Two disks that touch are pushed apart, harder and harder,</b> by two forces on top of "
+    "those that are there. Their neighbours hold them, until nothing balances and the packing "
+    "gives way."
 )
 HINT = (
     "<b>Click a line in the packing</b>, or choose the strongest one. Then guess how hard you must "
@@ -79,9 +80,12 @@ class View(TabView):
         super().__init__(state, "replay", looks=["contact"])
         self.what = question("Question", PUSHES, self.looks, "pushing")
         look = PRIMARY | {"margin": (4, 8), "sx": PLAIN}
-        self.strongest = pmui.Button(label="Choose the strongest contact", **look)
+        quiet = OUTLINED | {"margin": (4, 8), "sx": PLAIN}
+        self.strongest = pmui.Button(label="Choose the strongest contact", **quiet)
         self.push = pmui.Button(label="Push", **look)
-        self.guess = pmui.TextInput(label="Your guess", size="small", width=130, margin=(4, 8))
+        self.guess = pmui.TextInput(
+            label="Guess, mean forces", size="small", width=190, margin=(4, 8)
+        )
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
         self.plots = pn.Column(sizing_mode="stretch_width")

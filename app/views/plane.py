@@ -331,14 +331,15 @@ class View(TabView):
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
         dots = f"{'All' if inner == 1 else f'{inner:.0%} of the'} {len(path)} dots"
-        words = f"<b>{dots} lie less than halfway from the middle to the outline</b>"
+        dots += _of(self.state.replay)
+        words = f"<b>{dots} lie less than halfway from the middle of S to its outline</b>"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
             share = planes.inner_share(points, found.outer)
             words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
         words += CROWDED if free >= MANY and inner > MOSTLY else ""
         share = (
-            f" The {len(path)} dots{_of(self.state.replay)} span {part[0]:.0%} of its width, "
+            f" The {len(path)} dots span {part[0]:.0%} of its width, "
             f"{part[1]:.0%} of its height, and fill {area:.1%} of its area"
             f"{_variance(found.plane)}."
         )
@@ -379,7 +380,7 @@ class View(TabView):
         fig.patch("x", "y", source=self.inner, fill_alpha=0, line_color=DARK, line_alpha=0.4)
         outlines = list(fig.renderers)
         fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
-        fig.line("x", "y", source=self.path, color=STATES, line_alpha=0.5, line_width=0.8)
+        fig.line("x", "y", source=self.path, color=STATES, line_alpha=0.3, line_width=0.8)
         fig.scatter(
             "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7,
             legend_label="beside",
@@ -445,7 +446,7 @@ def _sweep(label: str, axis: int) -> pmui.Button:
 def _of(replay: Replay) -> str:
     """Of how many networks those on screen are a part."""
     summary = replay.summary
-    return f" (of {summary['states']} networks)" if summary["kept"] < summary["states"] else ""
+    return f" (of {summary['states']} found)" if summary["kept"] < summary["states"] else ""
 
 
 def _variance(plane: Plane) -> str:

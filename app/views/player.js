@@ -82,7 +82,8 @@ class Player {
     if (this.points) return this.plots.invites ? "point" : null
     if ((model.contact ?? null) !== null) return null
     if (this.pushes) return "choose"
-    return this.took || !this.replay.walk.free ? null : "drag"
+    if (this.took || !this.replay.walk.free) return null
+    return model.tab === "statistics" ? "click" : "drag"
   }
 
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */

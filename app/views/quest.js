@@ -25,6 +25,9 @@ const OWN = {
 export class Quest {
   constructor(host) { this.host = host; this.begin() }
 
+  /** How many times the force across the one up is to be; undefined where nothing such is asked. */
+  get times() { return this.asked?.times }
+
   /** Nothing is found yet: another scene, or another S. */
   begin() { Object.assign(this, { found: [false, false], best: -Infinity }) }
 
@@ -36,8 +39,9 @@ export class Quest {
     const [low, high] = (body.bounded && ends) || [NaN, NaN], room = high - low
     const none = !(room > 1e-6 * body.scaleOf())
     this.host.classList.toggle("none", none)
+    this.asked = undefined
     if (none) return
-    const value = body.forces()[2 * contact], own = OWN[body.scene.name]
+    const value = body.forces()[2 * contact], own = this.asked = OWN[body.scene.name]
     const reached = own ? [own.times ? place[1] >= own.times * place[0] : value >= own.least] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
     if (moved) this.found = this.found.map((found, k) => found || Boolean(reached[k]))
     const said = own ? this.own(own, value, high) : this.both(low, high)

@@ -56,8 +56,21 @@ export function drawShadow(space) {
     const [x, y] = corners.reduce((one, other) => (other[0] - other[1] > one[0] - one[1] ? other : one)) // where no dots are
     space.write(x + 18, y - 8, "S", look.cold, 22)
   }
+  if (space.ray && corners.length) drawRay(space, space.ray)
   const ends = [0, 1].map((k) => { const all = space.corners().map((p) => p[k]); return all.length && !stale ? [Math.min(...all), Math.max(...all)] : [] })
   for (const v of ends[0]) space.write(space.px([v, 0])[0], h - 42, v.toFixed(2), look.cold, 11)
   for (const v of ends[1]) space.write(52, space.px([0, v])[1], v.toFixed(2), look.cold, 11)
   space.shadow.forEach((force, d) => nameAxis(space, `${space.told("name", force)} →`, look.axes?.get(force) ?? look.ink, d ? null : h - 16))
+}
+
+/** Where the force up is so many times that across: through S, with words at its lower end. */
+function drawRay(space, times) {
+  const { context: g, look } = space, all = space.corners(), top = Math.max(...all.map(([, y]) => y)), low = Math.min(...all.map(([, y]) => y))
+  const [a, b] = [low, top].map((y) => space.px([y / times, y]))
+  g.strokeStyle = look.hand
+  g.lineWidth = 1.2
+  g.setLineDash([6, 5])
+  line(g, a, b)
+  g.setLineDash([])
+  space.write(a[0] - 6, a[1], `${times} times`, look.hand, 12, "right")
 }

@@ -62,7 +62,7 @@ export function render({ model, view }) {
     arrows.draw({ ...look, contacts: lit() })
     if (space.draw(body, look, now.path)) soon()
     root.painted = (root.painted ?? 0) + 1
-    if (!going.frame || root.painted % 2) bars.draw(body, lit(), now.bounds) // numbers on a walk: every second frame
+    if (!going.frame || root.painted % 2) bars.draw(body, lit(), now.bounds, now.fresh) // numbers on a walk: every second frame
   }
 
   /** Contacts that light up among disks and bars: those looked at, and those the point is read by. */
@@ -95,6 +95,7 @@ export function render({ model, view }) {
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
     const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
     quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: !now.fresh })
+    space.ray = quest.times
   }
 
   // What is done
@@ -278,6 +279,7 @@ export function render({ model, view }) {
 
   function chooseMu(value) {
     chosenMu = true
+    now.fresh = false
     setMu(value)
   }
 
@@ -344,8 +346,9 @@ export function render({ model, view }) {
     if (Number.isFinite(value) && value >= 0) chooseMu(value)
     else { say("μ is a number from 0 on"); follow() }
   })
-  part("play").addEventListener("click", () => { going.toggle(body); soon() })
+  part("play").addEventListener("click", () => { now.fresh = false; going.toggle(body); soon() })
   part("fill").addEventListener("click", () => {
+    now.fresh = false
     now.filled = !now.filled
     if (now.filled) space.fill()
     part("fill").classList.toggle("on", now.filled)

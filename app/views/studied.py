@@ -105,7 +105,7 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     """
     kind = {"y_axis_type": "log" if log else "linear"}
     walks = studied.rows("walk")
-    spread = _over_mu("spread", "how much a force varies (mean force = 1)", 330, **kind)
+    spread = _over_mu("spread", "how much one force varies (mean force = 1)", 330, **kind)
     found = statistics.means(walks, "eta1")
     _line(spread, found, f"mean of {_packings(walks)} packings", log)
     _own(spread, [(here["mu"], here["eta1"], 0.0)], log, colour=DOT, label=HERE)
