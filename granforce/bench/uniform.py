@@ -165,9 +165,9 @@ def _set_up(S: Ensemble) -> tuple[Any, Any]:
 def _all_rows(made: Any, part: float) -> Any:
     """All rows of K where they fit into a part of the memory, none of them yet where not."""
     rows = room_for_rows(made, part)
-    if len(rows.owner) == made.count:
+    if rows.whole:
         for first in range(0, len(made.moving), LANES):
-            make_rows(made, rows, range(first, min(first + LANES, len(made.moving))))
+            make_rows(made, rows.kept, range(first, min(first + LANES, len(made.moving))))
     return rows
 
 

@@ -8,6 +8,7 @@ is until it is made, and goes on, bit for bit as if it had been there.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -34,14 +35,26 @@ _LEAST = 1e-300
 _PATH, _HITS, _TURNS, _REFUSED, _FLYING, _NEXT = range(6)
 
 
-class Rows(NamedTuple):
-    """Rows of K that are kept."""
+class Kept(NamedTuple):
+    """Rows of K that are there."""
 
     values: Floats  # (places, walls)
     place: Integers  # (walls,) where each row is, −1 where it is not
     owner: Integers  # (places,) wall of each place, −1 where it is free
     used: Mask  # (places,) bool, since the hand came by last
     hand: Integers  # (1,) the next place that may be given away
+
+
+class Rows(NamedTuple):
+    """Rows of K, made on demand; threads may share them where there is room for all."""
+
+    kept: Kept
+    making: threading.Lock  # held by the thread that makes some
+
+    @property
+    def whole(self) -> bool:
+        """Whether there is room for all, so that none is ever given up."""
+        return len(self.kept.owner) >= len(self.kept.place)
 
 
 class Flight(NamedTuple):
@@ -58,26 +71,30 @@ def room_for_rows(walls: Walls, part: float = 1.0) -> Rows:
     """Rows with room in a part of MEMORY, none of them there yet."""
     count = max(1, walls.count)
     places = min(count, max(2 * lanes.LANES, int(part * MEMORY / (8 * count))))
-    return Rows(
+    kept = Kept(
         values=np.zeros((places, walls.count)),
         place=np.full(walls.count, -1),
         owner=np.full(places, -1),
         used=np.zeros(places, dtype=bool),
         hand=np.zeros(1, dtype=np.int64),
     )
+    return Rows(kept, threading.Lock())
 
 
-def make_rows(walls: Walls, rows: Rows, wanted: Sequence[int] | Integers) -> None:
-    """Put the rows of so many walls where others were not used for long."""
-    new = walls.rows(np.asarray(wanted))
-    for wall, row in zip(wanted, new, strict=True):
+def make_rows(walls: Walls, rows: Kept, wanted: Sequence[int]) -> None:
+    """Put the rows of so many walls where others were not used for long; those there stay."""
+    wanted = [wall for wall in wanted if rows.place[wall] < 0]
+    if not wanted:
+        return
+    for wall, row in zip(wanted, walls.rows(np.array(wanted, dtype=int)), strict=True):
         while rows.used[rows.hand[0]]:
             rows.used[rows.hand[0]] = False
             rows.hand[0] = (rows.hand[0] + 1) % len(rows.owner)
         here = rows.hand[0]
         if rows.owner[here] >= 0:
             rows.place[rows.owner[here]] = -1
-        rows.values[here], rows.place[wall], rows.owner[here] = row, here, wall
+        rows.values[here], rows.owner[here] = row, wall
+        rows.place[wall] = here  # last: other threads look here
         rows.used[here] = True
         rows.hand[0] = (here + 1) % len(rows.owner)
 
@@ -107,22 +124,23 @@ def follow(
     """
     flights, limit = [make_flight(s) for s in starts], MOST_TURNS * (walls.dimension + 1)
     outs = np.ones((len(starts), len(drawn[0][0]), walls.count))
-    waiting = list(range(len(starts)))
+    kept, waiting = rows.kept, list(range(len(starts)))
     while waiting:
         stop = cancelling.flag()
-        met = {k: fly(rows, *drawn[k], flights[k], limit, outs[k], stop) for k in waiting}
+        met = {k: fly(kept, *drawn[k], flights[k], limit, outs[k], stop) for k in waiting}
         cancelling.check("uniform sample")
         waiting = [k for k in waiting if met[k] >= 0]
         each = lanes.LANES // max(1, len(waiting))
         wanted = [met[k] for k in waiting]
         for k in waiting:
             rates = -flights[k].w / np.maximum(flights[k].s, _LEAST)
-            soon = np.where(rows.place < 0, rates, -1.0)
+            soon = np.where(kept.place < 0, rates, -1.0)
             ahead = np.argpartition(-soon, each)[:each].tolist() if each else []
             wanted += [wall for wall in ahead if soon[wall] > 0]
         wanted = list(dict.fromkeys(wanted))[: max(lanes.LANES, len(waiting))]
         if wanted:
-            make_rows(walls, rows, wanted)
+            with rows.making:
+                make_rows(walls, kept, wanted)
     counts = [flight.count[[_TURNS, _REFUSED]] for flight in flights]
     return np.stack([flight.s for flight in flights]), outs, np.array(counts)
 

@@ -36,8 +36,10 @@ class ThinMatrix(NamedTuple):
 
         Products round by the shapes of matrices: each row is made among the same others.
         """
-        found = np.empty((len(walls), self.count))
+        found = np.zeros((len(walls), self.count))
         for at, wall in enumerate(walls.tolist()):
+            if wall >= len(self.root):  # padding
+                continue
             first = wall - wall % LANES
             some = np.eye(min(LANES, len(self.root) - first), self.count, first)
             found[at] = self.moved(some)[wall - first]

@@ -75,7 +75,6 @@ class UniformSample(NamedTuple):
     diagnosis_seconds: float  # wall time of the diagnostics
     method: str
     walls: Walls  # the coordinates used
-    rows: Sequence[Rows]  # those of K that are kept, by thread
     reach: float  # root mean square distance |s − 1| from the centre, as found in the warm-up
     ends: Sequence[ChainState]  # ChainState of each chain, from which it can be continued
 
@@ -229,12 +228,13 @@ def sample_uniform(
         raise InputError("the effective sample size that is wanted must be above 0")
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}: take one of {', '.join(METHODS)}")
-    sample = previous or _start(ensemble, chains, seed, method, workers)
-    if len(sample.rows) != min(workers, len(sample.ends)):
-        sample = sample._replace(rows=stores_for(sample.walls, len(sample.ends), workers))
+    if previous is None:
+        sample, stores = _start(ensemble, chains, seed, method, workers)
+    else:
+        sample, stores = previous, stores_for(previous.walls, len(previous.ends), workers)
     most = MOST_STATES * max(states, effective or 0)
     while True:
-        sample, complete = _extend(ensemble, sample, states, progress)
+        sample, complete = _extend(ensemble, sample, stores, states, progress)
         h, done = sample.walls.dimension, len(sample.flat)
         enough = not h or not effective or sample.effective >= effective
         if enough or not complete or done >= most:
@@ -266,8 +266,10 @@ def warm_up(
 
 
 def stores_for(made: Walls, chains: int, workers: int) -> list[Rows]:
-    """Rows of K for each thread, which share the memory that there is for them."""
-    threads = min(workers, chains)
+    """Rows of K for each thread: the same for all where they fit, else in parts of the memory."""
+    threads, whole = min(workers, chains), billiard.room_for_rows(made)
+    if whole.whole:
+        return [whole] * threads
     return [billiard.room_for_rows(made, 1 / threads) for _ in range(threads)]
 
 
@@ -323,8 +325,10 @@ def counted(counts: dict[str, Any], done: Integers) -> dict[str, Any]:
     return counts | {"turns": counts["turns"] + turns, "refused": counts["refused"] + refused}
 
 
-def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int) -> UniformSample:
-    """A sample without states yet, its chains warmed up."""
+def _start(
+    ensemble: Ensemble, chains: int, seed: int, method: str, workers: int
+) -> tuple[UniformSample, list[Rows]]:
+    """A sample without states yet, its chains warmed up, and rows of K for each thread."""
     begin = time.perf_counter()
     made = walls(ensemble)
     ready = time.perf_counter()
@@ -333,7 +337,7 @@ def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int
     dropped = chains * sum(WARM_UP) if made.dimension else 0
     counts = {"turns": 0, "refused": 0, "dropped": dropped}
     nothing = np.zeros((chains, 0))
-    return UniformSample(
+    sample = UniformSample(
         states=np.zeros((chains, 0, len(ensemble.index), 2)),
         residual=nothing,
         violation=nothing,
@@ -345,21 +349,25 @@ def _start(ensemble: Ensemble, chains: int, seed: int, method: str, workers: int
         diagnosis_seconds=0.0,
         method=method,
         walls=made,
-        rows=stores,
         reach=reach,
         ends=ends,
     )
+    return sample, stores
 
 
 def _extend(
-    ensemble: Ensemble, sample: UniformSample, states: int, progress: Progress | None
+    ensemble: Ensemble,
+    sample: UniformSample,
+    stores: Sequence[Rows],
+    states: int,
+    progress: Progress | None,
 ) -> tuple[UniformSample, bool]:
     """The sample with at least `states` states, diagnosed, and whether it was not cancelled."""
     made, (chains, have) = sample.walls, sample.residual.shape
     target = -(-states // chains)
     begin = time.perf_counter()
     on = partial(step, made, reach=sample.reach, method=sample.method)
-    ends, new, done = drawn(ensemble, made, sample.rows, sample.ends, on, have, target, progress)
+    ends, new, done = drawn(ensemble, made, stores, sample.ends, on, have, target, progress)
     forces = np.concatenate([sample.states, new], axis=1)
     ready = time.perf_counter()
     varies = varying(ensemble, made)

@@ -253,7 +253,7 @@ def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _thin_matrix(frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
-    """The same by singular values."""
+    """K at y by singular values, and its walls' positions in y."""
     by_pivots, moving = _matrix(frame, y)
     balance = _balance(frame.ensemble, moving)
     levers = np.array([frame.forces(one).ravel() for one in np.diag(y)[moving]]).T

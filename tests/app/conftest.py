@@ -1,4 +1,4 @@
-"""A small store for the app's tests."""
+"""A small store, the app served from it, and pages of a browser, for the app's tests."""
 
 import re
 
@@ -143,8 +143,9 @@ def opening(context, address, request):
 
     yield opening
     for number, page in enumerate(pages):
-        picture(page, f"{request.module.__name__}/{request.node.name}-{number}", full_page=True)
-        page.close()
+        if not page.is_closed():
+            picture(page, f"{request.module.__name__}/{request.node.name}-{number}", full_page=True)
+            page.close()
     assert not [told for told in problems if not any(words in told for words in allowed)]
 
 

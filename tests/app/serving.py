@@ -111,16 +111,20 @@ def laid_out(page, name):
 def at_rest(place):
     """The box of a place, once it has been the same in twenty frames."""
     place.evaluate(
-        """element => new Promise((done) => {
+        """(element, patience) => new Promise((done, failed) => {
+            const end = performance.now() + patience
             let before = "", same = 0
             const look = () => {
                 const now = JSON.stringify(element.getBoundingClientRect())
                 same = now === before ? same + 1 : 0
                 before = now
-                same < 20 ? requestAnimationFrame(look) : done()
+                if (same >= 20) done()
+                else if (performance.now() > end) failed(new Error(`it never rests: ${now}`))
+                else requestAnimationFrame(look)
             }
             look()
-        })"""
+        })""",
+        PATIENCE,
     )
     return place.bounding_box()
 

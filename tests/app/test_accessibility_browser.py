@@ -1,7 +1,7 @@
 """The page judged by axe, the usual automatic check of accessibility: nothing serious is found."""
 
 import pytest
-from serving import how_it_is_made, looks
+from serving import at_rest, how_it_is_made, looks
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
@@ -78,4 +78,5 @@ def test_no_scene_has_a_serious_finding(opening, query):
     page.wait_for_function("e => e.painted > 0", arg=desk.element_handle())
     assert findings(page) == []
     page.set_viewport_size({"width": 1280, "height": 900})
+    at_rest(desk)
     assert findings(page) == []

@@ -871,10 +871,10 @@ def test_a_damaged_packing_is_made_anew_and_only_where_it_may_be(shipped, tmp_pa
 # Survival
 
 
-def next_on(pool, seconds=10):
+def next_on(pool):
     """Whether the pool still runs what it is given."""
     job = Job(lambda job: "done", pool)
-    return job.wait(seconds) and job.result == "done"
+    return job.wait(240) and job.result == "done"
 
 
 def raising(error):

@@ -352,8 +352,8 @@ def test_curves_of_the_shown_states_end_at_their_targets(page):
     assert sorted(targets) == pytest.approx(sorted(ends), rel=1e-3)
 
 
-def test_statistics_show_the_finished_study_with_claims_and_verdicts(lasting):
-    page = lasting("?tab=statistics")
+def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
+    page = visit("?tab=statistics")
     page.get_by_text("Forces are freest at friction").wait_for()
     page.get_by_text("What Shaebani, Unger and Kertész found, and what was found here").click()
     assert page.get_by_role("cell", name="reproduced").count() >= 5

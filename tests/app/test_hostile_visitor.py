@@ -9,7 +9,6 @@ import urllib.request
 import pytest
 from serving import CLOSED, free_port, painted, serve
 
-PATIENCE = 180_000  # ms, on a busy machine
 LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, unless it is ended
 LIMITS = "n=60,states=20000"
 LARGEST = "9" * 300
@@ -34,7 +33,6 @@ def address(shipped, tmp_path_factory):
 def page(context):
     """An empty page."""
     page = context().new_page()
-    page.set_default_timeout(PATIENCE)
     yield page
     page.close()
 

@@ -212,13 +212,14 @@ def pulled(page, up=60):
     """Drag the strongest chain upwards; returns it and what was there before."""
     contact, x, y = chain(page)
     before = normal(page)
+    frames = scene(page, "scene.hand.frames")
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x, y - 5)
     until(page, "scene.hand.rail !== null")
     for k in range(6):
         page.mouse.move(x, y - 5 - up * (k + 1) / 6)
-    until(page, "scene.hand.frames > 0")
+    until(page, f"scene.hand.frames > {frames}")
     return contact, before
 
 
@@ -250,9 +251,11 @@ def test_at_the_end_of_the_rail_the_page_says_why(page):
     contact, _ = pulled(page, up=600)
     until(page, "scene.hand.end === 1")
     page.get_by_text("held there by").wait_for()
+    until(page, f"Math.abs(scene.mixed.normal[{contact}] - scene.hand.value) < 1e-6")
     assert normal(page)[contact] == pytest.approx(scene(page, "scene.hand.rail.upper"), abs=1e-4)
     picture(page, "live/end")
     page.mouse.up()
+    searched(page, "pulls=")
 
 
 def test_brackets_move_the_selected_force_and_escape_lets_go(page):

@@ -12,6 +12,7 @@ from packings import REFERENCE, reference, skewed
 from serving import (
     CLOSED,
     MODEL,
+    PATIENCE,
     bars_drawn,
     column,
     picture,
@@ -25,7 +26,6 @@ from small_store import DISKS, KEPT
 import granforce as gf
 
 LAMMPS = REFERENCE.parent / "lammps"
-PATIENCE = 180  # s, on a busy machine
 
 
 def filled(page, source, least=3):
@@ -307,7 +307,7 @@ def test_closed_pages_are_forgotten(visit, shipped, tmp_path):
     variables = {"GRANFORCE_DATA": str(shipped), "ALIVE": str(alive)}
 
     def wait_for(count):
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + PATIENCE / 1000
         while not (alive.exists() and int(alive.read_text() or -1) in count):
             assert time.monotonic() < end, alive.read_text()
             time.sleep(0.1)

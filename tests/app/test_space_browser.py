@@ -64,7 +64,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
         page.mouse.up()
         searched(page, "pulls=")
         until(page, "scene.hand.player.replay.held.pull !== undefined")
-    before, start = normal(page), here(page)
+    before, start, frames = normal(page), here(page), scene(page, "scene.hand.frames")
     middle = [np.mean(column(page, "outer", name)) for name in "xy"]
     (x, y), (u, v) = place(page, *start), place(page, *middle)
     page.mouse.move(x, y)
@@ -72,7 +72,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     page.mouse.move(x + 2, y + 2)
     until(page, "scene.hand.spot.fan !== null")
     page.mouse.move(u, v)
-    until(page, "scene.hand.spot.at !== null && scene.hand.frames > 0")
+    until(page, "scene.hand.spot.at !== null && scene.hand.frames > %d" % frames)
     page.wait_for_function(
         f"([u, v]) => Math.abs({MODEL}('here').get_column('x')[0] - u) < 1e-2 * (1 + Math.abs(u))",
         arg=middle,

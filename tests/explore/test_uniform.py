@@ -392,10 +392,12 @@ def test_the_benchmark_compares_walks_by_cost_and_by_moments():
 def test_rows_made_on_demand_change_no_bit(sample):
     """Room for as few rows as there can be: each is made again and again."""
     made, few = sample.walls, billiard.room_for_rows(sample.walls, 0.0)
-    assert len(few.owner) < made.count == len(billiard.room_for_rows(made).owner)
+    whole = billiard.room_for_rows(made)
+    assert whole.whole and not few.whole
     on = partial(uniform.step, made, count=10, reach=sample.reach)
-    kept_ends, *kept = on(sample.ends, *sample.rows)
-    for stores in ([few], [billiard.room_for_rows(made, 0.0) for _ in range(3)]):
+    kept_ends, *kept = on(sample.ends, whole)
+    apart = [billiard.room_for_rows(made, 0.0) for _ in range(3)]
+    for stores in ([few], apart, [billiard.room_for_rows(made)] * 3):
         ends, *moved = uniform.together(stores, sample.ends, on)
         for one, other in zip(ends, kept_ends, strict=True):
             assert np.array_equal(one.slacks, other.slacks)

@@ -142,10 +142,10 @@ KINDS = [
     *((simulated, kind, whole, 0.1, 100, 1000, 10) for kind in ("yade", "mercury")),
     (simulated, "mercury, flat", whole, 0.1, 100, 1000, 10),
     (photoelastic, "few", whole_frame, 0.05, 60, 3334, 100),
-    *((photoelastic, kind, whole_frame, 0.08, 60, 1000, 10) for kind in ("text", "solved")),
-    (photoelastic, "blanks, walls", whole_frame, 0.08, 60, 1000, 10),
-    (photoelastic, "solved, packed", whole_frame, 0.08, 60, 1000, 10),
-    (photoelastic, "solved, 7.3", whole_frame, 0.08, 60, 1000, 10),
+    *((photoelastic, kind, whole_frame, 0.1, 60, 1000, 10) for kind in ("text", "solved")),
+    (photoelastic, "blanks, walls", whole_frame, 0.1, 60, 1000, 10),
+    (photoelastic, "solved, packed", whole_frame, 0.1, 60, 1000, 10),
+    (photoelastic, "solved, 7.3", whole_frame, 0.1, 60, 1000, 10),
 ]
 
 

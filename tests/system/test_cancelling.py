@@ -62,7 +62,7 @@ def one_endless_path(S):
     speeds = made.moved(np.random.default_rng(0).standard_normal((1, made.count)))
     path = speeds, np.array([1e12]), np.ones((0, made.count)), flight, 10**12
     rows = billiard.room_for_rows(made)
-    billiard.make_rows(made, rows, np.arange(made.count))
+    billiard.make_rows(made, rows.kept, range(made.count))
     billiard.fly(rows, *path, out, cancelling.flag())
     cancelling.check()
 
