@@ -19,7 +19,6 @@ from serving import (
     picture,
     scene,
     searched,
-    shows,
     until,
 )
 from small_store import DISKS, KEPT

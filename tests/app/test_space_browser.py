@@ -72,7 +72,7 @@ def test_the_point_follows_the_hand_and_the_network_the_point(visit, query):
     page.mouse.move(x + 2, y + 2)
     until(page, "scene.hand.spot.fan !== null")
     page.mouse.move(u, v)
-    until(page, "scene.hand.spot.at !== null && scene.hand.frames > %d" % frames)
+    until(page, f"scene.hand.spot.at !== null && scene.hand.frames > {frames}")
     page.wait_for_function(
         f"([u, v]) => Math.abs({MODEL}('here').get_column('x')[0] - u) < 1e-2 * (1 + Math.abs(u))",
         arg=middle,
