@@ -176,7 +176,7 @@ def test_the_forces_on_a_disk_are_shown_and_balance(page):
 
 
 def test_scales_of_colour_and_width_are_set_and_stay(visit):
-    page = visit(MANY + "&frame=5&full=0.2&stretch=2")
+    page = visit(MANY + "&frame=5&full=0.2&stretch=5")
     c, width, bin_, colours, change, force = scene(
         page,
         """(() => {
@@ -188,13 +188,13 @@ def test_scales_of_colour_and_width_are_set_and_stay(visit):
             ]
         })()""",
     )
-    assert c >= 0 and width == pytest.approx(2 * 0.23 * force, rel=1e-5)
+    assert c >= 0 and width == pytest.approx(5 * 0.23 * force, rel=1e-5)
     assert bin_ == pytest.approx((colours - 1) * (0.5 + change / 0.4), abs=0.51)
     page.get_by_text("+0.2 × mean force").wait_for()
-    page.get_by_text("4.35 × mean").wait_for()
+    page.get_by_text("1.74 × mean").wait_for()
     ask(page, 1)
     searched(page, "mu=1&")
-    assert "full=0.2" in page.url and "stretch=2" in page.url
+    assert "full=0.2" in page.url and "stretch=5" in page.url
     looks(page)
     page.get_by_label("Width, times").fill("-3")
     page.get_by_label("Width, times").press("Enter")
