@@ -63,7 +63,7 @@ def one_endless_path(S):
     path = speeds, np.array([1e12]), np.ones((0, made.count)), flight, 10**12
     rows = billiard.room_for_rows(made)
     billiard.make_rows(made, rows.kept, range(made.count))
-    billiard.fly(rows, *path, out, cancelling.flag())
+    billiard.fly(rows.kept, *path, out, cancelling.flag())
     cancelling.check()
 
 
