@@ -11,41 +11,62 @@ const WORDS = {
   drag: [FINGER ? "↙ tap, then drag" : "↙ drag me", "<b>Your turn: how strong can you make this force?</b> Drag the line: playing pauses."],
   choose: ["↙ click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in force space, and watch the lines."],
+  reach: ["", "<b>Your turn: can you bring the green force above {}?</b> Drag the red dot, and watch all lines."],
   click: ["", "<b>Your turn: at which friction are forces freest?</b> Click a point of the curve to see such a packing."],
 }
 
 export class Invitation {
-  constructor(scene) {
-    this.scene = scene
+  constructor(player) {
+    const { root } = player.scene
+    this.player = player
     this.of = this.row = null // the packing, and the line that was chosen in it
-    this.tag = scene.root.appendChild(made("div", { className: "invite", hidden: true }))
-    this.turn = scene.root.appendChild(made("div", { className: "turn", hidden: true }))
+    this.tag = root.appendChild(made("div", { className: "invite", hidden: true }))
+    this.turn = root.appendChild(made("div", { className: "turn", hidden: true }))
   }
 
-  /** what: one of WORDS; null where there is no hand for it. */
-  place(mixed, what) {
-    const { turn, tag } = this, at = what ? this.middle(mixed) : null
+  /** What can be done first, one of WORDS: nothing was dragged yet, and a line can be, or the point; or null. */
+  get what() {
+    const { model, replay, live, difference, predict, points, plots, pushes, took } = this.player
+    if (replay === null || live.moves || difference.on || predict.shown) return null
+    if (points && !plots.invites) return null
+    if (points) return this.target ? "reach" : "point"
+    if ((model.contact ?? null) !== null) return null
+    if (pushes) return "choose"
+    if (took || !replay.walk.free) return null
+    return model.tab === "statistics" ? "click" : "drag"
+  }
+
+  /** Near the largest force across that force space allows, of the green line; 0 in other planes. */
+  get target() {
+    const { plots } = this.player, across = plots.plane.pair?.length ? plots.find("outer")?.get_column("x") ?? [] : []
+    return Math.floor(9.8 * across.reduce((one, other) => Math.max(one, other), 0)) / 10
+  }
+
+  /** Say what can be done, beside its line and above the packing. */
+  place() {
+    const { turn, tag, what } = this, at = what ? this.middle() : null
     turn.hidden = at === null
     tag.hidden = at === null || !WORDS[what][0]
     if (at === null) return
     tag.style.transform = `translate(${at[0]}px, ${at[1]}px) translateY(-100%)`
-    if (this.what !== what) [tag.textContent, turn.innerHTML] = WORDS[what]
-    this.what = what
+    const [short, long] = WORDS[what], words = long.replace("{}", what === "reach" ? this.target : "")
+    if (this.words !== words) [tag.textContent, turn.innerHTML] = [short, words]
+    this.words = words
   }
 
   /** Where the line is, in pixels; null where it is out of view. */
-  middle(mixed) {
-    const { scene } = this, { geometry, view } = scene
-    if (this.of !== geometry) Object.assign(this, { of: geometry, row: this.strongest(mixed.normal) })
+  middle() {
+    const { scene, replay } = this.player, { geometry, view } = scene
+    if (this.of !== geometry) Object.assign(this, { of: geometry, row: this.strongest(replay.mixed.normal) })
     if (this.row === null) return null
     const [xa, ya, xb, yb] = scene.ends(this.row), x = (xa + xb) / 2, y = (ya + yb) / 2
     return Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > 0.9 * view.half ? null : scene.toPixel(x, y)
   }
 
   strongest(normal) {
-    const { geometry: { contact }, view } = this.scene
+    const { scene } = this.player, { geometry: { contact }, view } = scene
     let best = null
-    for (const { k, middle: [x, y] } of this.scene.segments(() => true)) {
+    for (const { k, middle: [x, y] } of scene.segments(() => true)) {
       if (Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > NEAR * view.half) continue
       if (best === null || normal[contact[k]] > normal[contact[best]]) best = k
     }

@@ -55,9 +55,9 @@ class Player {
     this.pins = new Pins(model)
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
-    this.invite = new Invitation(this.scene)
+    this.invite = new Invitation(this)
     this.scene.onMarks = (context, scene) => {
-      this.invite.place(this.replay?.mixed, this.inviting)
+      this.invite.place()
       this.pins.draw(context, scene)
       this.hand.draw(context, scene)
       this.difference.draw(context, scene)
@@ -73,17 +73,6 @@ class Player {
       grain: (k) => this.look.grain(k, this.replay),
       forces: (grain) => this.look.forcesOn(grain, this.replay.mixed),
     }
-  }
-
-  /** What can be done first, see invite.js: nothing was dragged yet, and a line can be, or the point; or null. */
-  get inviting() {
-    const { model, live, difference, predict } = this
-    if (this.replay === null || live.moves || difference.on || predict.shown) return null
-    if (this.points) return this.plots.invites ? "point" : null
-    if ((model.contact ?? null) !== null) return null
-    if (this.pushes) return "choose"
-    if (this.took || !this.replay.walk.free) return null
-    return model.tab === "statistics" ? "click" : "drag"
   }
 
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */

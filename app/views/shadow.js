@@ -72,5 +72,5 @@ function drawRay(space, times) {
   g.setLineDash([6, 5])
   line(g, a, b)
   g.setLineDash([])
-  space.write(a[0] - 6, a[1], `${times} times`, look.hand, 12, "right")
+  space.write(a[0] - 6, a[1], `violet = ${times} × green`, look.hand, 12, "right")
 }
