@@ -1,9 +1,12 @@
 """What somebody stumbled over who saw the page for the first time, one test each."""
 
+import re
+
 import pytest
 from serving import (
     MODEL,
     ask,
+    column,
     how_it_is_made,
     more,
     painted,
@@ -297,3 +300,35 @@ def test_the_volume_is_measured_among_the_numbers(visit):
     measure.wait_for()
     page.get_by_text("In numbers").click()
     measure.wait_for(state="hidden")
+
+
+def test_every_tab_asks_what_the_hand_can_find_out(visit):
+    """Above the packing; in force space for a value near the largest one that is possible."""
+    page = visit()
+    turn = page.locator(".turn")
+    for tab, words in (
+        ("Friction", "at which friction are forces freest?"),
+        ("Push", "how hard can two disks be pushed apart?"),
+        ("How far?", "how strong can you make this force?"),
+        ("Force space", "can you bring the green force above"),
+    ):
+        page.get_by_role("tab", name=tab).click()
+        turn.get_by_text(words).wait_for()
+    largest = max(column(page, "outer", "x"))
+    asked = float(re.search(r"above ([\d.]+)\?", turn.inner_text())[1])
+    assert 0.85 * largest < asked < largest
+    page.get_by_role("tab", name="How far?").click()
+    contact = scene(page, "scene.hand.player.invite.row")
+    middle = "(([a, b, c, d]) => scene.toPixel((a + c) / 2, (b + d) / 2))"
+    x, y = scene(page, f"{middle}(scene.ends({contact}))")
+    box = page.locator(".scene").bounding_box()
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x, box["y"] + y - 20, steps=4)
+    turn.wait_for(state="hidden")  # from now on it is known
+    page.mouse.up()
+    searched(page, "pulls=")
+    page.keyboard.press("Escape")
+    page.get_by_role("tab", name="Force space").click()
+    until(page, "scene.pair.length === 2")
+    assert turn.is_hidden()
