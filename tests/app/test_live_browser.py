@@ -357,7 +357,7 @@ def test_a_finger_pulls_the_selected_contact(visit):
 
 def test_a_grip_without_a_pull_leaves_what_is_told(page):
     """Let go before its rail is there, a contact is only selected."""
-    before = page.locator(".said").inner_text()
+    before, (contact, *_) = page.locator(".said").inner_text(), chain(page)
     told = page.locator(".scene").evaluate(
         """(e, contact) => {
             const {hand} = e.scene, source = hand.player.buttons.part("said")
@@ -366,8 +366,9 @@ def test_a_grip_without_a_pull_leaves_what_is_told(page):
             hand.leave()
             return told
         }""",
-        chain(page)[0],
+        contact,
     )
+    until(page, f"scene.selected === {contact}")
     assert "Finding" in told and page.locator(".said").inner_text() == before
 
 
