@@ -101,6 +101,8 @@ def fitting(view: View, replay: Replay) -> View:
             values = list(grabs.contacts(view[name]))
         if name == "known":
             values = [one.contact for one in view[name]]
+        if name == "pair" and len(set(values)) < 2:
+            return False
         return all(0 <= value < sizes[name] for value in values)
 
     return {name: view[name] for name in OF_A_REPLAY if name in view and fits(name)}

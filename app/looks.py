@@ -88,6 +88,8 @@ class Seen(param.Parameterized):
     )  # fmt: skip
     stretch = param.Number(default=1.0, bounds=(0.1, 10), doc="how many times as wide chains are")
     overlay = param.Boolean(doc="whether strong and undetermined contacts are marked (Fig. 5)")
+    figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
+    pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
     scale: Any = param.Selector(default="mean", objects=list(SCALES), doc="unit of the intervals")
 
 
@@ -111,9 +113,7 @@ class Looks(Seen):
     sort: Any = param.Selector(
         default="original", objects=list(SORTS), doc="order of the intervals"
     )
-    figure: Any = param.Selector(default="eta", objects=list(FIGURES), doc="of Statistics")
     axis: Any = param.Selector(default="linear", objects=list(AXES), doc="of the figure's values")
-    pushing: Any = param.Selector(default="one", objects=list(PUSHES), doc="what Perturb shows")
     axes: Any = param.Selector(default="pair", objects=list(PLANES), doc="of force space on screen")
     dark = param.Boolean(doc="theme")
 

@@ -88,13 +88,15 @@ def components(replay: Replay, first: Sequence[int], second: Sequence[int]) -> P
 
 def strong_pair(replay: Replay) -> tuple[int, int]:
     """Two contacts, positions in the backbone: the strongest as packed, and the strongest of those
-    that no disk has in common with it (where there are none, the second).
+    that no disk has in common with it (where there are none, the second). InputError for fewer.
     """
+    if replay.normal.shape[1] < 2:
+        raise InputError("there are no two contacts to be compared")
     strong = np.argsort(-replay.normal[0], kind="stable")
     disks = np.zeros((len(strong), 2), dtype=int)
     disks[replay.links.contact] = np.column_stack([replay.links.i, replay.links.j])
     apart = ~np.isin(disks[strong], disks[strong[0]]).any(axis=1)
-    other = strong[apart][0] if apart.any() else strong[-1 if len(strong) < 2 else 1]
+    other = strong[apart][0] if apart.any() else strong[1]
     return int(strong[0]), int(other)
 
 

@@ -175,7 +175,7 @@ class View(TabView):
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         shown = few and bool(exact) and self.looks.sort == "original"
-        self._show_key(top, shown and replay.summary["dimension"] > 0)
+        self._show_key(top, shown and not before and replay.summary["dimension"] > 0)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
         self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"

@@ -26,29 +26,33 @@ export class Invitation {
 
   /** What can be done first, one of WORDS: nothing was dragged yet, and a line can be, or the point; or null. */
   get what() {
-    const { model, replay, live, difference, predict, points, plots, pushes, took } = this.player
-    if (replay === null || live.moves || difference.on || predict.shown) return null
+    const { model, replay, live, difference, predict, points, plots, pushes, took, scene } = this.player
+    if (replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
     if (points && !plots.invites) return null
     if (points) return this.target ? "reach" : "point"
     if ((model.contact ?? null) !== null) return null
-    if (pushes) return "choose"
-    if (took || !replay.walk.free) return null
-    return model.tab === "statistics" ? "click" : "drag"
+    if (pushes) return model.pushing === "one" ? "choose" : null
+    if (took) return null
+    if (model.tab !== "statistics") return "drag"
+    return model.figure === "eta" ? "click" : null
   }
 
-  /** Near the largest force across that force space allows, of the green line; 0 in other planes. */
+  /** Near the largest force that the green line can have; 0 where it is there, and in other planes. */
   get target() {
-    const { plots } = this.player, across = plots.plane.pair?.length ? plots.find("outer")?.get_column("x") ?? [] : []
-    return Math.floor(9.8 * across.reduce((one, other) => Math.max(one, other), 0)) / 10
+    const { plots, replay } = this.player, [green] = plots.plane.pair ?? []
+    if (green === undefined) return 0
+    const most = (plots.find("outer")?.get_column("x") ?? []).reduce((one, other) => Math.max(one, other), 0)
+    const near = Math.floor(9.8 * most) / 10
+    return near > replay.mixed.normal[green] ? near : 0
   }
 
   /** Say what can be done, beside its line and above the packing. */
   place() {
-    const { turn, tag, what } = this, at = what ? this.middle() : null
-    turn.hidden = at === null
-    tag.hidden = at === null || !WORDS[what][0]
-    if (at === null) return
-    tag.style.transform = `translate(${at[0]}px, ${at[1]}px) translateY(-100%)`
+    const { turn, tag, what } = this, at = what && WORDS[what][0] ? this.middle() : null
+    turn.hidden = !what || Boolean(WORDS[what][0] && !at)
+    tag.hidden = !at
+    if (at) tag.style.transform = `translate(${at[0]}px, ${at[1]}px) translateY(-100%)`
+    if (!what) return
     const [short, long] = WORDS[what], words = long.replace("{}", what === "reach" ? this.target : "")
     if (this.words !== words) [tag.textContent, turn.innerHTML] = [short, words]
     this.words = words

@@ -124,6 +124,7 @@ export class Live {
     scene.palette ??= plain(plain(model.palettes).scene)
     scene.frozen = true
     scene.selected = null
+    scene.pair = [] // of the packing before
     scene.show(geometry)
     // As large as at first while it shrinks, larger where it tilts out of that.
     const half = Math.max(this.window[1] - this.window[0], right - left) / 2

@@ -67,7 +67,6 @@ PICTURE |= {"normal": Array, "tangential": Array}
 STATES = {"normal": Array, "tangential": Array, "number": Array, "residual": Array}
 STATES |= {"acceptance": Array, "eta1": Array, "eta2": Array, "eta3": Array}
 
-LIST = [float, ...]
 # {component: messages that its script is sent}; forces in ⟨f_n⟩, arrays flat.
 TO_BROWSER = {
     "FrictionSlider": ({"settled": True},),  # what was typed is taken, or refused

@@ -120,7 +120,6 @@ class PackingView:
             self._shown = replay
             room = len(live.numbers(replay.summary)) if state.growing else 0
             changes["walk"] = frames(replay, room)
-            changes["free"] = replay.summary["dimension"]
         self.player.param.update(changes)
 
     def _accompany(self, *events: Any) -> None:

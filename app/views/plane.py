@@ -135,7 +135,7 @@ class View(TabView):
             return
         free = replay.summary["dimension"]
         pair = self.kind == "pair"
-        self.lead.object = LEAD + (OF_A_PAIR if pair else TOUCH)
+        self.lead.object = LEAD + (OF_A_PAIR if pair else TOUCH) if free else ""
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)
         for line, colour in zip(self.lines, lines(self.looks.dark), strict=True):
@@ -193,7 +193,8 @@ class View(TabView):
 
     def _clear(self) -> None:
         """Nothing of another plane stays."""
-        self.state.plane = None
+        self.state.plane = self.found = None
+        self.finding.object, self.name_of_s.visible = "", False
         self.path.data = {"x": [], "y": [], "state": []}
         for source in (self.original, self.beside, self.here, self.inner, self.outer, self.cone):
             source.data = {"x": [], "y": []}
@@ -278,6 +279,8 @@ class View(TabView):
     def _span(self, event: Any) -> None:
         """A contact that is clicked takes the place of the green one of a pair."""
         pair = self.state.plane.pair if self.state.plane is not None else []
+        if self.shown is None or self.shown[1:] != ("pair", self.looks.pair):
+            return  # another is asked for, as by the way back
         if self.visible and pair and event.new not in (None, *pair):
             self.looks.pair = event.new, pair[1]
 
@@ -330,8 +333,8 @@ class View(TabView):
         area = planes.area(path) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
-        dots = f"{'All' if inner == 1 else f'{inner:.0%} of the'} {len(path)} dots"
-        dots += _of(self.state.replay)
+        share = "All" if inner == 1 else f"{min(inner, 0.99):.0%} of the"
+        dots = f"{share} {len(path)} dots{_of(self.state.replay)}"
         words = f"<b>{dots} lie less than halfway from the middle of S to its outline</b>"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])

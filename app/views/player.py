@@ -48,7 +48,6 @@ class Player(Scripted, Seen):
     source = param.String(doc="where the states come from, in words")
     busy = param.Boolean()
     pulled = param.Boolean(doc="whether a network is on screen that was pulled; told by the page")
-    free = param.Integer(default=0, doc="dimension h of S")
     twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
     zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
     between = param.List(default=None, allow_None=True)

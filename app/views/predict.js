@@ -8,7 +8,7 @@ const ASKED = [
     words: "Nothing moves. Are the forces at the contacts fixed, too?",
     choices: ["Yes, each has one value", "No, others balance as well"],
     answer: (player, chosen) => {
-      const free = player.model.free, right = free > 0 ? 1 : 0
+      const free = player.replay.walk.free, right = free > 0 ? 1 : 0
       if (free > 0) player.play(true)
       const told = free > 0
         ? `${free} numbers are left free by balance. Watch: every network that plays holds all disks.`

@@ -13,6 +13,7 @@ const OWN = {
     done: (value, high) => `✓ It presses with ${number(value)}, the disk weighs 1, and all is in balance. At ${number(high)} friction can do no more.`,
   },
   box: {
+    of: "between", // if that is the force up: which two forces are axes depends on friction
     ask: "can you make the disks press on each other (violet) with four times the weight of one disk?", least: 4,
     done: (value) => `✓ ${number(value)} times, and everything still balances.`,
   },
@@ -41,7 +42,8 @@ export class Quest {
     this.host.classList.toggle("none", none)
     this.asked = undefined
     if (none) return
-    const value = body.forces()[2 * contact], own = this.asked = OWN[body.scene.name]
+    const value = body.forces()[2 * contact], known = OWN[body.scene.name]
+    const own = this.asked = known && body.scene.names[contact].startsWith(known.of ?? "") ? known : undefined
     const reached = own ? [own.times ? place[1] >= own.times * place[0] : value >= own.least] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
     if (moved) this.found = this.found.map((found, k) => found || Boolean(reached[k]))
     const said = own ? this.own(own, value, high) : this.both(low, high)

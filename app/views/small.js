@@ -26,7 +26,7 @@ export function render({ model, view }) {
   root.innerHTML = desk(MOST_MU)
   const parts = {}, told = {}
   const part = (name) => (parts[name] ??= root.querySelector(`.${name}`))
-  const now = { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, filled: false, path: [], undo: [], fresh: true }
+  const now = { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, filled: false, path: [], undo: [], fresh: true, moved: false }
   let body = null, mu = model.scene.mu, chosenMu = false, waiting = 0, asleep = 0, returning = false
 
   const gone = goneBanner(view, "What is in the page still moves.")
@@ -94,7 +94,7 @@ export function render({ model, view }) {
     const contact = body.count && body.h && !body.empty ? space.read.at(-1) ?? 0 : null
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
     const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
-    quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: !now.fresh })
+    quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: now.moved })
     space.ray = quest.times
   }
 
@@ -117,7 +117,7 @@ export function render({ model, view }) {
       now.contacts = new Set(given ? given.stops.map(([c]) => c) : now.contact === null ? [] : [now.contact])
     }
     if (what === "begin") remember()
-    if (what === "go" || what === "pull") now.fresh = false
+    if (what === "go" || what === "pull") Object.assign(now, { fresh: false, moved: true })
     if (what === "go") { going.pause(); body.goTo(given); say() }
     if (what === "pull") { going.pause(); body.pull(given.contact, given.normal, given.tangential); say() }
     if (what === "press") return press(given)
@@ -220,7 +220,7 @@ export function render({ model, view }) {
     part("lesson").hidden = scene.name !== "groove"
     part("board").classList.toggle("reading", part("lesson").open && scene.name === "groove")
     if (!scene.i) return void tell("says", "The disks are being pressed together …")
-    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null, fresh: true })
+    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null, fresh: true, moved: false })
     pushes(false)
     going.pause()
     quest.begin()
@@ -366,6 +366,8 @@ export function render({ model, view }) {
     select.addEventListener("change", () => {
       space.shadow = planes.map((chosen) => Number(chosen.value))
       Object.assign(space, { outline: { points: [], stale: true }, sceneDrawn: null })
+      quest.begin()
+      say()
       measure()
       soon()
     })
@@ -413,7 +415,7 @@ export function render({ model, view }) {
     if (pushByKey(key)) return event.preventDefault()
     if (builds() && over(".packing") && builder.key(key, arrows.middle)) { event.preventDefault(); return soon() }
     if (key === "z" || key === "Z") undo()
-    else if (key === " ") going.toggle(body)
+    else if (key === " ") { now.fresh = false; going.toggle(body) }
     else if (key === "Escape") { tour.go(0); choose(null); now.chosen = false }
     else if (key === "[" || key === "]") {
       const contact = now.contact ?? 0, F = body.forces(), push = (key === "]" ? 0.05 : -0.05) * body.scaleOf()
@@ -421,6 +423,8 @@ export function render({ model, view }) {
       choose(contact)
       now.chosen = true
       remember()
+      now.fresh = false
+      now.moved = true
       body.pull(contact, F[2 * contact] + push, F[2 * contact + 1])
       say()
     } else if ((key === "n" || key === "N") && pushed.on) {
@@ -449,6 +453,7 @@ export function render({ model, view }) {
     if (news.fall && body.empty) { now.fall = news.fall.length ? news.fall : null; say(); soon() }
     if (news.measured && news.scene === body.scene.name && news.mu === mu && !body.whole) measured(news.measured, news.plane)
     if (news.file) download(news.file)
+    if (news.error && !body) return tell("says", news.error)
     if (news.error) { returning = false; part("name").value = body.scene.name; say(news.error) }
   })
   Object.defineProperty(root, "small", { get: () => ({ body, now, space, arrows, builder, pushed, mu }) })

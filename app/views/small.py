@@ -75,7 +75,6 @@ class Small(Scripted):
     def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
         if name == scenes.MANY:  # has a page of its own
             return
-        self._task.cancel()  # what was still to be told of the scene before
         self._made = name not in made.SCENES or not made.SCENES[name].packed
         if not self._made:
             self._task.start(lambda job: scenes.drawn(name, mu), self._put)
@@ -90,6 +89,7 @@ class Small(Scripted):
                 self._show(name)
 
     def _put(self, scene: dict[str, Any]) -> None:
+        self._task.cancel()  # what was still to be told of the scene before
         self._made = True
         self.scene = scene
 
