@@ -310,7 +310,8 @@ class Store(Mapping[str, xr.Dataset]):
         Raises InputError if the store cannot be written.
         """
         with self._writing():
-            stale = [item for item in self.path.glob(".tmp-*") if _is_stale(item)]
+            aside = (*self.path.glob(".tmp-*"), *self.path.glob(".granforce-*.part"))
+            stale = [item for item in aside if _is_stale(item)]
             for item in stale:
                 _remove(item)
         return len(stale)

@@ -600,7 +600,11 @@ def test_temporaries_of_dead_writers_are_cleaned(store):
         (store.path / name).mkdir()
         (store.path / name / "zarr.json").write_text("{}")
         os.utime(store.path / name, (time.time() - age, time.time() - age))
-    assert store.clean() == 4
+    for name, age in ((".granforce-ab.part", 0), (".granforce-cd.part", 4000)):  # of names.json
+        (store.path / name).write_text("{}")
+        os.utime(store.path / name, (time.time() - age, time.time() - age))
+    assert store.clean() == 5
+    assert [item.name for item in store.path.glob("*.part")] == [".granforce-ab.part"]
     zombie.wait()
     kept = {item.name[-2:] for item in store.path.glob(".tmp-*")}
     assert kept == {"bb", "dd"}
