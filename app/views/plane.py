@@ -58,7 +58,7 @@ COMPUTED = (
 
 LEAD = (
     "<b>Each dot is one whole set of forces that balance</b>, like the one drawn in the packing. "
-    "The blue shape, S, is all that is possible. Drag the red dot: "
+    "The blue shape is the shadow of S, of all that is possible. Drag the red dot: "
 )
 TOUCH = "orange lines grow, blue ones shrink."
 OF_A_PAIR = "it sets the forces of the green and the violet line, and all others follow."
