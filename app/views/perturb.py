@@ -84,7 +84,7 @@ class View(TabView):
         self.strongest = pmui.Button(label="Choose the strongest contact", **quiet)
         self.push = pmui.Button(label="Push", **look)
         self.guess = pmui.TextInput(
-            label="Your guess, mean forces", size="small", width=190, margin=(4, 8)
+            label="Your guess, mean forces", size="small", width=220, margin=(4, 8)
         )
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
