@@ -8,7 +8,6 @@ import hashlib
 import itertools
 import json
 import re
-import secrets
 import shutil
 import warnings
 from collections.abc import Sequence
@@ -39,7 +38,7 @@ from granforce.study.keys import Parameters
 from granforce.study.scan import run
 from granforce.study.schema import labelled, packing_dataset, to_builtin
 from granforce.study.store import Store, open_store
-from granforce.system.files import expanded
+from granforce.system.files import beside, expanded
 
 # Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
 STATES, UNMEASURED = 200, 1.0
@@ -376,7 +375,7 @@ def check_folder(path: str | Path) -> Path:
 def save_series(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a dataset as a Zarr folder, whole or not at all; one that is there is replaced."""
     path = check_folder(path)
-    aside = path.with_name(f".granforce-{secrets.token_hex(8)}.part")
+    aside = beside(path)
     try:
         with warnings.catch_warnings():
             # Of names as text, which Zarr has not laid down for good; xarray reads them.

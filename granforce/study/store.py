@@ -28,7 +28,7 @@ import xarray as xr
 from granforce.records import InputError
 from granforce.study import entries, keys
 from granforce.study.keys import Parameters
-from granforce.system.files import expanded
+from granforce.system.files import ASIDE, expanded
 
 LOCATION_VARIABLE = "GRANFORCE_CACHE"  # environment variable naming the store's folder
 STALE_SECONDS = 3600.0  # a temporary untouched for this long has lost its writer
@@ -310,7 +310,7 @@ class Store(Mapping[str, xr.Dataset]):
         Raises InputError if the store cannot be written.
         """
         with self._writing():
-            aside = (*self.path.glob(".tmp-*"), *self.path.glob(".granforce-*.part"))
+            aside = (*self.path.glob(".tmp-*"), *self.path.glob(ASIDE.format("*")))
             stale = [item for item in aside if _is_stale(item)]
             for item in stale:
                 _remove(item)

@@ -16,6 +16,14 @@ from granforce.records import InputError
 _OPEN_FILE = re.compile(r"/dev/(stdin|stdout|stderr|fd/.*)|/proc/[^/]+/fd/.*")
 
 
+ASIDE = ".granforce-{}.part"  # what is still being written
+
+
+def beside(path: Path) -> Path:
+    """A path of its own for what will be moved to `path`: names made from its can be too long."""
+    return path.with_name(ASIDE.format(secrets.token_hex(8)))
+
+
 @contextmanager
 def written(path: str | Path) -> Iterator[IO[bytes]]:
     """An open binary file; what was written to it stands at path when the block ends, or nothing.
@@ -32,8 +40,7 @@ def written(path: str | Path) -> Iterator[IO[bytes]]:
                 yield file
             return
         target, mode = kept
-        # A name of its own: one made from the file's could be too long.
-        aside = target.with_name(f".granforce-{secrets.token_hex(8)}.part")
+        aside = beside(target)
         try:
             with open(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
                 yield file
