@@ -14,8 +14,6 @@ import numpy as np
 Array = np.ndarray
 Message = dict[str, Any]
 
-LIST = [float, ...]
-
 # {component: messages that its script sends}; contacts are positions in the backbone.
 FROM_BROWSER = {
     "Address": ({"query": str},),  # gone back or forward to
@@ -48,7 +46,10 @@ FROM_BROWSER = {
         {"query": str},  # gone back or forward to
         {"built": str, "mu": float},  # by hand
         # "file", "fall" or "measured", of a scene under loads (3 N) on its disks
-        {"find": str, "scene": str, "built": str, "mu": float, "load": LIST, "plane": [int, int]},
+        {
+            **{"find": str, "scene": str, "built": str, "mu": float},
+            **{"load": [float, ...], "plane": [int, int]},
+        },
     ),
     "Tour": ({"step": int},),
 }

@@ -333,8 +333,8 @@ class View(TabView):
         area = planes.area(path) / planes.area(found.outer)
         inner = planes.inner_share(path, found.outer)
         free = self.state.replay.summary["dimension"]
-        share = "All" if inner == 1 else f"{min(inner, 0.99):.0%} of the"
-        dots = f"{share} {len(path)} dots{_of(self.state.replay)}"
+        many = "All" if inner == 1 else f"{min(inner, 0.99):.0%} of the"
+        dots = f"{many} {len(path)} dots{_of(self.state.replay)}"
         words = f"<b>{dots} lie less than halfway from the middle of S to its outline</b>"
         if self.other is not None and len(self.beside.data["x"]):
             points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])

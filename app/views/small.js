@@ -26,7 +26,9 @@ export function render({ model, view }) {
   root.innerHTML = desk(MOST_MU)
   const parts = {}, told = {}
   const part = (name) => (parts[name] ??= root.querySelector(`.${name}`))
-  const now = { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, filled: false, path: [], undo: [], fresh: true, moved: false }
+  // Of a scene that nobody has touched yet; moved: by hand.
+  const untouched = () => ({ contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null, fresh: true, moved: false })
+  const now = { ...untouched(), filled: false }
   let body = null, mu = model.scene.mu, chosenMu = false, waiting = 0, asleep = 0, returning = false
 
   const gone = goneBanner(view, "What is in the page still moves.")
@@ -117,12 +119,20 @@ export function render({ model, view }) {
       now.contacts = new Set(given ? given.stops.map(([c]) => c) : now.contact === null ? [] : [now.contact])
     }
     if (what === "begin") remember()
-    if (what === "go" || what === "pull") Object.assign(now, { fresh: false, moved: true })
+    if (what === "go" || what === "pull") byHand()
     if (what === "go") { going.pause(); body.goTo(given); say() }
     if (what === "pull") { going.pause(); body.pull(given.contact, given.normal, given.tangential); say() }
     if (what === "press") return press(given)
     if (what === "carry") carry(given)
     if (what === "release" && builds()) builder.release()
+    soon()
+  }
+
+  const byHand = () => Object.assign(now, { fresh: false, moved: true })
+
+  function walk() {
+    now.fresh = false
+    going.toggle(body)
     soon()
   }
 
@@ -220,7 +230,7 @@ export function render({ model, view }) {
     part("lesson").hidden = scene.name !== "groove"
     part("board").classList.toggle("reading", part("lesson").open && scene.name === "groove")
     if (!scene.i) return void tell("says", "The disks are being pressed together …")
-    Object.assign(now, { contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null, fresh: true, moved: false })
+    Object.assign(now, untouched())
     pushes(false)
     going.pause()
     quest.begin()
@@ -346,7 +356,7 @@ export function render({ model, view }) {
     if (Number.isFinite(value) && value >= 0) chooseMu(value)
     else { say("μ is a number from 0 on"); follow() }
   })
-  part("play").addEventListener("click", () => { now.fresh = false; going.toggle(body); soon() })
+  part("play").addEventListener("click", walk)
   part("fill").addEventListener("click", () => {
     now.fresh = false
     now.filled = !now.filled
@@ -415,7 +425,7 @@ export function render({ model, view }) {
     if (pushByKey(key)) return event.preventDefault()
     if (builds() && over(".packing") && builder.key(key, arrows.middle)) { event.preventDefault(); return soon() }
     if (key === "z" || key === "Z") undo()
-    else if (key === " ") { now.fresh = false; going.toggle(body) }
+    else if (key === " ") walk()
     else if (key === "Escape") { tour.go(0); choose(null); now.chosen = false }
     else if (key === "[" || key === "]") {
       const contact = now.contact ?? 0, F = body.forces(), push = (key === "]" ? 0.05 : -0.05) * body.scaleOf()
@@ -423,8 +433,7 @@ export function render({ model, view }) {
       choose(contact)
       now.chosen = true
       remember()
-      now.fresh = false
-      now.moved = true
+      byHand()
       body.pull(contact, F[2 * contact] + push, F[2 * contact + 1])
       say()
     } else if ((key === "n" || key === "N") && pushed.on) {
