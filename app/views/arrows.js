@@ -140,22 +140,31 @@ export class Arrows {
   }
 
   drawDisks() {
-    const { context: g, body, look } = this, { x, r, box } = body.scene
-    const shifts = box[0] ? [-1, 0, 1] : [0], { wide, high } = this.easel
-    for (let d = 0; d < r.length; d++) {
-      for (const a of shifts) for (const b of shifts) {
-        const [px, py] = this.px(x[2 * d] + a * box[0], x[2 * d + 1] + b * box[1]), R = r[d] * this.unit
-        if (px < -R || py < -R || px > wide + R || py > high + R) continue
-        circle(g, [px, py], R)
-        g.globalAlpha = a || b ? 0.3 : 1
-        g.fillStyle = look.disk === d ? look.lit : look.fill
-        g.fill()
-        g.strokeStyle = look.edge
-        g.lineWidth = 1.5
-        g.stroke()
-        g.globalAlpha = 1
+    const { context: g, body, look } = this, { x, r } = body.scene
+    const own = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]), alpha: 1 }))
+    for (const { disk, at, alpha } of [...own, ...this.copies()]) {
+      circle(g, at, r[disk] * this.unit)
+      g.globalAlpha = alpha
+      g.fillStyle = look.disk === disk ? look.lit : look.fill
+      g.fill()
+      g.strokeStyle = look.edge
+      g.lineWidth = 1.5
+      g.stroke()
+      g.globalAlpha = 1
+    }
+  }
+
+  /** Copies of the disks of a periodic scene that are in sight. */
+  copies() {
+    const { x, r, box } = this.body.scene, { wide, high } = this.easel, found = []
+    if (!box[0]) return found
+    for (let disk = 0; disk < r.length; disk++) {
+      for (const a of [-1, 0, 1]) for (const b of [-1, 0, 1]) {
+        const at = this.px(x[2 * disk] + a * box[0], x[2 * disk + 1] + b * box[1]), R = r[disk] * this.unit
+        if ((a || b) && at[0] > -R && at[1] > -R && at[0] < wide + R && at[1] < high + R) found.push({ disk, at, alpha: 0.3 })
       }
     }
+    return found
   }
 
   /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
@@ -166,6 +175,9 @@ export class Arrows {
     g.font = "12px sans-serif"
     g.textAlign = "center"
     g.textBaseline = "middle"
+    g.globalAlpha = 0.5
+    for (const { disk, at } of this.copies()) g.fillText(String(disk + 1), ...at)
+    g.globalAlpha = 1
     for (let d = 0; d < r.length; d++) {
       const clear = (k) => { const at = this.numberAt(d, k); return Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...at))) }
       if (clear((this.places[d] ??= 1)) < CLEAR) {
@@ -201,7 +213,7 @@ export class Arrows {
       const rubs = ["tangential force", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.easel.wide - x : x
       const fits = (line) => g.measureText(line).width < room - 4
       const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
-      const name = ["force of the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
+      const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
       const lines = [name, `normal force ${number(n)}`, ...both]
       write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
     }

@@ -4,7 +4,7 @@
 export function desk(most) {
   return `
     <p class="whole">Many different sets of forces can hold the same disks at rest.
-      <span>So no photograph of a heap of sand, however sharp, can tell how much each grain carries. Here you can try them out for yourself.</span></p>
+      <span>So no photograph of a heap of sand, however sharp, can show how much each grain carries. Here you can try out such sets of forces.</span></p>
     <div class="strip">
       <label>Scene <select class="name" aria-label="Scene"></select></label>
       <label class="mu">friction μ <input class="range" type="range" min="0" max="${most}" step="0.005" aria-label="friction μ">
@@ -18,7 +18,7 @@ export function desk(most) {
         <button type="button" class="tourist">Tour</button>
       </span>
     </div>
-    <p class="says" aria-live="polite"></p><button type="button" class="mend" hidden></button>
+    <p class="special"></p><p class="says" aria-live="polite"></p><button type="button" class="mend" hidden></button>
     <div class="own" hidden></div>
     <section class="card" role="dialog" aria-labelledby="small-title" hidden>
       <div><h2 id="small-title" tabindex="-1"></h2><p></p></div>
@@ -32,9 +32,9 @@ export function desk(most) {
         <canvas class="packing" tabindex="0" role="img" aria-label="Disks, and the force on them at every contact"></canvas></figure>
       <figure><figcaption class="what"></figcaption>
         <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one set of forces. Arrow keys move the point"></canvas>
-        <div class="plane" hidden><label>across <select aria-label="force shown across"></select></label>
-          <label>up <select aria-label="force shown upwards"></select></label></div></figure>
-      <div class="sums"><p class="special"></p><p class="count"></p><div class="bars" role="list"></div></div>
+        <div class="plane" hidden><label>horizontal axis <select aria-label="force shown across"></select></label>
+          <label>vertical axis <select aria-label="force shown upwards"></select></label></div></figure>
+      <div class="sums"><p class="count"></p><p class="key"></p><div class="bars" role="list"></div></div>
     </div>
     <details class="lesson" hidden><summary>The groove: a one-page lesson with three questions</summary>
       <button type="button" class="print">Print</button> <button type="button" class="print answered">Print with answers</button>

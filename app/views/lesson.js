@@ -1,6 +1,8 @@
 // A lesson of one page, for the groove, made to be printed: the numbers, and three questions.
 
+import { Arrows } from "./arrows.js"
 import { print } from "./save.js"
+import { Space } from "./space.js"
 
 const AT = [0, 0.2, 0.5, 0.8, 1]
 const QUESTIONS = [
@@ -14,8 +16,34 @@ const QUESTIONS = [
     "at the other wall's place of contact, and two such forces balance each other, however large they are."],
 ]
 
+/** Put the lesson in its place on a page, to be opened and printed; seen(): {body, look} to be printed with it. */
+export function teach(root, told, seen) {
+  const [folded, board] = [".lesson", ".board"].map((name) => root.querySelector(name))
+  folded.querySelector("article").innerHTML = lesson()
+  for (const button of folded.querySelectorAll(".print")) {
+    button.addEventListener("click", () => printed(pictures(root, told, seen()), button.classList.contains("answered")))
+  }
+  folded.addEventListener("toggle", () => {
+    board.classList.toggle("reading", folded.open && !folded.hidden)
+    if (folded.open) board.scrollIntoView()
+  })
+}
+
+/** The disk and S as they are, for white paper, with words that can be read at their size. */
+function pictures(root, told, { body, look }) {
+  return [Arrows, Space].map((Picture) => {
+    const canvas = root.appendChild(document.createElement("canvas"))
+    canvas.style.cssText = "position: absolute; visibility: hidden; width: 400px; height: 230px; border: 0"
+    const picture = new Picture(canvas, told, 3)
+    if (picture.fit) { picture.fit(body); picture.draw(look) }
+    else picture.draw(body, look, [])
+    canvas.remove()
+    return canvas.toDataURL()
+  })
+}
+
 /** The lesson as HTML; answers behind a click. */
-export function lesson() {
+function lesson() {
   const ends = (mu) => [Math.SQRT1_2 / (1 + mu), mu < 1 ? (Math.SQRT1_2 / (1 - mu)).toFixed(3) : "no end"]
   const rows = AT.map((mu) => `<tr><td>${mu}</td><td>${ends(mu)[0].toFixed(3)}</td><td>${ends(mu)[1]}</td></tr>`).join("")
   return `
@@ -39,7 +67,7 @@ export function lesson() {
 }
 
 /** Have it printed alone, with the pictures of the disk and of S; open: with its answers. */
-export function printed(pictures, open) {
+function printed(pictures, open) {
   print("The lesson, to be printed", `<!doctype html><meta charset="utf-8"><title>The groove</title><style>
     body { font: 10.5pt/1.35 sans-serif; max-width: 17cm; margin: 0 auto; } figure { display: flex; gap: 4mm; margin: 3mm 0; } img { flex: 1; min-width: 0; border: 1px solid #ccc; }
     sub { line-height: 0; } td, th { padding: 1px 14px 1px 0; text-align: left; } h2 { margin: 0; } .formula { text-align: center; }

@@ -37,31 +37,36 @@ export function drawSegment(space) {
 
 /** The axis of a force with its least, present and largest value: across S, at y below it, or up (d = 1), at x beside it. */
 export function drawAxis(space, index, at, d = 0) {
-  const { context: g, body, look, easel } = space, rest = body.origin[index]
+  const { context: g, body, look, easel } = space
   const ends = d ? [easel.high - space.floor, 10] : [24 + space.aside, easel.wide - 24]
-  const change = (u) => body.axes.reduce((sum, axis, k) => sum + u[k] * axis[index], 0)
-  const slope = change(space.moving(body.u, 1 - d, d)) - change(body.u) // by a step along the axis
-  const place = (v) => space.px(d ? [0, (v - rest) / slope] : [(v - rest) / slope, 0])[d]
+  const value = (u) => body.axes.reduce((sum, axis, k) => sum + u[k] * axis[index], body.origin[index])
+  // A line is drawn by its own length: how much the force changes by a step along it.
+  const [zero, slope] = space.over ? [0, 1] : [body.origin[index], value(space.moving(body.u, 1, 0)) - value(body.u)]
+  const place = (v) => space.px(d ? [0, (v - zero) / slope] : [(v - zero) / slope, 0])[d]
   const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
-  const sorted = [...body.corners].sort((a, b) => change(a.u) - change(b.u)), extreme = [sorted[0], sorted.at(-1)]
-  const told = look.fresh ? [] : extreme.filter(({ cap }) => !cap) // once something was dragged: they are there to be found
-  const marked = [...told.map(({ u }) => [u, look.cold]), [body.u, look.hand]]
-    .map(([u, colour]) => ({ v: change(u) + rest, place: space.px(space.flat(u)), colour }))
+  const told = look.fresh ? [] : extremes(space, value, d) // once something was dragged: they are there to be found
+  const marked = [...told.map((end) => ({ ...end, colour: look.cold })), { v: value(body.u), place: space.px(space.flat(body.u)), colour: look.hand }]
     .map((mark) => ({ ...mark, x: mark.place[d] }))
   const own = look.axes?.get(index) // the colour that its arrows have
   const stroke = (x, from, to) => (d ? line(g, [from, x], [to, x]) : line(g, [x, from], [x, to]))
   const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
+  const goal = space.goal !== undefined && index === 2 * space.read.at(-1) ? place(space.goal) : NaN
+  const beside = (x, text, colour) => {
+    const left = goal > x && goal < x + 50 // or the goal's line would run through it
+    return d ? space.write(at + 6, x - 9, text, colour, 12, "left") : space.write(left ? x - 5 : x + 5, at - 10, text, colour, 12, left ? "right" : "left")
+  }
   g.strokeStyle = own ?? look.edge
   g.lineWidth = 1
   line(g, ...ends.map((x) => (d ? [at, x] : [x, at])))
-  const free = (x, k = marked.length) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > (d ? 16 : 40))
+  const free = (x, k) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > (d ? 16 : 40))
   const ticks = [], [first, last] = ends.map((x) => (x - place(0)) / (place(1) - place(0)) / step).sort((a, b) => a - b)
   for (let k = Math.ceil(index % 2 ? first : Math.max(first, 0)); k <= last; k++) { // no normal force is below 0
     const x = place(k * step)
     stroke(x, at - 4, at + 4)
-    if (free(x)) ticks.push([x, String(Number((k * step).toPrecision(6)))])
+    ticks.push([x, String(Number((k * step).toPrecision(6)))])
   }
   for (const [x, text] of ticks) write(x, text, look.ink, 11)
+  if (goal > Math.min(...ends) && goal < Math.max(...ends)) drawGoal(space, goal, at, d)
   g.lineWidth = 1
   g.setLineDash([2, 4])
   for (const { x, place: there, colour } of marked) {
@@ -69,15 +74,36 @@ export function drawAxis(space, index, at, d = 0) {
     stroke(x, there[1 - d], at)
   }
   g.setLineDash([])
-  marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) write(x, number(v), colour, 12) })
+  marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) beside(x, number(v), colour) })
   const { r, load } = body.scene, one = r.length === 1 && Math.abs(Math.hypot(load[0], load[1]) - 1) < 1e-9
   const unit = one ? " (weight of the disk = 1)" : ""
   const name = forceName(body.scene, index) + unit, words = slope > 0 ? `${name} →` : `← ${name}`
   nameAxis(space, words, own ?? look.ink, d ? null : at + 33)
 }
 
+/** Least and largest value of a force in S, with their places, but where S has no end; none until they are known. */
+function extremes(space, value, d) {
+  const { body, outline } = space, shadow = outline.stale ? [] : space.corners().map((p) => ({ v: p[d], place: space.px(p) }))
+  const all = body.whole ? body.corners.map(({ u, cap }) => ({ v: value(u), place: space.px(space.flat(u)), cap })) : shadow
+  all.sort((a, b) => a.v - b.v)
+  return all.length ? [all[0], all.at(-1)].filter(({ cap }) => !cap) : []
+}
+
+/** What the force on an axis is to pass: a line across S, with its number. */
+function drawGoal(space, x, at, d) {
+  const { context: g, body, look, easel } = space, far = d ? easel.wide - 16 : space.px(space.flat(body.u))[1] - 52
+  g.strokeStyle = look.hand
+  g.lineWidth = 1.2
+  g.setLineDash([6, 5])
+  line(g, ...[at, far].map((end) => (d ? [end, x] : [x, end])))
+  g.setLineDash([])
+  const [px, py] = d ? [far - 46, x - 12] : [x, far - 10]
+  space.write(px, py, `goal: above ${space.goal}`, look.hand, 13)
+  for (const place of [[px, py], d ? [far, x] : [x, far + 30]]) space.free(place, 60, 24)
+}
+
 /** The name of an axis: below it, at y, or along the left edge. */
-export function nameAxis(space, words, colour, y) {
+function nameAxis(space, words, colour, y) {
   const { context: g, easel: { wide, high } } = space
   if (y !== null) return space.write((wide + space.aside) / 2, y, words, colour)
   g.save()

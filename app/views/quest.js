@@ -9,16 +9,16 @@ const FIND = "Drag the red dot and find out."
 /** By scenes: what is asked, from which normal force on, or how many times the other axis' force, and what is said then. */
 const OWN = {
   groove: {
-    ask: "can you make the left wall press harder than the disk weighs?", least: 1.005,
+    ask: "can you make the normal force at the left wall larger than the weight?", least: 1.005, goal: 1,
     done: (value, high) => `✓ It presses with ${number(value)}, the disk weighs 1, and all is in balance. At ${number(high)} friction can do no more.`,
   },
   box: {
     of: "between", // if that is the force up: which two forces are axes depends on friction
-    ask: "can you make the disks press on each other (violet) with four times the weight of one disk?", least: 4,
-    done: (value) => `✓ ${number(value)} times, and everything still balances.`,
+    ask: "can you make the normal force between the disks (violet) larger than 3.5 (each disk weighs 1)?", least: 3.5, goal: 3.5,
+    done: (value) => `✓ ${number(value)}, and everything still balances.`,
   },
   thirteen: {
-    ask: "can you make the violet force three times as strong as the green one?", times: 3,
+    ask: "can you make the violet normal force three times as strong as the green one?", times: 3,
     done: () => "✓ And everything still balances.",
   },
 }
@@ -26,8 +26,9 @@ const OWN = {
 export class Quest {
   constructor(host) { this.host = host; this.begin() }
 
-  /** How many times the force across the one up is to be; undefined where nothing such is asked. */
+  /** How many times the force across the one up is to be, and which value a normal force is to pass; undefined where nothing such is asked. */
   get times() { return this.asked?.times }
+  get goal() { return this.asked?.goal }
 
   /** Nothing is found yet: another scene, or another S. */
   begin() { Object.assign(this, { found: [false, false], best: -Infinity }) }
@@ -43,6 +44,7 @@ export class Quest {
     this.asked = undefined
     if (none) return
     const value = body.forces()[2 * contact], known = OWN[body.scene.name]
+    this.ratio = place[1] / place[0]
     const own = this.asked = known && body.scene.names[contact].startsWith(known.of ?? "") ? known : undefined
     const reached = own ? [own.times ? place[1] >= own.times * place[0] : value >= own.least] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
     if (moved) this.found = this.found.map((found, k) => found || Boolean(reached[k]))
@@ -52,9 +54,9 @@ export class Quest {
     if (text !== this.text) this.host.innerHTML = this.text = text
   }
 
-  own({ least, done }, value, high) {
+  own({ least, times, done }, value, high) {
     if (high < least) return "Not with this friction: take more."
-    if (!this.found[0]) return FIND
+    if (!this.found[0]) return times ? `${FIND} It is ${this.ratio.toFixed(1)} times as strong now.` : FIND
     this.best = Math.max(value, this.best)
     return done(this.best, high)
   }

@@ -19,9 +19,9 @@ export function readBy({ count, axes, corners }) {
   return turned[other] > 1e-6 ? [one, other] : []
 }
 
-/** The name of S within it: halfway from its middle to the corner that is farthest from that. */
-export function drawName(space, places, middle) {
+/** The name of S within it: so far on the way from its middle to the corner that is farthest from that. */
+export function drawName(space, places, middle, part = 0.5) {
   const far = ([x, y]) => Math.hypot(x - middle[0], y - middle[1])
   const corner = places.reduce((one, other) => (far(other) > far(one) ? other : one))
-  if (far(corner) > 80) space.write((middle[0] + corner[0]) / 2, (middle[1] + corner[1]) / 2, "S", space.look.cold, 22)
+  if (far(corner) > 80) space.write(...middle.map((v, d) => v + part * (corner[d] - v)), "S", space.look.cold, 22)
 }

@@ -9,8 +9,8 @@ const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(B
 const BOTH = "at the left wall and at the right wall"
 // A disk between two walls cannot slide down both: what is so is that friction does all it can.
 const AT_BOTH = {
-  "about to slide up": "friction at its limit, pushing down",
-  "about to slide down": "friction at its limit, pushing up",
+  "about to slide up": "friction pushes the disk down\nas hard as it can",
+  "about to slide down": "friction pushes the disk up\nas hard as it can",
 }
 
 /** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
@@ -48,8 +48,8 @@ export function legend(body) {
   const weights = Array.from(scene.r, (_, d) => Math.hypot(load[3 * d], load[3 * d + 1]))
   const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
-  const axes = h === 2 || h > 3 ? "; green, violet: on the axes" : ""
-  const parts = scene.r.length === 1 ? " (pale: their two parts)" : ""
+  const axes = h === 2 || h > 3 ? "; green, violet: plotted on the right" : ""
+  const parts = scene.r.length === 1 ? " (pale: normal and tangential parts)" : ""
   return `blue: contact forces${parts}${axes}; shaded wedge: directions that friction allows${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
 }
 
@@ -62,14 +62,14 @@ function slips(body) {
 /** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
 export function counted({ h, count, scene, empty, consistent, whole, corners }) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
-  const forces = plural(count, "contact") + ", each with a normal and a tangential force"
+  const forces = plural(count, "contact") + ", each with a normal and a tangential component"
   if (empty && !scene.idle) {
     const none = consistent ? "none of their solutions is allowed" : "they have no solution"
     const because = consistent ? "; in every solution some contact would have to pull, or its tangential force to exceed μ × its normal force" : ""
-    return `<b>${2 * count} unknown forces, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
+    return `<b>${2 * count} unknown force components, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
-  return `<b>${2 * count} unknown forces − ${equations} equations = ${h} free ${h === 1 ? "number" : "numbers"}${point}</b> <span>(${forces}; ${sum}${why})</span>`
+  return `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${h === 1 ? "number" : "numbers"}${point}</b> <span>(${forces}; ${sum}${why})</span>`
 }
 
 /** The sum that gives the number of equations, and what its parts are. */
@@ -78,8 +78,13 @@ function equationsOf({ grains, r, pressing, box, equations }) {
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
   const said = "no net force sideways, none up or down, and no turning, for each disk"
   if (whole !== equations) return [said, ""]
-  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, two of which follow from the others; one for the pressure`]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, less two, as the forces on all disks together cancel; and one for the pressure`]
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
+}
+
+/** What the bars below show; empty where there are none. */
+export function barred({ empty, h, scene }) {
+  return empty || !h || scene.idle ? "" : "The range of each normal force (pale), and its value now (red):"
 }
 
 /** What is special about a scene, besides its forces; empty for most. */
@@ -88,17 +93,17 @@ export function special({ scene }) {
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
   const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
-  return `No walls and no weight: the dashed square repeats on all sides (pale disks are copies of the same ${scene.r.length}) and is pressed together with pressure ${Number(scene.pressure.toPrecision(3))}. It was packed at μ = ${scene.packed}.${rattles}`
+  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))} (force per unit length), in a dashed square that repeats (pale disks: copies).${rattles}`
 }
 
 /** What the picture of S is. */
 export function pictured(body) {
-  const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"}, here`
+  const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"} (here:`
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
-  if (!h || (whole && corners.length === 1)) return `${S} a single point`
-  return h > 3 ? "shadow of S: all pairs of values that these two forces can have; dots: random samples, few of which come near the edge"
-    : `${S} ${["", "a line", "a polygon; its axes are two of the forces", "a body; drag beside the point to turn it"][h]}`
+  if (!h || (whole && corners.length === 1)) return `${S} a single point)`
+  return h > 3 ? "shadow (projection) of S onto two normal forces; dots: random points, rarely near its edge"
+    : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
 
 /** The sentence over a scene. */
@@ -117,13 +122,16 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `One free number made a line, two a polygon. ${h} are too many to draw, so you see only a shadow of S: the values of the green and violet forces. Drag the point or an arrow: all forces follow, and everything stays in balance.`
+  if (h > 3) return `S (the set of all solutions) has ${h} dimensions, too many to draw. The plot shows two of the forces. You can drag the red dot to any point inside: all other forces adjust.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
   const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
-  const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip or open`
-  return `Every point of this ${["", "line", "polygon", "body"][h]} is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
+  const opens = body.sides.some(({ stops }) => stops.some(([, what]) => what === OPENS))
+  const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
+  const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
+  if (now.fresh) return every // the rest once something was touched
+  return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 
 /** Whether a normal force can be more than all disks weigh. */

@@ -2,18 +2,19 @@
 
 import { Arrows, tall } from "./arrows.js"
 import { ask } from "./ask.js"
+import { Axes } from "./axes.js"
 import { Bars } from "./bars.js"
 import { Body } from "./body.js"
 import { Builder } from "./builder.js"
 import { desk } from "./desk.js"
 import { Going } from "./going.js"
 import { goneBanner } from "./gone.js"
-import { lesson, printed } from "./lesson.js"
+import { teach } from "./lesson.js"
 import { palette } from "./palette.js"
 import { Push } from "./push.js"
 import { Quest } from "./quest.js"
 import { save } from "./save.js"
-import { counted, forceName, legend, pictured, sentence, special, stopping } from "./saying.js"
+import { barred, counted, forceName, legend, pictured, sentence, special, stopping } from "./saying.js"
 import { Space } from "./space.js"
 import { TourCard } from "./tourcard.js"
 
@@ -36,7 +37,8 @@ export function render({ model, view }) {
   const builder = new Builder(part("own"), (built) => ask(model, view, { built, mu }))
   const arrows = new Arrows(part("packing"), heard), space = new Space(part("space"), heard)
   const going = new Going(part("play"), (path) => { now.path = path; say(); soon() })
-  const pushed = new Push(), quest = new Quest(part("quest")), bars = new Bars(part("bars")), planes = [...part("plane").querySelectorAll("select")]
+  const pushed = new Push(), quest = new Quest(part("quest")), bars = new Bars(part("bars"))
+  const axes = new Axes(part("plane"), cast)
   const tour = new TourCard(root, model.steps, model.all, ({ scene, mu: at }) => {
     if (scene !== body?.scene.name) ask(model, view, at === undefined ? { scene } : { scene, mu: at })
     else if (at !== undefined) setMu(at)
@@ -54,8 +56,8 @@ export function render({ model, view }) {
     if (!body || !root.isConnected) return
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = builds() && root.getRootNode().activeElement === part("packing") ? builder.cursor : null
-    const dressed = colours(), axes = new Map(space.axed.map((force, k) => [force, [dressed.across, dressed.up][k]]))
-    const look = { ...dressed, ...now, wall, cursor, axes, dots: now.filled && space.dots.length }
+    const dressed = colours(), onAxes = new Map(space.axed.map((force, k) => [force, [dressed.across, dressed.up][k]]))
+    const look = { ...dressed, ...now, wall, cursor, axes: onAxes, dots: now.filled && space.dots.length }
     if (body.scene !== arrows.body?.scene || arrows.wide !== part("packing").clientWidth) {
       arrows.fit(body, body.scene.name === "own" && arrows.own === part("packing").clientWidth)
       arrows.own = body.scene.name === "own" ? part("packing").clientWidth : 0
@@ -82,6 +84,7 @@ export function render({ model, view }) {
     tell("legend", legend(body))
     tell("what", pictured(body))
     tell("special", special(body))
+    tell("key", barred(body))
     tell("says", note || sentence(body, mu, now))
     tell("mend", `Set μ = ${now.enough}`)
     part("mend").hidden = !now.enough
@@ -97,7 +100,7 @@ export function render({ model, view }) {
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
     const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
     quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: now.moved })
-    space.ray = quest.times
+    Object.assign(space, { ray: quest.times, goal: quest.goal })
   }
 
   // What is done
@@ -229,7 +232,11 @@ export function render({ model, view }) {
     part("own").hidden = scene.name !== "own"
     part("lesson").hidden = scene.name !== "groove"
     part("board").classList.toggle("reading", part("lesson").open && scene.name === "groove")
-    if (!scene.i) return void tell("says", "The disks are being pressed together …")
+    root.classList.toggle("waiting", !scene.i)
+    if (!scene.i) {
+      part("name").value = new URLSearchParams(location.search).get("scene") ?? part("name").value
+      return void tell("says", "The disks are being pressed together …")
+    }
     Object.assign(now, untouched())
     pushes(false)
     going.pause()
@@ -239,7 +246,7 @@ export function render({ model, view }) {
     returning = false
     if (scene.name === "own" && builder.read(scene.built, scene.begins)) arrows.own = 0
     Object.assign(space, { body, dots: [], outline: { points: [], stale: true } })
-    showPlane()
+    space.shadow = axes.show(body, (force) => heard("name", force))
     if (body.whole && !body.empty) body.u = [...body.middle]
     else if (!body.empty && !startInside()) body.empty = true
     if (!body.whole && !body.empty) now.filled = true
@@ -258,14 +265,12 @@ export function render({ model, view }) {
   }
 
   /** Which two forces S casts its shadow on. */
-  function showPlane() {
-    part("plane").hidden = body.whole
-    space.shadow = [0, 2 * Math.min(1, body.count - 1)]
-    if (body.whole) return
-    planes.forEach((select, k) => {
-      select.innerHTML = body.scene.names.map((_, c) => [0, 1].map((part) => `<option value="${2 * c + part}">${heard("name", 2 * c + part)}</option>`).join("")).join("")
-      select.value = space.shadow[k]
-    })
+  function cast(shadow) {
+    Object.assign(space, { shadow, outline: { points: [], stale: true }, sceneDrawn: null })
+    quest.begin()
+    say()
+    measure()
+    soon()
   }
 
   function startInside() {
@@ -372,25 +377,8 @@ export function render({ model, view }) {
     if (was) { body.load = Float64Array.from(body.scene.load); body.reload(); cut() }
     say()
   })
-  for (const select of planes) {
-    select.addEventListener("change", () => {
-      space.shadow = planes.map((chosen) => Number(chosen.value))
-      Object.assign(space, { outline: { points: [], stale: true }, sceneDrawn: null })
-      quest.begin()
-      say()
-      measure()
-      soon()
-    })
-  }
   part("save").addEventListener("click", () => find("file"))
-  part("lesson").querySelector("article").innerHTML = lesson()
-  for (const button of root.querySelectorAll(".print")) {
-    button.addEventListener("click", () => printed(pictures(), button.classList.contains("answered")))
-  }
-  part("lesson").addEventListener("toggle", () => {
-    part("board").classList.toggle("reading", part("lesson").open && !part("lesson").hidden)
-    if (part("lesson").open) part("board").scrollIntoView()
-  })
+  teach(root, heard, () => ({ body, look: { ...colours(false), ...now, contact: null, disk: null, side: null, contacts: new Set(), dots: 0, fresh: false } }))
   part("mend").addEventListener("click", () => chooseMu(now.enough))
   part("tourist").addEventListener("click", () => tour.go(1))
   part("bars").addEventListener("pointerover", (event) => {
@@ -399,20 +387,6 @@ export function render({ model, view }) {
   })
 
   part("bars").addEventListener("pointerleave", () => { if (!now.chosen) { choose(null); soon() } })
-
-  /** The disk and S as they are, for white paper: nothing chosen, and with words that can be read at their size. */
-  function pictures() {
-    const look = { ...colours(false), ...now, contact: null, disk: null, side: null, contacts: new Set(), dots: 0, fresh: false }
-    return [Arrows, Space].map((Picture) => {
-      const canvas = root.appendChild(document.createElement("canvas"))
-      canvas.style.cssText = "position: absolute; visibility: hidden; width: 400px; height: 230px; border: 0"
-      const picture = new Picture(canvas, heard, 3)
-      if (picture.fit) { picture.fit(body); picture.draw(look) }
-      else picture.draw(body, look, [])
-      canvas.remove()
-      return canvas.toDataURL()
-    })
-  }
 
   function download(text) {
     save(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]), `${body.scene.name}.npz`)

@@ -6,12 +6,13 @@ import { Easel } from "./easel.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
 import { circle, line, polygon } from "./pen.js"
 import { drawName, readBy } from "./reading.js"
-import { drawInterval, drawShadow } from "./shadow.js"
+import { drawShadow } from "./shadow.js"
+import { drawInterval, drawSolid } from "./solid.js"
 
 const TURN = 0.008 // radians a pixel
 // Pixels left and right of S, and above and below it, for what is written there, by its dimensions.
-const BESIDE = [[46, 46], [95, 46], [110, 50], [30, 30], [60, 64]]
-const FLOOR = 46, ASIDE = 72 // of a polygon, for its axes
+const BESIDE = [[46, 46], [95, 46], [110, 50], [30, 30], [60, 24]]
+const FLOOR = 46, ASIDE = 72 // of what lies over two forces, for their axes
 const ON = 34 // pixels of an arrow where S goes on without an end
 const DRAWS = 700, WORK = 3e7 // draws from S, fewer where that is more than so many multiplications
 
@@ -50,8 +51,8 @@ export class Space {
   /** Place of u in the plane of the screen, in units of force, and its depth. */
   flat(u) {
     const { body } = this
-    if (body.h > 3) return this.onAxes.map(({ row, rest }) => dot(row, u) + rest)
-    if (body.h === 2) return this.axed.length ? this.onAxes.map(({ row }) => dot(row, u)) : u
+    if (this.over) return this.onAxes.map(({ row, rest }) => dot(row, u) + rest)
+    if (body.h === 2) return u
     if (body.h < 2) return [this.sign * (u[0] ?? 0), 0, 0]
     return this.view.map((row) => dot(row, u))
   }
@@ -77,10 +78,10 @@ export class Space {
     return force === null ? [] : [force >> 1]
   }
 
-  /** Whether S is a polygon over two forces. */
-  get over() { return this.body.h === 2 && this.axed.length > 0 }
+  /** Whether S, or its shadow, lies over two forces. */
+  get over() { return this.axed.length > 0 }
 
-  /** Pixels below S and left of it for its axes; a line leaves enough by itself. */
+  /** Pixels below it and left of it for their axes; a line leaves enough by itself. */
   get floor() { return this.over ? FLOOR : 0 }
   get aside() { return this.over ? ASIDE : 0 }
 
@@ -187,8 +188,12 @@ export class Space {
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
     if (body.h === 1) drawSegment(this)
+    if (this.over) {
+      drawAxis(this, this.axed[0], this.easel.high - FLOOR + 6)
+      drawAxis(this, this.axed[1], ASIDE - 6, 1)
+    }
     if (body.h === 2) this.drawPolygon()
-    if (body.h === 3) this.drawSolid()
+    if (body.h === 3) drawSolid(this)
     if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
@@ -208,10 +213,9 @@ export class Space {
   invite(x, y) {
     const { context: g, look } = this
     g.font = "13px sans-serif"
-    const wide = g.measureText("drag me ↘").width + 12
-    const ways = [["↙ drag me", 1, -1], ["drag me ↘", -1, -1], ["↖ drag me", 1, 1], ["drag me ↗", -1, 1]]
-    const places = [20, 30, 50, 75, 100].flatMap((off) => ways.map(([words, a, b]) => [x + a * (off / 2 + wide / 2), y + b * off, words]))
-    const [px, py, words] = places.find(([a, b]) => this.free([a, b], wide, 24)) ?? places[0]
+    const wide = g.measureText("drag me").width + 12, ways = [[1, -1], [-1, -1], [1, 1], [-1, 1]]
+    const places = [20, 30, 50, 75, 100].flatMap((off) => ways.map(([a, b]) => [x + a * (off / 2 + wide / 2), y + b * off]))
+    const [px, py] = places.find(([a, b]) => this.free([a, b], wide, 24)) ?? places[0]
     g.strokeStyle = g.fillStyle = look.hand
     g.lineWidth = 1.5
     line(g, [x, y], [px - Math.sign(px - x) * (wide / 2 - 4), py])
@@ -219,7 +223,7 @@ export class Space {
     g.textAlign = "center"
     g.textBaseline = "middle"
     g.fillStyle = look.paper
-    g.fillText(words, px, py)
+    g.fillText("drag me", px, py)
   }
 
   /** What decides how that looks which stands still while a point goes through S. */
@@ -294,10 +298,6 @@ export class Space {
     const { context: g, body, look } = this, { corners } = body
     const middle = this.px(this.flat(body.middle))
     const places = corners.map(({ u }) => this.px(this.flat(u)))
-    if (this.over) {
-      drawAxis(this, this.axed[0], this.easel.high - FLOOR + 6)
-      drawAxis(this, this.axed[1], ASIDE - 6, 1)
-    }
     const order = [...places.keys()].sort((a, b) =>
       Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
     polygon(g, order.map((k) => places[k]))
@@ -355,34 +355,6 @@ export class Space {
     if (parts.some((a) => this.taken.some((b) => meets(a, b)))) return false
     this.taken.push(...parts)
     return true
-  }
-
-  drawSolid() {
-    const { context: g, body, look } = this
-    const places = body.corners.map(({ u }) => this.px(this.flat(u)))
-    const towards = (side) => -dot(this.view[2], side.slope) // sides' slopes point inwards
-    const sides = [...body.sides].sort((a, b) => towards(a) - towards(b)), words = []
-    for (const side of sides) {
-      const front = towards(side) > 0, lit = this.lit(side)
-      polygon(g, side.corners.map((k) => places[k]))
-      if (front) {
-        g.globalAlpha = lit ? 0.5 : 0.15 + 0.35 * towards(side)
-        g.fillStyle = lit ? look.hand : look.cold
-        g.fill()
-        g.globalAlpha = 1
-        this.labels.push({ side, inside: side.corners.map((k) => places[k]) })
-      }
-      g.strokeStyle = lit ? look.hand : look.cold
-      g.lineWidth = front ? 2 : 1
-      g.globalAlpha = front ? 1 : 0.4
-      g.setLineDash(side.cap || !front ? [4, 4] : [])
-      g.stroke()
-      g.setLineDash([])
-      g.globalAlpha = 1
-      if (side.cap) for (const k of side.corners) this.drawOn(places[k], 2)
-      if (front && lit) words.push(side.cap ? "no end this way" : this.told("words", side))
-    }
-    words.forEach((line, k) => this.write(this.easel.wide / 2, 18 + 17 * k, line, look.ink)) // clear of the body
   }
 
   corners() {

@@ -378,9 +378,19 @@ def test_thirteen_disks_have_a_shadow_whose_two_forces_light_up(look):
     assert S.residual(forces(page)) < 1e-9 and S.violation(forces(page)) < 1e-6
 
 
+def test_while_disks_are_pressed_together_nothing_is_drawn_but_the_scene_named(look):
+    page = look("?scene=thirteen")
+    page.evaluate(
+        "[...Bokeh.documents[0].all_models].find(m => m.data?.scene?.names).data.scene = {}"
+    )
+    desk(page).locator(".says", has_text="being pressed together").wait_for()
+    assert not desk(page).locator("canvas.packing").is_visible()  # it is black before it is painted
+    assert desk(page).get_by_role("combobox", name="Scene").input_value() == "thirteen"
+
+
 def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
     page = look("?scene=column")
-    assert "a shadow of S" in says(page)
+    assert "too many to draw" in says(page)
     desk(page).get_by_role("combobox", name="force shown upwards").select_option(
         "tangential force between 1 and 2"
     )
@@ -447,7 +457,7 @@ def test_400_disks_take_the_theme_and_the_friction_along_and_back(look):
 def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     page = look("?scene=groove")
     quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
-    assert "harder than the disk weighs" in quest.inner_text() and "✓" not in quest.inner_text()
+    assert "larger than the weight" in quest.inner_text() and "✓" not in quest.inner_text()
     space.focus()
     for _ in range(40):
         page.keyboard.press("ArrowRight")
@@ -458,7 +468,8 @@ def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     assert not quest.is_visible()
     page = look("?scene=box")
     until(page, "small.body.h === 2")
-    assert "four times the weight" in desk(page).locator(".quest").inner_text()
+    assert "larger than 3.5" in desk(page).locator(".quest").inner_text()
+    assert ask(page, "small.space.goal") == 3.5
 
 
 def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
