@@ -1,6 +1,7 @@
 // Replays states in the page. The frames come once; per painted frame the chains are drawn anew and
 // the plots beside follow, without telling the server.
 
+import { actions } from "./actions.js"
 import { ask, knownThere } from "./ask.js"
 import { Buttons } from "./buttons.js"
 import { Difference } from "./difference.js"
@@ -9,6 +10,7 @@ import { Invitation } from "./invite.js"
 import { CATCH_UP, extend, Live, roomy } from "./live.js"
 import { Look } from "./look.js"
 import { plain } from "./plain.js"
+import { knows, remember } from "./memory.js"
 import { openMoving } from "./opening.js"
 import { Pins } from "./pins.js"
 import { Plots } from "./plots.js"
@@ -33,7 +35,8 @@ class Player {
   constructor(model, page, tell) {
     this.model = model
     this.scene = new Scene((contact) => { model.contact = contact })
-    this.buttons = new Buttons(this.scene, this.actions())
+    this.actions = actions(this)
+    this.buttons = new Buttons(this.scene, this.actions)
     this.plots = new Plots(page, () => this.again(), {
       dots: {
         take: (k, _, value) => this.hand.takeInBars(this.plots.find("bars").get_column("at")[k], value),
@@ -305,58 +308,6 @@ class Player {
     } else requestAnimationFrame((next) => this.tick(next))
   }
 
-  actions() {
-    const loaded = (action) => (given) => { if (this.replay && !this.live.moves) action(this.replay, given) }
-    const other = (action) => loaded((replay, given) => {
-      this.difference.end()
-      action(replay, given)
-    })
-    const halted = (action) => other((replay, given) => {
-      this.hand.free()
-      this.follows = false
-      this.play(false)
-      action(replay, given)
-    })
-    const { model } = this
-    const step = ({ swinging }) => (swinging ? 0.05 : 1)
-    return {
-      less: loaded(() => this.hand.nudge(-1)),
-      more: loaded(() => this.hand.nudge(1)),
-      hold: loaded((replay) => this.hold(replay)),
-      undo: loaded((replay) => { if (replay.held) this.hand.tell({ undo: true }) }),
-      free: loaded(() => this.hand.free()),
-      play: other((replay) => {
-        this.hand.free()
-        this.follows = false
-        if (this.playing && this.resting === null) this.pause(replay)
-        else if (this.playing) { this.resting = null; this.buttons.tellPlaying(true) }
-        else this.play(true)
-      }),
-      step: halted((replay) => this.show(Math.floor(replay.position + 1e-9) + step(replay))),
-      back: halted((replay) => this.show(Math.ceil(replay.position - 1e-9) - step(replay))),
-      restart: halted(() => this.show(0)),
-      end: halted((replay) => this.show(replay.last)),
-      next: loaded((replay) => this.choose(replay, 1)),
-      previous: loaded((replay) => this.choose(replay, -1)),
-      scrub: halted((replay, to) => this.show(to)),
-      pin: other((replay) => {
-        this.model.reference = replay.frame
-        this.model.beside = null
-      }),
-      between: other((replay) => this.between(replay)),
-      split: other(() => { this.model.split = !this.model.split }),
-      predict: loaded(() => { model.predict = model.predict ? 0 : 1 }),
-      differ: loaded((replay) => {
-        model.predict = 0
-        if (this.difference.on) return this.difference.end()
-        this.play(false)
-        if (replay.swinging) this.model.between = null
-        this.difference.begin(replay)
-      }),
-      tab: (number) => this.model.send_msg({ tab: number }),
-    }
-  }
-
   /** Select the next contact, the one with the largest force on screen first. */
   choose({ mixed: { normal } }, sign) {
     const { model } = this, order = Array.from(normal.keys()).sort((a, b) => normal[b] - normal[a] || a - b)
@@ -418,6 +369,10 @@ class Player {
       gone: loaded(() => { this.look.measure(); this.again() }),
       between: loaded((replay) => this.retrack(replay)),
       predict: loaded(() => this.predict.ask()),
+      guess: () => {
+        document.documentElement.style.setProperty("--hill", model.guess ? "hidden" : "visible") // which gives it away
+        if (!model.guess) remember("guess")
+      },
       frame: loaded((replay) => {
         if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
       }),
@@ -459,6 +414,7 @@ export function render({ model, view }) {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
   for (const name of ["lead", "legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
+  if (!knows("guess") && !new URLSearchParams(location.search).has("tour")) model.guess = true
   openMoving(player)
   closeSidebar(page, view)
   return player.buttons.root

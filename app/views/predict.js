@@ -34,7 +34,7 @@ const ASKED = [
     words: "Packings made with more and more friction: how undetermined are their forces?",
     choices: ["More and more", "Less and less", "More at first, then less"],
     answer: (player, chosen) => {
-      player.actions().tab(2)
+      player.actions.tab(2)
       return [chosen === 2, "More friction lets each contact carry a wider range of forces, but leaves fewer " +
         "contacts, and so fewer free numbers. The statistics show how the two compete."]
     },

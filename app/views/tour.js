@@ -2,8 +2,8 @@
 // the packing while there is nothing else.
 
 import { ask } from "./ask.js"
+import { knows, remember } from "./memory.js"
 
-const SEEN = "granforce.tour" // remembered in the browser
 const LOOK_MS = 100 // between two looks for what a step is about, which may still be on its way
 // Where each step points: other parts of the page than these come and go with their tab.
 const TARGETS = { scene: ".scene", friction: ".friction", plane: ".in-plane", perturb: ".in-perturb" }
@@ -29,8 +29,6 @@ export function render({ model, view }) {
   const part = (name) => root.querySelector(name), card = part(".card"), ring = part(".ring")
   let shown = 0, pointed = null // the step, and what it is about
 
-  const remember = () => { try { window.localStorage.setItem(SEEN, "seen") } catch { /* private */ } }
-  const known = () => { try { return window.localStorage.getItem(SEEN) !== null } catch { return true } }
   const target = () => model.steps[model.step - 1][2]
   const go = (step) => ask(model, view, { step })
 
@@ -57,7 +55,7 @@ export function render({ model, view }) {
     part(".on").textContent = step === steps.length ? "Finish" : "Next"
     if (step === shown) return
     shown = step
-    remember()
+    remember("tour")
     play(step)
     requestAnimationFrame(() => part("h2").focus({ preventScroll: true })) // once the card is there
     point(target(), step)
@@ -135,6 +133,6 @@ export function render({ model, view }) {
   room.observe(card)
   model.on("remove", () => { shown = 0; clear(0); room.disconnect() })
   show()
-  if (model.first && !model.step && !known()) go(1)
+  if (model.first && !model.step && !knows("tour")) go(1)
   return root
 }

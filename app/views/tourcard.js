@@ -1,7 +1,8 @@
 // The card of the tour in a small scene, above the pictures it speaks of: its first steps; the others are of 400 disks.
 
+import { knows, remember } from "./memory.js"
+
 const NARROW = "(max-width: 759.95px)" // where S lies below the scene
-const UNSEEN = "granforce.tour" // remembered in the browser: that the tour was seen
 
 export class TourCard {
   /** root: the page; shown(does): have it show what a step is about; onwards(): after the last step. */
@@ -15,7 +16,7 @@ export class TourCard {
 
   part(name) { return this.card.querySelector(`.${name}`) }
 
-  get seen() { try { return localStorage.getItem(UNSEEN) !== null } catch { return true } }
+  get seen() { return knows("tour") }
 
   /** Show this step, none for 0. */
   go(step) {
@@ -27,7 +28,7 @@ export class TourCard {
       if (was) root.querySelector(".tourist").focus({ preventScroll: true })
       return
     }
-    try { localStorage.setItem(UNSEEN, "seen") } catch { /* private */ }
+    remember("tour")
     const [title, text, does] = this.steps[step - 1]
     card.querySelector("h2").textContent = title
     card.querySelector("p").textContent = text

@@ -1,0 +1,54 @@
+// What buttons and keys do, by name, on a player.
+
+/** name → function, none of which does anything while a packing is being made. */
+export function actions(player) {
+  const loaded = (action) => (given) => { if (player.replay && !player.live.moves) action(player.replay, given) }
+  const other = (action) => loaded((replay, given) => {
+    player.difference.end()
+    action(replay, given)
+  })
+  const halted = (action) => other((replay, given) => {
+    player.hand.free()
+    player.follows = false
+    player.play(false)
+    action(replay, given)
+  })
+  const { model } = player
+  const step = ({ swinging }) => (swinging ? 0.05 : 1)
+  return {
+    less: loaded(() => player.hand.nudge(-1)),
+    more: loaded(() => player.hand.nudge(1)),
+    hold: loaded((replay) => player.hold(replay)),
+    undo: loaded((replay) => { if (replay.held) player.hand.tell({ undo: true }) }),
+    free: loaded(() => player.hand.free()),
+    play: other((replay) => {
+      player.hand.free()
+      player.follows = false
+      if (player.playing && player.resting === null) player.pause(replay)
+      else if (player.playing) { player.resting = null; player.buttons.tellPlaying(true) }
+      else player.play(true)
+    }),
+    step: halted((replay) => player.show(Math.floor(replay.position + 1e-9) + step(replay))),
+    back: halted((replay) => player.show(Math.ceil(replay.position - 1e-9) - step(replay))),
+    restart: halted(() => player.show(0)),
+    end: halted((replay) => player.show(replay.last)),
+    next: loaded((replay) => player.choose(replay, 1)),
+    previous: loaded((replay) => player.choose(replay, -1)),
+    scrub: halted((replay, to) => player.show(to)),
+    pin: other((replay) => {
+      player.model.reference = replay.frame
+      player.model.beside = null
+    }),
+    between: other((replay) => player.between(replay)),
+    split: other(() => { player.model.split = !player.model.split }),
+    predict: loaded(() => { model.predict = model.predict ? 0 : 1 }),
+    differ: loaded((replay) => {
+      model.predict = 0
+      if (player.difference.on) return player.difference.end()
+      player.play(false)
+      if (replay.swinging) player.model.between = null
+      player.difference.begin(replay)
+    }),
+    tab: (number) => player.model.send_msg({ tab: number }),
+  }
+}
