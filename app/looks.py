@@ -42,7 +42,7 @@ SORTS = {
     "position": "place as packed in its interval",
     "shortened": "how much what is known shortened it",
 }
-DRAWN = {"some": "a few dozen", "all": "all"}
+DRAWN = {"some": "a few", "all": "all"}
 # What single tabs can show.
 FIGURES = {
     "eta": "How does friction matter?",
@@ -77,6 +77,7 @@ class Seen(param.Parameterized):
     reference = param.Integer(default=0, doc="row of `replay` that is pinned, for differences")
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
     predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
+    guess = param.Boolean(doc="whether the curve over friction is to be guessed before it is shown")
     beside = param.Number(
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
     )

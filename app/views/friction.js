@@ -12,7 +12,7 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "friction"
   root.innerHTML = `
-    <div class="head"><label for="mu">Friction μ</label> <small>changes the packing</small>
+    <div class="head"><label for="mu">Friction μ</label> <small>(changes the packing)</small>
       <input id="mu" class="typed" inputmode="decimal" aria-label="μ"></div>
     <div class="hill"></div>
     <div class="rail"><div class="ticks"></div>
@@ -60,7 +60,7 @@ export function render({ model, view }) {
     if (!(most > 0)) return
     const points = model.hill.map(([mu, eta]) =>
       `${100 * (place(mu, model.least) - model.least) / (model.most - model.least)},${HILL * (1 - eta / most)}`)
-    part("hill").innerHTML = `<span>how free the forces are</span>
+    part("hill").innerHTML = `<span>how much forces vary</span>
       <svg viewBox="0 0 100 ${HILL}" preserveAspectRatio="none" aria-hidden="true">
       <polygon points="0,${HILL} ${points.join(" ")} 100,${HILL}"/></svg>`
   }

@@ -1,6 +1,7 @@
 """Statistics of the states on screen, and of all those in the stores that were made alike."""
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import chain
 from typing import Any
 
@@ -21,12 +22,33 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .packing import exact_intervals
-from .parts import TabView, choice, figure, folded, folded_away, linked, note, plotted, question
+from .parts import (
+    OUTLINED,
+    PLAIN,
+    TabView,
+    choice,
+    figure,
+    folded,
+    folded_away,
+    linked,
+    note,
+    plotted,
+    question,
+    together,
+)
 from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
+# Before the curve over friction is shown to who has never seen it, and what is said then.
+GUESS = (
+    "<b>Guess first.</b> The ring in the plot is this packing: the force at one contact varies by "
+    "about {:.2g} % of the mean force. Now take <b>a new packing for each friction value</b>, from "
+    "hardly any to a lot. How does it change how much the forces vary?"
+)
+GUESSES = ("It keeps rising ↗", "It keeps falling ↘", "It rises, then falls ∩")
+RIGHT, ANSWERS = 2, ("Not quite. ", "Well guessed. ")
 EACH = (
     "<b>Each dot is one contact:</b> the farther up, the less its force is determined; the farther "
     "right, the stronger it is. Click a dot to find its contact in the packing."
@@ -40,6 +62,13 @@ class View(TabView):
 
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", "exact", "catalogue")
+        self.guesses = pn.FlexBox(
+            *(_guess(text, partial(self._guessed, k)) for k, text in enumerate(GUESSES)),
+            _guess("Just show me", lambda event: self.looks.param.update(guess=False)),
+            visible=False,
+        )
+        self._curve: Figure | None = None  # over friction, where it is drawn
+        self._found = self._said = ""  # what figures over μ show, and what is said on a guess
         self.what = question("Question", FIGURES, self.looks, "figure")
         self.scale = linked(choice(AXES, self.looks.axis), self.looks, "axis")
         self.plots = pn.Column(sizing_mode="stretch_width")
@@ -55,6 +84,7 @@ class View(TabView):
         self.scale.param.watch(self.refresh, "value")
         self.task.param.watch(self._follow, ["running", "message"])
         self.looks.param.watch(self._mark, "contact")
+        self.looks.param.watch(lambda event: together(self._hide), "guess")
         self.catch_up()
 
     def panel(self) -> pn.Column:
@@ -63,6 +93,7 @@ class View(TabView):
             self.what,
             self.bar,
             self.lead,
+            self.guesses,
             self.plots,
             self.more,
             self.scale,
@@ -80,12 +111,12 @@ class View(TabView):
     def update(self) -> None:
         """Draw the figure chosen: at once from the states on screen, or over μ in a thread."""
         state, what = self.state, self.what.value
-        self.scale.visible = what in SCALED
-        self.more.visible = what == "eta"
         self.task.cancel()
+        self._curve = None
         if what != self._drawn:  # another figure's plot is no answer to this choice
-            self.plots.objects, self.lead.object, self.told.object = [], "", ""
+            self.plots.objects, self._found, self.told.object = [], "", ""
             self._drawn = what
+        self._hide()
         if state.replay is None:
             return
         if what in ("scatter", "force"):
@@ -103,15 +134,38 @@ class View(TabView):
         self.state.work.piecewise(self._showing(found))
 
     def _showing(self, found: Drawn) -> Iterator[None]:
-        figures, self.lead.object, self.told.object = found
+        figures, self._found, self.told.object = found
         for fig in figures:
             self._choosable(fig)
+        if self.what.value == "eta":
+            self._curve = figures[0]
+        self._hide()
         first = [plotted(figures[0])]
         self.plots.objects = first
         yield
         if self.plots.objects == first:  # nothing else was chosen
             for place, fig in zip(self.folded, figures[1:], strict=False):
                 place.objects = [plotted(fig)]
+
+    # The curve over friction is guessed before it is seen for the first time
+
+    def _guessed(self, k: int, event: Any) -> None:
+        self._said = ANSWERS[k == RIGHT]
+        self.looks.guess = False
+
+    def _hide(self) -> None:
+        """Hide what a guess is asked of, and show it, with what was found, once there was one."""
+        what, replay = self.what.value, self.state.replay
+        hidden = what == "eta" and self.looks.guess and replay is not None
+        self.guesses.visible = hidden
+        self.scale.visible = what in SCALED and not hidden
+        self.more.visible = what == "eta" and not hidden
+        if self._curve is not None:
+            studied.hide_curve(self._curve, hidden)
+        if hidden:
+            self.lead.object = GUESS.format(100 * replay.summary["eta1"])
+        elif what in DRAWN:
+            self.lead.object = (self._said if what == "eta" else "") + self._found
 
     def _follow(self, *events: Any) -> None:
         self.bar.visible = self.task.running and self.what.value in DRAWN
@@ -234,6 +288,12 @@ class View(TabView):
             f"{beyond:.2%} of the forces lie beyond the axis."
         )
         return fig, lead, folded(text)
+
+
+def _guess(label: str, on_click: Callable[[Any], object]) -> pmui.Button:
+    button = pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED)
+    button.on_click(on_click)
+    return button
 
 
 def over_friction(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, DataRange1d, FixedTicker, Label
+from bokeh.models import ColumnDataSource, DataRange1d, FixedTicker, GlyphRenderer, Label
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
@@ -34,7 +34,8 @@ SAMPLERS = {
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
-PEAK = "↓ freest here: click"
+THIS = "own"  # name of its ring
+PEAK = "↓ most here: click"
 LIKE = {0.03: "like ice", 1.0: "like rubber"}  # about, against themselves or a road
 RISES = "friction gives\neach force room"
 FALLS = "but packings have\nfewer contacts"
@@ -44,12 +45,12 @@ SHOWN = (0.01, 0.1, 1.0, 10.0)  # frictions of the study whose P(ΔF_n) is drawn
 # Titles of the figures of indeterminacy after the first, which are closed at first.
 FOLDED = (
     "Why it falls again: with more friction, packings have fewer contacts",
-    "Three measures of that freedom",
+    "Three measures of how much forces vary",
     "Networks found in other ways",
 )
 DECADES = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10]
 CLAIMS = """<details>
-<summary>What Shaebani, Unger and Kertész found, and what was found here</summary>
+<summary>What the published study found, and what was found here</summary>
 <table class="claims"><caption>The paper (Shaebani, Unger, Kertész, PRE 79, 052302)
 says, and what the study found, with its 95 % interval</caption>{}</table>{}</details>"""
 CLAIM = "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>"
@@ -105,10 +106,10 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     """
     kind = {"y_axis_type": "log" if log else "linear"}
     walks = studied.rows("walk")
-    spread = _over_mu("spread", "how much one force varies (mean force = 1)", 330, **kind)
+    spread = _over_mu("spread", "how much a force varies (mean force = 1)", 330, **kind)
     found = statistics.means(walks, "eta1")
     _line(spread, found, f"mean of {_packings(walks)} packings", log)
-    _own(spread, [(here["mu"], here["eta1"], 0.0)], log, colour=DOT, label=HERE)
+    _own(spread, [(here["mu"], here["eta1"], 0.0)], log, colour=DOT, label=HERE, name=THIS)
     _peak(spread, found)
     etas = _over_mu("indeterminacy", "how undetermined, η", 270, title=FOLDED[1], **kind)
     for k, (name, label, factor) in enumerate(MEASURES):
@@ -116,7 +117,7 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     for k, (name, _, factor) in enumerate(MEASURES):
         _own(etas, statistics.means(own, name, factor=factor), log, k)
     for fig in (spread, etas):
-        corner(fig, "measured: in networks found at random")
+        corner(fig, "measured in networks found at random")
         legend_above(fig)
     seen = _over_mu("samplers", "0.15 × range η3", 270, title=FOLDED[2], **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
@@ -144,13 +145,23 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
     return [spread, z, etas, seen], most_undetermined(found), text
 
 
+def hide_curve(fig: Figure, hidden: bool) -> None:
+    """Hide all of the first figure but the packing on screen and the axes, or show it."""
+    for part in (*fig.renderers, *fig.center):
+        if isinstance(part, GlyphRenderer) and part.name != THIS:
+            part.visible = not hidden
+        elif isinstance(part, Label) and part.name in ("peak", "rises", "falls"):
+            part.visible = not hidden
+    fig.legend.visible = not hidden
+
+
 def most_undetermined(points: Points) -> str:
     """At which friction of (μ, η, error) η is largest, in words; empty without any."""
     if not points:
         return ""
     peak = max(points, key=lambda point: point[1])[0]
     return (
-        f"<b>Forces are freest at friction {peak:g}.</b> More friction leaves every "
+        f"<b>Forces vary most at friction {peak:g}.</b> More friction leaves every "
         "force more room, but disks packed with more friction come to rest with fewer contacts, "
         "so fewer numbers are free. Click a point to see such a packing; individual packings lie "
         "above or below the average."
@@ -380,13 +391,14 @@ def _own(
     k: int = 0,
     colour: str = "",
     label: str = OWN,
+    name: str | None = None,
 ) -> None:
     """Rings around the page's own points of line k, over everything; colour: if another one."""
     x, y, _ = _shown(points, log, zero=fig.xaxis.axis_label != "friction μ")
     if len(x):
         fig.scatter(
             x, y, size=12, marker=MARKERS[k], fill_alpha=0, line_color=colour or COLOURS[k],
-            line_width=2.2, legend_label=label,
+            line_width=2.2, legend_label=label, name=name,
         )  # fmt: skip
 
 

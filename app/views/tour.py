@@ -108,6 +108,8 @@ def _shown(state: AppState, step: int) -> dict[str, Any]:
         changes["between"] = (0, _farthest(normal))
     if step == 3:
         changes["contact"] = int(np.argmax(extent))
+    if step == 5:
+        changes["guess"] = False  # it tells what would be guessed
     if step == 6:
         changes["contact"] = int(np.argmax(normal[0]))
     if step in TABS and not state.looks.shows(TABS[step]):

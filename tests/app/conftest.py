@@ -6,6 +6,7 @@ import pytest
 from serving import (
     CHROMIUM,
     FLAGS,
+    KNOW,
     MANY,
     PATIENCE,
     ask,
@@ -101,7 +102,6 @@ def context(chromium):
 
 # What a tab does as it begins: once, or each time that it goes to another page.
 FORGET = "sessionStorage.begun || localStorage.clear(); sessionStorage.begun = true"
-KNOW = "localStorage.setItem('granforce.tour', 'seen')"
 
 
 def begun(context, problems, width, height):

@@ -17,7 +17,7 @@ sys.path[:0] = [str(Path(__file__).parents[k]) for k in range(3)]  # tests/app, 
 
 from PIL import Image  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
-from serving import CHROMIUM, FLAGS, MANY, MODEL, ask, painted, scene, serve, until  # noqa: E402
+from serving import CHROMIUM, FLAGS, KNOW, MANY, MODEL, ask, painted, scene, serve, until  # noqa: E402
 from small_store import ROOT  # noqa: E402
 from test_live_browser import chain  # noqa: E402
 from test_space_browser import here, place  # noqa: E402
@@ -158,9 +158,7 @@ def main(path):
         with serve(Path(folder)) as (address, _):
             compiled(browser, address)
             context = browser.new_context(viewport=SIZE)
-            context.add_init_script(
-                "try { localStorage.setItem('granforce.tour', 'seen') } catch {}"
-            )
+            context.add_init_script(f"try {{ {KNOW} }} catch {{}}")
             page = context.new_page()
             page.set_default_timeout(300_000)
             page.goto(address + MANY)

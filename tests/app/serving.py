@@ -15,6 +15,8 @@ CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 # Of 400 disks, as a page opened that says no more: an address without a view begins with a scene.
 MANY = "?scene=many"
 PATIENCE = 180_000  # ms, on a busy machine
+# What makes a browser one that was here before: neither the tour nor a guess is asked of it.
+KNOW = "for (const what of ['tour', 'guess']) localStorage.setItem(`granforce.${what}`, 'seen')"
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]
 # Closed pages are soon given up, but not too soon for a busy machine: a session given
 # up before its page has connected comes back without what panel serve knows of it.
@@ -69,7 +71,7 @@ def wait_until_served(url, server, log):
 
 def how_it_is_made(page):
     """Open what only those need who compute something of their own; the page."""
-    return _opened(page, "How it is made")
+    return _opened(page, "How this packing is made")
 
 
 def looks(page):

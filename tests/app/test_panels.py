@@ -359,6 +359,30 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     assert view.lead.object  # what to look for
 
 
+def test_the_curve_over_friction_is_hidden_until_it_was_guessed(state):
+    state.looks.param.update(tab="statistics", guess=True)
+    view = statistics_view.View(state)
+    wait_for(state)
+    fig = view.plots.objects[0].object
+
+    def seen():
+        return [r.visible for r in fig.renderers if r.name != "own"]
+
+    (ring,) = fig.select(name="own")
+    assert ring.visible and not any(seen()) and not fig.select(name="peak")[0].visible
+    assert view.guesses.visible and not view.more.visible and "at friction" not in view.lead.object
+    view.what.value = "scatter"  # another figure asks for nothing
+    assert not view.guesses.visible and view.lead.object
+    view.what.value = "eta"
+    wait_for(state)
+    fig = view.plots.objects[0].object
+    assert view.guesses.visible and not any(seen())
+    view.guesses.objects[2].clicks += 1  # it rises, then falls
+    assert all(seen()) and fig.select(name="peak")[0].visible
+    assert not view.guesses.visible and view.more.visible and not state.looks.guess
+    assert view.lead.object.startswith("Well guessed.") and "at friction" in view.lead.object
+
+
 def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
     state.looks.tab = "statistics"
     view = statistics_view.View(state)
@@ -367,7 +391,7 @@ def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
     means = statistics.means(studied.rows("walk"), "eta1")
     most = max(means, key=lambda point: point[1])
     (peak,) = fig.select(name="peak")
-    assert peak.text == "↓ freest here: click" and peak.x == most[0]
+    assert peak.text == "↓ most here: click" and peak.x == most[0]
     assert f"at friction {most[0]:g}" in view.lead.object and "Click a point" in view.lead.object
     line, here = (r for r in fig.renderers if isinstance(r.glyph, Scatter))
     assert list(here.data_source.data["x"]) == [0.1]
