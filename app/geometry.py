@@ -1,5 +1,6 @@
 """Disks and contacts as they are drawn, with their periodic images: plain arrays."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,8 @@ from granforce.records import Floats, Integers, Mask, Packing
 
 # Width of the strip around the periodic cell in which images are drawn, in largest radii.
 MARGIN = 1.0
+# How far from the middle a contact may be that is to be dragged first, in half of what is seen.
+NEAR = 0.45
 # Of a force chain: its width where it carries the mean normal force, in largest radii, and the
 # change in ⟨f_n⟩ at which its colour is full where nothing else is asked for.
 CHAIN_WIDTH, FULL_CHANGE = 0.23, 0.5
@@ -48,6 +51,21 @@ def square(x: Floats, packing: Packing) -> tuple[float, float, float, float]:
     corners = np.stack([middle - half, middle + half], axis=1)
     x_low, x_high, y_low, y_high = corners.ravel().tolist()
     return x_low, x_high, y_low, y_high
+
+
+def nearly(most: float) -> float:
+    """What a visitor is asked to have a force pass: a little less than its largest value."""
+    return math.floor(9.8 * float(most)) / 10
+
+
+def inviting(links: Links, normal: Floats, window: tuple[float, ...]) -> int:
+    """Row of the strongest contact near the middle of the window, by f_n (N_c,); −1 without any."""
+    x_low, x_high, y_low, y_high = window
+    away = np.maximum(
+        np.abs(links.x0 + links.x1 - x_low - x_high), np.abs(links.y0 + links.y1 - y_low - y_high)
+    )
+    force = np.where(away < NEAR * (x_high - x_low), normal[links.contact], -1.0)
+    return int(np.argmax(force)) if force.max(initial=-1.0) >= 0 else -1
 
 
 def disks(packing: Packing, x: Floats, backbone: Integers) -> Disks:

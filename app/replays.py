@@ -22,6 +22,7 @@ class Replay(NamedTuple):
     box: Floats  # (2,) sides; inf where open
     tilt: float  # of the cell
     window: tuple[float, float, float, float]  # x_low, x_high, y_low, y_high of the view, a square
+    inviting: int  # row of links that a visitor is asked to drag first, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     force_scale: float  # ⟨f_n⟩, force
     normal: Any  # (F, N_c) float32 f_n: the original network, then the states kept
@@ -118,12 +119,14 @@ def _replay(
 ) -> Replay:
     """The Replay of frames (F, N_c, 2), float32, the original network first."""
     x = packing.cell.wrapped(packing.x)
+    links, window = geometry.links(packing, x, backbone), geometry.square(x, packing)
     return Replay(
         disks=geometry.disks(packing, x, backbone),
-        links=geometry.links(packing, x, backbone),
+        links=links,
         box=packing.box,
         tilt=packing.tilt,
-        window=geometry.square(x, packing),
+        window=window,
+        inviting=geometry.inviting(links, frames[0, :, 0], window),
         backbone=backbone,
         force_scale=scale,
         normal=np.ascontiguousarray(frames[..., 0]),

@@ -5,12 +5,13 @@ from typing import Any
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import ColumnDataSource, GlyphRenderer, Range1d, Span, TapTool
+from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 from bokeh.plotting import figure as Figure
 
 from granforce.records import Integers
 
 from .. import live
+from ..geometry import nearly
 from ..known import Narrowed
 from ..looks import DRAWN, SCALES, SORTS
 from ..replays import Replay
@@ -23,24 +24,15 @@ from .parts import MOVES, OUTLINED, TabView, figure, folded_away, note, plotted,
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
-SOME = 40  # bars that can be told apart, and taken by their dots
+SOME = 16  # bars that can be told apart at a glance
 APART = 100  # bars up to which there is room between them, and for large dots
+GOAL = "the red line, goal {:g} →"
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
 BARS += ("whole_low", "whole_high")  # exact intervals without what is known
 # Widths of what was possible before, is possible, and was seen, in that of one contact, and size
 # of dots, px; of few bars, and of many.
 FEW, MANY = (0.8, 0.8, 0.4, 7.5), (1.0, 1.0, 0.9, 2.4)
-# What one bar says, and at which part of the axis, from its least force to its largest; and where.
-KEY = {
-    "smallest possible": 0.47,
-    "seen so far": 0.57,
-    "as packed (when the disks came to rest)": 0.66,
-    "now; drag it up or down": 0.75,
-    "largest possible": 0.86,
-    "How to read a bar": 0.96,
-}
-KEY_AT = 2.5
 ROOM = 1.4  # of the axis for forces of a walk under way, which exceed the original ones
 ETAS = ("eta1", "eta2", "eta3")
 SMALL = {"width": 146, "margin": (6, 2, 2, 8)}
@@ -48,8 +40,8 @@ SMALL = {"width": 146, "margin": (6, 2, 2, 8)}
 
 GROWS = "How many networks does it take?"
 LEAD = (
-    "<b>How far can each force go?</b> Each bar is one contact. Drag a dot: all other forces "
-    "follow."
+    "<b>How far can each force go?</b> Each bar is one contact. Pale: its possible range, computed "
+    "exactly; dark: what random networks have shown so far. Drag a dot: all other forces follow."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -72,10 +64,7 @@ class View(TabView):
         self.bars = _source("bars", BARS)
         self.growth = _source("growth", ("state", *ETAS))
         self.chosen = _source("chosen", ("rank", "low", "high"))
-        self.example = _source(
-            "example", ("rank", "low", "high", "seen_low", "seen_high", "packed", "now")
-        )
-        self.words = _source("words", ("rank", "at", "words"))
+        self.invited = _source("invited", ("rank", "at", "words", "low", "high"))
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
         ]
@@ -112,6 +101,7 @@ class View(TabView):
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
         state.knowledge.param.watch(self.refresh, "narrowed")
+        state.hand.param.watch(lambda event: self._invite(), "pulls")
         state.param.watch(self._offer, ["seen", "exact"])
         state.work.param.watch(self._offer, "arriving")
         for task in (state.work.computation, state.knowledge.task):
@@ -129,7 +119,7 @@ class View(TabView):
         exact = exact_intervals(state.possible, replay)
         order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
         named = [one.contact for one in state.knowledge.known]
-        named += [] if looks.contact is None else [looks.contact]
+        named += self._invited() if looks.contact is None else [looks.contact]
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact, len(order))
         if replay is not self._grown:
@@ -174,23 +164,9 @@ class View(TabView):
         if self.state.growing:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
-        shown = few and bool(exact) and self.looks.sort == "original"
-        self._show_key(top, shown and not before and replay.summary["dimension"] > 0)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
         self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
-
-    def _show_key(self, top: float, shown: bool) -> None:
-        """One bar that says what it shows, up to a part of the axis; only where it hides none."""
-        for part in self.key:
-            part.visible = shown
-        self.figure.legend[0].visible = not shown  # which says the same
-        heights = [level * top for level in KEY.values()]
-        low, seen, packed, now, high, _ = ([height] for height in heights)
-        columns = {"low": low, "high": high, "packed": packed, "now": now}
-        columns |= {"seen_low": [0.97 * seen[0]], "seen_high": [1.07 * now[0]]}
-        self.example.data = {"rank": [KEY_AT]} | columns
-        self.words.data = {"rank": [KEY_AT] * len(KEY), "at": heights, "words": list(KEY)}
 
     def _show_growth(self, replay: Replay) -> None:
         self._grown, grows = replay, self.state.growing
@@ -224,6 +200,26 @@ class View(TabView):
         low, high = self.figure.y_range.start, self.figure.y_range.end
         rank = self.bars.data["rank"][at].tolist()
         self.chosen.data = {"rank": rank, "low": [low] * len(at), "high": [high] * len(at)}
+        self._invite()
+
+    def _invited(self) -> list[int]:
+        """The contact whose line in the packing says that it can be dragged, if there is one."""
+        replay = self.state.seen
+        if replay is None or replay.inviting < 0 or not replay.summary["dimension"]:
+            return []
+        return [int(replay.links.contact[replay.inviting])]
+
+    def _invite(self) -> None:
+        """Say which bar is that line's, and what the force is to pass, until something was done."""
+        wanted = self.looks.contact is None and not self.state.hand.pulls
+        wanted &= self.looks.scale == "mean"
+        at = np.flatnonzero(np.isin(self.contacts, self._invited() if wanted else []))
+        at = at[np.isfinite(self.bars.data["exact_high"][at])]
+        rank, low, high = (self.bars.data[name][at] for name in ("rank", "exact_low", "exact_high"))
+        goals = [nearly(most) for most in high]
+        words = [GOAL.format(goal) for goal in goals]
+        columns = {"rank": rank, "at": goals, "words": words}
+        self.invited.data = columns | {"low": low, "high": high}
 
     # Figures
 
@@ -264,18 +260,29 @@ class View(TabView):
             "now",
             source=self.bars,
             color=DOT,
-            legend_label="now",
+            legend_label="now: drag it up or down",
             nonselection_alpha=1,
             name="dots",
         )
         for moving in (seen, line, dots):
             moving.tags = MOVES
-        self.key = self._key(fig)
+        fig.vbar(
+            "rank", FEW[0], "high", "low", source=self.invited, fill_alpha=0, line_color=DOT,
+            line_width=2,
+        )  # fmt: skip
+        fig.scatter(
+            "rank", "at", source=self.invited, marker="dash", color=DOT, size=34, line_width=2
+        )
+        fig.text(
+            "rank", "at", "words", source=self.invited, x_offset=-12, text_baseline="middle",
+            text_align="right", text_color="white", text_font_size="12px",
+            background_fill_color=DOT, padding=3, border_radius=4, name="invited_bar",
+        )  # fmt: skip
         fig.name = "bars_figure"
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         self.whole_item, self.exact_item = fig.legend[0].items[:2]
         legend_above(fig, 5)
-        corner(fig, "possible: exact; seen: networks so far")
+        corner(fig, "possible: exact; seen: in the networks so far")
         fig.add_tools(
             hover(
                 [seen, exact],
@@ -288,22 +295,6 @@ class View(TabView):
             TapTool(renderers=[exact, seen, dots]),
         )
         return fig
-
-    def _key(self, fig: Figure) -> tuple[GlyphRenderer, ...]:
-        """A bar with words beside it, and none of a contact."""
-        bar: dict[str, Any] = {"x": "rank", "source": self.example, "line_color": None}
-        pale = fig.vbar(bottom="low", top="high", width=FEW[1], fill_color=PALE, **bar)
-        dark = fig.vbar(bottom="seen_low", top="seen_high", width=FEW[2], fill_color=DARK, **bar)
-        packed = fig.scatter(
-            "rank", "packed", source=self.example, marker="dash", color=ORIGINAL, size=18,
-            line_width=2,
-        )  # fmt: skip
-        dot = fig.scatter("rank", "now", source=self.example, color=DOT, size=FEW[3])
-        words = fig.text(
-            "rank", "at", "words", source=self.words, x_offset=12, text_baseline="middle",
-            text_font_size="12px", text_color="#808080", name="key",
-        )  # fmt: skip
-        return pale, dark, packed, dot, words
 
     def _growth_figure(self) -> Figure:
         fig = figure(

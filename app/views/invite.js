@@ -4,22 +4,22 @@
 
 import { made } from "./made.js"
 
-const NEAR = 0.45 // of half the view, from its middle
 const FINGER = matchMedia("(pointer: coarse)").matches
 // What the tag says, if there is one, and what stands above.
 const WORDS = {
-  drag: [FINGER ? "↙ tap, then drag" : "↙ drag me", "<b>Your turn: how strong can you make this force?</b> Drag the line: playing pauses."],
-  choose: ["↙ click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
-  point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in force space, and watch the lines."],
-  reach: ["", "<b>Your turn: can you bring the green force above {}?</b> Drag the red dot, and watch all lines."],
-  click: ["", "<b>Your turn: at which friction are forces freest?</b> Click a point of the curve to see such a packing."],
+  drag: [FINGER ? "tap, then drag ↕" : "drag me ↕", "<b>Your turn: can you make this force larger than {goal}?</b> Press on the red line and drag upwards (now {now})."],
+  strong: [FINGER ? "tap, then drag ↕" : "drag me ↕", "<b>Your turn: how strong can you make this force?</b> Press on the red line and drag upwards (now {now})."],
+  choose: ["click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
+  point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
+  reach: ["", "<b>Your turn: no dot got beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
+  guess: ["", "<b>Your turn: how does friction change how much the forces vary?</b> Pick your guess."],
+  click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
 }
 
 export class Invitation {
   constructor(player) {
     const { root } = player.scene
     this.player = player
-    this.of = this.row = null // the packing, and the line that was chosen in it
     this.tag = root.appendChild(made("div", { className: "invite", hidden: true }))
     this.turn = root.appendChild(made("div", { className: "turn", hidden: true }))
   }
@@ -33,47 +33,42 @@ export class Invitation {
     if ((model.contact ?? null) !== null) return null
     if (pushes) return model.pushing === "one" ? "choose" : null
     if (took) return null
-    if (model.tab !== "statistics") return "drag"
-    return model.figure === "eta" ? "click" : null
+    if (model.tab !== "statistics") return model.goal ? "drag" : "strong"
+    if (model.figure !== "eta") return null
+    return model.guess ? "guess" : "click"
   }
 
-  /** Near the largest force that the green line can have; 0 where it is there, and in other planes. */
+  /** How strong the force is that can be dragged, in mean forces. */
+  get now() { return this.player.replay.mixed.normal[this.contact]?.toFixed(1) }
+
+  /** The contact whose line can be dragged. */
+  get contact() { return this.player.scene.geometry.contact[this.player.replay.walk.inviting] }
+
+  /** What the green force is to reach; 0 where it is there, and in other planes. */
   get target() {
-    const { plots, replay } = this.player, [green] = plots.plane.pair ?? []
-    if (green === undefined) return 0
-    const most = (plots.find("outer")?.get_column("x") ?? []).reduce((one, other) => Math.max(one, other), 0)
-    const near = Math.floor(9.8 * most) / 10
-    return near > replay.mixed.normal[green] ? near : 0
+    const { plots: { plane }, replay } = this.player, [green] = plane.pair ?? []
+    return green !== undefined && plane.goal > replay.mixed.normal[green] ? plane.goal : 0
   }
 
   /** Say what can be done, beside its line and above the packing. */
   place() {
-    const { turn, tag, what } = this, at = what && WORDS[what][0] ? this.middle() : null
+    const { turn, tag, what, player: { scene, model, plots } } = this, at = what && WORDS[what][0] ? this.middle() : null
     turn.hidden = !what || Boolean(WORDS[what][0] && !at)
     tag.hidden = !at
+    if (at) scene.highlight(this.contact, scene.palette.selected)
     if (at) tag.style.transform = `translate(${at[0]}px, ${at[1]}px) translateY(-100%)`
     if (!what) return
-    const [short, long] = WORDS[what], words = long.replace("{}", what === "reach" ? this.target : "")
+    const [short, long] = WORDS[what], goal = what === "reach" ? this.target : model.goal
+    const words = long.replace("{goal}", goal).replace("{now}", this.now).replace("{seen}", plots.plane.seen)
     if (this.words !== words) [tag.textContent, turn.innerHTML] = [short, words]
     this.words = words
   }
 
   /** Where the line is, in pixels; null where it is out of view. */
   middle() {
-    const { scene, replay } = this.player, { geometry, view } = scene
-    if (this.of !== geometry) Object.assign(this, { of: geometry, row: this.strongest(replay.mixed.normal) })
-    if (this.row === null) return null
-    const [xa, ya, xb, yb] = scene.ends(this.row), x = (xa + xb) / 2, y = (ya + yb) / 2
+    const { scene, replay } = this.player, { inviting } = replay.walk, { view } = scene
+    if (inviting < 0) return null
+    const [xa, ya, xb, yb] = scene.ends(inviting), x = (xa + xb) / 2, y = (ya + yb) / 2
     return Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > 0.9 * view.half ? null : scene.toPixel(x, y)
-  }
-
-  strongest(normal) {
-    const { scene } = this.player, { geometry: { contact }, view } = scene
-    let best = null
-    for (const { k, middle: [x, y] } of scene.segments(() => true)) {
-      if (Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > NEAR * view.half) continue
-      if (best === null || normal[contact[k]] > normal[contact[best]]) best = k
-    }
-    return best
   }
 }

@@ -1,5 +1,6 @@
 """The packing: the player, what it shares with the server, and the legend."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import xarray as xr
 from granforce.records import Floats
 
 from .. import live
-from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
+from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION, nearly
 from ..known import Knowledge
 from ..looks import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
 from ..planes import Plane
@@ -18,7 +19,8 @@ from . import explanation
 from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
-SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour")  # both ways
+# Both ways.
+SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour", "guess")
 SEEN = sorted(set(Seen.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
@@ -85,7 +87,7 @@ class PackingView:
         state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
-            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab"]
+            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark"]
         )
         state.param.watch(self._explain, ["seen", "exact", "loads"])
         state.knowledge.param.watch(self._explain, "narrowed")
@@ -111,6 +113,7 @@ class PackingView:
         exact = exact_intervals(state.possible, replay)
         changes = {
             "exact": exact,
+            "goal": goal(replay, exact),
             "gone": gone(state.knowledge, replay),
             "measured": measured(state, replay),
             "most": full_extent(replay, exact, looks.full),
@@ -163,7 +166,9 @@ def projection(plane: Plane | None) -> dict[str, Any]:
     axes = plane.axes.astype(np.float32)
     names = {"xn": (0, 0), "xt": (0, 1), "yn": (1, 0), "yt": (1, 1)}
     columns = {name: np.ascontiguousarray(axes[k, :, part]) for name, (k, part) in names.items()}
-    return columns | {"origin": [float(value) for value in plane.origin], "pair": plane.pair}
+    origin = [float(value) for value in plane.origin]
+    seen = math.ceil(10 * float(plane.path[:, 0].max())) / 10
+    return columns | {"origin": origin, "pair": plane.pair, "goal": plane.goal, "seen": seen}
 
 
 def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
@@ -174,6 +179,13 @@ def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
         name: (dataset[name].values[:, 0] / replay.force_scale).astype(np.float32)
         for name in ("low", "high")
     }
+
+
+def goal(replay: Replay, exact: Bounds) -> float:
+    """What the force of the line to be dragged first shall pass, in ⟨f_n⟩; 0 unless known."""
+    if not exact or replay.inviting < 0:
+        return 0.0
+    return nearly(exact["high"][replay.links.contact[replay.inviting]])
 
 
 def gone(knowledge: Knowledge, replay: Replay) -> Any:

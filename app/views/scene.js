@@ -285,7 +285,7 @@ export class Scene {
       }
     }
     if (this.selected !== null) this.drawSelected(this.selected)
-    this.pair.forEach((contact, k) => this.drawAxis(contact, k ? palette.up : palette.across))
+    this.pair.forEach((contact, k) => this.highlight(contact, k ? palette.up : palette.across))
     if (this.pointed >= 0 && this.describe?.forces) this.drawForces(this.pointed)
     if (marks instanceof Sheet) this.onSheet?.(marks, this)
     else this.onMarks?.(marks, this)
@@ -310,7 +310,7 @@ export class Scene {
   }
 
   /** A line in the colour of its axis of force space. */
-  drawAxis(chosen, colour) {
+  highlight(chosen, colour) {
     const { marks, scale, palette } = this
     marks.lineCap = "round"
     for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {

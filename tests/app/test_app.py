@@ -37,8 +37,9 @@ from app.selection import (
     selected,
 )
 from app.state import AppState
+from app.views import packing as packing_view
 from app.views.controls import Controls
-from app.views.intervals import KEY, SOME, View, sorted_contacts
+from app.views.intervals import SOME, View, sorted_contacts
 from app.views.packing import PackingView, exact_intervals
 from app.views.player import frames
 from app.views.progress import Progress
@@ -536,20 +537,19 @@ def test_possible_is_in_the_legend_only_where_it_is_drawn(state):
     assert view.exact_item.visible and view.exact_item.label.value == "possible"
 
 
-def test_one_bar_says_what_it_shows_where_it_hides_none(state):
+def test_the_bar_of_the_line_to_be_dragged_says_what_is_to_be_reached(state):
     view = View(state)
-    assert not view.key[-1].visible  # no exact intervals yet
+    assert not len(view.invited.data["rank"])  # no exact intervals yet
     state.compute_exact()
     wait_for(state)
-    assert all(part.visible for part in view.key) and view.words.data["words"] == list(KEY)
-    column, (least, *_, largest) = view.bars.data, view.words.data["at"]
-    near = column["rank"] <= len(column["rank"]) / 3
-    assert 0 < least < largest < view.figure.y_range.end
-    assert np.mean(column["exact_high"][near] < least) > 0.5
-    state.looks.sort = "extent"
-    assert not any(part.visible for part in view.key)
-    state.looks.sort = "original"
-    assert all(part.visible for part in view.key)
+    replay, (goal,) = state.seen, view.invited.data["at"]
+    contact = replay.links.contact[replay.inviting]
+    assert view.contacts[int(view.invited.data["rank"][0]) - 1] == contact
+    assert goal == packing_view.goal(replay, exact_intervals(state.exact, replay))
+    high = state.exact["high"].values[contact, 0] / replay.force_scale
+    assert 0.9 * high - 0.1 < goal < high
+    state.looks.contact = 0
+    assert not len(view.invited.data["rank"])
 
 
 def test_another_friction_is_packed_as_is_usual_there(state):

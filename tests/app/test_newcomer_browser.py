@@ -307,9 +307,9 @@ def test_every_tab_asks_what_the_hand_can_find_out(visit):
     page = visit()
     turn = page.locator(".turn")
     for tab, words in (
-        ("Friction", "at which friction are forces freest?"),
+        ("Friction", "at which friction do forces vary most?"),
         ("Push", "how hard can two disks be pushed apart?"),
-        ("How far?", "how strong can you make this force?"),
+        ("How far?", "can you make this force larger than"),
         ("Force space", "can you bring the green force above"),
     ):
         page.get_by_role("tab", name=tab).click()
@@ -318,7 +318,7 @@ def test_every_tab_asks_what_the_hand_can_find_out(visit):
     asked = float(re.search(r"above ([\d.]+)\?", turn.inner_text())[1])
     assert 0.85 * largest < asked < largest
     page.get_by_role("tab", name="How far?").click()
-    contact = scene(page, "scene.hand.player.invite.row")
+    contact = scene(page, "scene.hand.player.replay.walk.inviting")
     middle = "(([a, b, c, d]) => scene.toPixel((a + c) / 2, (b + d) / 2))"
     x, y = scene(page, f"{middle}(scene.ends({contact}))")
     box = page.locator(".scene").bounding_box()
