@@ -19,6 +19,7 @@ from granforce.study.stresses import stress_axes
 
 from .compute import found_or_made
 from .data import Cell, Library
+from .geometry import nearly
 from .jobs import Job
 from .replays import Replay
 from .selection import Selection
@@ -36,6 +37,7 @@ class Plane(NamedTuple):
     share: Floats  # (2,) of the variance of the states, NaN for components
     path: Any  # (F, 2) float32: the original network, then the states shown
     kind: str = ""  # STRESS where the axes are those of stresses
+    goal: float = 0.0  # of a pair: what a visitor is asked to bring the force across to; 0: nothing
 
     @property
     def pair(self) -> list[int]:
@@ -45,6 +47,7 @@ class Plane(NamedTuple):
 
 
 STRESS = "stress"
+PAIR = "green", "violet"  # lines of the contacts whose forces are the axes, across and up
 
 
 class Outlined(NamedTuple):
@@ -122,7 +125,7 @@ def _plane(
 def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
     """Titles of the two axes, in words."""
     if plane.pair:  # whose lines have colours
-        return ("normal force (mean force = 1)",) * 2
+        return tuple(f"normal force of the {colour} line (mean force = 1)" for colour in PAIR)
     if plane.components:
         return tuple(
             f"{'normal force fₙ' if component == 0 else 'tangential force fₜ'} of contact "
@@ -257,6 +260,8 @@ def _as_kept(replay: Replay, plane: Plane, found: xr.Dataset) -> Plane:
 def _outlined(replay: Replay, plane: Plane, found: xr.Dataset) -> Outlined:
     """The outline as kept; its axes are those it was made with, and the path follows them."""
     plane = _as_kept(replay, plane, found)
+    if plane.pair:
+        plane = plane._replace(goal=nearly(found["outer"].values[:, 0].max()))
     return Outlined(
         plane,
         inner=found["inner"].values - plane.origin,

@@ -4,9 +4,9 @@
 import { made } from "./made.js"
 import { circle, line } from "./pen.js"
 
-const TRAIL = 40 // states that the trail in force space reaches back
+const TRAIL = 4 // states that the trail in force space reaches back
 const DOT_REACH = 9 // px from a dot that still mean it
-const INVITE = "↙ drag me"
+const INVITE = "drag me"
 const TOUCH_REACH = 22 // the same of a finger
 
 export class Layer {
@@ -116,7 +116,7 @@ export const LAYERS = {
     const track = replay.track.slice(Math.max(0, Math.floor(replay.position) - TRAIL), Math.floor(replay.position) + 1)
     const points = track.map((k) => [x(px[k]), y(py[k])])
     points.push([x(mix(px)), y(mix(py))])
-    for (let k = 1; k < points.length; k++) {
+    for (let k = plots.invites ? points.length : 1; k < points.length; k++) {
       context.globalAlpha = 0.85 * (k / points.length) ** 2
       line(context, points[k - 1], points[k])
     }
@@ -137,9 +137,9 @@ function spot(context, [px, py], plots) {
   context.font = "13px sans-serif"
   context.fillStyle = plots.colours.now
   const { width } = context.measureText(INVITE)
-  context.fillRect(px + 6, py - 26, width + 8, 20)
+  context.fillRect(px + 6, py + 8, width + 8, 20)
   context.fillStyle = "white"
-  context.fillText(INVITE, px + 10, py - 12)
+  context.fillText(INVITE, px + 10, py + 22)
 }
 
 function curve(context, xs, ys, x, y, count, from = 0) {

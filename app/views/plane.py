@@ -6,7 +6,7 @@ import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.core.properties import value
-from bokeh.models import ColumnDataSource, DataRange1d, Label, Node
+from bokeh.models import ColumnDataSource, DataRange1d, Label, Node, Span
 from bokeh.plotting import figure as Figure
 
 from granforce.records import InputError
@@ -18,8 +18,7 @@ from ..looks import PLANES
 from ..planes import Outlined, Plane
 from ..replays import Replay
 from ..state import AppState
-from . import stresses
-from .hints import term
+from . import shadows, stresses
 from .parts import (
     MOVES,
     OUTLINED,
@@ -33,15 +32,23 @@ from .parts import (
     together,
 )
 from .progress import Progress
-from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above, lines
+from .style import (
+    DARK,
+    DOT,
+    ORIGINAL,
+    PALE,
+    SERIES,
+    STATES,
+    corner,
+    hover,
+    legend_above,
+)
 
 # What is offered beside states of a kind, and what the others are called.
 ALSO = {"walk": "also show uniformly sampled networks", "uniform": "also show the walk"}
 CALLED = {"uniform": "uniformly sampled networks", "walk": "walk"}
 MARKED = {"uniform": "uniform ones (triangles)", "walk": "networks of the walk (triangles)"}
 ENOUGH = 300  # states beside those shown, where they have to be computed
-MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
-MOSTLY = 0.75  # part of the dots in the inner half, from which on they keep to the middle
 
 Columns = dict[str, Any]  # of a ColumnDataSource
 
@@ -50,30 +57,15 @@ WHOLE = "principal", "stress"  # planes that are the same whatever contact is se
 COMING = "The networks come as they are found; the first few tell how to look at them."
 GROWS = "The networks come as they are found; the exact outline of S follows."
 
-COMPUTED = (
-    " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
-    "it is known to {found.gap:.1g} of the mean force. Halfway is the outline shrunk "
-    "to half its lengths about its middle."
-)
-
 LEAD = (
-    "<b>Each dot is one whole set of forces that balance</b>, like the one drawn in the packing. "
-    "The blue shape is the shadow of S, of all that is possible. Drag the red dot: "
-)
-TOUCH = "orange lines grow, blue ones shrink."
-OF_A_PAIR = "it sets the forces of the green and the violet line, and all others follow."
-CROWDED = (
-    ": to get far out, many forces have to change in step, which hardly ever happens by chance"
+    "<b>Each dot is one whole network, like the one drawn in the packing.</b> S, the set of all "
+    "networks that balance, has {free} dimensions; the blue shape is its shadow (projection) on "
+    "two axes."
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")
 SWEEPS_OF_A_PAIR = ("Sweep the green force ↔", "Sweep the violet force ↕")
 SWEEP = 'button.document.get_model_by_name("player").player.hand.spot.sweep(axis)'
-HELP = (
-    "A thin line leads from each network to the one found next. A line that is clicked in the "
-    f"packing becomes the green one. Shown is the shadow ({term('principal', 'projection')}) that "
-    f"{term('s')} casts on a plane, not a section: the shaded {term('outline')} holds all of it."
-)
 
 
 class View(TabView):
@@ -82,7 +74,7 @@ class View(TabView):
     name = "plane"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "seen", looks=["contact", "pair", "dark"], work=["fourfold"])
+        super().__init__(state, "seen", looks=["contact", "pair"], work=["fourfold"])
         empty: Columns = {"x": [], "y": []}
         self.path = ColumnDataSource(empty | {"state": []}, name="path")
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
@@ -90,12 +82,17 @@ class View(TabView):
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
         self.cone = ColumnDataSource(empty)
         self.figure = self._figure()
-        self.lines = _lines(self.figure)
         self.name_of_s = Label(
             x=0, y=0, text="S", text_color=DARK, text_font_size="20px", visible=False
         )
-        self.figure.add_layout(self.name_of_s)
-        self.planes = question("Shown", PLANES, self.looks, "axes")
+        self.goal = Span(dimension="height", line_color=DOT, line_dash="dashed", visible=False)
+        self.goal_words = Label(
+            x=0, y=_edge("top", 20), x_offset=-6, text_align="right", text_color=DOT,
+            text_font_size="13px", visible=False,
+        )  # fmt: skip
+        for part in (self.name_of_s, self.goal, self.goal_words):
+            self.figure.add_layout(part)
+        self.planes = question("Plotted", PLANES, self.looks, "axes")
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
         self.others = state.work.task()  # who finds other states
@@ -115,8 +112,8 @@ class View(TabView):
         """Choice of the plane, plot, and what it says."""
         return pn.Column(
             self.lead,
-            self.finding,
             plotted(self.figure),
+            self.finding,
             pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
             self.planes,
             Progress(self.task),
@@ -135,11 +132,9 @@ class View(TabView):
             return
         free = replay.summary["dimension"]
         pair = self.kind == "pair"
-        self.lead.object = LEAD + (OF_A_PAIR if pair else TOUCH) if free else ""
+        self.lead.object = LEAD.format(free=free) if free else ""
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)
-        for line, colour in zip(self.lines, lines(self.looks.dark), strict=True):
-            line.update(visible=pair, text_color=colour)
         wanted = replay, self.kind, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
@@ -194,10 +189,15 @@ class View(TabView):
     def _clear(self) -> None:
         """Nothing of another plane stays."""
         self.state.plane = self.found = None
-        self.finding.object, self.name_of_s.visible = "", False
+        self.finding.object = ""
+        self._unname()
         self.path.data = {"x": [], "y": [], "state": []}
         for source in (self.original, self.beside, self.here, self.inner, self.outer, self.cone):
             source.data = {"x": [], "y": []}
+
+    def _unname(self) -> None:
+        for part in (self.name_of_s, self.goal, self.goal_words):
+            part.visible = False
 
     def _placed(self, replay: Replay, plane: Plane) -> None:
         state = self.state
@@ -293,7 +293,7 @@ class View(TabView):
         self.original.data = {"x": x[:1], "y": y[:1]}
         self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
         self.inner.data = self.outer.data = {"x": [], "y": []}
-        self.name_of_s.visible = False
+        self._unname()
         self.figure.xaxis.axis_label, self.figure.yaxis.axis_label = planes.labels(replay, plane)
         # Distances mean something among principal axes: both then have the same scale.
         self.figure.match_aspect = not plane.components
@@ -321,6 +321,9 @@ class View(TabView):
         middle = found.outer.mean(axis=0)
         x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
         self.name_of_s.update(x=x, y=y, visible=True)
+        goal = found.plane.goal
+        self.goal.update(location=goal, visible=goal > 0)
+        self.goal_words.update(x=goal, text=f"goal: {goal:g}", visible=goal > 0)
         self._tell(found)
 
     def _tell(self, found: Outlined) -> None:
@@ -328,28 +331,12 @@ class View(TabView):
         if found.plane.kind == planes.STRESS:
             self.told.object = stresses.told(found)
             return
-        path = found.plane.path[1:]
-        part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
-        area = planes.area(path) / planes.area(found.outer)
-        inner = planes.inner_share(path, found.outer)
-        free = self.state.replay.summary["dimension"]
-        many = "All" if inner == 1 else f"{min(inner, 0.99):.0%} of the"
-        dots = f"{many} {len(path)} dots{_of(self.state.replay)}"
-        words = f"<b>{dots} lie less than halfway from the middle of S to its outline</b>"
-        if self.other is not None and len(self.beside.data["x"]):
-            points = np.column_stack([self.beside.data["x"], self.beside.data["y"]])
-            share = planes.inner_share(points, found.outer)
-            words += f", and {share:.0%} of the {len(points)} {MARKED[self.other_kind]}"
-        words += CROWDED if free >= MANY and inner > MOSTLY else ""
-        share = (
-            f" The {len(path)} dots span {part[0]:.0%} of its width, "
-            f"{part[1]:.0%} of its height, and fill {area:.1%} of its area"
-            f"{_variance(found.plane)}."
-        )
-        self.finding.object = words + "."
-        named = [self.state.replay.backbone[contact] for contact in found.plane.pair]
-        which = " Green: contact {}; violet: contact {}.".format(*named) if named else ""
-        self.told.object = folded(HELP + which + share + COMPUTED.format(found=found))
+        replay, others, called = self.state.replay, np.empty((0, 2)), ""
+        if self.other is not None:
+            others = np.column_stack([self.beside.data[name] for name in "xy"])
+            called = MARKED[self.other_kind]
+        self.finding.object = shadows.finding(found, replay, others, called)
+        self.told.object = folded(shadows.computed(found, replay))
 
     @property
     def other_kind(self) -> str:
@@ -383,7 +370,6 @@ class View(TabView):
         fig.patch("x", "y", source=self.inner, fill_alpha=0, line_color=DARK, line_alpha=0.4)
         outlines = list(fig.renderers)
         fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
-        fig.line("x", "y", source=self.path, color=STATES, line_alpha=0.3, line_width=0.8)
         fig.scatter(
             "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7,
             legend_label="beside",
@@ -409,7 +395,7 @@ class View(TabView):
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
         )  # fmt: skip
         fig.text(
-            "x", "y", source=self.here, text=value("↙ drag me"), x_offset=6, y_offset=-8,
+            "x", "y", source=self.here, text=value("drag me"), x_offset=6, y_offset=26,
             text_color="white", text_font_size="13px", background_fill_color=DOT, padding=4,
             border_radius=5, name="invitation", visible=False,
         )  # fmt: skip
@@ -418,21 +404,9 @@ class View(TabView):
         fig.x_range.renderers = fig.y_range.renderers = [*outlines, states]
         legend_above(fig)
         fig.legend[0].visible = False
-        corner(fig, "outline: exact; dots: found at random; lines: one after another")
+        corner(fig, "outline: exact; dots: networks found at random")
         fig.add_tools(hover([states], ("network", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
-
-
-def _lines(fig: Figure) -> tuple[Label, Label]:
-    """Words at the ends of both axes: which line's force goes across, and which up."""
-    at = {"text_font_size": "13px", "text_font_style": "bold", "visible": False}
-    across = Label(
-        x=_edge("right", -6), y=_edge("bottom", -4), text="green line →", text_align="right", **at
-    )
-    up = Label(x=_edge("left", 6), y=_edge("top", 22), text="↑ violet line", **at)
-    for line in (across, up):
-        fig.add_layout(line)
-    return across, up
 
 
 def _edge(symbol: str, offset: int) -> Node:
@@ -444,20 +418,6 @@ def _sweep(label: str, axis: int) -> pmui.Button:
     button = pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED)
     button.js_on_click(args={"button": button, "axis": axis}, code=SWEEP)
     return button
-
-
-def _of(replay: Replay) -> str:
-    """Of how many networks those on screen are a part."""
-    summary = replay.summary
-    return f" (of {summary['states']} found)" if summary["kept"] < summary["states"] else ""
-
-
-def _variance(plane: Plane) -> str:
-    """How much of the states' scatter goes along the axes, where that was asked of them."""
-    if not np.isfinite(plane.share).all():
-        return ""
-    across, up = plane.share
-    return f", and {across:.0%} of their variance goes across, {up:.0%} upwards"
 
 
 def _loosest(replay: Replay) -> int:
