@@ -50,7 +50,7 @@ const BUTTONS = `
   </div>
   <div class="quiz" role="status"></div>
   <div class="read">
-    <span>network <b class="state"></b></span>
+    <span>network: <b class="state"></b></span>
     <span class="said"></span>
   </div>
   <div class="scenes">

@@ -24,7 +24,7 @@ from .select import Select
 WIDE = {"sizing_mode": "stretch_width"}
 SMALL = {"sizing_mode": "stretch_width", "size": "small", "margin": (5, 10)}
 FIELD = {"sizing_mode": "stretch_width", "margin": (5, 10)}
-LOOKS, MADE = "Colours and widths of lines", "How it is made"
+LOOKS, MADE = "Colours and widths of lines", "How this packing is made"
 # What went wrong is told at the page's lower edge, whether the sidebar is open or closed.
 AT_EDGE = """
 :host { position: fixed; inset: auto 0 calc(var(--task, 0px) + var(--card, 0px)); z-index: 1400; }

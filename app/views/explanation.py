@@ -12,19 +12,17 @@ from .foldout import Foldout
 from .hints import term
 
 QUESTION = "What am I seeing? Why more than one force network?"
-PULL, CLICK = ", or drag a line", ", or click a line to push there"
 
 
 def lead(state: AppState) -> str:
     """The question that the picture answers, and what is seen, as HTML."""
     if state.work.moving and not state.selection.imported:
         return jamming(state.selection)
-    more = CLICK if state.looks.tab == "perturb" else PULL
-    return "" if state.seen is None else first(state.seen.summary, more)
+    return "" if state.seen is None else first(state.seen.summary)
 
 
-def first(summary: Summary, more: str = "") -> str:
-    """What does not move, what is free, and what playing shows; more: what else can be done."""
+def first(summary: Summary) -> str:
+    """What does not move, what is free, and what playing shows."""
     n, free = summary["n"], summary["dimension"]
     if free == 0:
         found = f"These {n} disks never move, and the forces between them are fixed."
@@ -33,10 +31,9 @@ def first(summary: Summary, more: str = "") -> str:
     else:
         found = f"These {n} disks never move, yet the forces between them can change."
         networks = term("network", "other force networks")
-        forces = 2 * summary["contacts"]
-        told = f"<b>{forces} unknown forces − {forces - free} equations = {free} free numbers.</b> "
-        told += f"Each line is a force between two disks. Press Play to see {networks}, all in "
-        told += f"balance{more}."
+        told = f"<b>Force balance leaves {free} numbers free.</b> Each line is the force between "
+        told += "two disks. Playing shows "
+        told += f"{networks}, all in balance; dragging pauses it."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 
@@ -59,9 +56,10 @@ def rest(replay: Replay) -> str:
         why = (
             f"{carry} Newton's laws require balance: two forces and a torque at each of them, and "
             f"the pressure{_dependent(3 * grains + 1 - needed)}: {needed} independent equations. "
-            f"But {summary['contacts']} contacts carry {forces} unknown forces, a {term('fn')} "
-            f"and a {term('ft')} each: <b>h = {free}</b> numbers are left free ({term('h')}). "
-            "That the forces are not determined by balance is called force indeterminacy. "
+            f"But {summary['contacts']} contacts carry {forces} unknown force components, a "
+            f"{term('fn')} and a {term('ft')} each: <b>h = {free}</b> numbers are left free "
+            f"({term('h')}). That the forces are not determined by balance is called force "
+            "indeterminacy. "
             f"{term('s')} is all that is left once no contact pulls (fₙ ≥ 0) and none slips "
             "(|fₜ| ≤ μ fₙ)."
         )

@@ -10,7 +10,7 @@ from .handover import Handover
 from .number import NumberField
 from .parts import folded_away, note
 
-TITLE = "Packing and plots as one figure"
+TITLE = "Save as one figure"
 FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
 WIDTH_MM = 170  # of a page's two columns
 HELP = """

@@ -46,16 +46,19 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <g stroke="{colour}" stroke-width="4" stroke-linecap="round">
  <path d="M116 76H58M70 66L58 76L70 86M204 76H262M250 66L262 76L250 86"/></g>
  <g fill="currentColor" stroke="none" font-size="11" opacity="0.75" text-anchor="middle">
- <text x="40" y="46">holds</text><text x="280" y="46">holds</text></g>
+ <text x="50" y="42">neighbour</text><text x="50" y="56">holds</text>
+ <text x="270" y="42">neighbour</text><text x="270" y="56">holds</text></g>
+ <g fill="{colour}" stroke="none" font-size="11" text-anchor="middle">
+ <text x="122" y="98">your push</text><text x="198" y="98">your push</text></g>
 </svg>"""
 LEAD = (
-    "<b>Two disks that touch are pushed apart, harder and harder,</b> by two forces on top of "
-    "those that are there. Their neighbours hold them, until nothing balances and the packing "
-    "gives way."
+    "<b>You push two touching disks apart, harder and harder,</b> by two opposite forces. "
+    "Their neighbours hold them, and nothing moves, until no balance is possible any more."
 )
 HINT = (
-    "<b>Click a line in the packing</b>, or choose the strongest one. Then guess how hard you must "
-    "push, and see whether you were right: the mean force is 1, the strongest here is {most:.1f}."
+    "<b>1. Click a line</b> in the packing, or choose the strongest contact.<br>"
+    "<b>2. Guess</b> how hard you must push. For scale: the mean force is 1, the largest here is "
+    "now {most:.1f}.<br><b>3. Push</b>, and see how the balance fails."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
@@ -84,7 +87,7 @@ class View(TabView):
         self.strongest = pmui.Button(label="Choose the strongest contact", **quiet)
         self.push = pmui.Button(label="Push", **look)
         self.guess = pmui.TextInput(
-            label="Your guess, mean forces", size="small", width=220, margin=(4, 8)
+            label="Your guess (× mean force)", size="small", width=220, margin=(4, 8)
         )
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))

@@ -77,12 +77,14 @@ def checks(summary: Summary) -> str:
 def finding(summary: Summary) -> str:
     """What the numbers say, in one sentence."""
     if not summary["dimension"]:
-        return "<b>How free are the forces?</b> Not at all: balance leaves every force one value."
+        return (
+            "<b>How much can the forces vary?</b> Not at all: balance leaves every force one value."
+        )
     networks = "one network" if summary["states"] == 1 else f"{summary['states']} networks"
     return (
-        f"<b>How free are the forces?</b> Across {networks} found at random, the force at a "
-        f"contact varies by about <b>{100 * summary['eta1']:.2g} %</b> of the mean force. Drag one "
-        "yourself and it goes much farther, because the others all adjust a little."
+        f"<b>How much can the forces vary?</b> Over {networks} found at random, a force varies by "
+        f"about <b>{100 * summary['eta1']:.2g} %</b> of the mean force. Pulled on purpose, it can "
+        "go further."
     )
 
 

@@ -20,7 +20,7 @@ from serving import (
 )
 from small_store import KEPT, ROOT
 
-STATISTICS = "measured: in networks found at random"
+STATISTICS = "measured in networks found at random"
 
 
 # 1: Back and Forward
@@ -293,7 +293,7 @@ def test_legends_lie_where_no_curve_goes(lasting, tab, least):
 
 def test_ticks_of_friction_stand_apart(lasting):
     page = lasting("?tab=statistics")
-    page.get_by_text("Forces are freest at friction").wait_for()
+    page.get_by_text("Forces vary most at friction").wait_for()
     page.wait_for_function(
         "() => [...Bokeh.documents[0].all_models]"
         ".some((m) => m.type === 'LogAxis' && m.axis_label === 'friction μ')"
@@ -314,7 +314,7 @@ def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, served):
     page.get_by_role("button", name="Push", exact=True).click()
     page.get_by_text("the packing gives way:").wait_for()
     page.get_by_role("tab", name="Friction").click()
-    page.get_by_text("Forces are freest at friction").wait_for()
+    page.get_by_text("Forces vary most at friction").wait_for()
     assert "already known" not in (served[1] / "log").read_text()
 
 
@@ -331,9 +331,9 @@ def test_the_report_goes_when_another_file_is_dropped(visit):
 
 def test_nothing_old_stands_under_a_new_statistic(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("Forces are freest at friction").wait_for()
+    page.get_by_text("Forces vary most at friction").wait_for()
     page.get_by_role("combobox", name="Question").select_option("correlation")
-    page.get_by_text("Forces are freest at friction").wait_for(state="detached")
+    page.get_by_text("Forces vary most at friction").wait_for(state="detached")
     page.get_by_text("the correlation lies between").wait_for()
 
 
@@ -354,8 +354,8 @@ def test_curves_of_the_shown_states_end_at_their_targets(page):
 
 def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
     page = visit("?tab=statistics")
-    page.get_by_text("Forces are freest at friction").wait_for()
-    page.get_by_text("What Shaebani, Unger and Kertész found, and what was found here").click()
+    page.get_by_text("Forces vary most at friction").wait_for()
+    page.get_by_text("What the published study found, and what was found here").click()
     assert page.get_by_role("cell", name="reproduced").count() >= 5
     most = page.evaluate(
         """() => Math.max(...[...Bokeh.documents[0].all_models]
@@ -367,8 +367,8 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
 @pytest.mark.parametrize(
     "tab, words",
     [
-        ("intervals", ("possible: exact; seen: networks so far",)),
-        ("plane", ("outline: exact; dots: found at random; lines: one after another",)),
+        ("intervals", ("pale: all that is possible, exactly; dark: seen in the networks so far",)),
+        ("plane", ("outline: exact; dots: networks found at random",)),
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],
 )

@@ -120,13 +120,13 @@ def test_one_contact_in_its_cone(visit):
 def test_statistics_are_drawn_one_after_another(visit):
     page = visit("?tab=statistics")
     drawn(page, 2)
-    page.get_by_text("Forces are freest at friction").wait_for()
+    page.get_by_text("Forces vary most at friction").wait_for()
     for what, text in (
         ("extent", "one contact's force differs by"),
         ("correlation", "the correlation lies between"),
         ("scatter", "Each dot is one contact"),
         ("force", "of the forces are smaller than the mean force"),
-        ("eta", "Forces are freest at friction"),
+        ("eta", "Forces vary most at friction"),
     ):
         page.get_by_role("combobox", name="Question").select_option(what)
         page.get_by_text(text).wait_for()
@@ -326,7 +326,7 @@ def test_closed_pages_are_forgotten(visit, shipped, tmp_path):
 def test_packing_and_plots_are_one_figure_of_a_chosen_width(visit, tmp_path):
     page = visit("", 1440, 900)
     bars_drawn(page)
-    page.get_by_role("button", name="Packing and plots as one figure").click()
+    page.get_by_role("button", name="Save as one figure").click()
     width = page.get_by_role("spinbutton", name="Width, mm")
     width.fill("180")
     width.press("Enter")

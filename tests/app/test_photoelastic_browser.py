@@ -31,7 +31,9 @@ def head(page, number):
     return page.locator("p", has_text=f"frame {number}").filter(has_text="positions.txt")
 
 
-@pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
+@pytest.mark.parametrize(
+    "width", [390, 1440, *(pytest.param(wide, marks=pytest.mark.slow) for wide in (1280, 1920))]
+)
 def test_pictures_are_seen_and_saved(visit, tmp_path, width):
     page = visit("?scene=many&tab=upload", width, 900)
     dropped(page, tmp_path, (1,))

@@ -112,7 +112,7 @@ def test_on_a_narrow_page_the_sidebar_waits_until_it_is_asked_for(visit):
     press(page, "Close")
     card(page).wait_for(state="hidden")
     page.get_by_role("button", name="Open drawer").click()
-    page.get_by_role("dialog").get_by_text("How it is made").first.wait_for()
+    page.get_by_role("dialog").get_by_text("How this packing is made").first.wait_for()
 
 
 def test_the_tour_comes_once_by_itself_and_then_by_its_button(visit):
