@@ -367,7 +367,7 @@ def test_statistics_show_the_finished_study_with_claims_and_verdicts(visit):
 @pytest.mark.parametrize(
     "tab, words",
     [
-        ("intervals", ("pale: all that is possible, exactly; dark: seen in the networks so far",)),
+        ("intervals", ("possible: exact; seen: in the networks so far",)),
         ("plane", ("outline: exact; dots: networks found at random",)),
         ("statistics", (STATISTICS, "dashed exact, others measured")),
     ],
