@@ -14,7 +14,7 @@ from small_store import ROOT
 CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 # Of 400 disks, as a page opened that says no more: an address without a view begins with a scene.
 MANY = "?scene=many"
-PATIENCE = 40_000  # ms, on a busy machine
+PATIENCE = 180_000  # ms, on a busy machine
 # What makes a browser one that was here before: neither the tour nor a guess is asked of it.
 KNOW = "for (const what of ['tour', 'guess']) localStorage.setItem(`granforce.${what}`, 'seen')"
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"]

@@ -309,7 +309,7 @@ def test_every_tab_asks_what_the_hand_can_find_out(visit):
     for tab, words in (
         ("Friction", "at which friction do forces vary most?"),
         ("Push", "how hard can two disks be pushed apart?"),
-        ("How far?", "can you make this force larger than"),
+        ("How far?", "how strong can you make this force?"),
         ("Force space", "can you bring the green force above"),
     ):
         page.get_by_role("tab", name=tab).click()
