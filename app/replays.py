@@ -37,6 +37,11 @@ class Replay(NamedTuple):
     order: Integers  # (N_c,) contacts by original f_n, ascending
     summary: dict[str, Any]  # plain numbers of the states, by their names in the schema
 
+    @property
+    def invited(self) -> int | None:
+        """The contact of the row `inviting`; None without any."""
+        return None if self.inviting < 0 else int(self.links.contact[self.inviting])
+
 
 def make_replay(
     packing: Packing, dataset: xr.Dataset, mu: float, most_bytes: float = FRAME_BYTES

@@ -36,19 +36,19 @@ export function actions(player) {
     previous: loaded((replay) => player.choose(replay, -1)),
     scrub: halted((replay, to) => player.show(to)),
     pin: other((replay) => {
-      player.model.reference = replay.frame
-      player.model.beside = null
+      model.reference = replay.frame
+      model.beside = null
     }),
     between: other((replay) => player.between(replay)),
-    split: other(() => { player.model.split = !player.model.split }),
+    split: other(() => { model.split = !model.split }),
     predict: loaded(() => { model.predict = model.predict ? 0 : 1 }),
     differ: loaded((replay) => {
       model.predict = 0
       if (player.difference.on) return player.difference.end()
       player.play(false)
-      if (replay.swinging) player.model.between = null
+      if (replay.swinging) model.between = null
       player.difference.begin(replay)
     }),
-    tab: (number) => player.model.send_msg({ tab: number }),
+    tab: (number) => model.send_msg({ tab: number }),
   }
 }

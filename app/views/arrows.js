@@ -140,18 +140,21 @@ export class Arrows {
   }
 
   drawDisks() {
-    const { context: g, body, look } = this, { x, r } = body.scene
-    const own = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]), alpha: 1 }))
-    for (const { disk, at, alpha } of [...own, ...this.copies()]) {
+    const { context: g, body, look } = this, { x, r } = body.scene, copies = this.copies()
+    const own = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]) }))
+    for (const [k, { disk, at }] of [...own, ...copies].entries()) {
       circle(g, at, r[disk] * this.unit)
-      g.globalAlpha = alpha
+      g.globalAlpha = k < own.length ? 1 : 0.3
       g.fillStyle = look.disk === disk ? look.lit : look.fill
       g.fill()
       g.strokeStyle = look.edge
       g.lineWidth = 1.5
       g.stroke()
-      g.globalAlpha = 1
     }
+    this.beginNumbers()
+    g.globalAlpha = 0.5
+    for (const { disk, at } of copies) g.fillText(String(disk + 1), ...at)
+    g.globalAlpha = 1
   }
 
   /** Copies of the disks of a periodic scene that are in sight. */
@@ -161,23 +164,25 @@ export class Arrows {
     for (let disk = 0; disk < r.length; disk++) {
       for (const a of [-1, 0, 1]) for (const b of [-1, 0, 1]) {
         const at = this.px(x[2 * disk] + a * box[0], x[2 * disk + 1] + b * box[1]), R = r[disk] * this.unit
-        if ((a || b) && at[0] > -R && at[1] > -R && at[0] < wide + R && at[1] < high + R) found.push({ disk, at, alpha: 0.3 })
+        if ((a || b) && at[0] > -R && at[1] > -R && at[0] < wide + R && at[1] < high + R) found.push({ disk, at })
       }
     }
     return found
   }
 
-  /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
-  drawNumbers() {
-    const { context: g, body, look } = this, { r } = body.scene
-    this.ends() // a new scene forgets the places of the one before
+  beginNumbers() {
+    const { context: g, look } = this
     g.fillStyle = look.ink
     g.font = "12px sans-serif"
     g.textAlign = "center"
     g.textBaseline = "middle"
-    g.globalAlpha = 0.5
-    for (const { disk, at } of this.copies()) g.fillText(String(disk + 1), ...at)
-    g.globalAlpha = 1
+  }
+
+  /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
+  drawNumbers() {
+    const { context: g, body } = this, { r } = body.scene
+    this.ends() // a new scene forgets the places of the one before
+    this.beginNumbers()
     for (let d = 0; d < r.length; d++) {
       const clear = (k) => { const at = this.numberAt(d, k); return Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...at))) }
       if (clear((this.places[d] ??= 1)) < CLEAR) {

@@ -32,8 +32,7 @@ def first(summary: Summary) -> str:
         found = f"These {n} disks never move, yet the forces between them can change."
         networks = term("network", "other force networks")
         told = f"<b>Force balance leaves {free} numbers free.</b> Each line is the force between "
-        told += "two disks. Playing shows "
-        told += f"{networks}, all in balance; dragging pauses it."
+        told += f"two disks. Playing shows {networks}, all in balance; dragging pauses it."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

@@ -205,9 +205,9 @@ class View(TabView):
     def _invited(self) -> list[int]:
         """The contact whose line in the packing says that it can be dragged, if there is one."""
         replay = self.state.seen
-        if replay is None or replay.inviting < 0 or not replay.summary["dimension"]:
+        if replay is None or replay.invited is None or not replay.summary["dimension"]:
             return []
-        return [int(replay.links.contact[replay.inviting])]
+        return [replay.invited]
 
     def _invite(self) -> None:
         """Say which bar is that line's, and what the force is to pass, until something was done."""

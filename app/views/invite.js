@@ -5,10 +5,11 @@
 import { made } from "./made.js"
 
 const FINGER = matchMedia("(pointer: coarse)").matches
+const DRAG = FINGER ? "tap, then drag ↕" : "drag me ↕"
 // What the tag says, if there is one, and what stands above.
 const WORDS = {
-  drag: [FINGER ? "tap, then drag ↕" : "drag me ↕", "<b>Your turn: can you make this force larger than {goal}?</b> Press on the red line and drag upwards (now {now})."],
-  strong: [FINGER ? "tap, then drag ↕" : "drag me ↕", "<b>Your turn: how strong can you make this force?</b> Press on the red line and drag upwards (now {now})."],
+  drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the red line and drag upwards (now {now})."],
+  strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the red line and drag upwards (now {now})."],
   choose: ["click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
   reach: ["", "<b>Your turn: no dot got beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],

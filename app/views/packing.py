@@ -183,9 +183,8 @@ def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
 
 def goal(replay: Replay, exact: Bounds) -> float:
     """What the force of the line to be dragged first shall pass, in ⟨f_n⟩; 0 unless known."""
-    if not exact or replay.inviting < 0:
-        return 0.0
-    return nearly(exact["high"][replay.links.contact[replay.inviting]])
+    contact = replay.invited
+    return 0.0 if contact is None or not exact else nearly(exact["high"][contact])
 
 
 def gone(knowledge: Knowledge, replay: Replay) -> Any:

@@ -21,28 +21,17 @@ from ..state import AppState
 from . import shadows, stresses
 from .parts import (
     MOVES,
-    OUTLINED,
-    PLAIN,
     TabView,
     figure,
     folded,
     note,
+    one_of_several,
     plotted,
     question,
     together,
 )
 from .progress import Progress
-from .style import (
-    DARK,
-    DOT,
-    ORIGINAL,
-    PALE,
-    SERIES,
-    STATES,
-    corner,
-    hover,
-    legend_above,
-)
+from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
 
 # What is offered beside states of a kind, and what the others are called.
 ALSO = {"walk": "also show uniformly sampled networks", "uniform": "also show the walk"}
@@ -415,7 +404,7 @@ def _edge(symbol: str, offset: int) -> Node:
 
 def _sweep(label: str, axis: int) -> pmui.Button:
     """A button by which the point goes along an axis and back; pressed again, it stops."""
-    button = pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED)
+    button = one_of_several(label)
     button.js_on_click(args={"button": button, "axis": axis}, code=SWEEP)
     return button
 

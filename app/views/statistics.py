@@ -23,8 +23,6 @@ from ..state import AppState
 from . import studied
 from .packing import exact_intervals
 from .parts import (
-    OUTLINED,
-    PLAIN,
     TabView,
     choice,
     figure,
@@ -32,6 +30,7 @@ from .parts import (
     folded_away,
     linked,
     note,
+    one_of_several,
     plotted,
     question,
     together,
@@ -63,8 +62,10 @@ class View(TabView):
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", "exact", "catalogue")
         self.guesses = pn.FlexBox(
-            *(_guess(text, partial(self._guessed, k)) for k, text in enumerate(GUESSES)),
-            _guess("Just show me", lambda event: self.looks.param.update(guess=False)),
+            *(
+                one_of_several(text, on_click=partial(self._guessed, k))
+                for k, text in enumerate((*GUESSES, "Just show me"))
+            ),
             visible=False,
         )
         self._curve: Figure | None = None  # over friction, where it is drawn
@@ -150,7 +151,7 @@ class View(TabView):
     # The curve over friction is guessed before it is seen for the first time
 
     def _guessed(self, k: int, event: Any) -> None:
-        self._said = ANSWERS[k == RIGHT]
+        self._said = ANSWERS[k == RIGHT] if k < len(GUESSES) else ""
         self.looks.guess = False
 
     def _hide(self) -> None:
@@ -288,12 +289,6 @@ class View(TabView):
             f"{beyond:.2%} of the forces lie beyond the axis."
         )
         return fig, lead, folded(text)
-
-
-def _guess(label: str, on_click: Callable[[Any], object]) -> pmui.Button:
-    button = pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED)
-    button.on_click(on_click)
-    return button
 
 
 def over_friction(

@@ -543,7 +543,7 @@ def test_the_bar_of_the_line_to_be_dragged_says_what_is_to_be_reached(state):
     state.compute_exact()
     wait_for(state)
     replay, (goal,) = state.seen, view.invited.data["at"]
-    contact = replay.links.contact[replay.inviting]
+    contact = replay.invited
     assert view.contacts[int(view.invited.data["rank"][0]) - 1] == contact
     assert goal == packing_view.goal(replay, exact_intervals(state.exact, replay))
     high = state.exact["high"].values[contact, 0] / replay.force_scale
