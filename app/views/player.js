@@ -399,7 +399,7 @@ export function render({ model, view }) {
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
   const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
-  model.on(["tab", "wide"], () => player.mark())
+  model.on(["tab", "wide", "figure", "pushing", "guess"], () => player.mark()) // and what invites, in other words
   const observer = new ResizeObserver(() => player.scene.resize())
   observer.observe(player.scene.root)
   model.on("msg:custom", (message) => {

@@ -302,6 +302,20 @@ def test_the_volume_is_measured_among_the_numbers(visit):
     measure.wait_for(state="hidden")
 
 
+def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
+    page = visit(AT + "&tab=statistics")
+    page.locator(".turn").get_by_text("at which friction do forces vary most?").wait_for()
+    scene(page, "scene.hand.player.model.guess = true")
+    guess = page.get_by_role("button", name="It rises, then falls")
+    guess.wait_for()
+    page.locator(".turn").get_by_text("Pick your guess").wait_for()
+    assert not page.locator(".hill").filter(visible=True).count()  # it would give it away
+    guess.click()
+    page.get_by_text("Well guessed.").wait_for()
+    page.locator(".turn").get_by_text("at which friction do forces vary most?").wait_for()
+    assert page.evaluate("localStorage.getItem('granforce.guess')") == "seen"
+
+
 def test_every_tab_asks_what_the_hand_can_find_out(visit):
     """Above the packing; in force space for a value near the largest one that is possible."""
     page = visit()
