@@ -277,7 +277,7 @@ def test_questions_are_asked_before_the_page_shows_the_answers(visit):
     more(page).get_by_role("button", name="Predict, then look").click()
     told.get_by_role("button", name="No, others balance as well").click()
     told.get_by_text("numbers are left free").wait_for()
-    page.locator(".stage.playing").wait_for()
+    until(page, "scene.hand.player.replay.position > 0")  # it plays, or has played to the end
 
 
 # 12: at first there is the picture, and little around it
@@ -323,7 +323,8 @@ def test_every_tab_asks_what_the_hand_can_find_out(visit):
     for tab, words in (
         ("Friction", "at which friction do forces vary most?"),
         ("Push", "how hard can two disks be pushed apart?"),
-        ("How far?", "how strong can you make this force?"),
+        # By the bounds, once they are known: other tests may have had them computed.
+        ("How far?", re.compile("how strong can you make|can you make this force larger than")),
         ("Force space", "can you bring the green force above"),
     ):
         page.get_by_role("tab", name=tab).click()

@@ -682,9 +682,17 @@ def save_until_killed(path, first):
         store.save("walk", {"seed": seed}, walk_dataset(seed), version=1)
 
 
+def pace(path):
+    """How long saving an entry takes on this machine just now, s."""
+    store, before = open_store(path), time.monotonic()
+    for seed in range(8):
+        store.save("walk", {"seed": seed}, walk_dataset(seed), version=1)
+    return (time.monotonic() - before) / 8
+
+
 def kill_writers(path, kills, delays):
     """So many writers killed at work, one after the other; how many left a part behind."""
-    interrupted = 0
+    interrupted, took = 0, pace(path.with_name("pace"))
     for kill in range(kills):
         left_before = set(path.glob(".tmp-*"))
         writer = processes.Process(target=save_until_killed, args=(path, 10_000 * kill))
@@ -692,7 +700,7 @@ def kill_writers(path, kills, delays):
         deadline = time.monotonic() + 120
         while set(path.glob(".tmp-*")) <= left_before and time.monotonic() < deadline:
             time.sleep(0.002)  # until the writer is at work
-        time.sleep(delays.uniform(0, 0.08))
+        time.sleep(delays.uniform(0, 4 * took))
         os.kill(writer.pid, signal.SIGKILL)
         writer.join()
         assert writer.exitcode == -signal.SIGKILL
