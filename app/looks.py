@@ -36,7 +36,7 @@ EXPLAINED = {
     "measured": "measured",
 }
 SORTS = {
-    "original": "fₙ as packed",
+    "original": "force as packed",
     "extent": "ΔFₙ of all networks",
     "exact": "exact ΔFₙ",
     "position": "place as packed in its interval",

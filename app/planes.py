@@ -191,15 +191,20 @@ def points(plane: Plane, replay: Replay, other: Replay) -> Floats:
 
 
 def inner_share(points: Floats, outline: npt.ArrayLike) -> float:
-    """Share of points (n, 2) within a convex polygon (k, 2) shrunk to half about its centre."""
+    """Share of points (n, 2) within a convex polygon (k, 2) shrunk to half about its centroid."""
+    corners = halfway(outline)
+    edge, away = np.roll(corners, -1, axis=0) - corners, points[:, None] - corners
+    turn = edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0]
+    return float(np.mean(np.all(turn >= 0, axis=1) | np.all(turn <= 0, axis=1)))
+
+
+def halfway(outline: npt.ArrayLike) -> Floats:
+    """Corners (k, 2) of a convex polygon (k, 2) shrunk to half about its centroid."""
     corners = np.asarray(outline, dtype=np.float64)
     after = np.roll(corners, -1, axis=0)
     slice_ = corners[:, 0] * after[:, 1] - after[:, 0] * corners[:, 1]
-    centre = ((corners + after) * slice_[:, None]).sum(axis=0) / (3 * slice_.sum())
-    far = centre + 2 * (points - centre)
-    edge, away = after - corners, far[:, None] - corners
-    turn = edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0]
-    return float(np.mean(np.all(turn * np.sign(slice_.sum()) >= 0, axis=1)))
+    centroid = ((corners + after) * slice_[:, None]).sum(axis=0) / (3 * slice_.sum())
+    return (corners + centroid) / 2
 
 
 def area(points: npt.ArrayLike) -> float:

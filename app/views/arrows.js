@@ -87,6 +87,10 @@ export class Arrows {
         const at = [scene.x[2 * disk] - sign * arm * nx, scene.x[2 * disk + 1] - sign * arm * ny]
         found.push({ contact: c, disk, at, inward: [sign * nx, sign * ny], across: [-sign * ny, sign * nx] })
       }
+      const [one, other] = found.slice(-2)
+      if (!scene.box[0] || Math.hypot(one.at[0] - other.at[0], one.at[1] - other.at[1]) < 1e-6) continue
+      Object.assign(one, { copy: other.at }) // where it is seen on a copy of its disk
+      Object.assign(other, { copy: one.at })
     }
     return found
   }
@@ -105,6 +109,7 @@ export class Arrows {
     if (F) for (const end of this.ends()) this.drawEnd(end, F)
     if (look.fall) this.drawFall(look.fall)
     this.drawLoads()
+    if (F) this.drawValues(F)
     if (body.scene.r.length > 1) this.drawNumbers()
     else if (F && body.count <= NAMED) this.drawNames(F)
     if (look.cursor) this.drawCursor(this.px(...look.cursor))
@@ -178,6 +183,30 @@ export class Arrows {
     g.textBaseline = "middle"
   }
 
+  /** Beside the forces that S is drawn by: their values, on the side of each that is more free. */
+  drawValues(F) {
+    const { context: g, body, look } = this
+    g.font = "bold 12px sans-serif"
+    g.textAlign = "center"
+    g.textBaseline = "middle"
+    for (const [force, colour] of look.axes ?? []) {
+      const text = number(F[force]), wide = g.measureText(text).width / 2 + 3
+      const ends = this.ends().filter(({ contact }) => contact === force >> 1), { at, across } = ends[0]
+      const inward = ends.reduce((sum, end) => sum.map((v, k) => v + end.inward[k]), [0, 0]) // 0 between two disks
+      const out = wide * Math.abs(across[0]) + 9, along = 0.3 * body.scene.r[ends[0].disk] * this.unit
+      const [x, y] = this.px(...at).map((v, k) => v + along * [inward[0], -inward[1]][k])
+      const places = [1, -1].map((side) => [x + side * out * across[0], y - side * out * across[1]])
+      const room = places.map((place) => Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...place))))
+      const [px, py] = places[room[1] > room[0] + 4 ? 1 : 0]
+      g.lineWidth = 3
+      g.strokeStyle = look.fill
+      g.strokeText(text, px, py)
+      g.fillStyle = colour
+      g.fillText(text, px, py)
+      this.shafts.push([[px - wide, py], [px + wide, py]]) // no number of a disk there
+    }
+  }
+
   /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
   drawNumbers() {
     const { context: g, body } = this, { r } = body.scene
@@ -226,7 +255,7 @@ export class Arrows {
     if (load > 1e-9) write(cx, cy - 13, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
   }
 
-  drawEnd({ contact, disk, at, inward, across }, F) {
+  drawEnd({ contact, disk, at, inward, across, copy }, F) {
     const { context: g, body, look } = this, { mu } = body
     const [normal, tangential] = [F[2 * contact], F[2 * contact + 1]]
     const [px, py] = this.px(...at), lit = look.contacts.has(contact), long = this.unit * body.scene.r[disk] * 0.62
@@ -254,7 +283,12 @@ export class Arrows {
       this.arrow(px, py, across.map((v) => v * tangential), look.cold, 1.5)
       g.globalAlpha = 1
     }
-    this.arrow(px, py, force, lit ? look.hand : slides ? look.warm : this.axisColour(contact) ?? look.cold, lit || this.axisColour(contact) ? 3.5 : 2.5)
+    const own = this.axisColour(contact), colour = lit ? look.hand : slides ? look.warm : own ?? look.cold, thick = lit || own ? 3.5 : 2.5
+    this.arrow(px, py, force, colour, thick)
+    if (!copy) return
+    g.globalAlpha = 0.35
+    this.arrow(...this.px(...copy), force, colour, thick)
+    g.globalAlpha = 1
   }
 
   /** The colour of a contact whose force S is drawn by. */

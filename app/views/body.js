@@ -259,6 +259,15 @@ export class Body {
 
   least(u) { return Math.min(Infinity, ...this.rows.map((row) => dot(row.slope, u) + row.rest)) }
 
+  /** To a network within S, as far from its sides as is found near by; whether there is one. */
+  goInside() {
+    for (const margin of [0.1, 0.03, 0.01, 1e-3, 0]) {
+      const u = this.nearest(this.u, null, margin * this.scaleOf())
+      if (this.least(u) >= -1e-6) { this.u = u; return true }
+    }
+    return false
+  }
+
   /**
    * The network nearest to u, in the metric of H (its inverse; the unit one without): each side in
    * turn pushes by what it takes (Hildreth 1957).
@@ -313,8 +322,8 @@ export class Body {
   }
 
   /** A uniform draw by hit-and-run from u: a point of a random chord. */
-  step(u) {
-    const direction = u.map(() => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random()))
+  step(u, random = Math.random) {
+    const direction = u.map(() => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random()))
     let low = -Infinity, high = Infinity
     for (const row of this.whole ? this.drawn : this.rows) { // without an end, as far as it is drawn
       const slope = dot(row.slope, direction), room = dot(row.slope, u) + row.rest
@@ -322,7 +331,7 @@ export class Body {
       if (slope < -1e-12) high = Math.min(high, -Math.max(room, 0) / slope)
     }
     if (!Number.isFinite(low) || !Number.isFinite(high)) return u
-    const at = low + Math.random() * (high - low)
+    const at = low + random() * (high - low)
     return u.map((v, k) => v + at * direction[k])
   }
 }

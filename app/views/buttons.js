@@ -47,6 +47,7 @@ const BUTTONS = `
     <label class="along">network <input class="scrub" type="range" min="0" value="0" step="1" aria-label="network"></label>
     <label title="speed, networks per second">speed <input class="speed" type="range" min="0" max="6" step="0.25" value="3"
       aria-label="speed"><span class="rate"></span></label>
+    <button type="button" class="all">More controls</button>
   </div>
   <div class="quiz" role="status"></div>
   <div class="read">

@@ -15,6 +15,7 @@ export function desk(most) {
         <button type="button" class="undo" title="Take the last pull back (Z)" disabled>Undo</button>
         <button type="button" class="push" title="Drag a disk, or use the arrow keys, to push it" aria-pressed="false">Test push</button>
         <button type="button" class="save" title="This scene as a file for granforce: gf.load_packing">Download data</button>
+        <button type="button" class="more" title="Walk, points, push, data">More …</button>
         <button type="button" class="tourist">Tour</button>
       </span>
     </div>
@@ -34,7 +35,8 @@ export function desk(most) {
         <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one set of forces. Arrow keys move the point"></canvas>
         <div class="plane" hidden><label>horizontal axis <select aria-label="force shown across"></select></label>
           <label>vertical axis <select aria-label="force shown upwards"></select></label></div></figure>
-      <div class="sums"><p class="count"></p><p class="key"></p><div class="bars" role="list"></div></div>
+      <div class="sums"><p class="count"></p>
+        <details class="ranges"><summary class="key"></summary><div class="bars" role="list"></div></details></div>
     </div>
     <details class="lesson" hidden><summary>The groove: a one-page lesson with three questions</summary>
       <button type="button" class="print">Print</button> <button type="button" class="print answered">Print with answers</button>

@@ -30,9 +30,10 @@ def first(summary: Summary) -> str:
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can change."
-        networks = term("network", "other force networks")
-        told = f"<b>Force balance leaves {free} numbers free.</b> Each line is the force between "
-        told += f"two disks. Playing shows {networks}, all in balance; dragging pauses it."
+        forces, network = 2 * summary["contacts"], term("network", "network")
+        told = f"<b>{forces} unknown force components − {forces - free} equations = {free} free "
+        told += "numbers.</b> Each line is the force between two touching disks, thicker where it "
+        told += f"is stronger. One whole set of forces is a {network}; Play shows others."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

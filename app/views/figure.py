@@ -8,7 +8,7 @@ from ..state import AppState
 from .captions import caption, stem
 from .handover import Handover
 from .number import NumberField
-from .parts import folded_away, note
+from .parts import LATER, folded_away, note
 
 TITLE = "Save as one figure"
 FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
@@ -36,4 +36,4 @@ def panel(state: AppState) -> Any:
         margin=(0, 10, 4, 10),
     )  # fmt: skip
     inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")
-    return folded_away(TITLE, inside)
+    return pn.Column(folded_away(TITLE, inside), styles=LATER, sizing_mode="stretch_width")

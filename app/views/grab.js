@@ -93,6 +93,7 @@ export class Grab {
   /** Nothing is in the hand any more. */
   still() {
     this.unsay()
+    this.player.later.offer()
     this.player.plots.move(false)
     this.player.paint()
     this.player.paintPlots()

@@ -20,7 +20,7 @@ from .contacts import Contacts
 from .hints import term
 from .known import Known
 from .packing import Bounds, exact_intervals
-from .parts import MOVES, OUTLINED, TabView, figure, folded_away, note, plotted, question
+from .parts import LATER, MOVES, OUTLINED, TabView, figure, folded_away, note, plotted, question
 from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
@@ -40,8 +40,8 @@ SMALL = {"width": 146, "margin": (6, 2, 2, 8)}
 
 GROWS = "How many networks does it take?"
 LEAD = (
-    "<b>How far can each force go?</b> Each bar is one contact. Pale: its possible range, computed "
-    "exactly; dark: what random networks have shown so far. Drag a dot: all other forces follow."
+    "<b>How far can each force go?</b> Each bar is one contact, that is, one line in the packing. "
+    "By chance a force hardly moves (dark); on purpose it can go much further (pale)."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -83,17 +83,16 @@ class View(TabView):
 
     def panel(self) -> pn.Column:
         """Choices and bars; growth, to be opened."""
-        choices = pn.FlexBox(*self.choices, sizing_mode="stretch_width")
+        wide = {"sizing_mode": "stretch_width"}
+        grows = folded_away(GROWS, plotted(self.growth_figure))
         return pn.Column(
             self.lead,
             plotted(self.figure),
-            choices,
+            pn.FlexBox(*self.choices, styles=LATER, **wide),
             self.exact,  # below, as the plot must not move when the button goes
             Known(self.state),
-            self.told,
-            folded_away(GROWS, plotted(self.growth_figure)),
-            Contacts(self.looks),
-            sizing_mode="stretch_width",
+            pn.Column(self.told, grows, Contacts(self.looks), styles=LATER, **wide),
+            **wide,
         )
 
     def _connect(self) -> None:
@@ -144,6 +143,7 @@ class View(TabView):
             whole = before["low"][contacts], before["high"][contacts]
         few = len(contacts) <= APART
         *widths, size = FEW if few else MANY
+        self.figure.xaxis.major_label_text_alpha = 0 if few else 1  # which says nothing of a few
         for renderer, width in zip(self.layers, widths, strict=True):
             renderer.glyph.width = width
         self.dots.glyph.size = size

@@ -8,11 +8,11 @@ const FINGER = matchMedia("(pointer: coarse)").matches
 const DRAG = FINGER ? "tap, then drag ↕" : "drag me ↕"
 // What the tag says, if there is one, and what stands above.
 const WORDS = {
-  drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the red line and drag upwards (now {now})."],
-  strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the red line and drag upwards (now {now})."],
+  drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Drag the red line upwards: no disk moves, but all forces change (now {now})."],
+  strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Drag the red line upwards: no disk moves, but all forces change (now {now})."],
   choose: ["click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
-  reach: ["", "<b>Your turn: no dot got beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
+  reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
   guess: ["", "<b>Your turn: how does friction change how much the forces vary?</b> Pick your guess."],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
 }
@@ -27,8 +27,8 @@ export class Invitation {
 
   /** What can be done first, one of WORDS: nothing was dragged yet, and a line can be, or the point; or null. */
   get what() {
-    const { model, replay, live, difference, predict, points, plots, pushes, took, scene } = this.player
-    if (replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
+    const { model, replay, live, difference, predict, points, plots, pushes, took, scene, opens } = this.player
+    if (opens || replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
     if (points && !plots.invites) return null
     if (points) return this.target ? "reach" : "point"
     if ((model.contact ?? null) !== null) return null

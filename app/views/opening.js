@@ -1,8 +1,10 @@
-// The page opens moving: slowly, from the beginning again and again, until somebody touches it. The
-// speed stays what it was: who then plays sees what was seen before.
+// The page opens moving: slowly, from the beginning again and again, until somebody touches it; or, where
+// a first gesture is to be made, for some seconds. The speed stays what it was: who then plays sees what was
+// seen before.
 
 const SLOW = 0 // log2 of states per second
 const AGAIN_MS = 700 // rest at the end
+const FIRST_MS = 6000 // after which it rests, and the first gesture is pointed out
 
 export function openMoving(player) {
   const { model, buttons } = player
@@ -16,14 +18,22 @@ export function openMoving(player) {
     player.play(true)
   }, AGAIN_MS)
 
+  player.opens = player.later.waits
+  if (player.opens) setTimeout(() => { if (player.opens) end(() => player.pause(player.replay)) }, FIRST_MS)
+
+  function end(stop) {
+    clearInterval(again)
+    for (const name of HEARD) window.removeEventListener(name, touched, true)
+    player.opens = false
+    if (player.playing) stop()
+  }
+
   /** The button and Space, which pause, do it themselves. */
   function touched(event) {
     const path = event.composedPath()
     if (path.some((node) => node.classList?.contains("tour"))) return
     const pauses = event.key === " " || path.includes(buttons.part("play"))
-    clearInterval(again)
-    for (const name of HEARD) window.removeEventListener(name, touched, true)
-    if (!pauses && player.playing) player.play(false)
+    end(() => { if (!pauses) player.play(false) })
   }
 
   const HEARD = ["pointerdown", "keydown", "wheel"]

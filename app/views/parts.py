@@ -23,7 +23,9 @@ NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
 MOVES = ["moves"]  # tags of what the player draws itself while it plays
 
 # What is not seen while the tour speaks of something else; see tour.js.
-EXTRA = {"display": "var(--extra, flex)"}
+EXTRA = {"display": "var(--extra, var(--later, flex))"}
+# What is not seen before the first gesture, or before it is asked for; see later.js.
+LATER = {"display": "var(--later, flex)"}
 # Panes of HTML say themselves that they are visible, whatever is around them.
 BESIDE = {"content-visibility": "var(--beside, visible)"}
 

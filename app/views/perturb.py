@@ -19,7 +19,7 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .hints import term
-from .parts import OUTLINED, PLAIN, PRIMARY, TabView, figure, folded, note, plotted, question
+from .parts import LATER, OUTLINED, PLAIN, PRIMARY, TabView, figure, folded, note, plotted, question
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
@@ -52,8 +52,9 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <text x="122" y="98">your push</text><text x="198" y="98">your push</text></g>
 </svg>"""
 LEAD = (
-    "<b>You push two touching disks apart, harder and harder,</b> by two opposite forces. "
-    "Their neighbours hold them, and nothing moves, until no balance is possible any more."
+    "<b>You push two touching disks apart, harder and harder,</b> by two opposite forces. At first "
+    "they only press less on each other. Then the neighbours have to hold them: nothing moves until "
+    "no forces can balance your push any more."
 )
 HINT = (
     "<b>1. Click a line</b> in the packing, or choose the strongest contact.<br>"
@@ -111,7 +112,7 @@ class View(TabView):
         """Choices, buttons, numbers and plot."""
         wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
-            self.what,
+            pn.Column(self.what, styles=LATER, **wide),
             self.lead,
             pn.FlexBox(self.strongest, self.guess, self.push, self.animate, **wide),
             Progress(self.task),

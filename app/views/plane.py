@@ -20,6 +20,7 @@ from ..replays import Replay
 from ..state import AppState
 from . import shadows, stresses
 from .parts import (
+    LATER,
     MOVES,
     TabView,
     figure,
@@ -69,7 +70,7 @@ class View(TabView):
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
         self.original, self.beside = ColumnDataSource(empty), ColumnDataSource(empty)
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
-        self.cone = ColumnDataSource(empty)
+        self.cone, self.half = ColumnDataSource(empty), ColumnDataSource(empty)
         self.figure = self._figure()
         self.name_of_s = Label(
             x=0, y=0, text="S", text_color=DARK, text_font_size="20px", visible=False
@@ -99,17 +100,17 @@ class View(TabView):
 
     def panel(self) -> pn.Column:
         """Choice of the plane, plot, and what it says."""
+        wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
             self.lead,
             plotted(self.figure),
             self.finding,
-            pn.FlexBox(*self.sweeps, sizing_mode="stretch_width"),
-            self.planes,
+            pn.FlexBox(*self.sweeps, styles=LATER, **wide),
+            pn.Column(self.planes, styles=LATER, **wide),
             Progress(self.task),
-            self.told,
-            self.also,
+            pn.Column(self.told, self.also, styles=LATER, **wide),
             Progress(self.others),
-            sizing_mode="stretch_width",
+            **wide,
         )
 
     # Contents
@@ -185,6 +186,7 @@ class View(TabView):
             source.data = {"x": [], "y": []}
 
     def _unname(self) -> None:
+        self.half.data = {"x": [], "y": []}
         for part in (self.name_of_s, self.goal, self.goal_words):
             part.visible = False
 
@@ -310,6 +312,9 @@ class View(TabView):
         middle = found.outer.mean(axis=0)
         x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
         self.name_of_s.update(x=x, y=y, visible=True)
+        if found.plane.kind != planes.STRESS:  # of which nothing is said of the middle
+            half = planes.halfway(found.outer)
+            self.half.data = {"x": half[:, 0], "y": half[:, 1]}
         goal = found.plane.goal
         self.goal.update(location=goal, visible=goal > 0)
         self.goal_words.update(x=goal, text=f"goal: {goal:g}", visible=goal > 0)
@@ -358,6 +363,10 @@ class View(TabView):
         )  # fmt: skip
         fig.patch("x", "y", source=self.inner, fill_alpha=0, line_color=DARK, line_alpha=0.4)
         outlines = list(fig.renderers)
+        fig.patch(
+            "x", "y", source=self.half, fill_alpha=0, line_color=DARK, line_dash="dotted",
+            line_width=1.4,
+        )  # fmt: skip
         fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
         fig.scatter(
             "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7,

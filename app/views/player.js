@@ -10,6 +10,7 @@ import { Invitation } from "./invite.js"
 import { CATCH_UP, extend, Live, roomy } from "./live.js"
 import { Look } from "./look.js"
 import { plain } from "./plain.js"
+import { Later } from "./later.js"
 import { knows, remember } from "./memory.js"
 import { openMoving } from "./opening.js"
 import { Pins } from "./pins.js"
@@ -51,11 +52,14 @@ class Player {
     })
     this.replay = this.look = this.loaded = null
     this.resting = null // where a pause comes to rest, while it is on its way
+    this.opens = false // whether it plays by itself, before the first gesture
     this.took = false // whether a force was taken into the hand
     this.playing = this.follows = false // the newest state of a walk under way
     this.live = new Live(this, (live) => tell({ live }))
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(model)
+    const embedded = new URLSearchParams(location.search).has("embed")
+    this.later = new Later("network", this.buttons.part("all"), embedded)
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
     this.invite = new Invitation(this)
@@ -184,7 +188,7 @@ class Player {
     const { model, plots, replay } = this
     this.told = now
     if (model.tab === "intervals") plots.show(replay, model.scale)
-    plots.invite(this.points && !this.took && !this.grows && replay.walk.free > 0)
+    plots.invite(this.points && !this.opens && !this.took && !this.grows && replay.walk.free > 0)
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
     for (const listener of this.listeners) listener()
@@ -255,6 +259,7 @@ class Player {
       this.settle(replay)
       model.frame = replay.frame
       this.paintPlots()
+      this.mark()
       return
     }
     if (replay.atEnd && !replay.swinging) this.show(0, false)

@@ -1,37 +1,54 @@
-// A question that the hand answers. Famous scenes have one of their own; in all others it is how
-// strong, and how weak, one force can get.
+// Questions that the hand answers. Famous scenes have some of their own, one after the other; in all others
+// it is how strong, and how weak, one force can get.
 
 import { forceName, number } from "./saying.js"
 
 const NEAR = 0.01 // of what is possible: this near to an end it has been found
 const FIND = "Drag the red dot and find out."
+const SLIDE = "Drag the friction slider."
 
-/** By scenes: what is asked, from which normal force on, or how many times the other axis' force, and what is said then. */
+const single = (body) => !body.empty && body.whole && body.corners.length === 1
+const endless = (body) => !body.empty && !body.bounded
+const ONE_LEFT = { ask: "at which friction is just one set of forces left?", reached: single, done: "✓ Without friction everything is determined." }
+
+/**
+ * By scenes, what is asked: from which normal force on, or below which, or how many times the other axis'
+ * force; or what is to become of S. of: what that force's name begins with, as axes depend on friction.
+ */
 const OWN = {
-  groove: {
-    ask: "can you make the normal force at the left wall larger than the weight?", least: 1.005, goal: 1,
-    done: (value, high) => `✓ It presses with ${number(value)}, the disk weighs 1, and all is in balance. At ${number(high)} friction can do no more.`,
-  },
-  box: {
-    of: "between", // if that is the force up: which two forces are axes depends on friction
-    ask: "can you make the normal force between the disks (violet) larger than 3.5 (each disk weighs 1)?", least: 3.5, goal: 3.5,
-    done: (value) => `✓ ${number(value)}, and everything still balances.`,
-  },
-  thirteen: {
-    ask: "can you make the violet normal force three times as strong as the green one?", times: 3,
-    done: () => "✓ And everything still balances.",
-  },
+  groove: [
+    { ask: "can you make the normal force at the left wall larger than the weight?", least: 1, done: "✓ Larger, and all is in balance." },
+    ONE_LEFT,
+    { ask: "from which friction on can the walls press as hard as you like?", reached: endless, done: "✓ As steep as the walls are, the wedges let them: the disk has jammed itself." },
+  ],
+  box: [
+    { of: "between", ask: "can you make the normal force between the disks (violet) larger than 3.5 (each disk weighs 1)?", least: 3.5, done: "✓ And everything still balances." },
+    ONE_LEFT,
+    { ask: "from which friction on can they press as hard as you like?", reached: endless, done: "✓ The disks have jammed themselves." },
+  ],
+  thirteen: [
+    { ask: "can you make the violet normal force three times as strong as the green one?", times: 3, done: "✓ And everything still balances." },
+    { ask: "can you bring the violet force below 2?", most: 2, done: "✓ That, too." },
+    { ask: "with how little friction do these disks still hold?", reached: (body) => body.empty, done: "✓ Below that nothing balances: these disks need some friction." },
+  ],
 }
 
 export class Quest {
   constructor(host) { this.host = host; this.begin() }
 
-  /** How many times the force across the one up is to be, and which value a normal force is to pass; undefined where nothing such is asked. */
+  /** How many times the force across the one up is to be, or what is to be reached, in words; or undefined. */
   get times() { return this.asked?.times }
-  get goal() { return this.asked?.goal }
+  get goal() { return this.asked?.least ?? this.asked?.most }
+  get words() { return `goal: ${this.asked?.most ? "below" : "above"} ${this.goal}` }
 
-  /** Nothing is found yet: another scene, or another S. */
-  begin() { Object.assign(this, { found: [false, false], best: -Infinity }) }
+  /** Another scene: from its first question on. */
+  begin() {
+    Object.assign(this, { step: 0, told: "" })
+    this.again()
+  }
+
+  /** Another S of the same disks. */
+  again() { this.found = [false, false] }
 
   /**
    * Of the normal force of a contact, with its [least, largest] if known; colour: of its axis, in
@@ -39,32 +56,44 @@ export class Quest {
    */
   look(body, contact, { colour, ends, place, moved }) {
     const [low, high] = (body.bounded && ends) || [NaN, NaN], room = high - low
-    const none = !(room > 1e-6 * body.scaleOf())
+    const steps = OWN[body.scene.name] ?? [], value = contact === null ? NaN : body.forces()[2 * contact]
+    const now = { body, value, low, high, times: place[1] / place[0] }
+    const own = this.step >= steps.length || steps[this.step].reached || body.scene.names[contact]?.startsWith(steps[this.step].of ?? "")
+    if (steps.length && own && reaches(steps[this.step], now, moved)) this.told = steps[this.step++].done
+    const step = own ? steps[this.step] : undefined, over = steps.length > 0 && this.step === steps.length
+    const none = !over && !step?.reached && !(room > 1e-6 * body.scaleOf())
     this.host.classList.toggle("none", none)
-    this.asked = undefined
+    this.asked = none ? undefined : step
     if (none) return
-    const value = body.forces()[2 * contact], known = OWN[body.scene.name]
-    this.ratio = place[1] / place[0]
-    const own = this.asked = known && body.scene.names[contact].startsWith(known.of ?? "") ? known : undefined
-    const reached = own ? [own.times ? place[1] >= own.times * place[0] : value >= own.least] : [high, low].map((end) => Math.abs(value - end) < NEAR * room)
-    if (moved) this.found = this.found.map((found, k) => found || Boolean(reached[k]))
-    const said = own ? this.own(own, value, high) : this.both(low, high)
-    const ask = own ? own.ask : `how strong can the ${colour}${forceName(body.scene, 2 * contact)} get?`
-    const text = `<b>Your turn: ${ask}</b> <span>${said}</span>`
+    const text = over ? this.told : step ? this.next(step, steps.length, now) : this.both(`${colour}${forceName(body.scene, 2 * contact)}`, now, moved)
     if (text !== this.text) this.host.innerHTML = this.text = text
   }
 
-  own({ least, times, done }, value, high) {
-    if (high < least) return "Not with this friction: take more."
-    if (!this.found[0]) return times ? `${FIND} It is ${this.ratio.toFixed(1)} times as strong now.` : FIND
-    this.best = Math.max(value, this.best)
-    return done(this.best, high)
+  next(step, count, now) {
+    const turn = this.step ? `${this.told} <b>Next` : "<b>Your turn"
+    return `${turn} (${this.step + 1} of ${count}): ${step.ask}</b> <span>${hint(step, now)}</span>`
   }
 
-  both(low, high) {
+  both(name, { value, low, high }, moved) {
+    const near = [high, low].map((end) => Math.abs(value - end) < NEAR * (high - low))
+    if (moved) this.found = this.found.map((found, k) => found || near[k])
     const [most, least] = this.found
-    if (most && least) return `✓ Any value from ${number(low)} to ${number(high)}: balance alone does not say which.`
-    if (most) return `✓ ${number(high)} is its largest. And its smallest?`
-    return least ? `✓ ${number(low)} is its smallest. And its largest?` : FIND
+    const said = most && least ? `✓ Any value from ${number(low)} to ${number(high)}: balance alone does not say which.`
+      : most ? `✓ ${number(high)} is its largest. And its smallest?` : least ? `✓ ${number(low)} is its smallest. And its largest?` : FIND
+    return `<b>Your turn: how strong can the ${name} get?</b> <span>${said}</span>`
   }
+}
+
+/** Whether what is asked is so: by hand, of forces. */
+function reaches(step, { body, value, times }, moved) {
+  if (!step) return false
+  if (step.reached) return step.reached(body)
+  return moved && (value > step.least || value < step.most || times >= step.times)
+}
+
+/** What is to be done. */
+function hint({ least, most, times, reached }, { low, high, times: by }) {
+  if (reached) return SLIDE
+  if (high < least || low > most) return "Not with this friction: try another."
+  return times ? `${FIND} It is ${by.toFixed(1)} times as strong now.` : FIND
 }

@@ -50,7 +50,8 @@ export function legend(body) {
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   const axes = h === 2 || h > 3 ? "; green, violet: plotted on the right" : ""
   const parts = scene.r.length === 1 ? " (pale: normal and tangential parts)" : ""
-  return `blue: contact forces${parts}${axes}; shaded wedge: directions that friction allows${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
+  const heads = scene.r.length > 2 ? " (a pair between two disks)" : ""
+  return `blue: contact forces${parts}${heads}${axes}; wedge: directions friction allows${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
 }
 
 /** Whether friction is at its limit at some contact. */
@@ -78,7 +79,7 @@ function equationsOf({ grains, r, pressing, box, equations }) {
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
   const said = "no net force sideways, none up or down, and no turning, for each disk"
   if (whole !== equations) return [said, ""]
-  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, less two, as the forces on all disks together cancel; and one for the pressure`]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, less two that follow from the others, plus one for the pressure`]
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
 }
 
@@ -93,16 +94,16 @@ export function special({ scene }) {
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
   const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
-  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))} (force per unit length), in a dashed square that repeats (pale disks: copies).${rattles}`
+  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}. The dashed square repeats in all directions; pale disks are copies.${rattles}`
 }
 
 /** What the picture of S is. */
-export function pictured(body) {
+export function pictured(body, dotted) {
   const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"} (here:`
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
-  return h > 3 ? "shadow (projection) of S onto two normal forces; dots: random points, rarely near its edge"
+  return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
 
@@ -122,7 +123,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `S (the set of all solutions) has ${h} dimensions, too many to draw. The plot shows two of the forces. You can drag the red dot to any point inside: all other forces adjust.`
+  if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces adjust.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
@@ -130,7 +131,7 @@ export function sentence(body, mu, now) {
   const opens = body.sides.some(({ stops }) => stops.some(([, what]) => what === OPENS))
   const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
-  if (now.fresh) return every // the rest once something was touched
+  if (now.fresh) return `${every} There is more than one because friction may be anything up to μ times the normal force.` // the rest once something was touched
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 

@@ -9,6 +9,7 @@ import { Builder } from "./builder.js"
 import { desk } from "./desk.js"
 import { Going } from "./going.js"
 import { goneBanner } from "./gone.js"
+import { Later } from "./later.js"
 import { teach } from "./lesson.js"
 import { palette } from "./palette.js"
 import { Push } from "./push.js"
@@ -20,6 +21,7 @@ import { TourCard } from "./tourcard.js"
 
 const MOST_MU = 1.5 // on the slider; larger ones can be typed
 const REST_MS = 150 // after which what only the server tells is asked for
+const FEW = 12 // contacts up to which all their intervals are seen at once
 
 export function render({ model, view }) {
   const root = document.createElement("div")
@@ -38,7 +40,7 @@ export function render({ model, view }) {
   const arrows = new Arrows(part("packing"), heard), space = new Space(part("space"), heard)
   const going = new Going(part("play"), (path) => { now.path = path; say(); soon() })
   const pushed = new Push(), quest = new Quest(part("quest")), bars = new Bars(part("bars"))
-  const axes = new Axes(part("plane"), cast)
+  const axes = new Axes(part("plane"), cast), later = new Later("hand", part("more"))
   const tour = new TourCard(root, model.steps, model.all, ({ scene, mu: at }) => {
     if (scene !== body?.scene.name) ask(model, view, at === undefined ? { scene } : { scene, mu: at })
     else if (at !== undefined) setMu(at)
@@ -82,7 +84,7 @@ export function render({ model, view }) {
   function say(note = pushed.on ? now.note : "") {
     tell("count", counted(body), "innerHTML")
     tell("legend", legend(body))
-    tell("what", pictured(body))
+    tell("what", pictured(body, now.filled))
     tell("special", special(body))
     tell("key", barred(body))
     tell("says", note || sentence(body, mu, now))
@@ -100,7 +102,7 @@ export function render({ model, view }) {
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
     const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
     quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: now.moved })
-    Object.assign(space, { ray: quest.times, goal: quest.goal })
+    Object.assign(space, { ray: quest.times, goal: quest.goal, goalWords: quest.words })
   }
 
   // What is done
@@ -131,7 +133,10 @@ export function render({ model, view }) {
     soon()
   }
 
-  const byHand = () => Object.assign(now, { fresh: false, moved: true })
+  function byHand() {
+    Object.assign(now, { fresh: false, moved: true })
+    later.offer()
+  }
 
   function walk() {
     now.fresh = false
@@ -161,7 +166,7 @@ export function render({ model, view }) {
   function cut() {
     body.cut(mu)
     now.fall = now.bounds = now.enough = null
-    quest.begin()
+    quest.again()
     space.outline.stale = true
     if (!body.empty && !body.goTo(body.u)) body.empty = true
     if (!body.empty && body.whole && !Number.isFinite(body.u[0] ?? 0)) body.u = body.middle
@@ -248,11 +253,11 @@ export function render({ model, view }) {
     Object.assign(space, { body, dots: [], outline: { points: [], stale: true } })
     space.shadow = axes.show(body, (force) => heard("name", force))
     if (body.whole && !body.empty) body.u = [...body.middle]
-    else if (!body.empty && !startInside()) body.empty = true
-    if (!body.whole && !body.empty) now.filled = true
+    else if (!body.empty && !body.goInside()) body.empty = true
+    if (!body.whole) space.toMean()
     if (now.filled) space.fill()
-    if (!body.whole && space.dots.length) body.u = body.u.map((_, k) => space.dots.reduce((s, u) => s + u[k], 0) / space.dots.length)
     part("name").value = scene.name
+    part("ranges").open = body.count <= FEW || tall(scene)
     root.classList.toggle("explained", Boolean(scene.box[0]) || scene.name === "own")
     root.classList.toggle("tall", tall(scene))
     follow()
@@ -267,18 +272,10 @@ export function render({ model, view }) {
   /** Which two forces S casts its shadow on. */
   function cast(shadow) {
     Object.assign(space, { shadow, outline: { points: [], stale: true }, sceneDrawn: null })
-    quest.begin()
+    quest.again()
     say()
     measure()
     soon()
-  }
-
-  function startInside() {
-    for (const margin of [0.1, 0.03, 0.01, 1e-3, 0]) {
-      const u = body.nearest(body.u, null, margin * body.scaleOf())
-      if (body.least(u) >= -1e-6) { body.u = u; return true }
-    }
-    return false
   }
 
   function follow() {

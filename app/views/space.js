@@ -157,7 +157,7 @@ export class Space {
     return this.around.ends
   }
 
-  fill() {
+  fill(random) {
     const { body } = this
     this.dots = []
     if (body.empty || !body.h || !body.bounded || body.least(body.u) < -1e-6) return
@@ -165,9 +165,18 @@ export class Space {
     const between = Math.max(1, Math.ceil(body.h / 2))
     const draws = Math.min(DRAWS, WORK / (between * body.h * body.rows.length))
     for (let k = 0; k < draws; k++) {
-      for (let m = 0; m < between; m++) u = body.step(u)
+      for (let m = 0; m < between; m++) u = body.step(u, random)
       this.dots.push(u)
     }
+  }
+
+  /** To the mean of S, about: far from all of its sides, and the same each time. */
+  toMean() {
+    const { body } = this
+    this.fill(fixed())
+    const { dots } = this
+    this.dots = []
+    if (dots.length) body.u = body.u.map((_, k) => dots.reduce((sum, u) => sum + u[k], 0) / dots.length)
   }
 
   draw(body, look, path) {
@@ -322,26 +331,31 @@ export class Space {
       const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
       const words = short ? text : text.replace(/ (at|between) /, "\n$1 ").replace(upright ? /^(disk \d+) / : /^$/, "$1\n")
       const on = side.cap ? ON : 0
-      if (long > 14 || lit) this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright)
+      if (long <= 14 && !lit) { /* no room */ }
+      else if (!this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright) && !upright) {
+        const way = Math.sign(x - middle[0]) || 1 // beside it, where there is none along it
+        this.besides(x + (way * long) / 2, y, way, 0, text.replace(/ (at|between) /, "\n$1 ").replace(/^(disk \d+) /, "$1\n"), lit, false)
+      }
       this.labels.push({ side, a, b, reach: 14 })
     }
     if (places.length < 3) return // a line among two dimensions
     drawName(this, places, middle)
   }
 
-  /** Words outside a side at (x, y), u its normal: along it, or beside it. */
+  /** Words outside a side at (x, y), u its normal: along it, or beside it; whether there was room. */
   besides(x, y, ux, uy, text, lit, along) {
     const { context: g, look } = this, lines = text.split("\n"), high = 12 + 7 * (lines.length - 1)
     const wide = Math.max(...lines.map((line) => g.measureText(line).width))
     const at = along ? [x + high * ux, y + high * uy] : [x + Math.sign(ux) * (12 + 0.5 * wide + high * Math.abs(uy)), y]
     const angle = along ? Math.atan(-ux / uy) : 0
-    if (!this.free(at, wide, 16 * lines.length, angle) && !lit) return
+    if (!this.free(at, wide, 16 * lines.length, angle) && !lit) return false
     if (!along) at[0] = Math.min(Math.max(at[0], wide / 2 + 4), this.easel.wide - wide / 2 - 4)
     g.save()
     g.translate(...at)
     g.rotate(angle)
     this.write(0, 0, text, lit ? look.hand : look.ink, 13, "middle")
     g.restore()
+    return true
   }
 
   /** Whether nothing is written yet where these words shall be, at this angle; then they have their place. */
@@ -411,6 +425,12 @@ export class Space {
     this.told("begin")
     this.told("go", this.moving(this.body.u, 0.04 * this.half * dx, 0.04 * this.half * dy))
   }
+}
+
+/** Numbers in [0, 1) that look random, always the same ones: a linear congruential generator. */
+function fixed() {
+  let state = 1
+  return () => (state = (Math.imul(1664525, state) + 1013904223) >>> 0) / 2 ** 32
 }
 
 function within(points, px, py) {

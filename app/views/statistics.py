@@ -23,6 +23,7 @@ from ..state import AppState
 from . import studied
 from .packing import exact_intervals
 from .parts import (
+    LATER,
     TabView,
     choice,
     figure,
@@ -42,9 +43,10 @@ SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both s
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> The ring in the plot is this packing: the force at one contact varies by "
-    "about {:.2g} % of the mean force. Now take <b>a new packing for each friction value</b>, from "
-    "hardly any to a lot. How does it change how much the forces vary?"
+    "<b>Guess first.</b> The ring in the plot is this packing: over its networks the force at a "
+    "contact scatters by about {:.2g} % of the mean force. Now take <b>a new packing for each "
+    "friction</b>. More friction allows each contact more directions of force, but leaves fewer "
+    "contacts. So how does the scatter change?"
 )
 GUESSES = ("It keeps rising ↗", "It keeps falling ↘", "It rises, then falls ∩")
 RIGHT, ANSWERS = 2, ("Not quite. ", "Well guessed. ")
@@ -90,16 +92,16 @@ class View(TabView):
 
     def panel(self) -> pn.Column:
         """Choices, figure, and what it shows."""
+        wide = {"sizing_mode": "stretch_width"}
         return pn.Column(
-            self.what,
+            pn.Column(self.what, styles=LATER, **wide),
             self.bar,
             self.lead,
             self.guesses,
             self.plots,
             self.more,
-            self.scale,
-            self.told,
-            sizing_mode="stretch_width",
+            pn.Column(self.scale, self.told, styles=LATER, **wide),
+            **wide,
         )
 
     def _choose(self, event: Any) -> None:

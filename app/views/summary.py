@@ -9,6 +9,7 @@ from ..live import Summary
 from ..state import AppState
 from .foldout import Foldout
 from .hints import term
+from .parts import LATER
 
 TILE = """<div class="tile" tabindex="0" data-term="{term}"><div class="name">{name}</div>
 <div>{value}</div><div class="name">{meaning}</div></div>"""
@@ -149,7 +150,7 @@ def tiles(state: AppState, volume: Any) -> pn.Column:
 
     state.param.watch(tell, "replay")
     tell()
-    return pn.Column(shown, folded, within, sizing_mode="stretch_width")
+    return pn.Column(shown, folded, within, styles=LATER, sizing_mode="stretch_width")
 
 
 def of_which(state: AppState) -> pn.pane.HTML:

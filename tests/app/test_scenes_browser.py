@@ -460,11 +460,20 @@ def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     space.focus()
     for _ in range(40):
         page.keyboard.press("ArrowRight")
-    quest.get_by_text("✓ It presses with").wait_for()
-    desk(page).get_by_role("slider", name="friction μ").fill("0.1")  # at most 0.786
-    quest.get_by_text("Not with this friction").wait_for()
-    desk(page).get_by_role("slider", name="friction μ").fill("0")  # S is one point: nothing to ask
-    assert not quest.is_visible()
+    quest.get_by_text("✓ Larger, and all is in balance. Next (2 of 3)").wait_for()
+    friction = desk(page).get_by_role("slider", name="friction μ")
+    friction.fill("1.2")  # which answers the third question, and not the second
+    assert "Next (2 of 3)" in quest.inner_text()
+    friction.fill("0")
+    quest.get_by_text("✓ Without friction everything is determined. Next (3 of 3)").wait_for()
+    friction.fill("0.995")
+    assert "Next (3 of 3)" in quest.inner_text()
+    friction.fill("1")
+    quest.get_by_text("the disk has jammed itself").wait_for()
+    page = look("?scene=groove&mu=0.1")  # at most 0.786
+    desk(page).locator(".quest").get_by_text("Not with this friction").wait_for()
+    page = look("?scene=groove&mu=0")  # S is one point: nothing to ask
+    assert not desk(page).locator(".quest").is_visible()
     page = look("?scene=box")
     until(page, "small.body.h === 2")
     assert "larger than 3.5" in desk(page).locator(".quest").inner_text()

@@ -1,0 +1,29 @@
+// What a page offers only once the first gesture was made, in this visit or before, or where it is asked
+// for by a button: styles say so by --later, and of that button by --sooner.
+
+import { knows, remember } from "./memory.js"
+
+export class Later {
+  /** gesture: as a browser remembers it; button: shows all at once; now: nothing is to wait. */
+  constructor(gesture, button, now = false) {
+    this.gesture = gesture
+    this.waits = !now && !knows(gesture)
+    this.tell()
+    button.addEventListener("click", () => this.offer())
+  }
+
+  offer() {
+    if (!this.waits) return
+    this.waits = false
+    remember(this.gesture)
+    this.tell()
+  }
+
+  tell() {
+    const { style } = document.documentElement
+    for (const [name, value] of [["--later", "none"], ["--sooner", "inline-block"]]) {
+      if (this.waits) style.setProperty(name, value)
+      else style.removeProperty(name)
+    }
+  }
+}
