@@ -78,6 +78,7 @@ class Seen(param.Parameterized):
     split = param.Boolean(doc="whether the pinned state is seen beside the one on screen")
     predict = param.Integer(default=0, bounds=(0, 3), doc="the question asked before it is shown")
     guess = param.Boolean(doc="whether the curve over friction is to be guessed before it is shown")
+    fresh = param.Boolean(doc="whether no force was dragged yet in this browser")
     beside = param.Number(
         default=None, bounds=(0, None), allow_None=True, doc="μ that is seen beside in its place"
     )

@@ -157,7 +157,7 @@ export class Arrows {
       g.stroke()
     }
     this.beginNumbers()
-    g.globalAlpha = 0.5
+    g.globalAlpha = 0.35
     for (const { disk, at } of copies) g.fillText(String(disk + 1), ...at)
     g.globalAlpha = 1
   }
@@ -244,7 +244,7 @@ export class Arrows {
     for (const { contact, at, inward, across } of this.ends()) {
       const [px, py] = this.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
       const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
-      const rubs = ["tangential force", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.easel.wide - x : x
+      const rubs = ["friction", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.easel.wide - x : x
       const fits = (line) => g.measureText(line).width < room - 4
       const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
       const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
@@ -262,13 +262,15 @@ export class Arrows {
     const slides = body.slides(normal, tangential)
     // The cone: where the force on the disk may point.
     const wide = Math.atan(mu), middle = Math.atan2(-inward[1], inward[0])
-    g.beginPath()
-    g.moveTo(px, py)
-    g.arc(px, py, long, middle - wide, middle + wide)
-    g.closePath()
-    g.fillStyle = lit ? look.coneLit : slides ? look.coneFull : look.cone
-    g.fill()
-    if (mu < 0.01) { g.strokeStyle = look.coneLit; g.lineWidth = 1; g.stroke() }
+    if (lit || slides || !body.crowded) {
+      g.beginPath()
+      g.moveTo(px, py)
+      g.arc(px, py, long, middle - wide, middle + wide)
+      g.closePath()
+      g.fillStyle = lit ? look.coneLit : slides ? look.coneFull : look.cone
+      g.fill()
+      if (mu < 0.01) { g.strokeStyle = look.coneLit; g.lineWidth = 1; g.stroke() }
+    }
     if (normal < 1e-9) {
       circle(g, [px, py], 4)
       g.strokeStyle = look.warm
@@ -280,8 +282,9 @@ export class Arrows {
     if (body.scene.r.length === 1 && body.count <= NAMED) { // what its numbers tell: both parts
       g.globalAlpha = 0.45
       this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
-      this.arrow(px, py, across.map((v) => v * tangential), look.cold, 1.5)
       g.globalAlpha = 1
+      const aside = 9 // px from the wall, which would lie over it
+      this.arrow(px + aside * inward[0], py - aside * inward[1], across.map((v) => v * tangential), look.cold, 3)
     }
     const own = this.axisColour(contact), colour = lit ? look.hand : slides ? look.warm : own ?? look.cold, thick = lit || own ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)

@@ -259,6 +259,9 @@ export class Body {
 
   least(u) { return Math.min(Infinity, ...this.rows.map((row) => dot(row.slope, u) + row.rest)) }
 
+  /** Whether there are so many disks that only the wedges that matter are drawn. */
+  get crowded() { return this.scene.r.length > 8 }
+
   /** To a network within S, as far from its sides as is found near by; whether there is one. */
   goInside() {
     for (const margin of [0.1, 0.03, 0.01, 1e-3, 0]) {

@@ -26,7 +26,9 @@ from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_abov
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
 SOME = 16  # bars that can be told apart at a glance
 APART = 100  # bars up to which there is room between them, and for large dots
-GOAL = "the red line, goal {:g} →"
+GOAL = "goal {:g} →"
+ALONE = "the line marked in the packing, one of {} contacts"
+AROUND = 4.0  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
 BARS += ("whole_low", "whole_high")  # exact intervals without what is known
@@ -41,7 +43,7 @@ SMALL = {"width": 146, "margin": (6, 2, 2, 8)}
 GROWS = "How many networks does it take?"
 LEAD = (
     "<b>How far can each force go?</b> Each bar is one contact, that is, one line in the packing. "
-    "By chance a force hardly moves (dark); on purpose it can go much further (pale)."
+    "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -60,11 +62,14 @@ class View(TabView):
     name = "intervals"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "seen", "exact", looks=["drawn", "sort", "scale", "contact"])
+        super().__init__(
+            state, "seen", "exact", looks=["drawn", "sort", "scale", "contact", "fresh"]
+        )
         self.bars = _source("bars", BARS)
         self.growth = _source("growth", ("state", *ETAS))
         self.chosen = _source("chosen", ("rank", "low", "high"))
         self.invited = _source("invited", ("rank", "at", "words", "low", "high"))
+        self.ends = _source("ends", ("rank", "at", "words"))  # of a bar that is alone
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
         ]
@@ -119,8 +124,10 @@ class View(TabView):
         order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
         named = [one.contact for one in state.knowledge.known]
         named += self._invited() if looks.contact is None else [looks.contact]
+        if looks.fresh and exact and len(named) == 1:
+            order = np.array(named)  # one thing first
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
-        self._show_bars(replay, exact, len(order))
+        self._show_bars(replay, exact)
         if replay is not self._grown:
             self._show_growth(replay)
         self._mark()
@@ -131,8 +138,8 @@ class View(TabView):
         self.exact.visible = state.replay is not None and state.exact_wanted
         self.exact_item.visible = state.possible is not None or state.work.arriving is not None
 
-    def _show_bars(self, replay: Replay, exact: Bounds, of: int) -> None:
-        contacts = self.contacts
+    def _show_bars(self, replay: Replay, exact: Bounds) -> None:
+        contacts, of = self.contacts, len(replay.order)
         original = replay.normal[0, contacts]
         unit = original if self.looks.scale == "own" else np.ones_like(original)
         none = np.full_like(original, np.nan)
@@ -159,13 +166,21 @@ class View(TabView):
             "exact_high": high / unit,
             **{name: original / unit for name in ("low", "high", "now")},
         }
-        _set_range(self.figure.x_range, 0, len(contacts) + 1)
+        alone = len(contacts) == 1
+        _set_range(self.figure.x_range, -AROUND * alone, len(contacts) + 1 + AROUND * alone)
+        ends = [("at most {:.1f}", high), ("at least {:.1f}", low)] if alone and exact else []
+        self.ends.data = {
+            "rank": [1.0 for _ in ends],
+            "at": [float(end[0] / unit[0]) for _, end in ends],
+            "words": [words.format(end[0] / unit[0]) for words, end in ends],
+        }
         top = 3.0 if self.looks.scale == "own" else _top(replay, before or exact)
         if self.state.growing:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
-        self.figure.xaxis.axis_label = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
+        ranked = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
+        self.figure.xaxis.axis_label = ALONE.format(of) if alone else ranked
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
 
     def _show_growth(self, replay: Replay) -> None:
@@ -277,6 +292,10 @@ class View(TabView):
             "rank", "at", "words", source=self.invited, x_offset=-12, text_baseline="middle",
             text_align="right", text_color="white", text_font_size="12px",
             background_fill_color=DOT, padding=3, border_radius=4, name="invited_bar",
+        )  # fmt: skip
+        fig.text(
+            "rank", "at", "words", source=self.ends, x_offset=34, text_baseline="middle",
+            text_font_size="13px", text_color=DARK,
         )  # fmt: skip
         fig.name = "bars_figure"
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)

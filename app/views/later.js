@@ -7,6 +7,7 @@ export class Later {
   /** gesture: as a browser remembers it; button: shows all at once; now: nothing is to wait. */
   constructor(gesture, button, now = false) {
     this.gesture = gesture
+    this.listeners = [] // each called once there is nothing to wait for
     this.waits = !now && !knows(gesture)
     this.tell()
     button.addEventListener("click", () => this.offer())
@@ -17,6 +18,7 @@ export class Later {
     this.waits = false
     remember(this.gesture)
     this.tell()
+    for (const listener of this.listeners) listener()
   }
 
   tell() {

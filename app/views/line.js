@@ -5,21 +5,27 @@ import { forceName, number } from "./saying.js"
 
 const TICKS = 70 // pixels between two numbers of an axis, at least
 
-/** The line, with what stops it at its ends. */
-export function drawSegment(space) {
+const FOUND = 4 // pixels from an end of S: so near to it it has been found
+
+/** The line, with what stops it at its ends; in fog only what was visited of it. */
+export function drawSegment(space, visited) {
   const { context: g, body, look, easel } = space
-  const ends = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = ends[0][1]
+  const whole = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = whole[0][1]
+  const ends = space.fog ? whole.map((end) => nearest(end, visited.map((x) => space.px([x, 0])))) : whole
+  const found = ends.map(([x], k) => Math.abs(x - whole[k][0]) < FOUND)
   const index = axisForce(body, look.contact)
   if (index !== null) drawAxis(space, index, Math.min(easel.high - 46, y0 + 80))
   g.strokeStyle = look.cold
   g.lineWidth = 7
   g.lineCap = "butt"
   line(g, ends[0], ends[1] ?? ends[0])
+  found.forEach((known, k) => { if (!known) space.write(ends[k][0] + (ends[k][0] < whole[k][0] ? 24 : -24), y0, "?", look.edge, 22) })
   const [a, b] = [ends[0], ends.at(-1)]
   if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
   g.font = "13px sans-serif"
   let before = null // words of the other end
   for (const side of ends.length > 1 ? body.sides : []) {
+    if (!found[side.corners[0]]) continue
     const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.told("words", side)
     const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
     const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
@@ -35,6 +41,8 @@ export function drawSegment(space) {
   }
 }
 
+const nearest = ([x], places) => places.reduce((one, other) => (Math.abs(other[0] - x) < Math.abs(one[0] - x) ? other : one))
+
 /** The axis of a force with its least, present and largest value: across S, at y below it, or up (d = 1), at x beside it. */
 export function drawAxis(space, index, at, d = 0) {
   const { context: g, body, look, easel } = space
@@ -44,7 +52,7 @@ export function drawAxis(space, index, at, d = 0) {
   const [zero, slope] = space.over ? [0, 1] : [body.origin[index], value(space.moving(body.u, 1, 0)) - value(body.u)]
   const place = (v) => space.px(d ? [0, (v - zero) / slope] : [(v - zero) / slope, 0])[d]
   const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
-  const told = look.fresh ? [] : extremes(space, value, d) // once something was dragged: they are there to be found
+  const told = look.fresh || space.fog ? [] : extremes(space, value, d) // once something was dragged: they are there to be found
   const marked = [...told.map((end) => ({ ...end, colour: look.cold })), { v: value(body.u), place: space.px(space.flat(body.u)), colour: look.hand }]
     .map((mark) => ({ ...mark, x: mark.place[d] }))
   const own = look.axes?.get(index) // the colour that its arrows have

@@ -20,7 +20,7 @@ from .player import Player, frames
 from .style import BLUE, GREY, ORANGE, palettes
 
 # Both ways.
-SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour", "guess")
+SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour", "guess", "fresh")
 SEEN = sorted(set(Seen.param) - {"name"})
 
 Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
@@ -224,7 +224,7 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
     diverging = [BLUE, GREY, ORANGE]
     looks = state.looks
     full = looks.full or FULL_CHANGE
-    change = f"−{full:.3g}", diverging, f"+{full:.3g} × mean force"
+    change = f"−{full:.3g}", diverging, f"+{full:.3g} × mean force (grey: none)"
     if pulled:
         return change
     most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)

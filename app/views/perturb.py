@@ -44,7 +44,7 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <g fill="rgba(139,160,187,0.45)" stroke="#8fa1b5" stroke-width="1.5">
  <circle cx="122" cy="76" r="38"/><circle cx="198" cy="76" r="38"/></g>
  <g stroke="{colour}" stroke-width="4" stroke-linecap="round">
- <path d="M116 76H58M70 66L58 76L70 86M204 76H262M250 66L262 76L250 86"/></g>
+ <path d="M112 76H72M84 66L72 76L84 86M208 76H248M236 66L248 76L236 86"/></g>
  <g fill="currentColor" stroke="none" font-size="11" opacity="0.75" text-anchor="middle">
  <text x="50" y="42">neighbour</text><text x="50" y="56">holds</text>
  <text x="270" y="42">neighbour</text><text x="270" y="56">holds</text></g>
@@ -53,13 +53,13 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
 </svg>"""
 LEAD = (
     "<b>You push two touching disks apart, harder and harder,</b> by two opposite forces. At first "
-    "they only press less on each other. Then the neighbours have to hold them: nothing moves until "
-    "no forces can balance your push any more."
+    "they only press less on each other; then their neighbours have to hold them. Nothing moves as "
+    "long as some set of forces balances your push."
 )
 HINT = (
-    "<b>1. Click a line</b> in the packing, or choose the strongest contact.<br>"
+    "<b>1. Click a line</b> in the packing: two touching disks.<br>"
     "<b>2. Guess</b> how hard you must push. For scale: the mean force is 1, the largest here is "
-    "now {most:.1f}.<br><b>3. Push</b>, and see how the balance fails."
+    "now {most:.1f}.<br><b>3. Push</b>, and watch how the disks set off."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
@@ -85,7 +85,7 @@ class View(TabView):
         self.what = question("Question", PUSHES, self.looks, "pushing")
         look = PRIMARY | {"margin": (4, 8), "sx": PLAIN}
         quiet = OUTLINED | {"margin": (4, 8), "sx": PLAIN}
-        self.strongest = pmui.Button(label="Choose the strongest contact", **quiet)
+        self.strongest = pmui.Button(label="Or take the strongest", **quiet)
         self.push = pmui.Button(label="Push", **look)
         self.guess = pmui.TextInput(
             label="Your guess (× mean force)", size="small", width=220, margin=(4, 8)

@@ -42,6 +42,8 @@ ENOUGH = 300  # states beside those shown, where they have to be computed
 
 Columns = dict[str, Any]  # of a ColumnDataSource
 
+NAMED = "possible up to here", "halfway"  # of the outline, and within it
+
 WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
 
 COMING = "The networks come as they are found; the first few tell how to look at them."
@@ -71,6 +73,7 @@ class View(TabView):
         self.original, self.beside = ColumnDataSource(empty), ColumnDataSource(empty)
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
         self.cone, self.half = ColumnDataSource(empty), ColumnDataSource(empty)
+        self.words = ColumnDataSource(empty | {"words": []})
         self.figure = self._figure()
         self.name_of_s = Label(
             x=0, y=0, text="S", text_color=DARK, text_font_size="20px", visible=False
@@ -187,6 +190,7 @@ class View(TabView):
 
     def _unname(self) -> None:
         self.half.data = {"x": [], "y": []}
+        self.words.data = {"x": [], "y": [], "words": []}
         for part in (self.name_of_s, self.goal, self.goal_words):
             part.visible = False
 
@@ -315,6 +319,8 @@ class View(TabView):
         if found.plane.kind != planes.STRESS:  # of which nothing is said of the middle
             half = planes.halfway(found.outer)
             self.half.data = {"x": half[:, 0], "y": half[:, 1]}
+            tops = np.array([part[np.argmax(part[:, 1])] for part in (found.outer, half)])
+            self.words.data = {"x": tops[:, 0], "y": tops[:, 1], "words": [*NAMED]}
         goal = found.plane.goal
         self.goal.update(location=goal, visible=goal > 0)
         self.goal_words.update(x=goal, text=f"goal: {goal:g}", visible=goal > 0)
@@ -366,6 +372,10 @@ class View(TabView):
         fig.patch(
             "x", "y", source=self.half, fill_alpha=0, line_color=DARK, line_dash="dotted",
             line_width=1.4,
+        )  # fmt: skip
+        fig.text(
+            "x", "y", "words", source=self.words, y_offset=20, text_align="center",
+            text_font_size="12px", text_color=DARK,
         )  # fmt: skip
         fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
         fig.scatter(

@@ -419,6 +419,9 @@ export function render({ model, view }) {
     wide.removeEventListener("change", tellWidth)
     observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
   for (const name of ["lead", "legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
+  model.fresh = player.later.waits
+  player.buttons.root.classList.toggle("first", model.fresh)
+  player.later.listeners.push(() => { model.fresh = false; player.buttons.root.classList.remove("first") })
   if (!knows("guess") && !new URLSearchParams(location.search).has("tour")) model.guess = true
   openMoving(player)
   closeSidebar(page, view)

@@ -12,12 +12,12 @@ const endless = (body) => !body.empty && !body.bounded
 const ONE_LEFT = { ask: "at which friction is just one set of forces left?", reached: single, done: "✓ Without friction everything is determined." }
 
 /**
- * By scenes, what is asked: from which normal force on, or below which, or how many times the other axis'
- * force; or what is to become of S. of: what that force's name begins with, as axes depend on friction.
+ * By scenes, what is asked: how large a normal force can get, while S is in fog; from which one on, or below
+ * which, or how many times the other axis' force; or what is to become of S. of: what that force's name begins with, as axes depend on friction.
  */
 const OWN = {
   groove: [
-    { ask: "can you make the normal force at the left wall larger than the weight?", least: 1, done: "✓ Larger, and all is in balance." },
+    { ask: "how hard can the left wall press on the disk, which weighs 1?", how: "Drag the red dot to the right until it stops.", largest: true, done: "✓ That hard: there, friction can do no more." },
     ONE_LEFT,
     { ask: "from which friction on can the walls press as hard as you like?", reached: endless, done: "✓ As steep as the walls are, the wedges let them: the disk has jammed itself." },
   ],
@@ -39,7 +39,9 @@ export class Quest {
   /** How many times the force across the one up is to be, or what is to be reached, in words; or undefined. */
   get times() { return this.asked?.times }
   get goal() { return this.asked?.least ?? this.asked?.most }
-  get words() { return `goal: ${this.asked?.most ? "below" : "above"} ${this.goal}` }
+  get fog() { return Boolean(this.asked?.largest) }
+  get below() { return Boolean(this.asked?.most) }
+  get words() { return `goal: ${this.below ? "below" : "above"} ${this.goal}` }
 
   /** Another scene: from its first question on. */
   begin() {
@@ -85,15 +87,16 @@ export class Quest {
 }
 
 /** Whether what is asked is so: by hand, of forces. */
-function reaches(step, { body, value, times }, moved) {
+function reaches(step, { body, value, low, high, times }, moved) {
   if (!step) return false
   if (step.reached) return step.reached(body)
-  return moved && (value > step.least || value < step.most || times >= step.times)
+  return moved && ((step.largest && high - value < NEAR * (high - low)) || value > step.least || value < step.most || times >= step.times)
 }
 
 /** What is to be done. */
-function hint({ least, most, times, reached }, { low, high, times: by }) {
+function hint({ least, most, times, reached, how }, { low, high, times: by }) {
   if (reached) return SLIDE
+  if (how) return how
   if (high < least || low > most) return "Not with this friction: try another."
   return times ? `${FIND} It is ${by.toFixed(1)} times as strong now.` : FIND
 }

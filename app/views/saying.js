@@ -6,6 +6,7 @@ export const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) <
 const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
 const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
 
+const FREE = "There is more than one because friction may be anything up to μ times the normal force."
 const BOTH = "at the left wall and at the right wall"
 // A disk between two walls cannot slide down both: what is so is that friction does all it can.
 const AT_BOTH = {
@@ -49,9 +50,9 @@ export function legend(body) {
   const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   const axes = h === 2 || h > 3 ? "; green, violet: plotted on the right" : ""
-  const parts = scene.r.length === 1 ? " (pale: normal and tangential parts)" : ""
+  const parts = scene.r.length === 1 ? " (pale: normal part; short: friction)" : ""
   const heads = scene.r.length > 2 ? " (a pair between two disks)" : ""
-  return `blue: contact forces${parts}${heads}${axes}; wedge: directions friction allows${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: at its limit" : ""}`
+  return `blue: contact forces${parts}${heads}${axes}${body.crowded ? "" : "; wedge: directions friction allows"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
 }
 
 /** Whether friction is at its limit at some contact. */
@@ -94,7 +95,7 @@ export function special({ scene }) {
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
   const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
-  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}. The dashed square repeats in all directions; pale disks are copies.${rattles}`
+  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity. The dashed square repeats in all directions; pale disks are copies.${rattles}`
 }
 
 /** What the picture of S is. */
@@ -123,7 +124,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces adjust.`
+  if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces adjust, as little as they must.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
@@ -131,7 +132,8 @@ export function sentence(body, mu, now) {
   const opens = body.sides.some(({ stops }) => stops.some(([, what]) => what === OPENS))
   const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
-  if (now.fresh) return `${every} There is more than one because friction may be anything up to μ times the normal force.` // the rest once something was touched
+  if (now.fog) return `Each place of the red dot is one set of forces that holds the same disk at rest. ${FREE}`
+  if (now.fresh) return `${every} ${FREE}` // the rest once something was touched
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }
 

@@ -1,5 +1,6 @@
 // The shadow that S casts on two forces above three dimensions.
 
+import { shadeGoal } from "./goal.js"
 import { line, polygon } from "./pen.js"
 import { drawName } from "./reading.js"
 
@@ -12,6 +13,8 @@ export function drawShadow(space) {
     g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
     g.fillStyle = look.shade
     g.fill()
+    shadeGoal(space, corners)
+    polygon(g, corners)
     g.strokeStyle = look.cold
     g.lineWidth = 2.5
     g.setLineDash(stale ? [4, 4] : [])

@@ -87,13 +87,13 @@ export function render({ model, view }) {
     tell("what", pictured(body, now.filled))
     tell("special", special(body))
     tell("key", barred(body))
-    tell("says", note || sentence(body, mu, now))
+    inquire()
+    tell("says", note || sentence(body, mu, { ...now, fog: quest.fog }))
     tell("mend", `Set μ = ${now.enough}`)
     part("mend").hidden = !now.enough
     part("says").classList.toggle("note", Boolean(note))
     part("says").classList.toggle("bad", body.empty && !body.scene.idle)
     part("undo").disabled = !now.undo.length
-    inquire()
   }
 
   /** The question that the hand answers is of the normal force that goes up in the picture of S, or across. */
@@ -102,7 +102,8 @@ export function render({ model, view }) {
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
     const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
     quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: now.moved })
-    Object.assign(space, { ray: quest.times, goal: quest.goal, goalWords: quest.words })
+    Object.assign(space, { ray: quest.times, goal: quest.goal, below: quest.below, goalWords: quest.words, fog: quest.fog })
+    part("ranges").hidden = quest.fog // which would tell
   }
 
   // What is done

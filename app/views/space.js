@@ -3,6 +3,7 @@
 
 import { distance, dot, solve } from "./body.js"
 import { Easel } from "./easel.js"
+import { shadeGoal } from "./goal.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
 import { circle, line, polygon } from "./pen.js"
 import { drawName, readBy } from "./reading.js"
@@ -196,7 +197,7 @@ export class Space {
     g.lineJoin = "round" // no spikes where sides meet
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
-    if (body.h === 1) drawSegment(this)
+    if (body.h === 1) drawSegment(this, this.visit())
     if (this.over) {
       drawAxis(this, this.axed[0], this.easel.high - FLOOR + 6)
       drawAxis(this, this.axed[1], ASIDE - 6, 1)
@@ -233,6 +234,14 @@ export class Space {
     g.textBaseline = "middle"
     g.fillStyle = look.paper
     g.fillText("drag me", px, py)
+  }
+
+  /** Of a line: from where to where it has been visited by now. */
+  visit() {
+    const { body } = this, [at] = this.flat(body.u)
+    if (this.visited?.corners !== body.corners) this.visited = { corners: body.corners, ends: [at, at] }
+    const { ends } = this.visited
+    return (this.visited.ends = [Math.min(ends[0], at), Math.max(ends[1], at)])
   }
 
   /** What decides how that looks which stands still while a point goes through S. */
@@ -312,6 +321,7 @@ export class Space {
     polygon(g, order.map((k) => places[k]))
     g.fillStyle = look.shade
     g.fill()
+    shadeGoal(this, order.map((k) => places[k]))
     const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
     for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
       const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)

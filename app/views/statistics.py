@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import ColumnDataSource, GlyphRenderer, Scatter, Span, TapTool
+from bokeh.models import (
+    ColumnDataSource,
+    FreehandDrawTool,
+    GlyphRenderer,
+    Scatter,
+    Span,
+    TapTool,
+)
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
@@ -39,15 +46,17 @@ from .parts import (
 from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
 
+GUESS_COLOUR = "#888888"
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> The ring in the plot is this packing: over its networks the force at a "
-    "contact scatters by about {:.2g} % of the mean force. Now take <b>a new packing for each "
-    "friction</b>. More friction allows each contact more directions of force, but leaves fewer "
-    "contacts. So how does the scatter change?"
+    "<b>Guess first.</b> The ring is this packing: from network to network, the force at a contact "
+    "varies by about {:.2g} % of the mean force (standard deviation). Now take <b>a new packing "
+    "for each friction</b>. <b>Draw a line through the ring</b>, as you think it goes on, or pick:"
 )
+SHOW = "Show the curve"
+DRAWN_FIRST = "The grey line is your guess. "
 GUESSES = ("It keeps rising ↗", "It keeps falling ↘", "It rises, then falls ∩")
 RIGHT, ANSWERS = 2, ("Not quite. ", "Well guessed. ")
 EACH = (
@@ -66,7 +75,7 @@ class View(TabView):
         self.guesses = pn.FlexBox(
             *(
                 one_of_several(text, on_click=partial(self._guessed, k))
-                for k, text in enumerate((*GUESSES, "Just show me"))
+                for k, text in enumerate((*GUESSES, SHOW))
             ),
             visible=False,
         )
@@ -82,6 +91,8 @@ class View(TabView):
         self.task = state.work.task(reading)
         self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
         self.chosen = ColumnDataSource({"x": [], "y": []})
+        self.guessed = ColumnDataSource({"xs": [], "ys": []}, name="guessed")  # drawn by hand
+        self._pencil: FreehandDrawTool | None = None  # in the figure that is to be guessed
         self._drawn: str | None = None  # what the plots are of
         self.what.param.watch(self._choose, "value")
         self.scale.param.watch(self.refresh, "value")
@@ -153,7 +164,9 @@ class View(TabView):
     # The curve over friction is guessed before it is seen for the first time
 
     def _guessed(self, k: int, event: Any) -> None:
-        self._said = ANSWERS[k == RIGHT] if k < len(GUESSES) else ""
+        self._said = DRAWN_FIRST if len(self.guessed.data["xs"]) else ""
+        if k < len(GUESSES):
+            self._said = ANSWERS[k == RIGHT] + self._said
         self.looks.guess = False
 
     def _hide(self) -> None:
@@ -165,10 +178,27 @@ class View(TabView):
         self.more.visible = what == "eta" and not hidden
         if self._curve is not None:
             studied.hide_curve(self._curve, hidden)
+            self._give_pencil(self._curve, hidden)
         if hidden:
             self.lead.object = GUESS.format(100 * replay.summary["eta1"])
         elif what in DRAWN:
             self.lead.object = (self._said if what == "eta" else "") + self._found
+
+    def _give_pencil(self, fig: Figure, hidden: bool) -> None:
+        """Have what is dragged over the figure draw the guess, while the curve is hidden."""
+        if self._pencil is not None and (not hidden or self._pencil not in fig.tools):
+            fig.toolbar.update(active_drag="auto", active_tap="auto")
+            fig.tools = [tool for tool in fig.tools if tool is not self._pencil]
+            self._pencil = None
+        if hidden and self._pencil is None:
+            line = fig.multi_line(
+                "xs", "ys", source=self.guessed, line_color=GUESS_COLOUR, line_width=3,
+                name=studied.GUESS,
+            )  # fmt: skip
+            self._pencil = FreehandDrawTool(renderers=[line], num_objects=1)
+            fig.add_tools(self._pencil)
+            # Of taps, too: what listens to both is active for both, or for neither.
+            fig.toolbar.update(active_drag=self._pencil, active_tap=self._pencil)
 
     def _follow(self, *events: Any) -> None:
         self.bar.visible = self.task.running and self.what.value in DRAWN

@@ -302,6 +302,38 @@ def test_the_volume_is_measured_among_the_numbers(visit):
     measure.wait_for(state="hidden")
 
 
+OFFERED = ".scrub, .extras, [aria-expanded]"  # some of what is offered after the first gesture
+
+
+def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
+    """The page moves for a while, rests, and points out what can be dragged; then all is there."""
+    page = visit(AT, first=True)
+    offered = page.locator(OFFERED).filter(visible=True)
+    assert not offered.count()
+    page.locator("button.all").wait_for()
+    page.locator(".turn").get_by_text("Drag the red line").wait_for()
+    until(page, "!scene.hand.player.playing")
+    x, y = inviting(page)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 20, steps=4)
+    until(page, "scene.hand.moved")
+    assert not offered.count()  # nothing moves while the hand holds
+    page.mouse.up()
+    page.locator(".scrub").filter(visible=True).wait_for()
+    assert page.evaluate("localStorage.getItem('granforce.network')") == "seen"
+    page.reload()
+    page.locator(".scrub").filter(visible=True).wait_for()
+    assert not page.locator("button.all").is_visible()
+
+
+def test_all_controls_are_there_at_once_for_who_asks(visit):
+    page = visit(AT, first=True)
+    page.locator("button.all").click()
+    page.locator(".scrub").filter(visible=True).wait_for()
+    how_it_is_made(page).get_by_role("spinbutton", name="Disks N").wait_for()
+
+
 def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     page = visit(AT + "&tab=statistics")
     page.locator(".turn").get_by_text("at which friction do forces vary most?").wait_for()
@@ -310,10 +342,32 @@ def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     guess.wait_for()
     page.locator(".turn").get_by_text("Pick your guess").wait_for()
     assert not page.locator(".hill").filter(visible=True).count()  # it would give it away
+    plot = page.locator("canvas").filter(visible=True).last.bounding_box()
+    at = [
+        (plot["x"] + part * plot["width"], plot["y"] + 0.5 * plot["height"]) for part in (0.3, 0.7)
+    ]
+    page.mouse.move(*at[0])
+    page.mouse.down()
+    page.mouse.move(*at[1], steps=8)
+    page.mouse.up()
+    page.wait_for_function(f"() => {MODEL}('guessed').get_column('xs')[0]?.length > 4")
     guess.click()
-    page.get_by_text("Well guessed.").wait_for()
+    page.get_by_text("Well guessed. The grey line is your guess.").wait_for()
+    tools = "[...Bokeh.documents[0].all_models].filter(model => model.type === 'TapTool')"
+    page.wait_for_function(
+        f"() => {tools}.every(tool => tool.active)"
+    )  # points can be clicked again
     page.locator(".turn").get_by_text("at which friction do forces vary most?").wait_for()
     assert page.evaluate("localStorage.getItem('granforce.guess')") == "seen"
+
+
+def inviting(page):
+    """Where on the page the line is that says that it can be dragged."""
+    contact = scene(page, "scene.hand.player.replay.walk.inviting")
+    middle = "(([a, b, c, d]) => scene.toPixel((a + c) / 2, (b + d) / 2))"
+    x, y = scene(page, f"{middle}(scene.ends({contact}))")
+    box = page.locator(".scene").bounding_box()
+    return box["x"] + x, box["y"] + y
 
 
 def test_every_tab_asks_what_the_hand_can_find_out(visit):
@@ -333,13 +387,10 @@ def test_every_tab_asks_what_the_hand_can_find_out(visit):
     asked = float(re.search(r"above ([\d.]+)\?", turn.inner_text())[1])
     assert 0.85 * largest < asked < largest
     page.get_by_role("tab", name="How far?").click()
-    contact = scene(page, "scene.hand.player.replay.walk.inviting")
-    middle = "(([a, b, c, d]) => scene.toPixel((a + c) / 2, (b + d) / 2))"
-    x, y = scene(page, f"{middle}(scene.ends({contact}))")
-    box = page.locator(".scene").bounding_box()
-    page.mouse.move(box["x"] + x, box["y"] + y)
+    x, y = inviting(page)
+    page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(box["x"] + x, box["y"] + y - 20, steps=4)
+    page.mouse.move(x, y - 20, steps=4)
     turn.wait_for(state="hidden")  # from now on it is known
     page.mouse.up()
     searched(page, "pulls=")

@@ -453,6 +453,49 @@ def test_400_disks_take_the_theme_and_the_friction_along_and_back(look):
     painted(page)
 
 
+def test_what_else_can_be_done_is_offered_once_the_point_was_dragged(look):
+    page = look("?scene=box", first=True)
+    walk = desk(page).get_by_role("button", name="Random walk")
+    more = desk(page).get_by_role("button", name="More …")
+    assert more.is_visible() and not walk.is_visible()
+    desk(page).locator("canvas.space").focus()
+    page.keyboard.press("ArrowRight")
+    walk.wait_for()
+    assert not more.is_visible() and desk(page).locator(".bars").is_visible()
+    page.reload()
+    drawn(page)
+    assert walk.is_visible()
+
+
+def test_values_stand_beside_the_forces_that_are_axes_and_copies_have_arrows(look):
+    """The side of a polygon that is too short for its words has them beside it."""
+    page = look("?scene=box")
+    values = ask(page, "small.space.axed.map(force => small.body.forces()[force].toFixed(3))")
+    write = "const g = small.arrows.context, told = [], fill = g.fillText.bind(g)"
+    told = f"""(() => {{ {write}
+        g.fillText = (text, ...at) => {{ told.push(text); fill(text, ...at) }}
+        small.arrows.draw(small.arrows.look)
+        delete g.fillText
+        return told }})()"""
+    assert set(values) <= set(ask(page, told))
+    said = told.replace("small.arrows.context", "small.space.context").replace(
+        "small.arrows.draw(small.arrows.look)", "small.space.draw(small.body, small.space.look, [])"
+    )
+    assert "about to slide down" in ask(page, said)  # of disk 2, at the right wall
+    page = look("?scene=thirteen")
+    ends = ask(page, "small.arrows.ends().map(({ contact, at, copy }) => [contact, at, copy])")
+    crossing = [end for end in ends if end[2]]
+    assert len(crossing) >= 8
+    for contact, at, copy in crossing:
+        other = next(end for end in crossing if end[0] == contact and end[1] != at)
+        assert other[1] == copy and other[2] == at
+
+
+def test_a_scene_of_many_dimensions_begins_the_same_each_time(look):
+    first, second = (ask(look("?scene=thirteen"), "[...small.body.u]") for _ in range(2))
+    assert first == second and len(first) == 8
+
+
 def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     page = look("?scene=groove")
     quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
