@@ -30,13 +30,10 @@ def first(summary: Summary) -> str:
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can change."
-        contacts, carry = summary["contacts"], n - summary.get("rattlers", 0)
-        equations, networks = 2 * contacts - free, term("network", "networks")
-        told = f"<b>{contacts} contacts × 2 − {equations} equations = {free} free numbers.</b> "
-        if equations == 3 * carry - 1:  # as in any box that repeats
-            told += f"({carry} disks carry: {carry} × 3 − 2 + 1 = {equations}.) "
-        told += f"So there are many {networks}: sets of forces that all balance. Nothing changes "
-        told += "in time; Play steps through some, found at random. Thick lines are large forces."
+        told = "Thick lines are large forces. <b>Balance leaves "
+        told += f"{free} numbers free</b> (counted below), so there are many "
+        told += f"{term('network', 'networks')}: sets of forces that all balance. Nothing changes "
+        told += "in time; Play steps through some of them, found at random."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
+from bokeh.core.properties import value
 from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
 from bokeh.plotting import figure as Figure
 
@@ -28,6 +29,8 @@ SOME = 16  # bars that can be told apart at a glance
 APART = 100  # bars up to which there is room between them, and for large dots
 GOAL = "goal {:g} →"
 ALONE = "the line marked in the packing, one of {} contacts"
+CORNER = "possible: exact; seen: in the networks so far"
+CORNER_ALONE = "seen: in the networks so far"
 AROUND = 4.0  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
@@ -44,6 +47,10 @@ GROWS = "How many networks does it take?"
 LEAD = (
     "<b>How far can each force go?</b> Each bar is one contact, that is, one line in the packing. "
     "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
+)
+LEAD_ALONE = (
+    "<b>How far can this force go?</b> It is that of the line marked in the packing. Dark: by "
+    "chance, in the networks shown so far, it hardly varies. Drag it to find out how far it can go."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -69,12 +76,13 @@ class View(TabView):
         self.growth = _source("growth", ("state", *ETAS))
         self.chosen = _source("chosen", ("rank", "low", "high"))
         self.invited = _source("invited", ("rank", "at", "words", "low", "high"))
-        self.ends = _source("ends", ("rank", "at", "words"))  # of a bar that is alone
+        self.unknown = _source("unknown", ("rank", "at", "off"))  # beyond what was seen
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
         ]
         self.figure, self.growth_figure = self._bars_figure(), self._growth_figure()
         self.contacts = np.array([], dtype=int)
+        self.alone = False  # whether only the contact is drawn that a visitor is asked to drag
         self._grown: Replay | None = None  # whose growth is drawn
         self.choices = [
             question("Contacts", DRAWN, self.looks, "drawn", **SMALL),
@@ -95,8 +103,9 @@ class View(TabView):
             plotted(self.figure),
             pn.FlexBox(*self.choices, styles=LATER, **wide),
             self.exact,  # below, as the plot must not move when the button goes
-            Known(self.state),
-            pn.Column(self.told, grows, Contacts(self.looks), styles=LATER, **wide),
+            pn.Column(
+                Known(self.state), self.told, grows, Contacts(self.looks), styles=LATER, **wide
+            ),
             **wide,
         )
 
@@ -119,15 +128,18 @@ class View(TabView):
         state, looks, replay = self.state, self.looks, self.state.seen
         if replay is None:
             return
-        self.lead.object = LEAD if replay.summary["dimension"] else FIXED
         exact = exact_intervals(state.possible, replay)
         order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
         named = [one.contact for one in state.knowledge.known]
         named += self._invited() if looks.contact is None else [looks.contact]
-        if looks.fresh and exact and len(named) == 1:
-            order = np.array(named)  # one thing first
+        self.alone = looks.fresh and len(named) == 1  # one thing first, to be found out
+        if self.alone:
+            order, exact = np.array(named), {}
+        free = replay.summary["dimension"] > 0
+        self.lead.object = FIXED if not free else LEAD_ALONE if self.alone else LEAD
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact)
+        self._offer()
         if replay is not self._grown:
             self._show_growth(replay)
         self._mark()
@@ -136,7 +148,8 @@ class View(TabView):
         """Exact intervals are to be asked for only where none are there or under way."""
         state = self.state
         self.exact.visible = state.replay is not None and state.exact_wanted
-        self.exact_item.visible = state.possible is not None or state.work.arriving is not None
+        known = state.possible is not None or state.work.arriving is not None
+        self.exact_item.visible = known and not self.alone
 
     def _show_bars(self, replay: Replay, exact: Bounds) -> None:
         contacts, of = self.contacts, len(replay.order)
@@ -166,21 +179,19 @@ class View(TabView):
             "exact_high": high / unit,
             **{name: original / unit for name in ("low", "high", "now")},
         }
-        alone = len(contacts) == 1
-        _set_range(self.figure.x_range, -AROUND * alone, len(contacts) + 1 + AROUND * alone)
-        ends = [("at most {:.1f}", high), ("at least {:.1f}", low)] if alone and exact else []
-        self.ends.data = {
-            "rank": [1.0 for _ in ends],
-            "at": [float(end[0] / unit[0]) for _, end in ends],
-            "words": [words.format(end[0] / unit[0]) for words, end in ends],
-        }
+        around = AROUND * self.alone
+        _set_range(self.figure.x_range, -around, len(contacts) + 1 + around)
+        self.packed_item.visible = not self.alone  # a line through all bars
+        self.corner.text = CORNER_ALONE if self.alone else CORNER
+        ends = [replay.low[contacts[0], 0], replay.high[contacts[0], 0]] if self.alone else []
+        self.unknown.data = {"rank": [1.0] * len(ends), "at": ends, "off": [28, -10][: len(ends)]}
         top = 3.0 if self.looks.scale == "own" else _top(replay, before or exact)
         if self.state.growing:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
         ranked = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
-        self.figure.xaxis.axis_label = ALONE.format(of) if alone else ranked
+        self.figure.xaxis.axis_label = ALONE.format(of) if self.alone else ranked
         self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
 
     def _show_growth(self, replay: Replay) -> None:
@@ -197,9 +208,9 @@ class View(TabView):
             return
         # Of the states shown, like the curves: all states of the walk have seen more.
         finals = [replay.growth[name][-1] * (0.15 if name == "eta3" else 1) for name in ETAS]
-        finals = [float(np.nan_to_num(value)) for value in finals]
-        for span, value in zip(self.finals, finals, strict=True):
-            span.location = value
+        finals = [float(np.nan_to_num(final)) for final in finals]
+        for span, final in zip(self.finals, finals, strict=True):
+            span.location = final
         _set_range(self.growth_figure.y_range, 0, 1.25 * max(finals) if max(finals) > 1e-9 else 1)
 
     # Selection, linked with the packing
@@ -226,7 +237,7 @@ class View(TabView):
 
     def _invite(self) -> None:
         """Say which bar is that line's, and what the force is to pass, until something was done."""
-        wanted = self.looks.contact is None and not self.state.hand.pulls
+        wanted = self.looks.contact is None and not self.state.hand.pulls and not self.alone
         wanted &= self.looks.scale == "mean"
         at = np.flatnonzero(np.isin(self.contacts, self._invited() if wanted else []))
         at = at[np.isfinite(self.bars.data["exact_high"][at])]
@@ -294,14 +305,15 @@ class View(TabView):
             background_fill_color=DOT, padding=3, border_radius=4, name="invited_bar",
         )  # fmt: skip
         fig.text(
-            "rank", "at", "words", source=self.ends, x_offset=34, text_baseline="middle",
-            text_font_size="13px", text_color=DARK,
+            "rank", "at", value("?"), source=self.unknown, y_offset="off", text_align="center",
+            text_font_size="20px", text_color=DARK,
         )  # fmt: skip
         fig.name = "bars_figure"
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         self.whole_item, self.exact_item = fig.legend[0].items[:2]
+        self.packed_item = fig.legend[0].items[3]
         legend_above(fig, 5)
-        corner(fig, "possible: exact; seen: in the networks so far")
+        self.corner = corner(fig, CORNER)
         fig.add_tools(
             hover(
                 [seen, exact],

@@ -11,9 +11,9 @@ const WORDS = {
   drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   choose: ["click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
-  point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
+  point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, away from the others."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
-  guess: ["", "<b>Your turn: how does friction change how much the forces vary?</b> Draw your guess into the plot, or pick one."],
+  guess: ["", "<b>Your turn: how does friction change how much the forces vary?</b>"],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
 }
 
@@ -34,7 +34,7 @@ export class Invitation {
     if ((model.contact ?? null) !== null) return null
     if (pushes) return model.pushing === "one" ? "choose" : null
     if (took) return null
-    if (model.tab !== "statistics") return model.goal ? "drag" : "strong"
+    if (model.tab !== "statistics") return model.goal && !model.fresh ? "drag" : "strong" // who is new finds out how far it goes
     if (model.figure !== "eta") return null
     return model.guess ? "guess" : "click"
   }
@@ -47,6 +47,7 @@ export class Invitation {
 
   /** What the green force is to reach; 0 where it is there, and in other planes. */
   get target() {
+    if (this.player.model.fresh) return 0
     const { plots: { plane }, replay } = this.player, [green] = plane.pair ?? []
     return green !== undefined && plane.goal > replay.mixed.normal[green] ? plane.goal : 0
   }

@@ -8,9 +8,9 @@ export class Later {
   constructor(gesture, button, now = false) {
     this.gesture = gesture
     this.listeners = [] // each called once there is nothing to wait for
-    this.waits = !now && !knows(gesture)
+    this.waits = this.new = !now && !knows(gesture) // new: nothing was known before this visit, or asked for
     this.tell()
-    button.addEventListener("click", () => this.offer())
+    button.addEventListener("click", () => { this.new = false; this.offer() })
   }
 
   offer() {

@@ -5,27 +5,24 @@ import { forceName, number } from "./saying.js"
 
 const TICKS = 70 // pixels between two numbers of an axis, at least
 
-const FOUND = 4 // pixels from an end of S: so near to it it has been found
-
-/** The line, with what stops it at its ends; in fog only what was visited of it. */
-export function drawSegment(space, visited) {
+/** The line, with what stops it at its ends; in fog only what was found of it. */
+export function drawSegment(space) {
   const { context: g, body, look, easel } = space
   const whole = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = whole[0][1]
-  const ends = space.fog ? whole.map((end) => nearest(end, visited.map((x) => space.px([x, 0])))) : whole
-  const found = ends.map(([x], k) => Math.abs(x - whole[k][0]) < FOUND)
+  const known = space.fog ? space.been.reached(space, whole) : whole.map((at) => ({ at, found: true })), ends = known.map(({ at }) => at)
   const index = axisForce(body, look.contact)
   if (index !== null) drawAxis(space, index, Math.min(easel.high - 46, y0 + 80))
   g.strokeStyle = look.cold
   g.lineWidth = 7
   g.lineCap = "butt"
   line(g, ends[0], ends[1] ?? ends[0])
-  found.forEach((known, k) => { if (!known) space.write(ends[k][0] + (ends[k][0] < whole[k][0] ? 24 : -24), y0, "?", look.edge, 22) })
+  known.forEach(({ at, found }, k) => { if (!found) space.write(at[0] + (at[0] < whole[k][0] ? 24 : -24), y0, "?", look.edge, 22) })
   const [a, b] = [ends[0], ends.at(-1)]
   if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
   g.font = "13px sans-serif"
   let before = null // words of the other end
   for (const side of ends.length > 1 ? body.sides : []) {
-    if (!found[side.corners[0]]) continue
+    if (!known[side.corners[0]].found) continue
     const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.told("words", side)
     const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
     const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
@@ -40,8 +37,6 @@ export function drawSegment(space, visited) {
     before = { x, wide }
   }
 }
-
-const nearest = ([x], places) => places.reduce((one, other) => (Math.abs(other[0] - x) < Math.abs(one[0] - x) ? other : one))
 
 /** The axis of a force with its least, present and largest value: across S, at y below it, or up (d = 1), at x beside it. */
 export function drawAxis(space, index, at, d = 0) {

@@ -59,7 +59,7 @@ LEAD = (
 HINT = (
     "<b>1. Click a line</b> in the packing: two touching disks.<br>"
     "<b>2. Guess</b> how hard you must push. For scale: the mean force is 1, the largest here is "
-    "now {most:.1f}.<br><b>3. Push</b>, and watch how the disks set off."
+    "now {most:.1f}.<br><b>3. Push</b>, and watch which disks start to move."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "

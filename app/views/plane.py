@@ -42,6 +42,8 @@ ENOUGH = 300  # states beside those shown, where they have to be computed
 
 Columns = dict[str, Any]  # of a ColumnDataSource
 
+CORNER = "outline: exact; dots: networks found at random"
+CORNER_FIRST = "dots: networks found at random"
 NAMED = "possible up to here", "halfway"  # of the outline, and within it
 
 WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
@@ -51,8 +53,13 @@ GROWS = "The networks come as they are found; the exact outline of S follows."
 
 LEAD = (
     "<b>Each dot is one whole network, like the one drawn in the packing.</b> S, the set of all "
-    "networks that balance, has {free} dimensions; the blue shape is its shadow (projection) on "
-    "two axes."
+    "networks that balance, has {free} dimensions, one for each free number. The blue shape is its "
+    "shadow (projection): we look at two of the forces."
+)
+# Before the first gesture, which is to find out how far S goes.
+LEAD_FIRST = (
+    "<b>Each dot is one whole network, like the one drawn in the packing,</b> by the two forces "
+    "that are marked there, green and violet. All of them were found at random."
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")
@@ -66,7 +73,7 @@ class View(TabView):
     name = "plane"
 
     def __init__(self, state: AppState) -> None:
-        super().__init__(state, "seen", looks=["contact", "pair"], work=["fourfold"])
+        super().__init__(state, "seen", looks=["contact", "pair", "fresh"], work=["fourfold"])
         empty: Columns = {"x": [], "y": []}
         self.path = ColumnDataSource(empty | {"state": []}, name="path")
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
@@ -74,6 +81,7 @@ class View(TabView):
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
         self.cone, self.half = ColumnDataSource(empty), ColumnDataSource(empty)
         self.words = ColumnDataSource(empty | {"words": []})
+        self.hidden = False  # whether the outline is to be found out
         self.figure = self._figure()
         self.name_of_s = Label(
             x=0, y=0, text="S", text_color=DARK, text_font_size="20px", visible=False
@@ -125,9 +133,11 @@ class View(TabView):
             return
         free = replay.summary["dimension"]
         pair = self.kind == "pair"
-        self.lead.object = LEAD.format(free=free) if free else ""
+        first = self.looks.fresh and pair
+        self.lead.object = "" if not free else LEAD_FIRST if first else LEAD.format(free=free)
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)
+        self._hide_outline(bool(first))
         wanted = replay, self.kind, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
@@ -313,18 +323,37 @@ class View(TabView):
             closed = np.concatenate([corners, corners[:1]])
             source.data = {"x": closed[:, 0], "y": closed[:, 1]}
         self.cone.data = self._cone(found.plane, 1.05 * float(found.outer[:, 0].max()))
-        middle = found.outer.mean(axis=0)
+        self._name(found)
+        self._tell(found)
+
+    def _hide_outline(self, hidden: bool) -> None:
+        """Hide the outline, which still decides what part of the plane is seen, or show it."""
+        if hidden == self.hidden:
+            return
+        self.hidden = hidden
+        for renderer, fill, line in self.outlines:
+            shown = {"fill_alpha": fill, "line_alpha": line}
+            renderer.glyph.update(**(dict.fromkeys(shown, 0) if hidden else shown))
+        self.finding.visible = not hidden
+        self.corner.text = CORNER_FIRST if hidden else CORNER
+        if self.found is not None:
+            self._name(self.found)
+
+    def _name(self, found: Outlined) -> None:
+        """What stands in S: its name, its half, and what its green force is to reach."""
+        self._unname()
+        if self.hidden:
+            return
+        middle, goal = found.outer.mean(axis=0), found.plane.goal
         x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
         self.name_of_s.update(x=x, y=y, visible=True)
+        self.goal.update(location=goal, visible=goal > 0)
+        self.goal_words.update(x=goal, text=f"goal: {goal:g}", visible=goal > 0)
         if found.plane.kind != planes.STRESS:  # of which nothing is said of the middle
             half = planes.halfway(found.outer)
             self.half.data = {"x": half[:, 0], "y": half[:, 1]}
             tops = np.array([part[np.argmax(part[:, 1])] for part in (found.outer, half)])
             self.words.data = {"x": tops[:, 0], "y": tops[:, 1], "words": [*NAMED]}
-        goal = found.plane.goal
-        self.goal.update(location=goal, visible=goal > 0)
-        self.goal_words.update(x=goal, text=f"goal: {goal:g}", visible=goal > 0)
-        self._tell(found)
 
     def _tell(self, found: Outlined) -> None:
         """How much of the outline the states reach."""
@@ -363,12 +392,19 @@ class View(TabView):
             sizing_mode="scale_width",
             match_aspect=True,
         )
-        fig.patch(
-            "x", "y", source=self.outer, fill_color=PALE, fill_alpha=0.35, line_color=DARK,
-            line_width=1.6,
-        )  # fmt: skip
-        fig.patch("x", "y", source=self.inner, fill_alpha=0, line_color=DARK, line_alpha=0.4)
-        outlines = list(fig.renderers)
+        self.outlines = [  # with their opacity, of what they are filled with and of their edge
+            (
+                fig.patch(
+                    "x", "y", source=source, fill_color=PALE, fill_alpha=fill, line_color=DARK,
+                    line_alpha=line, line_width=wide,
+                ),
+                fill,
+                line,
+            )
+            for source, fill, line, wide in (
+                (self.outer, 0.35, 1.0, 1.6), (self.inner, 0.0, 0.4, 1.0),
+            )
+        ]  # fmt: skip
         fig.patch(
             "x", "y", source=self.half, fill_alpha=0, line_color=DARK, line_dash="dotted",
             line_width=1.4,
@@ -409,10 +445,11 @@ class View(TabView):
         )  # fmt: skip
         here.tags, fig.name = MOVES, "path_figure"
         # The state on screen moves too often to be looked at for the range.
+        outlines = [renderer for renderer, _, _ in self.outlines]
         fig.x_range.renderers = fig.y_range.renderers = [*outlines, states]
         legend_above(fig)
         fig.legend[0].visible = False
-        corner(fig, "outline: exact; dots: networks found at random")
+        self.corner = corner(fig, CORNER)
         fig.add_tools(hover([states], ("network", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
 

@@ -12,22 +12,22 @@ const endless = (body) => !body.empty && !body.bounded
 const ONE_LEFT = { ask: "at which friction is just one set of forces left?", reached: single, done: "✓ Without friction everything is determined." }
 
 /**
- * By scenes, what is asked: how large a normal force can get, while S is in fog; from which one on, or below
- * which, or how many times the other axis' force; or what is to become of S. of: what that force's name begins with, as axes depend on friction.
+ * By scenes, what is asked: how large a normal force can get; from which one on, or below which, or how many
+ * times the other axis' force, whether or not S hides in fog meanwhile; or what is to become of S. of: what that force's name begins with, as axes depend on friction.
  */
 const OWN = {
   groove: [
-    { ask: "how hard can the left wall press on the disk, which weighs 1?", how: "Drag the red dot to the right until it stops.", largest: true, done: "✓ That hard: there, friction can do no more." },
+    { ask: "how large can the normal force at the left wall get? (The disk weighs 1.)", how: "Drag the red dot to the right until it stops.", largest: true, done: "✓ That large: friction can do no more." },
     ONE_LEFT,
     { ask: "from which friction on can the walls press as hard as you like?", reached: endless, done: "✓ As steep as the walls are, the wedges let them: the disk has jammed itself." },
   ],
   box: [
-    { of: "between", ask: "can you make the normal force between the disks (violet) larger than 3.5 (each disk weighs 1)?", least: 3.5, done: "✓ And everything still balances." },
+    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot upwards until it stops.", largest: true, done: "✓ That large, and all is in balance." },
     ONE_LEFT,
     { ask: "from which friction on can they press as hard as you like?", reached: endless, done: "✓ The disks have jammed themselves." },
   ],
   thirteen: [
-    { ask: "can you make the violet normal force three times as strong as the green one?", times: 3, done: "✓ And everything still balances." },
+    { ask: "can you make the violet normal force three times as strong as the green one?", times: 3, hides: true, done: "✓ And everything still balances." },
     { ask: "can you bring the violet force below 2?", most: 2, done: "✓ That, too." },
     { ask: "with how little friction do these disks still hold?", reached: (body) => body.empty, done: "✓ Below that nothing balances: these disks need some friction." },
   ],
@@ -39,7 +39,8 @@ export class Quest {
   /** How many times the force across the one up is to be, or what is to be reached, in words; or undefined. */
   get times() { return this.asked?.times }
   get goal() { return this.asked?.least ?? this.asked?.most }
-  get fog() { return Boolean(this.asked?.largest) }
+  /** Whether the answer is to be found out, not seen. */
+  get fog() { return Boolean(this.asked?.largest || this.asked?.hides) }
   get below() { return Boolean(this.asked?.most) }
   get words() { return `goal: ${this.below ? "below" : "above"} ${this.goal}` }
 

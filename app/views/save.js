@@ -9,6 +9,11 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000)
 }
 
+/** The same of bytes, as base64. */
+export function saveBytes(text, name) {
+  save(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]), name)
+}
+
 /** Print an HTML document alone; title: of it, for screen readers. */
 export function print(title, html) {
   const sheet = made("iframe", { title, srcdoc: html, style: "position: fixed; width: 0; height: 0; border: 0" })

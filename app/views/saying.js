@@ -71,7 +71,8 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }) 
     return `<b>${2 * count} unknown force components, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
-  return `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${h === 1 ? "number" : "numbers"}${point}</b> <span>(${forces}; ${sum}${why})</span>`
+  const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${h === 1 ? "number" : "numbers"}${point}</b>`
+  return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}${why})</span>`
 }
 
 /** The sum that gives the number of equations, and what its parts are. */
@@ -99,12 +100,14 @@ export function special({ scene }) {
 }
 
 /** What the picture of S is. */
-export function pictured(body, dotted) {
+export function pictured(body, { filled: dotted, fog }) {
   const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"} (here:`
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
-  return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
+  const find = fog ? ": drag to find out how far it goes" : ""
+  if (fog && h < 3) return `S, every way to hold the ${scene.r.length > 1 ? "disks" : "disk"}${find}`
+  return h > 3 ? `shadow (projection) of S onto two of the forces${find}${dotted ? "; dots: random points, rarely near its edge" : ""}`
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
 
@@ -124,7 +127,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces adjust, as little as they must.`
+  if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
@@ -132,7 +135,7 @@ export function sentence(body, mu, now) {
   const opens = body.sides.some(({ stops }) => stops.some(([, what]) => what === OPENS))
   const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
-  if (now.fog) return `Each place of the red dot is one set of forces that holds the same disk at rest. ${FREE}`
+  if (now.fog) return `Each place of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}`
   if (now.fresh) return `${every} ${FREE}` // the rest once something was touched
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }

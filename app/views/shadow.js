@@ -8,7 +8,7 @@ import { drawName } from "./reading.js"
 export function drawShadow(space) {
   const { context: g, look } = space
   const corners = space.corners().map((p) => space.px(p)), { stale } = space.outline
-  if (corners.length) {
+  if (corners.length && !space.fog) {
     polygon(g, corners)
     g.globalAlpha = stale ? 0.35 : 1 // of another friction or load
     g.fillStyle = look.shade

@@ -11,10 +11,11 @@ import { Going } from "./going.js"
 import { goneBanner } from "./gone.js"
 import { Later } from "./later.js"
 import { teach } from "./lesson.js"
+import { toMean } from "./mean.js"
 import { palette } from "./palette.js"
 import { Push } from "./push.js"
 import { Quest } from "./quest.js"
-import { save } from "./save.js"
+import { saveBytes } from "./save.js"
 import { barred, counted, forceName, legend, pictured, sentence, special, stopping } from "./saying.js"
 import { Space } from "./space.js"
 import { TourCard } from "./tourcard.js"
@@ -56,6 +57,7 @@ export function render({ model, view }) {
   function paint() {
     waiting = 0
     if (!body || !root.isConnected) return
+    hide()
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = builds() && root.getRootNode().activeElement === part("packing") ? builder.cursor : null
     const dressed = colours(), onAxes = new Map(space.axed.map((force, k) => [force, [dressed.across, dressed.up][k]]))
@@ -84,11 +86,12 @@ export function render({ model, view }) {
   function say(note = pushed.on ? now.note : "") {
     tell("count", counted(body), "innerHTML")
     tell("legend", legend(body))
-    tell("what", pictured(body, now.filled))
     tell("special", special(body))
     tell("key", barred(body))
     inquire()
-    tell("says", note || sentence(body, mu, { ...now, fog: quest.fog }))
+    const seen = { ...now, fog: space.fog }
+    tell("what", pictured(body, seen))
+    tell("says", note || sentence(body, mu, seen))
     tell("mend", `Set μ = ${now.enough}`)
     part("mend").hidden = !now.enough
     part("says").classList.toggle("note", Boolean(note))
@@ -102,8 +105,14 @@ export function render({ model, view }) {
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
     const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
     quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: now.moved })
-    Object.assign(space, { ray: quest.times, goal: quest.goal, below: quest.below, goalWords: quest.words, fog: quest.fog })
-    part("ranges").hidden = quest.fog // which would tell
+    Object.assign(space, { ray: quest.times, goal: quest.goal, below: quest.below, goalWords: quest.words })
+    hide()
+  }
+
+  /** What the first question asks for is not seen by who was never here; but the tour speaks of S. */
+  function hide() {
+    space.fog = later.new && quest.fog && !root.classList.contains("touring")
+    part("ranges").hidden = space.fog // which would tell
   }
 
   // What is done
@@ -255,7 +264,7 @@ export function render({ model, view }) {
     space.shadow = axes.show(body, (force) => heard("name", force))
     if (body.whole && !body.empty) body.u = [...body.middle]
     else if (!body.empty && !body.goInside()) body.empty = true
-    if (!body.whole) space.toMean()
+    if (!body.whole) toMean(space)
     if (now.filled) space.fill()
     part("name").value = scene.name
     part("ranges").open = body.count <= FEW || tall(scene)
@@ -369,6 +378,7 @@ export function render({ model, view }) {
     soon()
   })
   part("undo").addEventListener("click", undo)
+  later.listeners.push(() => { say(); soon() })
   part("push").addEventListener("click", () => {
     const was = pushed.disk !== null
     pushes(!pushed.on)
@@ -383,12 +393,7 @@ export function render({ model, view }) {
     const row = event.target.closest("[data-contact]")
     if (row) { choose(Number(row.dataset.contact)); soon() }
   })
-
   part("bars").addEventListener("pointerleave", () => { if (!now.chosen) { choose(null); soon() } })
-
-  function download(text) {
-    save(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]), `${body.scene.name}.npz`)
-  }
 
   function key(event) {
     if (event.metaKey || event.ctrlKey || !root.isConnected) return
@@ -433,7 +438,7 @@ export function render({ model, view }) {
   model.on("msg:custom", (news) => {
     if (news.fall && body.empty) { now.fall = news.fall.length ? news.fall : null; say(); soon() }
     if (news.measured && news.scene === body.scene.name && news.mu === mu && !body.whole) measured(news.measured, news.plane)
-    if (news.file) download(news.file)
+    if (news.file) saveBytes(news.file, `${body.scene.name}.npz`)
     if (news.error && !body) return tell("says", news.error)
     if (news.error) { returning = false; part("name").value = body.scene.name; say(news.error) }
   })

@@ -3,6 +3,7 @@
 
 import { distance, dot, solve } from "./body.js"
 import { Easel } from "./easel.js"
+import { Fog } from "./fog.js"
 import { shadeGoal } from "./goal.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
 import { circle, line, polygon } from "./pen.js"
@@ -30,6 +31,7 @@ export class Space {
     this.shadow = [0, 2] // forces that are its axes above three dimensions: 2 c for f_n, 2 c + 1 for f_t
     this.outline = { points: [], stale: true } // of S on them, flat, by linear programs
     this.dots = []
+    this.been = new Fog() // what was found of S, while that is in fog
     const at = (event) => this.easel.at(event)
     canvas.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
     canvas.addEventListener("pointermove", (event) => this.moved(...at(event)))
@@ -171,15 +173,6 @@ export class Space {
     }
   }
 
-  /** To the mean of S, about: far from all of its sides, and the same each time. */
-  toMean() {
-    const { body } = this
-    this.fill(fixed())
-    const { dots } = this
-    this.dots = []
-    if (dots.length) body.u = body.u.map((_, k) => dots.reduce((sum, u) => sum + u[k], 0) / dots.length)
-  }
-
   draw(body, look, path) {
     this.body = body
     this.look = look
@@ -197,7 +190,8 @@ export class Space {
     g.lineJoin = "round" // no spikes where sides meet
     if (body.empty) return this.write(w / 2, h / 2, `S is empty: no forces hold this${look.enough ? `\nμ = ${look.enough} would do` : ""}`, look.warm, 14)
     this.sceneDrawn = body.scene
-    if (body.h === 1) drawSegment(this, this.visit())
+    if (this.fog) this.been.visit(this)
+    if (body.h === 1) drawSegment(this)
     if (this.over) {
       drawAxis(this, this.axed[0], this.easel.high - FLOOR + 6)
       drawAxis(this, this.axed[1], ASIDE - 6, 1)
@@ -205,6 +199,7 @@ export class Space {
     if (body.h === 2) this.drawPolygon()
     if (body.h === 3) drawSolid(this)
     if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
+    if (this.fog && this.over) this.been.draw(this)
     this.drawPath(path)
     const [x, y] = this.px(this.flat(body.u))
     circle(g, [x, y], 8)
@@ -234,14 +229,6 @@ export class Space {
     g.textBaseline = "middle"
     g.fillStyle = look.paper
     g.fillText("drag me", px, py)
-  }
-
-  /** Of a line: from where to where it has been visited by now. */
-  visit() {
-    const { body } = this, [at] = this.flat(body.u)
-    if (this.visited?.corners !== body.corners) this.visited = { corners: body.corners, ends: [at, at] }
-    const { ends } = this.visited
-    return (this.visited.ends = [Math.min(ends[0], at), Math.max(ends[1], at)])
   }
 
   /** What decides how that looks which stands still while a point goes through S. */
@@ -318,13 +305,16 @@ export class Space {
     const places = corners.map(({ u }) => this.px(this.flat(u)))
     const order = [...places.keys()].sort((a, b) =>
       Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
-    polygon(g, order.map((k) => places[k]))
-    g.fillStyle = look.shade
-    g.fill()
-    shadeGoal(this, order.map((k) => places[k]))
+    if (!this.fog) {
+      polygon(g, order.map((k) => places[k]))
+      g.fillStyle = look.shade
+      g.fill()
+      shadeGoal(this, order.map((k) => places[k]))
+    }
     const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
     for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
       const [a, b] = [places[side.corners[0]], places[side.corners.at(-1)]], lit = this.lit(side)
+      if (this.fog && !this.been.touched(side, a, b)) continue
       g.strokeStyle = lit ? look.hand : look.cold
       g.lineWidth = lit ? 5 : 2.5
       g.setLineDash(side.cap ? [3, 7] : [])
@@ -344,11 +334,11 @@ export class Space {
       if (long <= 14 && !lit) { /* no room */ }
       else if (!this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright) && !upright) {
         const way = Math.sign(x - middle[0]) || 1 // beside it, where there is none along it
-        this.besides(x + (way * long) / 2, y, way, 0, text.replace(/ (at|between) /, "\n$1 ").replace(/^(disk \d+) /, "$1\n"), lit, false)
+        this.besides(x + (way * long) / 2, y + 28, way, 0, text.replace(/ (at|between) /, "\n$1 ").replace(/^(disk \d+) /, "$1\n"), lit, false)
       }
       this.labels.push({ side, a, b, reach: 14 })
     }
-    if (places.length < 3) return // a line among two dimensions
+    if (this.fog || places.length < 3) return // or a line among two dimensions
     drawName(this, places, middle)
   }
 
@@ -435,12 +425,6 @@ export class Space {
     this.told("begin")
     this.told("go", this.moving(this.body.u, 0.04 * this.half * dx, 0.04 * this.half * dy))
   }
-}
-
-/** Numbers in [0, 1) that look random, always the same ones: a linear congruential generator. */
-function fixed() {
-  let state = 1
-  return () => (state = (Math.imul(1664525, state) + 1013904223) >>> 0) / 2 ** 32
 }
 
 function within(points, px, py) {

@@ -105,10 +105,12 @@ def hover(renderers: list[Any], *rows: tuple[str, str], **options: Any) -> Hover
     return HoverTool(renderers=renderers, tooltips=list(rows), **policy, **options)
 
 
-def corner(fig: Figure, word: str) -> None:
+def corner(fig: Figure, word: str) -> Title:
     """Say in a plot's upper right corner whether it shows exact, seen or measured values."""
     look = {"text_font_size": "11px", "text_font_style": "italic", "text_color": "#808080"}
-    fig.add_layout(Title(text=word, align="right", **look), "above")
+    title = Title(text=word, align="right", **look)
+    fig.add_layout(title, "above")
+    return title
 
 
 def legend_above(fig: Figure, columns: int = 4) -> None:

@@ -552,6 +552,19 @@ def test_the_bar_of_the_line_to_be_dragged_says_what_is_to_be_reached(state):
     assert not len(view.invited.data["rank"])
 
 
+def test_one_bar_without_its_ends_is_drawn_until_a_force_was_dragged(state):
+    state.compute_exact()
+    wait_for(state)
+    state.looks.fresh = True
+    view = View(state)
+    assert view.contacts.tolist() == [state.seen.invited] and not view.exact_item.visible
+    assert np.isnan(view.bars.data["exact_high"]).all() and len(view.unknown.data["at"]) == 2
+    assert not len(view.invited.data["rank"])  # what is to be found out
+    state.looks.fresh = False
+    assert len(view.contacts) > 8 and view.exact_item.visible
+    assert np.isfinite(view.bars.data["exact_high"]).all() and not len(view.unknown.data["at"])
+
+
 def test_another_friction_is_packed_as_is_usual_there(state):
     controls, usual = Controls(state), kinds.PACKING.parameters(DISKS, 2.0, 1)
     first = state.cell.selection

@@ -311,7 +311,7 @@ def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
     offered = page.locator(OFFERED).filter(visible=True)
     assert not offered.count()
     page.locator("button.all").wait_for()
-    page.locator(".turn").get_by_text("Drag the red line").wait_for()
+    page.locator(".turn").get_by_text("how strong can you make this force?").wait_for()
     until(page, "!scene.hand.player.playing")
     x, y = inviting(page)
     page.mouse.move(x, y)
@@ -325,6 +325,20 @@ def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
     page.reload()
     page.locator(".scrub").filter(visible=True).wait_for()
     assert not page.locator("button.all").is_visible()
+
+
+def test_who_is_new_finds_out_how_far_networks_go(visit):
+    """Force space without its outline, and one bar without its ends, until a force was dragged."""
+    page = visit(AT + "&tab=plane", first=True)
+    page.locator(".turn").get_by_text("how far out can you take the red dot?").wait_for()
+    page.wait_for_function(f"() => {MODEL}('outer').get_length() > 0")
+    assert not page.get_by_text("halfway").filter(visible=True).count()
+    page.get_by_role("tab", name="How far?").click()
+    page.wait_for_function(f"() => {MODEL}('bars').get_length() === 1")
+    page.locator("button.all").click()
+    page.wait_for_function(f"() => {MODEL}('bars').get_length() > 8")
+    page.get_by_role("tab", name="Force space").click()
+    page.get_by_text("halfway").filter(visible=True).first.wait_for()
 
 
 def test_all_controls_are_there_at_once_for_who_asks(visit):

@@ -690,6 +690,28 @@ def test_the_inner_half_of_an_outline_has_a_quarter_of_its_area():
     assert planes.inner_share(points[inside], corners[::-1]) == pytest.approx(0.25, abs=0.01)
 
 
+def test_halfway_is_the_outline_at_half_its_size():
+    corners = np.array([[0, 0], [4, 0], [5, 3], [1, 4]], float)
+    half = planes.halfway(corners)
+    assert planes.area(half) == pytest.approx(planes.area(corners) / 4)
+    np.testing.assert_allclose(half, planes.halfway(corners[::-1])[::-1])
+
+
+def test_the_outline_is_hidden_until_it_was_found_out_how_far_it_goes(state):
+    state.looks.tab, state.looks.fresh = "plane", True
+    view = plane_view.View(state)
+    wait_for(state)
+    around = view.figure.x_range.renderers
+    assert len(view.outer.data["x"]) > 3 and view.outlines[0][0] in around  # it counts
+    assert all(r.glyph.line_alpha == r.glyph.fill_alpha == 0 for r, _, _ in view.outlines)
+    assert not any(p.visible for p in (view.name_of_s, view.goal, view.goal_words, view.finding))
+    assert not len(view.half.data["x"])
+    state.looks.fresh = False
+    assert all(r.glyph.line_alpha == line for r, _, line in view.outlines)
+    assert view.name_of_s.visible and view.goal.visible and view.finding.visible
+    assert len(view.half.data["x"]) == len(view.outer.data["x"]) - 1
+
+
 def test_walk_and_uniform_states_are_shown_together(state):
     state.looks.tab = "plane"
     view = plane_view.View(state)

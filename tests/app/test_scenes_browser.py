@@ -389,7 +389,8 @@ def test_while_disks_are_pressed_together_nothing_is_drawn_but_the_scene_named(l
 
 def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
     page = look("?scene=column")
-    assert "too many to draw" in says(page)
+    assert "dimensions, so the plot shows its shadow" in says(page)
+    desk(page).get_by_role("button", name="Random points").click()
     desk(page).get_by_role("combobox", name="force shown upwards").select_option(
         "tangential force between 1 and 2"
     )
@@ -470,7 +471,8 @@ def test_what_else_can_be_done_is_offered_once_the_point_was_dragged(look):
 def test_values_stand_beside_the_forces_that_are_axes_and_copies_have_arrows(look):
     """The side of a polygon that is too short for its words has them beside it."""
     page = look("?scene=box")
-    values = ask(page, "small.space.axed.map(force => small.body.forces()[force].toFixed(3))")
+    force = "`normal ${small.body.forces()[force].toFixed(3)}`"
+    values = ask(page, f"small.space.axed.map(force => {force})")
     write = "const g = small.arrows.context, told = [], fill = g.fillText.bind(g)"
     told = f"""(() => {{ {write}
         g.fillText = (text, ...at) => {{ told.push(text); fill(text, ...at) }}
@@ -499,11 +501,12 @@ def test_a_scene_of_many_dimensions_begins_the_same_each_time(look):
 def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     page = look("?scene=groove")
     quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
-    assert "larger than the weight" in quest.inner_text() and "✓" not in quest.inner_text()
+    assert "how large can the normal force at the left wall get?" in quest.inner_text()
+    assert "✓" not in quest.inner_text()
     space.focus()
     for _ in range(40):
         page.keyboard.press("ArrowRight")
-    quest.get_by_text("✓ Larger, and all is in balance. Next (2 of 3)").wait_for()
+    quest.get_by_text("✓ That large: friction can do no more. Next (2 of 3)").wait_for()
     friction = desk(page).get_by_role("slider", name="friction μ")
     friction.fill("1.2")  # which answers the third question, and not the second
     assert "Next (2 of 3)" in quest.inner_text()
@@ -513,14 +516,50 @@ def test_the_question_of_a_scene_is_answered_by_the_hand(look):
     assert "Next (3 of 3)" in quest.inner_text()
     friction.fill("1")
     quest.get_by_text("the disk has jammed itself").wait_for()
-    page = look("?scene=groove&mu=0.1")  # at most 0.786
-    desk(page).locator(".quest").get_by_text("Not with this friction").wait_for()
     page = look("?scene=groove&mu=0")  # S is one point: nothing to ask
     assert not desk(page).locator(".quest").is_visible()
-    page = look("?scene=box")
-    until(page, "small.body.h === 2")
-    assert "larger than 3.5" in desk(page).locator(".quest").inner_text()
-    assert ask(page, "small.space.goal") == 3.5
+
+
+def test_thirteen_disks_ask_for_a_ratio_a_value_and_a_friction(look):
+    page = look("?scene=thirteen")
+    quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
+    quest.get_by_text("three times as strong").wait_for()
+    assert ask(page, "small.space.ray") == 3 and not ask(page, "small.space.fog")
+    space.focus()
+    for _ in range(30):
+        page.keyboard.press("ArrowLeft")
+    quest.get_by_text("Next (2 of 3): can you bring the violet force below 2?").wait_for()
+    assert ask(page, "[small.space.goal, small.space.below, small.space.ray ?? 0]") == [2, True, 0]
+    for step in range(40):
+        page.keyboard.press("ArrowDown")
+        if step % 3 == 0:
+            page.keyboard.press("ArrowRight")
+    quest.get_by_text("Next (3 of 3): with how little friction").wait_for()
+    assert ask(page, "small.body.forces()[small.space.axed[1]]") < 2
+    desk(page).get_by_role("slider", name="friction μ").fill("0.05")
+    quest.get_by_text("these disks need some friction").wait_for()
+    assert ask(page, "small.body.empty")
+
+
+def test_who_is_new_finds_out_how_far_s_goes(look):
+    """S hides until the first question is answered or all is asked for; the tour speaks of it."""
+    page = look("?scene=box", first=True)
+    assert ask(page, "small.space.fog") and not desk(page).locator(".ranges").is_visible()
+    assert "how large can the violet normal force get?" in desk(page).locator(".quest").inner_text()
+    desk(page).locator("canvas.space").focus()
+    page.keyboard.press("ArrowUp")
+    until(page, "small.space.been.way.length > 1 && small.space.been.sides.size === 0")
+    for _ in range(40):
+        page.keyboard.press("ArrowUp")
+    desk(page).locator(".quest").get_by_text("Next (2 of 3)").wait_for()
+    until(page, "!small.space.fog && small.space.been.sides.size > 0")
+    assert desk(page).locator(".ranges").is_visible()
+    page = look("?scene=groove", first=True)
+    assert ask(page, "small.space.fog")
+    desk(page).get_by_role("button", name="More …").click()
+    until(page, "!small.space.fog")
+    page = look("?scene=groove&tour=2", first=True)
+    assert not ask(page, "small.space.fog")
 
 
 def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
