@@ -18,11 +18,16 @@ def lead(state: AppState) -> str:
     """The question that the picture answers, and what is seen, as HTML."""
     if state.work.moving and not state.selection.imported:
         return jamming(state.selection)
-    return "" if state.seen is None else first(state.seen.summary)
+    return "" if state.seen is None else first(state.seen.summary, state.looks.tab)
 
 
-def first(summary: Summary) -> str:
-    """What does not move, what is free, and what playing shows."""
+# What the packing is looked at for, by tabs, where it is not what is free.
+ASKED = {"statistics": "How does friction change how much forces vary?"}
+ASKED |= {"perturb": "How hard can you push until something moves?"}
+
+
+def first(summary: Summary, tab: str = "") -> str:
+    """What does not move, what is free, and what playing shows; or what is asked beside."""
     n, free = summary["n"], summary["dimension"]
     if free == 0:
         found = f"These {n} disks never move, and the forces between them are fixed."
@@ -30,10 +35,10 @@ def first(summary: Summary) -> str:
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can change."
-        told = "Thick lines are large forces. <b>Balance leaves "
-        told += f"{free} numbers free</b> (counted below), so there are many "
-        told += f"{term('network', 'networks')}: sets of forces that all balance. Nothing changes "
-        told += "in time; Play steps through some of them, found at random."
+        found = ASKED.get(tab, found)
+        told = f"Thick lines are large forces. <b>Balance leaves {free} numbers free</b>, so there "
+        told += f"are many {term('network', 'networks')}: sets of forces that all balance. Nothing "
+        told += "moves in time; Play steps through some of them, found at random."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

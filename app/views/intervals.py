@@ -49,8 +49,8 @@ LEAD = (
     "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
 )
 LEAD_ALONE = (
-    "<b>How far can this force go?</b> It is that of the line marked in the packing. Dark: by "
-    "chance, in the networks shown so far, it hardly varies. Drag it to find out how far it can go."
+    "<b>How far can this force go?</b> The blue bar: values that the force of the marked line had "
+    "in the networks shown so far, found at random. Drag the line to find out how far it can go."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -182,11 +182,12 @@ class View(TabView):
         around = AROUND * self.alone
         _set_range(self.figure.x_range, -around, len(contacts) + 1 + around)
         self.packed_item.visible = not self.alone  # a line through all bars
+        self.figure.xgrid.visible = not self.alone
         self.corner.text = CORNER_ALONE if self.alone else CORNER
         ends = [replay.low[contacts[0], 0], replay.high[contacts[0], 0]] if self.alone else []
         self.unknown.data = {"rank": [1.0] * len(ends), "at": ends, "off": [28, -10][: len(ends)]}
         top = 3.0 if self.looks.scale == "own" else _top(replay, before or exact)
-        if self.state.growing:
+        if self.state.growing or self.alone:
             top *= ROOM
         _set_range(self.figure.y_range, 0, top)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""

@@ -11,7 +11,7 @@ const WORDS = {
   drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   choose: ["click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
-  point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, away from the others."],
+  point: ["", "<b>Your turn: no dot has a green force above {seen}. How far can you take it?</b> Drag the red dot."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
   guess: ["", "<b>Your turn: how does friction change how much the forces vary?</b>"],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],

@@ -87,7 +87,7 @@ class PackingView:
         state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
-            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark"]
+            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab"]
         )
         state.param.watch(self._explain, ["seen", "exact", "loads"])
         state.knowledge.param.watch(self._explain, "narrowed")

@@ -59,7 +59,8 @@ LEAD = (
 # Before the first gesture, which is to find out how far S goes.
 LEAD_FIRST = (
     "<b>Each dot is one whole network, like the one drawn in the packing,</b> by the two forces "
-    "that are marked there, green and violet. All of them were found at random."
+    "that are marked there, green and violet. Blue: found at random; yellow: as the disks came to "
+    "rest (“as packed”)."
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")

@@ -51,9 +51,9 @@ SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both s
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> The ring is this packing: from network to network, the force at a contact "
-    "varies by about {:.2g} % of the mean force (standard deviation). Now take <b>a new packing "
-    "for each friction</b>. <b>Draw a line through the ring</b>, as you think it goes on, or pick:"
+    "<b>Guess first.</b> In this packing (ring) the force at a contact is typically {:.2f} above "
+    "or below its mean, from network to network; the mean force is 1. With other friction the "
+    "disks come to rest otherwise. <b>How do forces vary then?</b> Draw it, or pick:"
 )
 SHOW = "Show the curve"
 DRAWN_FIRST = "The grey line is your guess. "
@@ -178,22 +178,27 @@ class View(TabView):
         self.more.visible = what == "eta" and not hidden
         if self._curve is not None:
             studied.hide_curve(self._curve, hidden)
-            self._give_pencil(self._curve, hidden)
+            self._give_pencil(self._curve, replay, hidden)
         if hidden:
-            self.lead.object = GUESS.format(100 * replay.summary["eta1"])
+            self.lead.object = GUESS.format(replay.summary["eta1"])
         elif what in DRAWN:
             self.lead.object = (self._said if what == "eta" else "") + self._found
 
-    def _give_pencil(self, fig: Figure, hidden: bool) -> None:
+    def _give_pencil(self, fig: Figure, replay: Replay | None, hidden: bool) -> None:
         """Have what is dragged over the figure draw the guess, while the curve is hidden."""
         if self._pencil is not None and (not hidden or self._pencil not in fig.tools):
             fig.toolbar.update(active_drag="auto", active_tap="auto")
             fig.tools = [tool for tool in fig.tools if tool is not self._pencil]
             self._pencil = None
-        if hidden and self._pencil is None:
+        if hidden and self._pencil is None and replay is not None:
             line = fig.multi_line(
                 "xs", "ys", source=self.guessed, line_color=GUESS_COLOUR, line_width=3,
                 name=studied.GUESS,
+            )  # fmt: skip
+            mu, eta = (replay.summary[name] for name in ("mu", "eta1"))
+            fig.text(
+                [mu], [eta], ["draw your guess through the ring"], x_offset=14, y_offset=4,
+                text_color=DOT, text_font_size="12px", name=studied.DRAW,
             )  # fmt: skip
             self._pencil = FreehandDrawTool(renderers=[line], num_objects=1)
             fig.add_tools(self._pencil)

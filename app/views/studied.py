@@ -34,7 +34,11 @@ SAMPLERS = {
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
-THIS, GUESS = "own", "guess"  # names of its ring, and of the line that a visitor draws
+THIS, GUESS, DRAW = (
+    "own",
+    "guess",
+    "draw",
+)  # names of its ring, of what a visitor draws, and of a word
 PEAK = "↓ most here: click"
 LIKE = {0.03: "like ice", 1.0: "like rubber"}  # about, against themselves or a road
 RISES = "friction gives\neach force room"
@@ -148,7 +152,9 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
 def hide_curve(fig: Figure, hidden: bool) -> None:
     """Hide all of the first figure but the packing on screen and the axes, or show it."""
     for part in (*fig.renderers, *fig.center):
-        if isinstance(part, GlyphRenderer) and part.name not in (THIS, GUESS):
+        if isinstance(part, GlyphRenderer) and part.name == DRAW:
+            part.visible = hidden
+        elif isinstance(part, GlyphRenderer) and part.name not in (THIS, GUESS):
             part.visible = not hidden
         elif isinstance(part, Label) and part.name in ("peak", "rises", "falls"):
             part.visible = not hidden
