@@ -197,8 +197,8 @@ class View(TabView):
             )  # fmt: skip
             mu, eta = (replay.summary[name] for name in ("mu", "eta1"))
             fig.text(
-                [mu], [eta], ["draw your guess through the ring"], x_offset=14, y_offset=4,
-                text_color=DOT, text_font_size="12px", name=studied.DRAW,
+                [mu], [eta], ["draw your guess through here"], x_offset=-14, y_offset=4,
+                text_align="right", text_color=DOT, text_font_size="12px", name=studied.DRAW,
             )  # fmt: skip
             self._pencil = FreehandDrawTool(renderers=[line], num_objects=1)
             fig.add_tools(self._pencil)
