@@ -11,7 +11,8 @@ const WORDS = {
   drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   choose: ["click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
-  point: ["", "<b>Your turn: no dot has a green force above {seen}. How far can you take it?</b> Drag the red dot."],
+  point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
+  first: ["", "<b>Your turn: no dot has a green force above {seen}. How far can you take it?</b> Drag the red dot."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
   guess: ["", "<b>Your turn: how does friction change how much the forces vary?</b>"],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
@@ -30,6 +31,7 @@ export class Invitation {
     const { model, replay, live, difference, predict, points, plots, pushes, took, scene, opens } = this.player
     if (opens || replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
     if (points && !plots.invites) return null
+    if (points && model.fresh && plots.plane.pair?.length) return "first"
     if (points) return this.target ? "reach" : "point"
     if ((model.contact ?? null) !== null) return null
     if (pushes) return model.pushing === "one" ? "choose" : null

@@ -22,6 +22,8 @@ import { closeSidebar } from "./sidebar.js"
 import { Split } from "./split.js"
 import { Sway } from "./sway.js"
 
+// What a link may hold that opens a page as it is at first.
+const PLAIN = ["scene", "mu", "n", "seed", "states", "source", "relax", "packed_mu", "tab", "tour", "dark"]
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
@@ -58,8 +60,7 @@ class Player {
     this.live = new Live(this, (live) => tell({ live }))
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(model)
-    const embedded = new URLSearchParams(location.search).has("embed")
-    this.later = new Later("network", this.buttons.part("all"), embedded)
+    this.later = new Later("network", this.buttons.part("all"), shown())
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
     this.invite = new Invitation(this)
@@ -394,6 +395,9 @@ class Player {
     this.show(replay.swinging ? 0 : frame)
   }
 }
+
+/** Whether the page was opened by a link that shows something of its own. */
+function shown() { return [...new URLSearchParams(location.search).keys()].some((name) => !PLAIN.includes(name)) }
 
 export function render({ model, view }) {
   const page = view.model.document, tell = (message) => ask(model, view, message)

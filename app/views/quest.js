@@ -54,6 +54,18 @@ export class Quest {
   again() { this.found = [false, false] }
 
   /**
+   * Ask of the normal force that goes up in the picture of S, or across, and have that show what is asked;
+   * bounds: of all contacts, where S is not drawn whole; moved: whether by hand.
+   */
+  ask(space, { bounds, moved }) {
+    const { body, axed, read } = space, contact = body.count && body.h && !body.empty ? read.at(-1) ?? 0 : null
+    const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : bounds?.[contact]
+    const colour = axed.at(-1) === 2 * contact ? "violet " : ""
+    this.look(body, contact, { colour, ends, place: space.flat(body.u), moved })
+    Object.assign(space, { ray: this.times, goal: this.goal, below: this.below, goalWords: this.words })
+  }
+
+  /**
    * Of the normal force of a contact, with its [least, largest] if known; colour: of its axis, in
    * words; place: of the dot, across and up; moved: by hand.
    */

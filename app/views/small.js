@@ -32,7 +32,7 @@ export function render({ model, view }) {
   const part = (name) => (parts[name] ??= root.querySelector(`.${name}`))
   // Of a scene that nobody has touched yet; moved: by hand.
   const untouched = () => ({ contact: null, disk: null, side: null, contacts: new Set(), read: [], fall: null, enough: null, path: [], undo: [], chosen: false, bounds: null, fresh: true, moved: false })
-  const now = { ...untouched(), filled: false }
+  const now = { ...untouched(), filled: false }, toured = new Set()
   let body = null, mu = model.scene.mu, chosenMu = false, waiting = 0, asleep = 0, returning = false
 
   const gone = goneBanner(view, "What is in the page still moves.")
@@ -57,7 +57,9 @@ export function render({ model, view }) {
   function paint() {
     waiting = 0
     if (!body || !root.isConnected) return
+    const was = space.fog
     hide()
+    if (was !== space.fog) say()
     const wall = builder.held?.wall === undefined ? [] : builder.walls[builder.held.wall]
     const cursor = builds() && root.getRootNode().activeElement === part("packing") ? builder.cursor : null
     const dressed = colours(), onAxes = new Map(space.axed.map((force, k) => [force, [dressed.across, dressed.up][k]]))
@@ -88,7 +90,8 @@ export function render({ model, view }) {
     tell("legend", legend(body))
     tell("special", special(body))
     tell("key", barred(body))
-    inquire()
+    quest.ask(space, now)
+    hide()
     const seen = { ...now, fog: space.fog }
     tell("what", pictured(body, seen))
     tell("says", note || sentence(body, mu, seen))
@@ -99,19 +102,10 @@ export function render({ model, view }) {
     part("undo").disabled = !now.undo.length
   }
 
-  /** The question that the hand answers is of the normal force that goes up in the picture of S, or across. */
-  function inquire() {
-    const contact = body.count && body.h && !body.empty ? space.read.at(-1) ?? 0 : null
-    const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : now.bounds?.[contact]
-    const colour = space.axed.at(-1) === 2 * contact ? "violet " : ""
-    quest.look(body, contact, { colour, ends, place: space.flat(body.u), moved: now.moved })
-    Object.assign(space, { ray: quest.times, goal: quest.goal, below: quest.below, goalWords: quest.words })
-    hide()
-  }
-
-  /** What the first question asks for is not seen by who was never here; but the tour speaks of S. */
+  /** What the first question asks for is not seen by who was never here; but of scenes in the tour, which speaks of S. */
   function hide() {
-    space.fog = later.new && quest.fog && !root.classList.contains("touring")
+    if (root.classList.contains("touring")) toured.add(body.scene.name)
+    space.fog = later.new && quest.fog && !toured.has(body.scene.name)
     part("ranges").hidden = space.fog // which would tell
   }
 

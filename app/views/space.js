@@ -233,8 +233,8 @@ export class Space {
 
   /** What decides how that looks which stands still while a point goes through S. */
   standing() {
-    const { body, look, dots, outline, centre, half, shadow, view } = this
-    return [body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
+    const { body, look, dots, outline, centre, half, shadow, view, fog, ray, goal, below } = this
+    return [fog, ray, goal, below, body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
   }
 
   write(x, y, text, colour, size = 13, align = "center") {

@@ -52,8 +52,8 @@ LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into ho
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
     "<b>Guess first.</b> In this packing (ring) the force at a contact is typically {:.2f} above "
-    "or below its mean, from network to network; the mean force is 1. With other friction the "
-    "disks come to rest otherwise. <b>How do forces vary then?</b> Draw it, or pick:"
+    "or below its average, from network to network (forces in units of the mean force). With other "
+    "friction the disks come to rest otherwise. <b>How do forces vary then?</b> Draw it, or pick:"
 )
 SHOW = "Show the curve"
 DRAWN_FIRST = "The grey line is your guess. "
