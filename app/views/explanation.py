@@ -34,11 +34,11 @@ def first(summary: Summary, tab: str = "") -> str:
         told = f"No number is free: there is just one {term('network', 'force network')}."
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
-        found = f"These {n} disks never move, yet the forces between them can change."
+        found = f"These {n} disks never move, yet the forces between them can differ."
         found = ASKED.get(tab, found)
         told = f"Thick lines are large forces. <b>Balance leaves {free} numbers free</b>, so there "
-        told += f"are many {term('network', 'networks')}: sets of forces that all balance. Nothing "
-        told += "moves in time; Play steps through some of them, found at random."
+        told += f"are many {term('network', 'networks')}: sets of forces that all balance. Play "
+        told += "steps through some of them, found at random; they are no moments in time."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

@@ -23,7 +23,7 @@ import { Split } from "./split.js"
 import { Sway } from "./sway.js"
 
 // What a link may hold that opens a page as it is at first.
-const PLAIN = ["scene", "mu", "n", "seed", "states", "source", "relax", "packed_mu", "tab", "tour", "dark"]
+const PLAIN = ["scene", "mu", "n", "seed", "states", "source", "relax", "packed_mu", "tab", "dark"]
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,

@@ -34,11 +34,8 @@ SAMPLERS = {
     "sweeps_1e-4": "by Gauss–Seidel, to 10⁻⁴",
 }
 OWN, HERE = "on this page", "this packing"
-THIS, GUESS, DRAW = (
-    "own",
-    "guess",
-    "draw",
-)  # names of its ring, of what a visitor draws, and of a word
+# Names of this packing's ring, of what a visitor draws, and of the word that asks for it.
+THIS, GUESS, DRAW = "own", "guess", "draw"
 PEAK = "↓ most here: click"
 LIKE = {0.03: "like ice", 1.0: "like rubber"}  # about, against themselves or a road
 RISES = "friction gives\neach force room"

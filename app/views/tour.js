@@ -61,10 +61,11 @@ export function render({ model, view }) {
     point(target(), step)
   }
 
-  /** The second step moves: that is what it says. */
+  /** The second step moves: that is what it says; from it on, the tour speaks of all that there is. */
   function play(step) {
     const player = page.get_model_by_name("player")?.player
     if (!player?.replay) return
+    if (step > 1) player.later.offer()
     const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches
     if (step === 2 && !still) setTimeout(() => { if (model.step === 2) player.play(true) }, 400)
     else if (step !== 1) player.play(false)

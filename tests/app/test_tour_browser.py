@@ -153,6 +153,17 @@ def test_the_tour_goes_by_keyboard_and_is_told_to_screen_readers(visit):
     card(page).wait_for(state="hidden")
 
 
+def test_the_tour_offers_all_that_it_speaks_of(visit):
+    page = visit("?mu=0.1&n=30&states=30&relax=nearest")
+    scrub = page.locator(".scrub")
+    page.get_by_role("button", name="Tour").click()
+    at_step(page, 1)
+    assert not scrub.is_visible()
+    card(page).get_by_role("button", name="Next").click()
+    at_step(page, 2)
+    scrub.filter(visible=True).wait_for()  # that beside Play
+
+
 # The page opens moving
 
 
