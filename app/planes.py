@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -120,6 +121,11 @@ def _plane(
     path = np.tensordot(_frames(replay) - centre, axes, ((1, 2), (1, 2)))
     origin = np.tensordot(axes, centre, ((1, 2), (0, 1)))
     return Plane(chosen, axes, origin, share, path.astype(np.float32))
+
+
+def seen(plane: Plane) -> float:
+    """Beyond which value across no state lies, in tenths."""
+    return math.ceil(10 * float(plane.path[:, 0].max())) / 10
 
 
 def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:

@@ -3,12 +3,12 @@
 
 import { distance, dot } from "./body.js"
 import { Easel } from "./easel.js"
+import { ASIDE, drawNames, drawValues } from "./naming.js"
 import { circle, line } from "./pen.js"
-import { number } from "./saying.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
-const NAMED = 3 // contacts up to which the forces on a single disk have their names beside them
+const NAMED = 3 // disks, or contacts, up to which the forces on a single disk have their names beside them
 
 /** Whether a scene is so much higher than wide that it needs a picture like that. */
 export function tall({ name, x, box }) {
@@ -109,9 +109,9 @@ export class Arrows {
     if (F) for (const end of this.ends()) this.drawEnd(end, F)
     if (look.fall) this.drawFall(look.fall)
     this.drawLoads()
-    if (F) this.drawValues(F)
+    if (F) drawValues(this, F)
     if (body.scene.r.length > 1) this.drawNumbers()
-    else if (F && body.count <= NAMED) this.drawNames(F)
+    else if (F && body.count <= NAMED) drawNames(this, F)
     if (look.cursor) this.drawCursor(this.px(...look.cursor))
     if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
   }
@@ -183,30 +183,6 @@ export class Arrows {
     g.textBaseline = "middle"
   }
 
-  /** Beside the forces that S is drawn by: their values, on the side of each that is more free. */
-  drawValues(F) {
-    const { context: g, body, look } = this
-    g.font = "bold 12px sans-serif"
-    g.textAlign = "center"
-    g.textBaseline = "middle"
-    for (const [force, colour] of look.axes ?? []) {
-      const text = `${force % 2 ? "tangential" : "normal"} ${number(F[force])}`, wide = g.measureText(text).width / 2 + 3
-      const ends = this.ends().filter(({ contact }) => contact === force >> 1), { at, across } = ends[0]
-      const inward = ends.reduce((sum, end) => sum.map((v, k) => v + end.inward[k]), [0, 0]) // 0 between two disks
-      const out = wide * Math.abs(across[0]) + 9, along = Math.max(0.3 * body.scene.r[ends[0].disk] * this.unit, wide + 4) // clear of a wall
-      const [x, y] = this.px(...at).map((v, k) => v + along * [inward[0], -inward[1]][k])
-      const places = [1, -1].map((side) => [x + side * out * across[0], y - side * out * across[1]])
-      const room = places.map((place) => Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...place))))
-      const [px, py] = places[room[1] > room[0] + 4 ? 1 : 0]
-      g.lineWidth = 3
-      g.strokeStyle = look.fill
-      g.strokeText(text, px, py)
-      g.fillStyle = colour
-      g.fillText(text, px, py)
-      this.shafts.push([[px - wide, py], [px + wide, py]]) // no number of a disk there
-    }
-  }
-
   /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
   drawNumbers() {
     const { context: g, body } = this, { r } = body.scene
@@ -227,32 +203,6 @@ export class Arrows {
     const { x, r } = this.body.scene, [px, py] = this.px(x[2 * d], x[2 * d + 1])
     const R = k ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
     return [px + R * Math.cos(angle), py + R * Math.sin(angle)]
-  }
-
-  /** Beside the only disk: what each wall does, in numbers, and the weight. */
-  drawNames(F) {
-    const { context: g, body, look } = this, { scene } = body
-    g.font = "13px sans-serif"
-    g.textBaseline = "middle"
-    const write = (x, y, lines, align) => {
-      g.textAlign = align
-      lines.forEach((line, k) => {
-        g.fillStyle = k ? look.cold : look.ink
-        g.fillText(line, x, y + 17 * (k - (lines.length - 1) / 2))
-      })
-    }
-    for (const { contact, at, inward, across } of this.ends()) {
-      const [px, py] = this.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
-      const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
-      const rubs = ["friction", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? this.easel.wide - x : x
-      const fits = (line) => g.measureText(line).width < room - 4
-      const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
-      const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
-      const lines = [name, `normal force ${number(n)}`, ...both]
-      write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
-    }
-    const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = this.px(scene.x[0], scene.x[1])
-    if (load > 1e-9) write(cx, cy - 13, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
   }
 
   drawEnd({ contact, disk, at, inward, across, copy }, F) {
@@ -283,10 +233,15 @@ export class Arrows {
       g.globalAlpha = 0.45
       this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
       g.globalAlpha = 1
-      const aside = 9 // px from the wall, which would lie over it
-      this.arrow(px + aside * inward[0], py - aside * inward[1], across.map((v) => v * tangential), look.cold, 3)
+      this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     }
-    const own = this.axisColour(contact), colour = lit ? look.hand : slides ? look.warm : own ?? look.cold, thick = lit || own ? 3.5 : 2.5
+    const own = this.axisColour(contact)
+    if (own && body.scene.r.length <= NAMED) { // what its number tells
+      g.globalAlpha = 0.45
+      this.arrow(px, py, inward.map((v) => v * normal), own, 1.5)
+      g.globalAlpha = 1
+    }
+    const colour = lit ? look.hand : slides ? look.warm : own ?? look.cold, thick = lit || own ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)
     if (!copy) return
     g.globalAlpha = 0.35

@@ -1,6 +1,5 @@
 """The packing: the player, what it shares with the server, and the legend."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,7 @@ import xarray as xr
 
 from granforce.records import Floats
 
-from .. import live
+from .. import live, planes
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION, nearly
 from ..known import Knowledge
 from ..looks import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
@@ -167,8 +166,8 @@ def projection(plane: Plane | None) -> dict[str, Any]:
     names = {"xn": (0, 0), "xt": (0, 1), "yn": (1, 0), "yt": (1, 1)}
     columns = {name: np.ascontiguousarray(axes[k, :, part]) for name, (k, part) in names.items()}
     origin = [float(value) for value in plane.origin]
-    seen = math.ceil(10 * float(plane.path[:, 0].max())) / 10
-    return columns | {"origin": origin, "pair": plane.pair, "goal": plane.goal, "seen": seen}
+    told = {"origin": origin, "pair": plane.pair, "goal": plane.goal, "seen": planes.seen(plane)}
+    return columns | told
 
 
 def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:

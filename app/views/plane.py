@@ -344,17 +344,24 @@ class View(TabView):
         """What stands in S: its name, its half, and what its green force is to reach."""
         self._unname()
         if self.hidden:
-            return
+            seen = planes.seen(found.plane)
+            return self._mark(seen, f"no dot beyond {seen:g}", "left")
         middle, goal = found.outer.mean(axis=0), found.plane.goal
         x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
         self.name_of_s.update(x=x, y=y, visible=True)
-        self.goal.update(location=goal, visible=goal > 0)
-        self.goal_words.update(x=goal, text=f"goal: {goal:g}", visible=goal > 0)
+        if goal > 0:
+            self._mark(goal, f"goal: {goal:g}", "right")
         if found.plane.kind != planes.STRESS:  # of which nothing is said of the middle
             half = planes.halfway(found.outer)
             self.half.data = {"x": half[:, 0], "y": half[:, 1]}
             tops = np.array([part[np.argmax(part[:, 1])] for part in (found.outer, half)])
             self.words.data = {"x": tops[:, 0], "y": tops[:, 1], "words": [*NAMED]}
+
+    def _mark(self, x: float, words: str, align: str) -> None:
+        """A line at x, with words at its upper end."""
+        self.goal.update(location=x, visible=True)
+        offset = 6 if align == "left" else -6
+        self.goal_words.update(x=x, text=words, x_offset=offset, text_align=align, visible=True)
 
     def _tell(self, found: Outlined) -> None:
         """How much of the outline the states reach."""

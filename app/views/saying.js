@@ -105,9 +105,9 @@ export function pictured(body, { filled: dotted, fog }) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
-  const find = fog && h ? ": drag to find out how far it goes" : ""
-  if (fog && h < 3) return `every way to hold the ${scene.r.length > 1 ? "disks" : "disk"}${find}`
-  return h > 3 ? `shadow (projection) of S onto two of the forces${find}${dotted ? "; dots: random points, rarely near its edge" : ""}`
+  if (fog && h < 3) return `every way to hold the ${scene.r.length > 1 ? "disks" : "disk"}: drag to find out how far it goes`
+  if (fog && h > 3) return "all possible pairs of the green and the violet force: drag to find out how far they go"
+  return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
 

@@ -208,6 +208,7 @@ export class Space {
     g.strokeStyle = look.paper
     g.lineWidth = 2
     g.stroke()
+    if (this.ray) this.write(x + 12, y + 18, `${(this.flat(body.u)[1] / this.flat(body.u)[0]).toFixed(1)} ×`, look.hand, 13, "left")
     const determined = !body.h || (body.whole && body.corners.length === 1)
     if (determined) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
     else if (look.fresh) this.invite(x, y)

@@ -44,7 +44,7 @@ from .parts import (
     together,
 )
 from .studied import Drawn
-from .style import DARK, DOT, ORIGINAL, PALE, corner, hover, legend_above
+from .style import DARK, DOT, ORIGINAL, PALE, STATES, corner, hover, legend_above
 
 GUESS_COLOUR = "#888888"
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
@@ -55,6 +55,15 @@ GUESS = (
     "or below its average, from network to network (forces in units of the mean force). With other "
     "friction the disks come to rest otherwise. <b>How do forces vary then?</b> Draw it, or pick:"
 )
+# One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
+STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:100%;display:block"
+ role="img" aria-label="the forces at one contact in all networks, with their spread" fill="none"
+ stroke="currentColor" font-size="12">
+ <path d="M10 34H510" stroke-opacity="0.4"/><g fill="{dots}" stroke="none">{points}</g>
+ <path d="M{low:.0f} 14V8H{high:.0f}V14" stroke="{mark}" stroke-width="2"/>
+ <g fill="currentColor" stroke="none"><text x="10" y="54">0</text>
+ <text x="{middle:.0f}" y="54" text-anchor="middle">one contact’s force in {count} networks</text>
+ <text x="{beside:.0f}" y="15" fill="{mark}">± {spread:.2f}</text></g></svg>"""
 SHOW = "Show the curve"
 DRAWN_FIRST = "The grey line is your guess. "
 GUESSES = ("It keeps rising ↗", "It keeps falling ↘", "It rises, then falls ∩")
@@ -180,7 +189,7 @@ class View(TabView):
             studied.hide_curve(self._curve, hidden)
             self._give_pencil(self._curve, replay, hidden)
         if hidden:
-            self.lead.object = GUESS.format(replay.summary["eta1"])
+            self.lead.object = GUESS.format(replay.summary["eta1"]) + _strip(replay)
         elif what in DRAWN:
             self.lead.object = (self._said if what == "eta" else "") + self._found
 
@@ -353,3 +362,22 @@ DRAWN: dict[str, Callable[[list[Row], list[Row], Row, bool], Drawn]] = {
     "extent": lambda rows, exact, here, log: studied.extents(rows, here["mu"], log),
     "correlation": lambda rows, exact, here, log: studied.correlations(rows, exact),
 }
+
+
+def _strip(replay: Replay) -> str:
+    """The forces of the contact whose spread is nearest to η1, as SVG."""
+    spread = replay.normal.std(axis=0)
+    contact = int(np.argmin(np.abs(spread - replay.summary["eta1"])))
+    forces, typical = replay.normal[:, contact], float(spread[contact])
+    mean = float(forces.mean())
+    scale = 500 / max(1.25 * float(forces.max()), 1e-9)
+    low, high = (10 + scale * (mean + sign * typical) for sign in (-1, 1))
+    heights = 34 + 7 * np.sin(2.4 * np.arange(len(forces)))  # so that dots do not hide each other
+    points = "".join(
+        f'<circle cx="{10 + scale * f:.1f}" cy="{y:.1f}" r="2"/>'
+        for f, y in zip(forces, heights, strict=True)
+    )
+    return STRIP.format(
+        points=points, low=low, high=high, middle=10 + scale * mean, beside=high + 8,
+        count=len(forces), spread=typical, dots=STATES, mark=DOT,
+    )  # fmt: skip

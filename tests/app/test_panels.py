@@ -704,11 +704,14 @@ def test_the_outline_is_hidden_until_it_was_found_out_how_far_it_goes(state):
     around = view.figure.x_range.renderers
     assert len(view.outer.data["x"]) > 3 and view.outlines[0][0] in around  # it counts
     assert all(r.glyph.line_alpha == r.glyph.fill_alpha == 0 for r, _, _ in view.outlines)
-    assert not any(p.visible for p in (view.name_of_s, view.goal, view.goal_words, view.finding))
+    assert not view.name_of_s.visible and not view.finding.visible
+    assert 0 <= view.goal.location - max(view.path.data["x"]) < 0.1
+    assert view.goal_words.text == f"no dot beyond {view.goal.location:g}"
     assert not len(view.half.data["x"])
     state.looks.fresh = False
     assert all(r.glyph.line_alpha == line for r, _, line in view.outlines)
     assert view.name_of_s.visible and view.goal.visible and view.finding.visible
+    assert view.goal_words.text.startswith("goal: ")
     assert len(view.half.data["x"]) == len(view.outer.data["x"]) - 1
 
 
