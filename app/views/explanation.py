@@ -21,9 +21,18 @@ def lead(state: AppState) -> str:
     return "" if state.seen is None else first(state.seen.summary, state.looks.tab)
 
 
-# What the packing is looked at for, by tabs, where it is not what is free.
-ASKED = {"statistics": "How does friction change how much forces vary?"}
-ASKED |= {"perturb": "How hard can you push until something moves?"}
+# What the packing is looked at for, by tabs, where it is not what is free; and what is seen of it.
+ASKED = {
+    "statistics": (
+        "How does friction change how much forces vary?",
+        "Here is a packing made with friction μ = {mu:g}. With another friction the disks would "
+        "have come to rest in other places.",
+    ),
+    "perturb": (
+        "How hard can you push until something moves?",
+        "Thick lines are large forces: those with which the disks came to rest.",
+    ),
+}
 
 
 def first(summary: Summary, tab: str = "") -> str:
@@ -35,10 +44,13 @@ def first(summary: Summary, tab: str = "") -> str:
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
     else:
         found = f"These {n} disks never move, yet the forces between them can differ."
-        found = ASKED.get(tab, found)
-        told = f"Thick lines are large forces. <b>Balance leaves {free} numbers free</b>, so there "
-        told += f"are many {term('network', 'networks')}: sets of forces that all balance. Play "
-        told += "steps through some of them, found at random; they are no moments in time."
+        contacts, networks = summary["contacts"], term("network", "networks")
+        told = f"Thick lines are large forces. <b>Balance leaves {free} numbers free</b> (2 × "
+        told += f"{contacts} forces − {2 * contacts - free} equations), so there are many "
+        told += f"{networks}: sets of forces that all balance. Play steps through some of them, "
+        told += "found at random; they are no moments in time."
+        found, told = ASKED.get(tab, (found, told))
+        told = told.format(mu=summary["mu"]) if tab in ASKED else told
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

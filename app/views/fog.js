@@ -42,6 +42,7 @@ export class Fog {
     for (const place of this.way) g.lineTo(...space.px(place))
     g.stroke()
     g.globalAlpha = 1
-    if (look.fresh) for (const [dx, dy] of [[-34, 0], [34, 0], [0, -34], [0, 34]]) space.write(x + dx, y + dy, "?", look.edge, 22)
+    const ways = [[-40, 0], [40, 0], [0, -40], [0, 40]].slice(space.ray ? 1 : 0) // none on the goal's line
+    if (look.fresh) for (const [dx, dy] of ways) space.write(x + dx, y + dy, "?", look.edge, 22)
   }
 }

@@ -85,7 +85,7 @@ class View(TabView):
         self.what = question("Question", PUSHES, self.looks, "pushing")
         look = PRIMARY | {"margin": (4, 8), "sx": PLAIN}
         quiet = OUTLINED | {"margin": (4, 8), "sx": PLAIN}
-        self.strongest = pmui.Button(label="Or the strongest line", **quiet)
+        self.strongest = pmui.Button(label="Pick the strongest for me", **quiet)
         self.push = pmui.Button(label="Push", **look)
         self.guess = pmui.TextInput(
             label="Your guess (× mean force)", size="small", width=220, margin=(4, 8)

@@ -22,7 +22,7 @@ const OWN = {
     { ask: "from which friction on can the walls press as hard as you like?", reached: endless, done: "✓ As steep as the walls are, the wedges let them: the disk has jammed itself." },
   ],
   box: [
-    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot upwards until it stops.", largest: true, done: "✓ That large, and all is in balance." },
+    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot up, and along the edge, as high as it goes.", largest: true, done: "✓ That large, and all is in balance." },
     ONE_LEFT,
     { ask: "from which friction on can they press as hard as you like?", reached: endless, done: "✓ The disks have jammed themselves." },
   ],

@@ -50,9 +50,8 @@ export function legend(body) {
   const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   const axes = h === 2 || h > 3 ? "; green, violet: plotted on the right" : ""
-  const parts = scene.r.length === 1 ? " (pale: normal part; short: friction)" : ""
   const heads = scene.r.length > 2 ? " (a pair between two disks)" : ""
-  return `blue: contact forces${parts}${heads}${axes}${body.crowded ? "" : "; wedge: directions friction allows"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
+  return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: directions friction allows"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
 }
 
 /** Whether friction is at its limit at some contact. */
@@ -127,7 +126,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3 && now.fresh) return `${h} numbers are free. The plot shows two of the forces, green and violet: wherever you drag the red dot, the other forces change just enough to keep every disk in balance.`
+  if (h > 3 && now.fresh) return `${h} numbers are free. The plot shows two of the forces, green and violet: wherever you drag the red dot, the other forces change just enough to keep every disk in balance. Friction is at most μ times the normal force, and disks cannot pull: that sets limits.`
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""

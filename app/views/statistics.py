@@ -52,8 +52,8 @@ LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into ho
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
     "<b>Guess first.</b> In this packing (ring) the force at a contact is typically {:.2f} above "
-    "or below its average, from network to network (forces in units of the mean force). With other "
-    "friction the disks come to rest otherwise. <b>How do forces vary then?</b> Draw it, or pick:"
+    "or below its average, from network to network (forces in units of the mean force). For each "
+    "friction the disks are packed anew. <b>How do forces vary then?</b> Draw it, or pick:"
 )
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
 STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:100%;display:block"
@@ -61,8 +61,8 @@ STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:10
  stroke="currentColor" font-size="12">
  <path d="M10 34H510" stroke-opacity="0.4"/><g fill="{dots}" stroke="none">{points}</g>
  <path d="M{low:.0f} 14V8H{high:.0f}V14" stroke="{mark}" stroke-width="2"/>
- <g fill="currentColor" stroke="none"><text x="10" y="54">0</text>
- <text x="{middle:.0f}" y="54" text-anchor="middle">one contact’s force in {count} networks</text>
+ <g fill="currentColor" stroke="none">{ticks}
+ <text x="10" y="15">one contact’s force in {count} networks</text>
  <text x="{beside:.0f}" y="15" fill="{mark}">± {spread:.2f}</text></g></svg>"""
 SHOW = "Show the curve"
 DRAWN_FIRST = "The grey line is your guess. "
@@ -377,7 +377,11 @@ def _strip(replay: Replay) -> str:
         f'<circle cx="{10 + scale * f:.1f}" cy="{y:.1f}" r="2"/>'
         for f, y in zip(forces, heights, strict=True)
     )
+    ticks = "".join(
+        f'<text x="{10 + scale * at:.0f}" y="55" text-anchor="middle">{at:g}</text>'
+        for at in np.arange(0, 500 / scale, 0.5)
+    )
     return STRIP.format(
-        points=points, low=low, high=high, middle=10 + scale * mean, beside=high + 8,
-        count=len(forces), spread=typical, dots=STATES, mark=DOT,
+        points=points, low=low, high=high, beside=high + 8, count=len(forces), spread=typical,
+        ticks=ticks, dots=STATES, mark=DOT,
     )  # fmt: skip
