@@ -330,11 +330,11 @@ def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
 def test_who_is_new_finds_out_how_far_networks_go(visit):
     """Force space without its outline, and one bar without its ends, until a force was dragged."""
     page = visit(AT + "&tab=plane", first=True)
-    page.locator(".turn").get_by_text("how far out can you take the red dot?").wait_for()
-    page.wait_for_function(f"() => {MODEL}('outer').get_length() > 0")
+    page.locator(".turn").get_by_text("How far can you take it?").wait_for()
+    page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 0")
     assert not page.get_by_text("halfway").filter(visible=True).count()
     page.get_by_role("tab", name="How far?").click()
-    page.wait_for_function(f"() => {MODEL}('bars').get_length() === 1")
+    page.wait_for_function(f"() => {MODEL}('bars')?.get_length() === 1")
     page.locator("button.all").click()
     page.wait_for_function(f"() => {MODEL}('bars').get_length() > 8")
     page.get_by_role("tab", name="Force space").click()
@@ -354,7 +354,7 @@ def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     scene(page, "scene.hand.player.model.guess = true")
     guess = page.get_by_role("button", name="It rises, then falls")
     guess.wait_for()
-    page.locator(".turn").get_by_text("Pick your guess").wait_for()
+    page.locator(".turn").get_by_text("how does friction change").wait_for()
     assert not page.locator(".hill").filter(visible=True).count()  # it would give it away
     plot = page.locator("canvas").filter(visible=True).last.bounding_box()
     at = [

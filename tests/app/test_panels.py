@@ -9,7 +9,7 @@ import xarray as xr
 import zarr
 from bokeh.document import Document
 from bokeh.io.doc import patch_curdoc
-from bokeh.models import CustomJS, Scatter
+from bokeh.models import CustomJS, FreehandDrawTool, Scatter
 from packings import REFERENCE, packed, skewed
 from panel.pane import Bokeh
 from PIL import Image
@@ -366,10 +366,12 @@ def test_the_curve_over_friction_is_hidden_until_it_was_guessed(state):
     fig = view.plots.objects[0].object
 
     def seen():
-        return [r.visible for r in fig.renderers if r.name != "own"]
+        return [r.visible for r in fig.renderers if r.name not in ("own", "guess", "draw")]
 
-    (ring,) = fig.select(name="own")
-    assert ring.visible and not any(seen()) and not fig.select(name="peak")[0].visible
+    ring, guess, asked = (fig.select(name=name)[0] for name in ("own", "guess", "draw"))
+    assert ring.visible and guess.visible and asked.visible
+    assert not any(seen()) and not fig.select(name="peak")[0].visible
+    assert isinstance(fig.toolbar.active_drag, FreehandDrawTool) and "<svg" in view.lead.object
     assert view.guesses.visible and not view.more.visible and "at friction" not in view.lead.object
     view.what.value = "scatter"  # another figure asks for nothing
     assert not view.guesses.visible and view.lead.object
@@ -378,6 +380,8 @@ def test_the_curve_over_friction_is_hidden_until_it_was_guessed(state):
     fig = view.plots.objects[0].object
     assert view.guesses.visible and not any(seen())
     view.guesses.objects[2].clicks += 1  # it rises, then falls
+    guess, asked = (fig.select(name=name)[0] for name in ("guess", "draw"))
+    assert guess.visible and not asked.visible and fig.toolbar.active_drag == "auto"
     assert all(seen()) and fig.select(name="peak")[0].visible
     assert not view.guesses.visible and view.more.visible and not state.looks.guess
     assert view.lead.object.startswith("Well guessed.") and "at friction" in view.lead.object
