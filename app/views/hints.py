@@ -22,7 +22,7 @@ LABELS = {
     "Colour": "mobilisation",
     "Width": "fn",
     "Strong and undetermined contacts": "overlay",
-    "fₙ as packed": "original",
+    "force as packed": "original",
     "ΔFₙ of all networks": "seen",
     "exact ΔFₙ": "exact",
     "place as packed in its interval": "place",

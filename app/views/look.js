@@ -101,7 +101,7 @@ export class Look {
       ["normal force fₙ, mean = 1", n.toFixed(3)],
       ["tangential force fₜ", t.toFixed(3)],
       ["fₜ/(μ fₙ)", this.mobilised(n, t)?.toFixed(2) ?? "–"],
-      ["fₙ as packed", walk.normal[c].toFixed(3)],
+      ["force as packed", walk.normal[c].toFixed(3)],
     ]
     if (seen) rows.push(["fₙ seen", told(low[c], high[c])])
     if (exact) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])

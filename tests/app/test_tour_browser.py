@@ -213,6 +213,7 @@ def hint(page):
 
 def test_words_explain_themselves_on_hover_focus_and_touch(visit):
     page = visit("?mu=0.1&n=30&states=30&relax=nearest", reduced_motion="reduce")
+    page.get_by_role("button", name="More controls").click()
     page.get_by_text("In numbers").click()
     tile = page.locator(".tile[data-term=h]")
     tile.hover()
@@ -232,6 +233,7 @@ def test_a_finger_on_a_word_explains_it(visit):
     page = visit(
         "?mu=0.1&n=30&states=30&relax=nearest", 390, 844, has_touch=True, reduced_motion="reduce"
     )
+    page.get_by_role("button", name="More controls").tap()
     page.get_by_text("In numbers").tap()
     page.locator(".tile[data-term=eta1]").tap()
     hint(page).get_by_text(TERMS["eta1"].sentence).wait_for()
