@@ -12,20 +12,23 @@ export function openMoving(player) {
   if (model.frame || model.between || model.predict || player.pushes) return // a link that shows one moment
   buttons.part("speed").value = SLOW
   buttons.tellRate()
+  let rests = null // the timer by which it comes to rest
   const again = setInterval(() => {
     if (!player.scene.root.isConnected || player.playing || !player.replay || !model.walk) return
     player.show(0, false)
     player.play(true)
+    if (player.opens) rests ??= setTimeout(() => end(() => player.pause(player.replay)), FIRST_MS)
   }, AGAIN_MS)
 
   player.opens = player.later.waits
-  if (player.opens) setTimeout(() => { if (player.opens) end(() => player.pause(player.replay)) }, FIRST_MS)
 
   function end(stop) {
     clearInterval(again)
+    clearTimeout(rests)
     for (const name of HEARD) window.removeEventListener(name, touched, true)
     player.opens = false
     if (player.playing) stop()
+    else player.mark()
   }
 
   /** The button and Space, which pause, do it themselves. */

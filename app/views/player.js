@@ -189,7 +189,9 @@ class Player {
     const { model, plots, replay } = this
     this.told = now
     if (model.tab === "intervals") plots.show(replay, model.scale)
+    const invited = plots.invites
     plots.invite(this.points && !this.opens && !this.took && !this.grows && replay.walk.free > 0)
+    if (plots.invites !== invited) this.mark() // what can be dragged is said above the packing, too
     plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
     this.buttons.read(replay)
     for (const listener of this.listeners) listener()

@@ -356,6 +356,9 @@ def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     guess.wait_for()
     page.locator(".turn").get_by_text("how does friction change").wait_for()
     assert not page.locator(".hill").filter(visible=True).count()  # it would give it away
+    models = "[...Bokeh.documents[0].all_models]"
+    pencil = "model => model.type === 'FreehandDrawTool' && model.active"
+    page.wait_for_function(f"() => {models}.some({pencil})")
     plot = page.locator("canvas").filter(visible=True).last.bounding_box()
     at = [
         (plot["x"] + part * plot["width"], plot["y"] + 0.5 * plot["height"]) for part in (0.3, 0.7)

@@ -164,11 +164,13 @@ def test_the_tour_offers_all_that_it_speaks_of(visit):
     scrub.filter(visible=True).wait_for()  # that beside Play
 
 
-# The page opens moving
+# The page opens moving: of a link that shows something of its own, until it is touched
+
+SHOWS = "?mu=0.1&n=30&states=30&relax=nearest&drawn=all"
 
 
 def test_the_page_plays_slowly_until_it_is_touched(visit):
-    page = visit("?mu=0.1&n=30&states=30&relax=nearest")
+    page = visit(SHOWS)
     plays(page)
     assert page.locator(".rate").inner_text() == "1.0 /s"
     page.locator(".lead").click()
@@ -178,7 +180,7 @@ def test_the_page_plays_slowly_until_it_is_touched(visit):
 
 @pytest.mark.parametrize("action", ["button", "space"])
 def test_what_pauses_does_not_start_again(visit, action):
-    page = visit("?mu=0.1&n=30&states=30&relax=nearest")
+    page = visit(SHOWS)
     plays(page)
     if action == "button":
         page.locator("button.play").click()
