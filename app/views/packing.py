@@ -46,7 +46,7 @@ BAR = (
     """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
 )
 # What the legend says in place of the words to choose by.
-DEFINED = {"change": "stronger or weaker than when the disks came to rest"}
+DEFINED = {"change": "stronger or weaker than as packed"}
 DOT = """<svg width="12" height="12">
  <circle cx="6" cy="6" r="4" fill="{fill}" stroke="{line}" stroke-width="1.5"/></svg> {text}"""
 

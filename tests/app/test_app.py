@@ -576,7 +576,7 @@ def test_another_friction_is_packed_as_is_usual_there(state):
 
 def test_the_legend_says_what_colours_mean_in_the_hand(state):
     view = PackingView(state)
-    assert "stronger or weaker than when the disks came to rest" in view.player.legend
+    assert "stronger or weaker than as packed" in view.player.legend
     view.player.pulled = True
     assert "change by what was pulled" in view.player.legend
 
