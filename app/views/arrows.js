@@ -8,7 +8,7 @@ import { circle, line } from "./pen.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
-const NAMED = 3 // disks, or contacts, up to which the forces on a single disk have their names beside them
+const NAMED = 3 // disks, and contacts of a single one, up to which the parts of forces are drawn that numbers tell
 
 /** Whether a scene is so much higher than wide that it needs a picture like that. */
 export function tall({ name, x, box }) {
@@ -229,18 +229,13 @@ export class Arrows {
       return
     }
     const force = [0, 1].map((k) => normal * inward[k] + tangential * across[k])
-    if (body.scene.r.length === 1 && body.count <= NAMED) { // what its numbers tell: both parts
+    const own = this.axisColour(contact), named = body.scene.r.length === 1 && body.count <= NAMED
+    if (named || (own && body.scene.r.length <= NAMED)) { // the part that its number tells
       g.globalAlpha = 0.45
-      this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
-      g.globalAlpha = 1
-      this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
-    }
-    const own = this.axisColour(contact)
-    if (own && body.scene.r.length <= NAMED) { // what its number tells
-      g.globalAlpha = 0.45
-      this.arrow(px, py, inward.map((v) => v * normal), own, 1.5)
+      this.arrow(px, py, inward.map((v) => v * normal), own ?? look.cold, 1.5)
       g.globalAlpha = 1
     }
+    if (named) this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     const colour = lit ? look.hand : slides ? look.warm : own ?? look.cold, thick = lit || own ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)
     if (!copy) return

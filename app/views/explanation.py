@@ -42,6 +42,9 @@ def first(summary: Summary, tab: str = "") -> str:
         found = f"These {n} disks never move, and the forces between them are fixed."
         told = f"No number is free: there is just one {term('network', 'force network')}."
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
+    elif tab in ASKED:
+        found, told = ASKED[tab]
+        told = told.format(mu=summary["mu"])
     else:
         found = f"These {n} disks never move, yet the forces between them can differ."
         contacts, networks = summary["contacts"], term("network", "networks")
@@ -49,8 +52,6 @@ def first(summary: Summary, tab: str = "") -> str:
         told += f"{contacts} forces − {2 * contacts - free} equations), so there are many "
         told += f"{networks}: sets of forces that all balance. Play steps through some of them, "
         told += "found at random; they are no moments in time."
-        found, told = ASKED.get(tab, (found, told))
-        told = told.format(mu=summary["mu"]) if tab in ASKED else told
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

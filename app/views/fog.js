@@ -12,7 +12,9 @@ export class Fog {
     const { body } = space, at = space.flat(body.u)
     if (this.of !== body.axes || this.mu !== body.mu) Object.assign(this, { of: body.axes, mu: body.mu, ends: [at[0], at[0]], way: [], sides: new Set() })
     this.ends = [Math.min(this.ends[0], at[0]), Math.max(this.ends[1], at[0])]
-    this.way = [...this.way.slice(1 - LONGEST), at]
+    const before = this.way.at(-1)
+    if (!before || at.some((v, k) => v !== before[k])) this.way.push(at)
+    if (this.way.length > LONGEST) this.way.shift()
     this.at = space.px(at)
   }
 

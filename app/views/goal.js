@@ -18,12 +18,12 @@ export function shadeGoal(space, places) {
 
 /** Corners in pixels of the part of the picture beyond the goal; null without one. */
 function beyond(space) {
-  const { easel: { wide, high }, ray, goal, below } = space
+  const { easel: { wide, high }, ray, goal } = space
   if (ray) {
     const [a, b] = [0, 1].map((across) => space.px([across, across * ray])), slope = (b[0] - a[0]) / (b[1] - a[1])
     return [[0, 0], ...[0, high].map((y) => [a[0] + slope * (y - a[1]), y]), [0, high]]
   }
   if (goal === undefined) return null
-  const [y] = space.px([0, goal]).slice(1), end = below ? high : 0
-  return [[0, y], [wide, y], [wide, end], [0, end]]
+  const [, y] = space.px([0, goal])
+  return [[0, y], [wide, y], [wide, high], [0, high]]
 }

@@ -49,7 +49,6 @@ export class Invitation {
 
   /** What the green force is to reach; 0 where it is there, and in other planes. */
   get target() {
-    if (this.player.model.fresh) return 0
     const { plots: { plane }, replay } = this.player, [green] = plane.pair ?? []
     return green !== undefined && plane.goal > replay.mixed.normal[green] ? plane.goal : 0
   }

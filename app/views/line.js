@@ -101,7 +101,7 @@ function drawGoal(space, x, at, d) {
   line(g, ...[at, far].map((end) => (d ? [end, x] : [x, end])))
   g.setLineDash([])
   const [px, py] = d ? [far - 46, x - 12] : [x, far - 10]
-  space.write(px, py, space.goalWords, look.hand, 13)
+  space.write(px, py, `goal: below ${space.goal}`, look.hand, 13)
   for (const place of [[px, py], d ? [far, x] : [x, far + 30]]) space.free(place, 60, 24)
 }
 

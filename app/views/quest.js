@@ -12,8 +12,8 @@ const endless = (body) => !body.empty && !body.bounded
 const ONE_LEFT = { ask: "at which friction is just one set of forces left?", reached: single, done: "✓ Without friction everything is determined." }
 
 /**
- * By scenes, what is asked: how large a normal force can get; from which one on, or below which, or how many
- * times the other axis' force, whether or not S hides in fog meanwhile; or what is to become of S. of: what that force's name begins with, as axes depend on friction.
+ * By scenes, what is asked: how large a normal force can get; below which value, or how many times the other
+ * axis' force, whether or not S hides in fog meanwhile; or what is to become of S. of: what that force's name begins with, as axes depend on friction.
  */
 const OWN = {
   groove: [
@@ -36,13 +36,11 @@ const OWN = {
 export class Quest {
   constructor(host) { this.host = host; this.begin() }
 
-  /** How many times the force across the one up is to be, or what is to be reached, in words; or undefined. */
+  /** How many times the force across the one up is to be, and below which value; undefined where nothing such is asked. */
   get times() { return this.asked?.times }
-  get goal() { return this.asked?.least ?? this.asked?.most }
+  get goal() { return this.asked?.most }
   /** Whether the answer is to be found out, not seen. */
   get fog() { return Boolean(this.asked?.largest || this.asked?.hides) }
-  get below() { return Boolean(this.asked?.most) }
-  get words() { return `goal: ${this.below ? "below" : "above"} ${this.goal}` }
 
   /** Another scene: from its first question on. */
   begin() {
@@ -62,7 +60,7 @@ export class Quest {
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : bounds?.[contact]
     const colour = axed.at(-1) === 2 * contact ? "violet " : ""
     this.look(body, contact, { colour, ends, place: space.flat(body.u), moved })
-    Object.assign(space, { ray: this.times, goal: this.goal, below: this.below, goalWords: this.words })
+    Object.assign(space, { ray: this.times, goal: this.goal })
   }
 
   /**
@@ -103,13 +101,13 @@ export class Quest {
 function reaches(step, { body, value, low, high, times }, moved) {
   if (!step) return false
   if (step.reached) return step.reached(body)
-  return moved && ((step.largest && high - value < NEAR * (high - low)) || value > step.least || value < step.most || times >= step.times)
+  return moved && ((step.largest && high - value < NEAR * (high - low)) || value < step.most || times >= step.times)
 }
 
 /** What is to be done. */
-function hint({ least, most, times, reached, how }, { low, high, times: by }) {
+function hint({ most, times, reached, how }, { low, times: by }) {
   if (reached) return SLIDE
   if (how) return how
-  if (high < least || low > most) return "Not with this friction: try another."
+  if (low > most) return "Not with this friction: try another."
   return times ? `${FIND} It is ${by.toFixed(1)} times as strong now.` : FIND
 }

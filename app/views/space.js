@@ -201,14 +201,14 @@ export class Space {
     if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
     if (this.fog && this.over) this.been.draw(this)
     this.drawPath(path)
-    const [x, y] = this.px(this.flat(body.u))
+    const at = this.flat(body.u), [x, y] = this.px(at)
     circle(g, [x, y], 8)
     g.fillStyle = look.hand
     g.fill()
     g.strokeStyle = look.paper
     g.lineWidth = 2
     g.stroke()
-    if (this.ray) this.write(x + 12, y + 18, `${(this.flat(body.u)[1] / this.flat(body.u)[0]).toFixed(1)} ×`, look.hand, 13, "left")
+    if (this.ray) this.write(x + 12, y + 18, `${(at[1] / at[0]).toFixed(1)} ×`, look.hand, 13, "left")
     const determined = !body.h || (body.whole && body.corners.length === 1)
     if (determined) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
     else if (look.fresh) this.invite(x, y)
@@ -234,8 +234,8 @@ export class Space {
 
   /** What decides how that looks which stands still while a point goes through S. */
   standing() {
-    const { body, look, dots, outline, centre, half, shadow, view, fog, ray, goal, below } = this
-    return [fog, ray, goal, below, body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
+    const { body, look, dots, outline, centre, half, shadow, view, fog, ray, goal } = this
+    return [fog, ray, goal, body.scene, body.empty, body.origin, look.dots ? dots : null, outline.points, outline.stale, ...(centre ?? []), half, shadow.join(), view.join()]
   }
 
   write(x, y, text, colour, size = 13, align = "center") {
@@ -307,10 +307,11 @@ export class Space {
     const order = [...places.keys()].sort((a, b) =>
       Math.atan2(places[a][1] - middle[1], places[a][0] - middle[0]) - Math.atan2(places[b][1] - middle[1], places[b][0] - middle[0]))
     if (!this.fog) {
-      polygon(g, order.map((k) => places[k]))
+      const around = order.map((k) => places[k])
+      polygon(g, around)
       g.fillStyle = look.shade
       g.fill()
-      shadeGoal(this, order.map((k) => places[k]))
+      shadeGoal(this, around)
     }
     const size = (side) => { const [a, b] = [side.corners[0], side.corners.at(-1)].map((k) => places[k]); return Math.hypot(a[0] - b[0], a[1] - b[1]) }
     for (const side of [...body.sides].sort((one, other) => size(other) - size(one))) {
@@ -330,12 +331,12 @@ export class Space {
       // Words beside it, in short lines, where they could not be read along it, or are longer than it is.
       const upright = Math.abs(uy) < 0.64 || (Math.abs(ux) > 0.5 && 0.6 * g.measureText(text).width > long)
       const short = g.measureText(text).width <= (upright ? BESIDE[2][0] - 20 : long - 8)
-      const words = short ? text : text.replace(/ (at|between) /, "\n$1 ").replace(upright ? /^(disk \d+) / : /^$/, "$1\n")
+      const inLines = (beside) => text.replace(/ (at|between) /, "\n$1 ").replace(beside ? /^(disk \d+) / : /^$/, "$1\n")
+      const words = short ? text : inLines(upright)
       const on = side.cap ? ON : 0
-      if (long <= 14 && !lit) { /* no room */ }
-      else if (!this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright) && !upright) {
-        const way = Math.sign(x - middle[0]) || 1 // beside it, where there is none along it
-        this.besides(x + (way * long) / 2, y + 28, way, 0, text.replace(/ (at|between) /, "\n$1 ").replace(/^(disk \d+) /, "$1\n"), lit, false)
+      if ((long > 14 || lit) && !this.besides(x + on * ux, y + on * uy, ux, uy, words, lit, !upright) && !upright) {
+        const way = Math.sign(x - middle[0]) || 1 // beside it, where there is no room along it
+        this.besides(x + (way * long) / 2, y + 28, way, 0, inLines(true), lit, false)
       }
       this.labels.push({ side, a, b, reach: 14 })
     }
