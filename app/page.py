@@ -105,7 +105,10 @@ TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
     "export": ("Export", export.View),
 }
 
-TAB = {"& .MuiTab-root": {"minWidth": 0, "padding": "12px 8px", **PLAIN}}
+TAB = {
+    "& .MuiTab-root": {"minWidth": 0, "padding": "12px 8px", **PLAIN},
+    "& .MuiTab-root:nth-of-type(n+5)": {"visibility": "var(--unseen, visible)"},  # see later.js
+}
 # The same with the tab of force space hidden, which has a place of its own on a wide screen.
 TAB_LESS = TAB | {"& .MuiTab-root:nth-of-type(3)": {"display": "none"}}
 GROWING = ("intervals", "plane")  # what shows a walk while it is computed

@@ -30,7 +30,8 @@ ASKED = {
     ),
     "perturb": (
         "How hard can you push until something moves?",
-        "Thick lines are large forces: those with which the disks came to rest.",
+        "Each line is the force between two touching disks, as they came to rest: the thicker, "
+        "the stronger.",
     ),
 }
 
@@ -47,11 +48,10 @@ def first(summary: Summary, tab: str = "") -> str:
         told = told.format(mu=summary["mu"])
     else:
         found = f"These {n} disks never move, yet the forces between them can differ."
-        contacts, networks = summary["contacts"], term("network", "networks")
-        told = f"Thick lines are large forces. <b>Balance leaves {free} numbers free</b> (2 × "
-        told += f"{contacts} forces − {2 * contacts - free} equations), so there are many "
-        told += f"{networks}: sets of forces that all balance. Play steps through some of them, "
-        told += "found at random; they are no moments in time."
+        told = "Each line is the force between two touching disks: the thicker, the stronger. "
+        told += f"<b>Balance leaves {free} numbers free</b>, so countless sets of forces, "
+        told += f"{term('network', 'networks')}, hold the very same disks. Play goes through some, "
+        told += "found at random: alternatives, not moments in time."
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

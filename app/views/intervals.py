@@ -30,7 +30,7 @@ APART = 100  # bars up to which there is room between them, and for large dots
 GOAL = "goal {:g} →"
 ALONE = "the line marked in the packing, one of {} contacts"
 CORNER = "possible: exact; seen: in the networks so far"
-CORNER_ALONE = "seen: in the networks so far"
+CORNER_ALONE = "blue: values so far; red: now"
 AROUND = 4.0  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
@@ -182,6 +182,7 @@ class View(TabView):
         around = AROUND * self.alone
         _set_range(self.figure.x_range, -around, len(contacts) + 1 + around)
         self.packed_item.visible = not self.alone  # a line through all bars
+        self.figure.legend[0].visible = not self.alone
         self.figure.xgrid.visible = not self.alone
         self.corner.text = CORNER_ALONE if self.alone else CORNER
         ends = [replay.low[contacts[0], 0], replay.high[contacts[0], 0]] if self.alone else []

@@ -23,7 +23,7 @@ export class Later {
 
   tell() {
     const { style } = document.documentElement
-    for (const [name, value] of [["--later", "none"], ["--sooner", "inline-block"]]) {
+    for (const [name, value] of [["--later", "none"], ["--unseen", "hidden"], ["--sooner", "inline-block"]]) {
       if (this.waits) style.setProperty(name, value)
       else style.removeProperty(name)
     }

@@ -8,12 +8,14 @@ const THIN = 0.15 // of its width, a chain that a filter leaves out
 const DIM = 0.35 // chains under the marks of Fig. 5
 
 export class Look {
-  constructor(model, walk) {
+  /** quiet: whether colours wait for the first pull, which explains them. */
+  constructor(model, walk, quiet = false) {
     this.model = model
     this.walk = walk
     this.scales = plain(model.scales)
     this.only = null // 1 for each contact that a filter leaves, or null
     this.before = null // fₙ before the pull whose changes are coloured
+    this.quiet = quiet
     this.plain = false // whether colours would give something away, see difference.js
     this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
     this.strong = largest(walk.normal.subarray(0, walk.contacts))
@@ -46,7 +48,7 @@ export class Look {
       const value = this.thickness(c, mixed)
       style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
     }
-    const told = !this.plain && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
+    const told = !this.plain && (this.before || !this.quiet) && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
       (colour !== "deviation" || this.measured)
     style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
     const last = style.colours.length - 1

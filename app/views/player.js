@@ -12,6 +12,7 @@ import { Look } from "./look.js"
 import { plain } from "./plain.js"
 import { Later } from "./later.js"
 import { knows, remember } from "./memory.js"
+import { Near } from "./near.js"
 import { openMoving } from "./opening.js"
 import { Pins } from "./pins.js"
 import { Plots } from "./plots.js"
@@ -24,6 +25,7 @@ import { Sway } from "./sway.js"
 
 // What a link may hold that opens a page as it is at first.
 const PLAIN = ["scene", "mu", "n", "seed", "states", "source", "relax", "packed_mu", "tab", "dark"]
+const UNASKED = ["upload", "export"] // tabs that come later to somebody new
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
@@ -61,6 +63,7 @@ class Player {
     this.hand = this.scene.hand = new Grab(this, tell)
     this.pins = new Pins(model)
     this.later = new Later("network", this.buttons.part("all"), shown())
+    this.near = new Near(this)
     this.tell = tell
     this.listeners = new Set() // functions to be called when other numbers are on screen
     this.invite = new Invitation(this)
@@ -101,7 +104,7 @@ class Player {
     const view = this.live.leave(), place = this.grownInto(walk)
     this.playing = false
     this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
-    this.look = new Look(model, this.replay.walk)
+    this.look = new Look(model, this.replay.walk, this.later.waits)
     this.hand.settle()
     this.tellHeld(false)
     scene.mixed = this.replay.mixed
@@ -113,6 +116,7 @@ class Player {
     this.tellAsked()
     scene.show(this.replay.walk)
     if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
+    else scene.view = this.near.view ?? scene.view
     this.split.show()
     scene.resize()
     scene.repaint()
@@ -211,7 +215,7 @@ class Player {
   /** Where the view has come to rest, for links. */
   tellView() {
     const { scene, model } = this, { x, y, half } = scene.view, key = `${x},${y},${half}`
-    if (key === this.viewed || scene.frozen) return
+    if (key === this.viewed || scene.frozen || this.later.waits) return
     this.viewed = key
     clearTimeout(this.looking)
     this.looking = setTimeout(() => {
@@ -360,7 +364,11 @@ class Player {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
-      tab: loaded((replay) => { if (this.pushes && this.playing && this.resting === null) this.pause(replay) }),
+      tab: loaded((replay) => {
+        if (this.pushes && this.playing && this.resting === null) this.pause(replay)
+        this.mark()
+        this.near.show()
+      }),
       lead: () => { buttons.part("lead").innerHTML = model.lead },
       legend: () => { buttons.part("legend").innerHTML = model.legend },
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
@@ -371,7 +379,7 @@ class Player {
       displacement: () => this.sway.take(model.displacement),
       twin: () => this.split.take(),
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
-      plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.again() },
+      plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.near.show(); this.again() },
       loads: loaded(() => { this.look.measure(); this.again() }),
       measured: loaded(() => { this.look.measure(); this.again() }),
       gone: loaded(() => { this.look.measure(); this.again() }),
@@ -399,7 +407,10 @@ class Player {
 }
 
 /** Whether the page was opened by a link that shows something of its own. */
-function shown() { return [...new URLSearchParams(location.search).keys()].some((name) => !PLAIN.includes(name)) }
+function shown() {
+  const asked = new URLSearchParams(location.search)
+  return UNASKED.includes(asked.get("tab")) || [...asked.keys()].some((name) => !PLAIN.includes(name))
+}
 
 export function render({ model, view }) {
   const page = view.model.document, tell = (message) => ask(model, view, message)

@@ -1,0 +1,43 @@
+// Who is new sees at first a few disks, around what is to be dragged, and forces without colour. When the
+// hand lets go, the view goes out to the whole packing, where colours show what has changed, and where.
+
+const AROUND = 6.5 // half width of what is seen, in largest radii
+const MARGIN = 3 // around two lines that are seen at once, in largest radii
+
+export class Near {
+  constructor(player) {
+    this.player = player
+    player.later.listeners.push(() => {
+      if (player.look) player.look.quiet = false
+      this.go(player.scene.whole)
+      player.again()
+    })
+  }
+
+  /** The view that a newcomer begins with, or null. */
+  get view() {
+    const { player: { scene, later, replay } } = this
+    if (!later.waits || !(replay?.walk.inviting >= 0)) return null
+    const places = scene.pair.length ? scene.pair.map((contact) => scene.geometry.contact.indexOf(contact)) : [replay.walk.inviting]
+    const ends = places.map((k) => scene.ends(k)), { whole } = scene
+    const [x, y] = [0, 1].map((d) => ends.flatMap((end) => [end[d], end[d + 2]]))
+    const [left, right, low, high] = [Math.min(...x), Math.max(...x), Math.min(...y), Math.max(...y)]
+    const unit = Math.max(...scene.geometry.radius)
+    const half = Math.max(AROUND * unit, Math.max(right - left, high - low) / 2 + MARGIN * unit)
+    return half < whole.half ? { x: (left + right) / 2, y: (low + high) / 2, half } : whole
+  }
+
+  /** Another view, where another tab asks for another line. */
+  show() {
+    const { view, player: { scene, live } } = this
+    if (view && !live.moves) this.go(view)
+  }
+
+  go(view) {
+    const { scene, live } = this.player, from = scene.view
+    if (!from || live.moves) return
+    scene.view = view
+    scene.changed()
+    live.glide(from)
+  }
+}
