@@ -75,6 +75,8 @@ _HOME = {
     "Protocol": "perturb.critical_force",
     "response": "perturb.critical_force",
     "Response": "perturb.critical_force",
+    "loaded_networks": "perturb.loaded",
+    "Loaded": "perturb.loaded",
     "load_packing": "packing.importers",
     "save_packing": "packing.importers",
     "read_known": "packing.importers",

@@ -70,6 +70,8 @@ from granforce.perturb.critical_force import Response as Response
 from granforce.perturb.critical_force import critical_force as critical_force
 from granforce.perturb.critical_force import critical_forces as critical_forces
 from granforce.perturb.critical_force import response as response
+from granforce.perturb.loaded import Loaded as Loaded
+from granforce.perturb.loaded import loaded_networks as loaded_networks
 from granforce.records import Cancelled as Cancelled
 from granforce.records import Cell as Cell
 from granforce.records import Contacts as Contacts

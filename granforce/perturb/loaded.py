@@ -1,0 +1,71 @@
+"""Networks under a force pair that pushes the two grains of one contact apart.
+
+The pair ±F counts in the balance of the grains, and in the pressure, like a normal force of the
+contact c itself, but not in its Coulomb cone: A (f + F e_c) = b. So the networks under F are those
+of the same cones with b − F A e_c in place of b, and what is nearest to a given network among them
+is found as in S (`forces.nearest`). The pairs (f, F) form a convex set: between two networks under
+two loads the straight line is admissible under the load in between.
+
+Such a network exists up to the limit load. Grains may set off before (`critical_force`).
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from granforce.forces.ensemble import Ensemble
+from granforce.forces.nearest import some_network, starting_network
+from granforce.records import Cancel, Floats, InputError, float_array
+from granforce.system import cancelling
+
+
+class Loaded(NamedTuple):
+    """Networks under loads that push the grains of one contact apart."""
+
+    contact: int  # its number in the packing
+    loads: Floats  # (k,) force
+    states: Floats  # (k, N_c, 2) networks, force; without the load
+    residual: Floats  # (k,) unbalance with the load, in ⟨f_n⟩, by Ensemble.residual
+    violation: Floats  # (k,) in ⟨f_n⟩, by Ensemble.violation
+
+
+@cancelling.cancellable
+def loaded_networks(
+    ensemble: Ensemble,
+    contact: int,
+    loads: npt.ArrayLike,
+    state: Floats | None = None,
+    *,
+    cancel: Cancel | None = None,
+) -> Loaded:
+    """The networks nearest to `state` that balance force pairs on one contact; a Loaded.
+
+    contact: its number in the packing. loads (k,), force, positive where they push its grains
+    apart. state (N_c, 2), force: by default the original network. Nearest: the least
+    Σ |F_c − F_state,c|². cancel() returning True raises Cancelled.
+
+    Raises InputError for a contact that carries nothing, and for a load under which no network was
+    found (above the limit load there is none).
+    """
+    (position,) = ensemble.positions([contact])
+    loads = float_array(np.atleast_1d(loads), (-1,), "loads")
+    if state is None:
+        state = starting_network(ensemble)
+    state = float_array(state, (len(ensemble.index), 2), "state")
+    pair = np.zeros_like(state)
+    pair[position, 0] = 1.0
+    turned = ensemble.A @ ensemble.to_vector(pair)
+    states = np.empty((len(loads), *state.shape))
+    for k, load in enumerate(loads):
+        cancelling.check()
+        under = replace(ensemble, b=ensemble.b - load * turned, found=None)
+        states[k] = some_network(under, state)
+        if not under.admits(states[k]):
+            raise InputError(
+                f"no network was found that balances a pair of {load:.9g} on contact {contact}; "
+                "above its limit load there is none"
+            )
+    residual = ensemble.residual(states + loads[:, None, None] * pair)
+    return Loaded(int(contact), loads, states, residual, ensemble.violation(states))
