@@ -38,7 +38,7 @@ class Held(NamedTuple):
     residual: float
 
 
-def _puller(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
+def puller_of(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
     """The Puller of a cell's packing; given: rows of known forces, which pulls keep."""
     key = cell.name, str(given)
     with _lock:
@@ -156,13 +156,13 @@ class Hand(param.Parameterized):
         library = state.library
 
         def work(job: Job) -> tuple[Any, ...]:
-            puller = _puller(library, cell, known.rows(replay, told))
-            pulled = partial(_pulled, library, cell, replay, puller)
+            ours = puller_of(library, cell, known.rows(replay, told))
+            pulled = partial(_pulled, library, cell, replay, ours)
             held, refusal = _networks(pulled, _held(told), made, pulls, first)
             ready: Iterator[Message] = iter(())
             if grabbed is not None and not refusal:
                 last = held[-1][1] if held else first
-                ready = _to_pull(puller, replay, last, grabbed)
+                ready = _to_pull(ours, replay, last, grabbed)
             return base, held, next(ready, None), ready, refusal
 
         if pulls or grabbed is not None:

@@ -16,6 +16,7 @@ from granforce.study.responses import moved_grains
 from .compute import found_or_made
 from .data import Cell, Library, readable
 from .distributions import Row, alike, rows
+from .grabs import puller_of
 from .jobs import Job
 from .replays import Replay
 
@@ -42,6 +43,9 @@ class Pushed(NamedTuple):
     slid: int  # at which grains slide
     kept: int  # and which stick
     breach: float  # of Coulomb's law by the motion
+    loads: Floats  # (k,) from 0 to `low`
+    states: Floats  # (k, N_c, 2) networks under them, nearest to that as packed
+    residual: Floats  # (k,) of these
     displacement: Floats  # (N, 2) first motion, rms 1; 0 for rattlers
     distance: Floats  # (k,) of the backbone's grains from the contact, length
     size: Floats  # (k,) |u| of those grains
@@ -83,12 +87,16 @@ def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable
         )
         stage = "contact dynamics under a growing load"
         found = found_or_made(library, job, stage, kinds.PERTURBATION, params)
-        return _pushed(found, library.packing(cell.selection.packing), contact)
+        low = found["critical_low"].values[0].item()
+        job.begin("networks under smaller loads")
+        under = puller_of(library, cell, []).loaded(int(replay.backbone[contact]), low)
+        packing = library.packing(cell.selection.packing)
+        return _pushed(found, packing, contact, under)
 
     return work
 
 
-def _pushed(found: xr.Dataset, packing: Packing, contact: int) -> Pushed:
+def _pushed(found: xr.Dataset, packing: Packing, contact: int, under: Any) -> Pushed:
     scale = found["force_scale"].item()
 
     def force(name: str) -> float:
@@ -108,6 +116,9 @@ def _pushed(found: xr.Dataset, packing: Packing, contact: int) -> Pushed:
         slid=count("slid"),
         kept=count("kept"),
         breach=float(found["motion_breach"].values[0]),
+        loads=under.loads / scale,
+        states=under.states / scale,
+        residual=under.residual,
         displacement=np.nan_to_num(u),
         distance=distance,
         size=size,

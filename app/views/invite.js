@@ -1,5 +1,5 @@
 // The first gesture, pointed out: one strong line near the middle of the packing says that it can be dragged,
-// until one was; or clicked, where a contact is to be chosen. What there is to find out stands above,
+// until one was. What there is to find out stands above,
 // also of the point in force space, which has a tag of its own (layer.js).
 
 import { made } from "./made.js"
@@ -10,7 +10,7 @@ const DRAG = FINGER ? "tap, then drag ↕" : "drag me ↕"
 const WORDS = {
   drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
-  choose: ["click me", "<b>Your turn: how hard can two disks be pushed apart?</b> Click a line, guess, then push."],
+  push: ["", "<b>Your turn: how hard can these two disks be pushed apart?</b> Drag the slider until something moves; or click another line."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
   first: ["", "<b>Your turn: no dot has a green force above {seen}. How far can you take it?</b> Drag the red dot."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
@@ -28,13 +28,13 @@ export class Invitation {
 
   /** What can be done first, one of WORDS: nothing was dragged yet, and a line can be, or the point; or null. */
   get what() {
-    const { model, replay, live, difference, predict, points, plots, pushes, took, scene, opens } = this.player
+    const { model, replay, live, difference, predict, points, plots, pushes, pushed, took, scene, opens } = this.player
     if (opens || replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
     if (points && !plots.invites) return null
     if (points && model.fresh && plots.plane.pair?.length) return "first"
     if (points) return this.target ? "reach" : "point"
+    if (pushes) return model.pushing === "one" && !pushed.load ? "push" : null
     if ((model.contact ?? null) !== null) return null
-    if (pushes) return model.pushing === "one" ? "choose" : null
     if (took) return null
     if (model.tab !== "statistics") return model.goal && !model.fresh ? "drag" : "strong" // who is new finds out how far it goes
     if (model.figure !== "eta") return null

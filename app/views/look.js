@@ -50,7 +50,8 @@ export class Look {
     }
     const told = !this.plain && (this.before || !this.quiet) && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
       (colour !== "deviation" || this.measured)
-    style.colours = told ? palettes[this.before ? "change" : colour] : [palettes.neutral]
+    const { change, neutral } = palettes, plain = this.quiet ? change[change.length >> 1] : neutral
+    style.colours = told ? palettes[this.before ? "change" : colour] : [plain]
     const last = style.colours.length - 1
     for (let c = 0; c < style.bin.length; c++) {
       style.bin[c] = told ? Math.round(last * Math.max(0, Math.min(1, this.shade(c, mixed)))) : 0

@@ -21,6 +21,7 @@ FROM_BROWSER = {
     "FrictionSlider": ({"typed": str},),
     "Handover": ({"key": str},),  # of a file that is asked for
     "Known": ({"release": int}, {"next": True}, {"choose": int}),  # contacts; what to measure next
+    "LoadSlider": ({"push": True}, {"gave": True}),  # was moved; has come to where disks move
     "Mine": ({"open": str}, {"call": [str, str]}, {"delete": str}),  # entries; and a name
     "NumberField": ({"typed": str},),  # and is no number
     "Player": (

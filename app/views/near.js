@@ -29,7 +29,7 @@ export class Near {
 
   /** Another view, where another tab asks for another line. */
   show() {
-    const { view, player: { scene, live } } = this
+    const { view, player: { live } } = this
     if (view && !live.moves) this.go(view)
   }
 

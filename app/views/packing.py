@@ -240,7 +240,8 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
 
 def colour_words(looks: Looks, pulled: bool) -> str:
     """What colours mean just now."""
-    return "change by what was pulled" if pulled else COLOURS[looks.colour]
+    by = "the push" if looks.tab == "perturb" else "what was pulled"
+    return f"change by {by}" if pulled else COLOURS[looks.colour]
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:

@@ -1,6 +1,5 @@
 """Push the disks of a contact apart: limit load, critical force, and how the packing gives way."""
 
-import html
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -19,7 +18,8 @@ from ..replays import Replay
 from ..state import AppState
 from . import studied
 from .hints import term
-from .parts import LATER, OUTLINED, PLAIN, PRIMARY, TabView, figure, folded, note, plotted, question
+from .load import LoadSlider
+from .parts import LATER, PRIMARY, TabView, figure, folded, note, plotted, question
 from .progress import Progress
 from .style import DARK, DOT, ORIGINAL, corner, hover, legend_above
 
@@ -29,7 +29,7 @@ TILE = (
     '<div style="font-size:15px;font-variant-numeric:tabular-nums">{}</div></div>'
 )
 EXPLAINED = {  # words on tiles → keys of the glossary
-    "carries now": "fn",
+    "carries as packed": "fn",
     "gives way at": "critical_force",
     "limit load": "limit_load",
 }
@@ -56,10 +56,11 @@ LEAD = (
     "they only press less on each other; then their neighbours have to hold them. Nothing moves as "
     "long as some set of forces balances your push."
 )
-HINT = (
-    "<b>1. Click a line</b> in the packing: two touching disks.<br>"
-    "<b>2. Guess</b> how hard you must push. For scale: the mean force is 1, the largest here is "
-    "now {most:.1f}.<br><b>3. Push</b>, and watch which disks start to move."
+WHERE = (
+    "Pushed is contact {number}, marked in the packing (fainter where the box repeats); click "
+    "another line to push there. For scale: the mean force is 1, the largest here {most:.1f}. "
+    "Colours show what the push changes: orange carries more, blue less. Of all sets of forces "
+    "that balance it, those nearest to the forces as packed are shown."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
@@ -71,7 +72,7 @@ EVERY = (
 )
 Said = tuple[str, list[Figure], str, str]  # text, plots, numbers and lead
 
-LONGEST_GUESS = 12  # characters
+SCALE = 2.0  # of the largest force, up to which the slider goes at first
 UNIT = "Forces are in units of the mean normal force."
 
 
@@ -83,13 +84,8 @@ class View(TabView):
     def __init__(self, state: AppState) -> None:
         super().__init__(state, "replay", looks=["contact"])
         self.what = question("Question", PUSHES, self.looks, "pushing")
-        look = PRIMARY | {"margin": (4, 8), "sx": PLAIN}
-        quiet = OUTLINED | {"margin": (4, 8), "sx": PLAIN}
-        self.strongest = pmui.Button(label="Pick the strongest for me", **quiet)
-        self.push = pmui.Button(label="Push", **look)
-        self.guess = pmui.TextInput(
-            label="Your guess (× mean force)", size="small", width=220, margin=(4, 8)
-        )
+        self.load = LoadSlider(self._push, self._give_way)
+        self.every = pmui.Button(label="Compute for all contacts", margin=(4, 8), **PRIMARY)
         self.animate = pmui.Switch(label="animate the first motion", value=True, margin=(4, 10))
         self.numbers = pn.pane.HTML(sizing_mode="stretch_width", margin=(4, 10))
         self.plots = pn.Column(sizing_mode="stretch_width")
@@ -97,14 +93,14 @@ class View(TabView):
         self.task = state.work.task(told=False)
         self.loads: Loads | None = None
         self.pushed: Any = None  # (Pushed, contact, Replay)
+        self.gave = False  # whether the push has come to where disks move, which is not told before
         self._shown: Replay | None = None
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.what.param.watch(self.refresh, "value")
         self.animate.param.watch(self._animate, "value")
-        self.push.on_click(lambda event: self._push())
-        self.strongest.on_click(lambda event: self._take_strongest())
+        self.every.on_click(lambda event: self._find_loads())
         self.task.param.watch(self.failed, "message")
-        self.task.param.watch(lambda event: self._allow(), "running")
+        self.task.param.watch(lambda event: self.load.param.update(running=event.new), "running")
         self.looks.param.watch(self._animate, "tab")
         self.catch_up()
 
@@ -114,7 +110,8 @@ class View(TabView):
         return pn.Column(
             pn.Column(self.what, styles=LATER, **wide),
             self.lead,
-            pn.FlexBox(self.strongest, self.guess, self.push, self.animate, **wide),
+            self.load,
+            pn.FlexBox(self.every, self.animate, **wide),
             Progress(self.task),
             self.numbers,
             self.plots,
@@ -124,37 +121,38 @@ class View(TabView):
 
     def update(self) -> None:
         """Show what is chosen; what is not known yet waits for a click, but for Fig. 2."""
-        state, what, contact = self.state, self.what.value, self.looks.contact
+        state, what = self.state, self.what.value
         if state.replay is not self._shown:
             self._shown, self.loads = state.replay, None
         if self.pushed is not None and not self._holds():
             self.task.cancel()
-            self.pushed, self.guess.value = None, ""
-        one = what == "one"
-        self.push.visible = what != "store"
-        self.push.label = "Push" if one else "Compute for all contacts"
-        self.strongest.visible = one and contact is None
-        self.animate.visible = one and self.pushed is not None
-        self.guess.visible = one and self.pushed is None
-        self._allow()
+            self.pushed, self.gave = None, False
+        one, fixed = what == "one", state.replay is None or state.replay.summary["mu"] == 0
+        self.load.visible = one and not fixed
+        self.every.visible = what == "all" and not fixed
+        self.animate.visible = one and self.gave
         if state.replay is None:
             return
-        if state.replay.summary["mu"] == 0:
+        self.load.param.update(
+            contact=self.contact,
+            path={} if self.pushed is None else path(self.pushed[0]),
+            most=float(f"{SCALE * state.replay.normal[0].max(initial=0.5):.2g}"),
+        )
+        if fixed:
             self._say("", lead=ISOSTATIC)
-            self.push.visible = self.strongest.visible = self.guess.visible = False
             return
         {"one": self._one, "all": self._all, "store": self._store}[what]()
         self._animate()
 
-    def _allow(self) -> None:
-        """What needs a contact waits for one, and a push for the one before."""
-        none = self.what.value == "one" and self.looks.contact is None
-        self.guess.disabled, self.push.disabled = none, none or self.task.running
+    @property
+    def contact(self) -> int | None:
+        """What is pushed: the selected contact, or the one that is pointed out in the packing."""
+        replay, chosen = self.state.replay, self.looks.contact
+        return replay.invited if chosen is None and replay is not None else chosen
 
     def _holds(self) -> bool:
-        """Whether what was pushed is still the contact selected."""
-        contact, replay = self.pushed[1:]
-        return contact == self.looks.contact and replay is self.state.replay
+        """Whether what was pushed is still what is to be."""
+        return self.pushed[1] == self.contact and self.pushed[2] is self.state.replay
 
     def _say(
         self, text: str, plots: Iterable[Figure] = (), numbers: str = "", lead: str = ""
@@ -164,40 +162,34 @@ class View(TabView):
 
     # One contact
 
-    def _take_strongest(self) -> None:
-        self.looks.contact = int(np.argmax(self.state.replay.normal[0]))
-
     def _push(self) -> None:
-        state = self.state
-        if self.what.value == "all":
-            work = perturbations.limit_loads(state.library, state.cell)
-            self.task.start(work, self._loads_known)
-            return
-        contact, replay = self.looks.contact, state.replay
-        if contact is None or replay is None:
+        """The slider was moved: find out how far it goes."""
+        state, contact, replay = self.state, self.contact, self.state.replay
+        if contact is None or replay is None or self.what.value != "one":
             return
         work = perturbations.push(state.library, state.cell, replay, contact)
-        self.task.start(work, lambda found: self._gave_way(found, contact, replay))
+        self.task.start(work, lambda found: self._found(found, contact, replay))
 
-    def _gave_way(self, found: Pushed, contact: int, replay: Replay) -> None:
-        if contact == self.looks.contact and replay is self.state.replay:
-            self.pushed = found, contact, replay
+    def _found(self, found: Pushed, contact: int, replay: Replay) -> None:
+        if contact == self.contact and replay is self.state.replay:
+            self.pushed, self.gave = (found, contact, replay), False
             self.refresh()
 
+    def _give_way(self) -> None:
+        self.gave = self.pushed is not None
+        self.refresh()
+
     def _one(self) -> None:
-        contact, replay = self.looks.contact, self.state.replay
+        contact, replay = self.contact, self.state.replay
         drawn = LEAD + SKETCH.format(colour=DOT)
         if contact is None:
-            self._say("", lead=drawn + HINT.format(most=replay.normal[0].max()))
+            self._say("", lead=drawn)
             return
-        tiles = [("carries now", f"{replay.normal[0, contact]:.2f}")]
-        if self.pushed is None:
+        tiles = [("carries as packed", f"{replay.normal[0, contact]:.2f}")]
+        if not self.gave:
             if self.loads is not None:
                 tiles.append(("limit load", f"{self.loads.load[contact]:.2f}"))
-            where = (
-                f"Contact {replay.backbone[contact]}, marked in the packing; fainter where "
-                f"the box repeats. {UNIT}"
-            )
+            where = WHERE.format(number=replay.backbone[contact], most=replay.normal[0].max())
             self._say(where, numbers=_tiles(tiles), lead=drawn)
             return
         pushed = self.pushed[0]
@@ -207,8 +199,6 @@ class View(TabView):
             f"way:</b> {pushed.opened} of its contacts open, {pushed.slid} slide, {pushed.kept} "
             "hold. The disks set off as the packing shows."
         )
-        if self.guess.value:
-            lead += f" You guessed {html.escape(self.guess.value[:LONGEST_GUESS])}."
         text = (
             f"The {term('critical_force', 'critical force')} of contact "
             f"{replay.backbone[contact]}, with which the packing gives way, lies between "
@@ -252,11 +242,15 @@ class View(TabView):
     def _animate(self, *events: Any) -> None:
         """The first motion goes to and fro on the packing while this tab is seen."""
         shown = self.visible and self.what.value == "one" and self.animate.value
-        field = self.pushed[0].displacement if shown and self.pushed is not None else None
+        field = self.pushed[0].displacement if shown and self.gave else None
         if self.state.displacement is not field:
             self.state.displacement = field
 
     # All contacts
+
+    def _find_loads(self) -> None:
+        work = perturbations.limit_loads(self.state.library, self.state.cell)
+        self.task.start(work, self._loads_known)
 
     def _loads_known(self, found: Loads) -> None:
         self.loads = found
@@ -318,6 +312,16 @@ class View(TabView):
     def _show_store(self, found: Said) -> None:
         if self.what.value == "store":
             self._say(*found)
+
+
+def path(pushed: Pushed) -> dict[str, Any]:
+    """Networks under growing loads as the slider takes them: flat arrays, forces in ⟨f_n⟩."""
+    return {
+        "loads": pushed.loads,
+        "normal": pushed.states[..., 0].astype(np.float32).ravel(),
+        "tangential": pushed.states[..., 1].astype(np.float32).ravel(),
+        "residual": pushed.residual,
+    }
 
 
 def over_store(library: Library, cells: list[Cell], cell: Cell) -> Callable[[Job], Said]:

@@ -5,7 +5,7 @@ import { arrow, circle } from "./pen.js"
 import { plain } from "./plain.js"
 
 const PIN = 17 // px, its height
-const ARROW_PX = 34 // beyond the edge of the disk that is pushed
+const ARROW_PX = 20, GROWN_PX = 90 // beyond the edge of the disk that is pushed: at least, and more at most
 const COPY = 0.35 // opacity of the arrows at a periodic copy
 const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
 
@@ -19,7 +19,7 @@ export class Pins {
 
   draw(context, scene) {
     const { contacts = [], exact = [], ranked = [] } = this.pins
-    if (this.model.tab === "perturb" && scene.selected !== null) this.push(context, scene)
+    if (this.model.tab === "perturb") this.push(context, scene)
     if (!contacts.length && !ranked.length) return
     const held = new Map(), rank = new Map(), { ratio } = scene
     for (let k = 0; k < contacts.length; k++) held.set(contacts[k], exact[k])
@@ -34,19 +34,23 @@ export class Pins {
     context.restore()
   }
 
-  /** The two forces that push the disks of the selected contact apart; faintly at its periodic copies. */
+  /** The two forces that push the disks of a contact apart, the selected one or the one that is pointed out;
+   * faintly at its periodic copies. */
   push(context, scene) {
-    const { geometry, ratio, palette, scale } = scene, first = geometry.contact.indexOf(scene.selected)
+    const { geometry, ratio, palette, scale } = scene, { replay, pushed } = scene.hand.player
+    const contact = scene.selected ?? replay.walk.contact[replay.walk.inviting] ?? -1
+    const first = geometry.contact.indexOf(contact), arrow_px = ARROW_PX + GROWN_PX * pushed.part
+    if (scene.selected === null) scene.drawSelected(contact)
     context.save()
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
     context.lineCap = context.lineJoin = "round"
-    for (const { k, ...ends } of scene.segments((contact) => contact === scene.selected)) {
+    for (const { k, ...ends } of scene.segments((each) => each === contact)) {
       const a = scene.toPixel(...ends.a), b = scene.toPixel(...ends.b)
       const far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, u = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
       context.globalAlpha = k === first ? 1 : COPY
       context.beginPath()
       for (const [from, grain, way] of [[a, geometry.i[k], -1], [b, geometry.j[k], 1]]) {
-        const long = way * (scale * geometry.radius[grain] + ARROW_PX)
+        const long = way * (scale * geometry.radius[grain] + arrow_px)
         arrow(context, from, from.map((v, d) => v + long * u[d]), 12, 0.7)
       }
       for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {

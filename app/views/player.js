@@ -17,6 +17,7 @@ import { openMoving } from "./opening.js"
 import { Pins } from "./pins.js"
 import { Plots } from "./plots.js"
 import { Predict } from "./predict.js"
+import { Pushed } from "./pushed.js"
 import { Replay } from "./replay.js"
 import { Scene } from "./scene.js"
 import { closeSidebar } from "./sidebar.js"
@@ -78,6 +79,7 @@ class Player {
     this.predict = new Predict(this)
     this.split = new Split(this)
     this.sway = new Sway(this.scene)
+    this.pushed = new Pushed(this)
     this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
     this.scene.describe = {
       contact: (k) => this.look.contact(k, this.replay),
@@ -88,6 +90,11 @@ class Player {
 
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
   get pushes() { return this.model.tab === "perturb" }
+
+  tellPushes() {
+    this.buttons.root.classList.toggle("pushes", this.pushes)
+    if (!this.pushes) this.pushed.end()
+  }
 
   /** Whether force space has been turned to, where the point is what can be dragged first. */
   get points() { return this.model.tab === "plane" }
@@ -107,6 +114,7 @@ class Player {
     this.look = new Look(model, this.replay.walk, this.later.waits)
     this.hand.settle()
     this.tellHeld(false)
+    this.tellPushes()
     scene.mixed = this.replay.mixed
     scene.palette = plain(plain(model.palettes).scene)
     this.plots.colours = plain(plain(model.palettes).plots)
@@ -365,6 +373,7 @@ class Player {
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
       tab: loaded((replay) => {
+        this.tellPushes()
         if (this.pushes && this.playing && this.resting === null) this.pause(replay)
         this.mark()
         this.near.show()
@@ -376,7 +385,7 @@ class Player {
       live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
       busy: () => buttons.root.classList.toggle("busy", model.busy),
       walk: () => this.load(),
-      displacement: () => this.sway.take(model.displacement),
+      displacement: () => this.pushed.tellMotion(),
       twin: () => this.split.take(),
       exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
       plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.near.show(); this.again() },

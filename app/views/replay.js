@@ -106,7 +106,7 @@ export class Replay {
 
   /** Where the position is, in words. */
   get place() {
-    if (this.held) return "pulled"
+    if (this.held) return this.held.place ?? "pulled"
     const { walk, frame } = this, [a, b, portion] = this.spot
     const name = (k) => (k ? `network ${walk.number[k]}` : "that as packed")
     if (this.swinging) return `${Math.round(100 * portion)} % of the way from ${name(a)} to ${name(b)}`

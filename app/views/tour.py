@@ -53,9 +53,9 @@ STEPS = (
     ),
     (
         "Push until it gives way",
-        "Two forces push the disks of the marked contact apart until the packing gives way: press "
-        "Push to see how much load it can take, and how it begins to move. That's the tour. Try "
-        "anything.",
+        "Two forces push the disks of the marked contact apart: drag the slider, see who helps to "
+        "hold them, and find out how much load the packing can take before it begins to move. "
+        "That's the tour. Try anything.",
         "perturb",
     ),
 )

@@ -1,4 +1,5 @@
-"""Networks for whoever pulls: along the interval of a contact's f_n, or over a plane of S.
+"""Networks for whoever pulls or pushes: along the interval of a contact's f_n, over a plane of S,
+or under a growing load on a contact.
 
 Nothing is kept in a store: a rail or a fan takes some tenths of a second at 400 disks.
 """
@@ -13,6 +14,7 @@ from granforce.explore.outline import extremes
 from granforce.explore.pull import Pull, Reach, pull, reach
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
+from granforce.perturb.loaded import Loaded, loaded_networks
 from granforce.records import Floats, InputError, Mask, Packing
 from granforce.study import conditions
 
@@ -21,6 +23,7 @@ STOPS = 17  # networks along a rail
 # width) that each is found at once.
 MANY, FEW_STOPS, INWARD = 5000, 5, 1e-4
 RIBS = 48  # directions of a fan
+LOADS = 9  # on the way to the largest; between two of their networks the line balances, too
 WORKERS = 2  # threads, while somebody waits with a force in hand
 
 
@@ -88,6 +91,13 @@ class Puller:
         """
         found = pull(self._S, contact, [value], state)
         return found.states[0], float(found.residual[0])
+
+    def loaded(self, contact: int, load: float) -> Loaded:
+        """Networks under force pairs on a contact, from none to `load` (force), a few on the way.
+
+        Raises what `loaded_networks` raises.
+        """
+        return loaded_networks(self._S, contact, np.linspace(0.0, load, LOADS))
 
     def fan(self, axes: Floats) -> Fan:
         """The Fan of the plane of two axes (2, N_c, 2).

@@ -402,7 +402,7 @@ def test_every_tab_asks_what_the_hand_can_find_out(visit):
     turn = page.locator(".turn")
     for tab, words in (
         ("Friction", "at which friction do forces vary most?"),
-        ("Push", "how hard can two disks be pushed apart?"),
+        ("Push", "how hard can these two disks be pushed apart?"),
         # By the bounds, once they are known: other tests may have had them computed.
         ("How far?", re.compile("how strong can you make|can you make this force larger than")),
         ("Force space", "can you bring the green force above"),

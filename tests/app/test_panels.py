@@ -525,15 +525,18 @@ def test_unknown_keys_are_ignored(state):
 def test_a_pushed_contact_gives_way_between_its_bounds(state):
     state.looks.tab = "perturb"
     view = perturb_view.View(state)
-    assert view.strongest.visible and view.push.disabled and view.guess.disabled
-    assert "Click a line" in view.lead.object and "<svg" in view.lead.object
+    assert view.load.contact == state.replay.invited and "<svg" in view.lead.object
     assert view.lead.object.count("<circle") == 8  # two that are pushed, and those around them
-    press(view.strongest)
-    assert state.looks.contact == int(np.argmax(state.replay.normal[0])) and not view.push.disabled
-    press(view.push)
+    state.looks.contact = 5
+    assert view.load.contact == 5 and not view.load.path
+    view.load.hear({"push": True})
     wait_for(state, lambda: view.pushed is not None)
     pushed = view.pushed[0]
     assert 0 < pushed.low <= pushed.high <= pushed.limit + 0.02
+    # What it bears is found out by the slider, and not told before.
+    assert not view.plots.objects and state.displacement is None
+    assert f"{pushed.low:.2f}" not in view.numbers.object
+    view.load.hear({"gave": True})
     backbone = int((state.replay.disks.contacts[~state.replay.disks.image] > 0).sum())
     assert len(pushed.size) == backbone
     assert np.sqrt(np.mean(pushed.size**2)) == pytest.approx(1)
@@ -543,12 +546,25 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
     assert f"{pushed.low:.2f}" in view.numbers.object and f"{pushed.low:.3f}" in view.told.object
 
 
+def test_the_slider_of_a_push_has_networks_in_balance_from_none_to_the_critical_force(state):
+    view = pushed(state)
+    path, replay, low = view.load.path, state.replay, view.pushed[0].low
+    count = len(path["loads"])
+    assert path["loads"][0] == 0 and path["loads"][-1] == pytest.approx(low)
+    normal = path["normal"].reshape(count, -1)
+    assert np.allclose(normal[0], replay.normal[0], atol=1e-6)
+    tangential = path["tangential"].reshape(count, -1)
+    assert np.all(abs(tangential) <= replay.summary["mu"] * normal + 1e-6)
+    assert np.all(path["residual"] <= 1e-10)
+
+
 def pushed(state):
-    """The view of a push on a contact, with its result."""
+    """The view of a push on a contact that has come to where disks move."""
     state.looks.contact, state.looks.tab = 3, "perturb"
     view = perturb_view.View(state)
-    press(view.push)
+    view.load.hear({"push": True})
     wait_for(state, lambda: view.pushed is not None)
+    view.load.hear({"gave": True})
     return view
 
 
@@ -571,7 +587,7 @@ def test_limit_loads_of_all_contacts_bound_the_one_pushed(state):
     view = pushed(state)
     view.what.value = "all"
     assert not view.plots.objects
-    press(view.push)
+    press(view.every)
     wait_for(state, lambda: view.loads is not None)
     assert view.loads.load[3] == pytest.approx(view.pushed[0].limit, abs=1e-6)
     view.plots.objects[0].object.renderers[0].data_source.selected.indices = [8]
@@ -583,7 +599,7 @@ def test_nothing_is_pushed_without_friction(state):
     wait_for(state, lambda: state.cell.mu == 0)
     state.looks.contact, state.looks.tab = 3, "perturb"
     view = perturb_view.View(state)
-    assert not view.push.visible and "isostatic" in view.lead.object
+    assert not view.load.visible and "isostatic" in view.lead.object
 
 
 def test_figure_2_takes_what_the_stores_hold(state):

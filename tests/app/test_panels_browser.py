@@ -147,7 +147,7 @@ def test_statistics_by_night_on_a_narrow_screen(visit):
 def test_a_contact_is_pushed_and_its_field_seen(visit):
     page = visit("?tab=perturb&contact=5")
     before = scene(page, "scene.offset")
-    page.get_by_role("button", name="Push", exact=True).click()
+    page.get_by_role("button", name="Push until something moves").click()
     page.get_by_text("the packing gives way:").wait_for()
     assert before is None
     until(page, "Math.abs(scene.offset?.amplitude) > 0.001")
@@ -155,6 +155,31 @@ def test_a_contact_is_pushed_and_its_field_seen(visit):
     drawn(page)
     page.get_by_label("animate the first motion").click()
     until(page, "scene.offset === null")
+
+
+def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit):
+    page = visit("?tab=perturb&contact=5")
+    slider = page.get_by_role("slider", name="push, in mean forces")
+    slider.wait_for()
+    packed = scene(page, "Array.from(scene.mixed.normal)")
+    slider.evaluate("e => { e.value = e.step; e.dispatchEvent(new Event('input')) }")
+    until(page, "scene.hand.player.pushed.held !== null")
+    page.locator(".state").get_by_text("pushed").wait_for()
+    load = scene(page, "scene.hand.player.pushed.load")
+    now = scene(page, "Array.from(scene.mixed.normal)")
+    # A small push is taken over by the contact itself, as far as balance goes.
+    assert 0 < load and now[5] < packed[5] + 1e-6 and now != packed
+    assert scene(page, "scene.offset") is None
+    slider.evaluate("e => { e.value = e.max; e.dispatchEvent(new Event('input')) }")
+    page.get_by_text("the packing gives way:").wait_for()
+    end = scene(page, "scene.hand.player.pushed.load")
+    assert load < end < float(slider.get_attribute("max"))
+    until(page, "scene.offset !== null")
+    slider.evaluate("e => { e.value = 0; e.dispatchEvent(new Event('input')) }")
+    until(page, "scene.offset === null")
+    until(page, "scene.hand.player.replay.held === null")
+    page.locator(".state").get_by_text("as packed").wait_for()
+    page.get_by_role("tab", name="How far?").click()
 
 
 def test_dumps_are_dropped_reported_and_shown(visit):

@@ -1,0 +1,56 @@
+// A push on the two disks of a contact: arrows that grow with the load, and the network, which follows along
+// networks that the server made. Between two of them the straight line balances the load in between (S under
+// all loads is convex, too). Where the last of them is reached, disks set off.
+
+import { between } from "./replay.js"
+
+export class Pushed {
+  constructor(player) {
+    this.player = player
+    this.end()
+  }
+
+  /** Nothing is pushed any more. */
+  end() {
+    this.load = this.part = 0
+    this.there = false // whether disks set off
+    const { player } = this, held = this.held
+    this.held = null
+    player.sway?.take(null)
+    if (held && player.replay?.held === held) player.hand.forget()
+  }
+
+  /** path: networks under loads up to the largest one that is held; part: of the longest arrow. */
+  take(contact, path, load, part) {
+    const { player } = this, { replay, scene } = player
+    if (!replay || !player.pushes) return
+    Object.assign(this, { load, part, there: load > 0 && load >= (path.loads?.at(-1) ?? Infinity) })
+    this.tellMotion()
+    if (!(load > 0 && path.loads?.length) || path.normal.length !== path.loads.length * replay.walk.contacts) {
+      if (this.held) this.end()
+      return scene.style && scene.drawMarks(scene.style)
+    }
+    if (replay.position) player.show(0)
+    player.took = true
+    this.follow(path, load)
+  }
+
+  follow({ loads, normal, tangential, residual }, load) {
+    const { player } = this, { replay } = player, size = replay.walk.contacts
+    let k = 0
+    while (k < loads.length - 2 && loads[k + 1] < load) k++
+    const part = Math.min(1, (load - loads[k]) / (loads[k + 1] - loads[k] || 1))
+    const held = { normal: new Float32Array(size), tangential: new Float32Array(size), place: "pushed" }
+    between(normal, k, k + 1, part, held.normal)
+    between(tangential, k, k + 1, part, held.tangential)
+    held.residual = Math.max(residual[k], residual[k + 1])
+    player.look.before = replay.walk.normal.subarray(0, size)
+    player.hand.show((this.held = held))
+  }
+
+  /** The slider was let go. */
+  leave() { if (this.there) this.player.later.offer() }
+
+  /** Disks move only where they are pushed hard enough. */
+  tellMotion() { this.player.sway.take(this.there ? this.player.model.displacement : null) }
+}
