@@ -42,6 +42,13 @@ class Replay(NamedTuple):
         """The contact of the row `inviting`; None without any."""
         return None if self.inviting < 0 else int(self.links.contact[self.inviting])
 
+    @property
+    def typical(self) -> int:
+        """The contact whose f_n scatters over the frames most nearly as it does on average (η1)."""
+        if not len(self.backbone):
+            return -1
+        return int(np.argmin(np.abs(self.normal.std(axis=0) - self.summary["eta1"])))
+
 
 def make_replay(
     packing: Packing, dataset: xr.Dataset, mu: float, most_bytes: float = FRAME_BYTES

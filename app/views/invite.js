@@ -14,7 +14,7 @@ const WORDS = {
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
   first: ["", "<b>Your turn: no dot has a green force above {seen}. How far can you take it?</b> Drag the red dot."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
-  guess: ["", "<b>Your turn: how does friction change how much the forces vary?</b>"],
+  guess: ["this contact", "<b>Your turn: guess.</b> Draw a curve in the plot, or pick one of the four."],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
 }
 
@@ -41,11 +41,23 @@ export class Invitation {
     return model.guess ? "guess" : "click"
   }
 
+  /** Whether the curve over friction is to be guessed. */
+  get guesses() {
+    const { tab, figure, guess } = this.player.model
+    return tab === "statistics" && figure === "eta" && guess
+  }
+
+  /** The row of links that is pointed out: of a contact as it varies typically, or of that to be dragged. */
+  get row() {
+    const { walk } = this.player.replay
+    return this.guesses ? walk.contact.indexOf(walk.typical) : walk.inviting
+  }
+
   /** How strong the force is that can be dragged, in mean forces. */
   get now() { return this.player.replay.mixed.normal[this.contact]?.toFixed(1) }
 
-  /** The contact whose line can be dragged. */
-  get contact() { return this.player.scene.geometry.contact[this.player.replay.walk.inviting] }
+  /** The contact whose line is pointed out. */
+  get contact() { return this.player.scene.geometry.contact[this.row] }
 
   /** What the green force is to reach; 0 where it is there, and in other planes. */
   get target() {
@@ -69,9 +81,9 @@ export class Invitation {
 
   /** Where the line is, in pixels; null where it is out of view. */
   middle() {
-    const { scene, replay } = this.player, { inviting } = replay.walk, { view } = scene
-    if (inviting < 0) return null
-    const [xa, ya, xb, yb] = scene.ends(inviting), x = (xa + xb) / 2, y = (ya + yb) / 2
+    const { row, player: { scene } } = this, { view } = scene
+    if (!(row >= 0)) return null
+    const [xa, ya, xb, yb] = scene.ends(row), x = (xa + xb) / 2, y = (ya + yb) / 2
     return Math.max(Math.abs(x - view.x), Math.abs(y - view.y)) > 0.9 * view.half ? null : scene.toPixel(x, y)
   }
 }

@@ -137,9 +137,9 @@ function spot(context, [px, py], plots) {
   context.font = "13px sans-serif"
   context.fillStyle = plots.colours.now
   const { width } = context.measureText(INVITE)
-  context.fillRect(px + 6, py + 8, width + 8, 20)
+  context.fillRect(px - width - 18, py - 9, width + 8, 20)
   context.fillStyle = "white"
-  context.fillText(INVITE, px + 10, py + 22)
+  context.fillText(INVITE, px - width - 14, py + 5)
 }
 
 function curve(context, xs, ys, x, y, count, from = 0) {

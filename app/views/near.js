@@ -16,15 +16,17 @@ export class Near {
 
   /** The view that a newcomer begins with, or null. */
   get view() {
-    const { player: { scene, later, replay } } = this
+    const { player: { scene, later, replay, invite } } = this
     if (!later.waits || !(replay?.walk.inviting >= 0)) return null
-    const places = scene.pair.length ? scene.pair.map((contact) => scene.geometry.contact.indexOf(contact)) : [replay.walk.inviting]
+    const places = scene.pair.length ? scene.pair.map((contact) => scene.geometry.contact.indexOf(contact)) : [invite.row]
     const ends = places.map((k) => scene.ends(k)), { whole } = scene
     const [x, y] = [0, 1].map((d) => ends.flatMap((end) => [end[d], end[d + 2]]))
     const [left, right, low, high] = [Math.min(...x), Math.max(...x), Math.min(...y), Math.max(...y)]
     const unit = Math.max(...scene.geometry.radius)
     const half = Math.max(AROUND * unit, Math.max(right - left, high - low) / 2 + MARGIN * unit)
-    return half < whole.half ? { x: (left + right) / 2, y: (low + high) / 2, half } : whole
+    if (half > whole.half) return whole
+    const within = (from, to, middle) => Math.max(middle + half - whole.half, Math.min(middle - half + whole.half, (from + to) / 2))
+    return { x: within(left, right, whole.x), y: within(low, high, whole.y), half }
   }
 
   /** Another view, where another tab asks for another line. */

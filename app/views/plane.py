@@ -6,7 +6,7 @@ import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.core.properties import value
-from bokeh.models import ColumnDataSource, DataRange1d, Label, Node, Span
+from bokeh.models import ColumnDataSource, DataRange1d
 from bokeh.plotting import figure as Figure
 
 from granforce.records import InputError
@@ -32,7 +32,8 @@ from .parts import (
     together,
 )
 from .progress import Progress
-from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, corner, hover, legend_above
+from .standing import Standing
+from .style import DARK, DOT, ORIGINAL, PALE, SERIES, STATES, hover, legend_above
 
 # What is offered beside states of a kind, and what the others are called.
 ALSO = {"walk": "also show uniformly sampled networks", "uniform": "also show the walk"}
@@ -41,10 +42,6 @@ MARKED = {"uniform": "uniform ones (triangles)", "walk": "networks of the walk (
 ENOUGH = 300  # states beside those shown, where they have to be computed
 
 Columns = dict[str, Any]  # of a ColumnDataSource
-
-CORNER = "outline: exact; dots: networks found at random"
-CORNER_FIRST = "dots: networks found at random"
-NAMED = "possible up to here", "halfway"  # of the outline, and within it
 
 WHOLE = "principal", "stress"  # planes that are the same whatever contact is selected
 
@@ -58,9 +55,9 @@ LEAD = (
 )
 # Before the first gesture, which is to find out how far S goes.
 LEAD_FIRST = (
-    "<b>Each dot is one whole network, like the one drawn in the packing,</b> by the two forces "
-    "that are marked there, green and violet. Blue: found at random; yellow: as the disks came to "
-    "rest (“as packed”)."
+    "<b>Each dot is one whole network:</b> across, how strong its green force is, up, its violet "
+    "one. <b>The red dot is the network in the packing.</b> The blue ones were found at random, "
+    "and none lies beyond the dashed line. Is that a law, or luck?"
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")
@@ -80,20 +77,8 @@ class View(TabView):
         self.here = ColumnDataSource(empty, name="here", tags=["follows", "path", self.name])
         self.original, self.beside = ColumnDataSource(empty), ColumnDataSource(empty)
         self.inner, self.outer = (ColumnDataSource(empty, name=n) for n in ("inner", "outer"))
-        self.cone, self.half = ColumnDataSource(empty), ColumnDataSource(empty)
-        self.words = ColumnDataSource(empty | {"words": []})
-        self.hidden = False  # whether the outline is to be found out
+        self.cone = ColumnDataSource(empty)
         self.figure = self._figure()
-        self.name_of_s = Label(
-            x=0, y=0, text="S", text_color=DARK, text_font_size="20px", visible=False
-        )
-        self.goal = Span(dimension="height", line_color=DOT, line_dash="dashed", visible=False)
-        self.goal_words = Label(
-            x=0, y=_edge("top", 20), x_offset=-6, text_align="right", text_color=DOT,
-            text_font_size="13px", visible=False,
-        )  # fmt: skip
-        for part in (self.name_of_s, self.goal, self.goal_words):
-            self.figure.add_layout(part)
         self.planes = question("Plotted", PLANES, self.looks, "axes")
         self.task, self.placing = state.work.task(told=False), state.work.task(reading, told=False)
         self.also = pmui.Switch(label=ALSO["walk"], margin=(10, 8))
@@ -105,6 +90,7 @@ class View(TabView):
         self.placing.param.watch(self.failed, "message")
         self.planes.param.watch(self.refresh, "value")
         self.looks.param.watch(self._span, "contact")
+        self.looks.param.watch(self._title, "dark")
         self.task.param.watch(self.failed, "message")
         self.shown: tuple[Any, ...] | None = None
         self.found: Outlined | None = None
@@ -138,7 +124,8 @@ class View(TabView):
         self.lead.object = "" if not free else LEAD_FIRST if first else LEAD.format(free=free)
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)
-        self._hide_outline(bool(first))
+        self.standing.hide(bool(first), self.found)
+        self.finding.visible = not first
         wanted = replay, self.kind, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
         if same and state.plane is not None:
@@ -194,16 +181,10 @@ class View(TabView):
         """Nothing of another plane stays."""
         self.state.plane = self.found = None
         self.finding.object = ""
-        self._unname()
+        self.standing.clear()
         self.path.data = {"x": [], "y": [], "state": []}
         for source in (self.original, self.beside, self.here, self.inner, self.outer, self.cone):
             source.data = {"x": [], "y": []}
-
-    def _unname(self) -> None:
-        self.half.data = {"x": [], "y": []}
-        self.words.data = {"x": [], "y": [], "words": []}
-        for part in (self.name_of_s, self.goal, self.goal_words):
-            part.visible = False
 
     def _placed(self, replay: Replay, plane: Plane) -> None:
         state = self.state
@@ -299,14 +280,18 @@ class View(TabView):
         self.original.data = {"x": x[:1], "y": y[:1]}
         self.here.data = {"x": x[frame : frame + 1].copy(), "y": y[frame : frame + 1].copy()}
         self.inner.data = self.outer.data = {"x": [], "y": []}
-        self._unname()
-        self.figure.xaxis.axis_label, self.figure.yaxis.axis_label = planes.labels(replay, plane)
+        self.standing.clear()
+        self._title()
         # Distances mean something among principal axes: both then have the same scale.
         self.figure.match_aspect = not plane.components
         self.cone.data = self._cone(plane, 1.05 * float(x.max()))
         self.told.object = self.finding.object = ""
         self.found = None
         self._show_beside()
+
+    def _title(self, *events: Any) -> None:
+        if self.state.plane is not None and self.state.seen is not None:
+            self.standing.title(self.state.seen, self.state.plane, self.looks.dark)
 
     def _path(self, replay: Replay, plane: Plane) -> Columns:
         """Columns of the path; of a walk under way the player fills in the states as they come."""
@@ -324,44 +309,8 @@ class View(TabView):
             closed = np.concatenate([corners, corners[:1]])
             source.data = {"x": closed[:, 0], "y": closed[:, 1]}
         self.cone.data = self._cone(found.plane, 1.05 * float(found.outer[:, 0].max()))
-        self._name(found)
+        self.standing.show(found)
         self._tell(found)
-
-    def _hide_outline(self, hidden: bool) -> None:
-        """Hide the outline, which still decides what part of the plane is seen, or show it."""
-        if hidden == self.hidden:
-            return
-        self.hidden = hidden
-        for renderer, fill, line in self.outlines:
-            shown = {"fill_alpha": fill, "line_alpha": line}
-            renderer.glyph.update(**(dict.fromkeys(shown, 0) if hidden else shown))
-        self.finding.visible = not hidden
-        self.corner.text = CORNER_FIRST if hidden else CORNER
-        if self.found is not None:
-            self._name(self.found)
-
-    def _name(self, found: Outlined) -> None:
-        """What stands in S: its name, its half, and what its green force is to reach."""
-        self._unname()
-        if self.hidden:
-            seen = planes.seen(found.plane)
-            return self._mark(seen, f"no dot beyond {seen:g}", "left")
-        middle, goal = found.outer.mean(axis=0), found.plane.goal
-        x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
-        self.name_of_s.update(x=x, y=y, visible=True)
-        if goal > 0:
-            self._mark(goal, f"goal: {goal:g}", "right")
-        if found.plane.kind != planes.STRESS:  # of which nothing is said of the middle
-            half = planes.halfway(found.outer)
-            self.half.data = {"x": half[:, 0], "y": half[:, 1]}
-            tops = np.array([part[np.argmax(part[:, 1])] for part in (found.outer, half)])
-            self.words.data = {"x": tops[:, 0], "y": tops[:, 1], "words": [*NAMED]}
-
-    def _mark(self, x: float, words: str, align: str) -> None:
-        """A line at x, with words at its upper end."""
-        self.goal.update(location=x, visible=True)
-        offset = 6 if align == "left" else -6
-        self.goal_words.update(x=x, text=words, x_offset=offset, text_align=align, visible=True)
 
     def _tell(self, found: Outlined) -> None:
         """How much of the outline the states reach."""
@@ -400,7 +349,7 @@ class View(TabView):
             sizing_mode="scale_width",
             match_aspect=True,
         )
-        self.outlines = [  # with their opacity, of what they are filled with and of their edge
+        outlines = [  # with their opacity, of what they are filled with and of their edge
             (
                 fig.patch(
                     "x", "y", source=source, fill_color=PALE, fill_alpha=fill, line_color=DARK,
@@ -413,14 +362,6 @@ class View(TabView):
                 (self.outer, 0.35, 1.0, 1.6), (self.inner, 0.0, 0.4, 1.0),
             )
         ]  # fmt: skip
-        fig.patch(
-            "x", "y", source=self.half, fill_alpha=0, line_color=DARK, line_dash="dotted",
-            line_width=1.4,
-        )  # fmt: skip
-        fig.text(
-            "x", "y", "words", source=self.words, y_offset=20, text_align="center",
-            text_font_size="12px", text_color=DARK,
-        )  # fmt: skip
         fig.line("x", "y", source=self.cone, line_dash="dashed", color="#888888")
         fig.scatter(
             "x", "y", source=self.beside, marker="triangle", size=5, color=SERIES[2], alpha=0.7,
@@ -434,11 +375,11 @@ class View(TabView):
             color=STATES,
             alpha=0.9,
         )
-        fig.scatter(
+        diamond = fig.scatter(
             "x", "y", source=self.original, marker="diamond", size=15, color=ORIGINAL,
             line_color="#333333",
         )  # fmt: skip
-        fig.text(
+        its_name = fig.text(
             "x", "y", source=self.original, text=value("as packed"), x_offset=-9,
             y_offset=-6, text_align="right", text_font_size="12px", text_font_style="bold",
             text_color=ORIGINAL,
@@ -447,23 +388,19 @@ class View(TabView):
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
         )  # fmt: skip
         fig.text(
-            "x", "y", source=self.here, text=value("drag me"), x_offset=6, y_offset=26,
+            "x", "y", source=self.here, text=value("drag me"), x_offset=-14, y_offset=8, text_align="right",
             text_color="white", text_font_size="13px", background_fill_color=DOT, padding=4,
             border_radius=5, name="invitation", visible=False,
         )  # fmt: skip
         here.tags, fig.name = MOVES, "path_figure"
         # The state on screen moves too often to be looked at for the range.
-        outlines = [renderer for renderer, _, _ in self.outlines]
-        fig.x_range.renderers = fig.y_range.renderers = [*outlines, states]
+        edges = [renderer for renderer, _, _ in outlines]
+        fig.x_range.renderers = fig.y_range.renderers = [*edges, states]
         legend_above(fig)
         fig.legend[0].visible = False
-        self.corner = corner(fig, CORNER)
+        self.standing = Standing(fig, outlines, [diamond, its_name])
         fig.add_tools(hover([states], ("network", "@state"), ("at", "@x{0.00}, @y{0.00}")))
         return fig
-
-
-def _edge(symbol: str, offset: int) -> Node:
-    return Node(target="frame", symbol=symbol, offset=offset)
 
 
 def _sweep(label: str, axis: int) -> pmui.Button:

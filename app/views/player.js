@@ -91,9 +91,11 @@ class Player {
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
   get pushes() { return this.model.tab === "perturb" }
 
-  tellPushes() {
+  /** What the tab that is open asks of the packing. */
+  tellTab() {
     this.buttons.root.classList.toggle("pushes", this.pushes)
     if (!this.pushes) this.pushed.end()
+    this.buttons.root.classList.toggle("guesses", this.invite.guesses)
   }
 
   /** Whether force space has been turned to, where the point is what can be dragged first. */
@@ -114,7 +116,7 @@ class Player {
     this.look = new Look(model, this.replay.walk, this.later.waits)
     this.hand.settle()
     this.tellHeld(false)
-    this.tellPushes()
+    this.tellTab()
     scene.mixed = this.replay.mixed
     scene.palette = plain(plain(model.palettes).scene)
     this.plots.colours = plain(plain(model.palettes).plots)
@@ -373,10 +375,7 @@ class Player {
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
       tab: loaded((replay) => {
-        this.tellPushes()
         if (this.pushes && this.playing && this.resting === null) this.pause(replay)
-        this.mark()
-        this.near.show()
       }),
       lead: () => { buttons.part("lead").innerHTML = model.lead },
       legend: () => { buttons.part("legend").innerHTML = model.legend },
@@ -430,7 +429,13 @@ export function render({ model, view }) {
   for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
   const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
   model.on(looks, () => player.again())
-  model.on(["tab", "wide", "figure", "pushing", "guess"], () => player.mark()) // and what invites, in other words
+  model.on(["tab", "wide", "figure", "pushing", "guess"], () => { // and what invites, in other words
+    if (!player.replay || player.live.moves) return
+    player.tellTab()
+    player.near.show()
+    player.again()
+    player.mark()
+  })
   const observer = new ResizeObserver(() => player.scene.resize())
   observer.observe(player.scene.root)
   model.on("msg:custom", (message) => {

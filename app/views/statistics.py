@@ -51,22 +51,23 @@ SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both s
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> In this packing (ring) the force at a contact is typically {:.2f} above "
-    "or below its average, from network to network (forces in units of the mean force). For each "
-    "friction the disks are packed anew. <b>How do forces vary then?</b> Draw it, or pick:"
+    "<b>Guess first.</b> Each blue dot is the force at one contact, that marked in the packing, in "
+    "one network found at random. It varies by ±{:.2f} of the mean force, as is typical in this "
+    "packing, made with friction {:g}. <b>And in packings made with less friction, or more?</b> "
+    "Draw a curve through the ring, or pick:"
 )
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
 STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:100%;display:block"
- role="img" aria-label="the forces at one contact in all networks, with their spread" fill="none"
+ role="img" aria-label="the forces at the marked contact, with their spread" fill="none"
  stroke="currentColor" font-size="12">
  <path d="M10 34H510" stroke-opacity="0.4"/><g fill="{dots}" stroke="none">{points}</g>
  <path d="M{low:.0f} 14V8H{high:.0f}V14" stroke="{mark}" stroke-width="2"/>
  <g fill="currentColor" stroke="none">{ticks}
- <text x="10" y="15">one contact’s force in {count} networks</text>
+ <text x="10" y="15">force at the marked contact, mean force = 1</text>
  <text x="{beside:.0f}" y="15" fill="{mark}">± {spread:.2f}</text></g></svg>"""
 SHOW = "Show the curve"
 DRAWN_FIRST = "The grey line is your guess. "
-GUESSES = ("It keeps rising ↗", "It keeps falling ↘", "It rises, then falls ∩")
+GUESSES = ("It rises ↗", "It falls ↘", "It rises, then falls ∩", "It falls, then rises ∪")
 RIGHT, ANSWERS = 2, ("Not quite. ", "Well guessed. ")
 EACH = (
     "<b>Each dot is one contact:</b> the farther up, the less its force is determined; the farther "
@@ -189,7 +190,7 @@ class View(TabView):
             studied.hide_curve(self._curve, hidden)
             self._give_pencil(self._curve, replay, hidden)
         if hidden:
-            self.lead.object = GUESS.format(replay.summary["eta1"]) + _strip(replay)
+            self.lead.object = _guess_first(replay)
         elif what in DRAWN:
             self.lead.object = (self._said if what == "eta" else "") + self._found
 
@@ -232,7 +233,7 @@ class View(TabView):
         if self.state.cell.mu > 0:
             here = Span(
                 location=self.state.cell.mu, dimension="height", line_width=9, line_alpha=0.18,
-                line_color="#888888",
+                line_color="#888888", name=studied.HERE,
             )  # fmt: skip
             fig.add_layout(here)
 
@@ -364,10 +365,13 @@ DRAWN: dict[str, Callable[[list[Row], list[Row], Row, bool], Drawn]] = {
 }
 
 
+def _guess_first(replay: Replay) -> str:
+    """What is asked, and the forces of a typical contact as SVG."""
+    return GUESS.format(replay.summary["eta1"], replay.summary["mu"]) + _strip(replay)
+
+
 def _strip(replay: Replay) -> str:
-    """The forces of the contact whose spread is nearest to η1, as SVG."""
-    spread = replay.normal.std(axis=0)
-    contact = int(np.argmin(np.abs(spread - replay.summary["eta1"])))
+    contact, spread = replay.typical, replay.normal.std(axis=0)
     forces, typical = replay.normal[:, contact], float(spread[contact])
     mean = float(forces.mean())
     scale = 500 / max(1.25 * float(forces.max()), 1e-9)
@@ -382,6 +386,6 @@ def _strip(replay: Replay) -> str:
         for at in np.arange(0, 500 / scale, 0.5)
     )
     return STRIP.format(
-        points=points, low=low, high=high, beside=high + 8, count=len(forces), spread=typical,
+        points=points, low=low, high=high, beside=high + 8, spread=typical,
         ticks=ticks, dots=STATES, mark=DOT,
     )  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, DataRange1d, FixedTicker, GlyphRenderer, Label
+from bokeh.models import ColumnDataSource, DataRange1d, FixedTicker, GlyphRenderer, Label, Title
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
@@ -35,7 +35,7 @@ SAMPLERS = {
 }
 OWN, HERE = "on this page", "this packing"
 # Names of this packing's ring, of what a visitor draws, and of the word that asks for it.
-THIS, GUESS, DRAW = "own", "guess", "draw"
+THIS, GUESS, DRAW, HERE = "own", "guess", "draw", "here"
 PEAK = "↓ most here: click"
 LIKE = {0.03: "like ice", 1.0: "like rubber"}  # about, against themselves or a road
 RISES = "friction gives\neach force room"
@@ -155,6 +155,8 @@ def hide_curve(fig: Figure, hidden: bool) -> None:
             part.visible = not hidden
         elif isinstance(part, Label) and part.name in ("peak", "rises", "falls"):
             part.visible = not hidden
+    for said in (*fig.select(Title), *fig.select(name=HERE)):
+        said.visible = not hidden
     fig.legend.visible = not hidden
 
 

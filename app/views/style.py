@@ -75,6 +75,11 @@ def lines(dark: bool) -> tuple[str, str]:
     return ("#4ecb8d", "#c39bff") if dark else ("#12793f", "#7a3fc4")
 
 
+def text(dark: bool) -> str:
+    """Colour of words in plots, as the page's theme has it."""
+    return "#ffffff" if dark else "rgba(0, 0, 0, 0.87)"
+
+
 def _faded(colour: tuple[int, ...], part: float) -> str:
     return f"rgba({', '.join(map(str, colour))}, {min(1.0, part):.3f})"
 

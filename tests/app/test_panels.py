@@ -29,7 +29,7 @@ from app.views import upload as upload_view
 from app.views.controls import Controls
 from app.views.dropper import Dropper
 from app.views.messages import TO_BROWSER, listed
-from app.views.style import palettes
+from app.views.style import lines, palettes
 from granforce import measures
 from granforce.measures import statistics
 from granforce.records import InputError
@@ -722,17 +722,22 @@ def test_the_outline_is_hidden_until_it_was_found_out_how_far_it_goes(state):
     view = plane_view.View(state)
     wait_for(state)
     around = view.figure.x_range.renderers
-    assert len(view.outer.data["x"]) > 3 and view.outlines[0][0] in around  # it counts
-    assert all(r.glyph.line_alpha == r.glyph.fill_alpha == 0 for r, _, _ in view.outlines)
-    assert not view.name_of_s.visible and not view.finding.visible
-    assert 0 <= view.goal.location - max(view.path.data["x"]) < 0.1
-    assert view.goal_words.text == f"no dot beyond {view.goal.location:g}"
-    assert not len(view.half.data["x"])
+    assert len(view.outer.data["x"]) > 3 and view.standing.outlines[0][0] in around  # it counts
+    assert all(r.glyph.line_alpha == r.glyph.fill_alpha == 0 for r, _, _ in view.standing.outlines)
+    assert not view.standing.name_of_s.visible and not view.finding.visible
+    assert 0 <= view.standing.goal.location - max(view.path.data["x"]) < 0.1
+    assert view.standing.goal_words.text == f"no dot beyond {view.standing.goal.location:g}"
+    assert not len(view.standing.half.data["x"])
+    assert not any(renderer.visible for renderer in view.standing.packed)
+    across, up = view.figure.xaxis[0], view.figure.yaxis[0]  # in the colours of their lines
+    assert "green" in across.axis_label and "violet" in up.axis_label
+    assert (across.axis_label_text_color, up.axis_label_text_color) == lines(dark=False)
     state.looks.fresh = False
-    assert all(r.glyph.line_alpha == line for r, _, line in view.outlines)
-    assert view.name_of_s.visible and view.goal.visible and view.finding.visible
-    assert view.goal_words.text.startswith("goal: ")
-    assert len(view.half.data["x"]) == len(view.outer.data["x"]) - 1
+    assert all(renderer.visible for renderer in view.standing.packed)
+    assert all(r.glyph.line_alpha == line for r, _, line in view.standing.outlines)
+    assert view.standing.name_of_s.visible and view.standing.goal.visible and view.finding.visible
+    assert view.standing.goal_words.text.startswith("goal: ")
+    assert len(view.standing.half.data["x"]) == len(view.outer.data["x"]) - 1
 
 
 def test_walk_and_uniform_states_are_shown_together(state):
