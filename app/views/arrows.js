@@ -8,6 +8,7 @@ import { circle, line } from "./pen.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
+const QUIET = 0.35 // opacity of forces that are not spoken of yet
 const NAMED = 3 // disks, and contacts of a single one, up to which the parts of forces are drawn that numbers tell
 
 /** Whether a scene is so much higher than wide that it needs a picture like that. */
@@ -236,11 +237,11 @@ export class Arrows {
       g.globalAlpha = 1
     }
     if (named) this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
+    g.globalAlpha = look.fresh && body.crowded && !own && !lit ? QUIET : 1 // at first only those that are plotted count
     const colour = lit ? look.hand : slides ? look.warm : own ?? look.cold, thick = lit || own ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)
-    if (!copy) return
-    g.globalAlpha = 0.35
-    this.arrow(...this.px(...copy), force, colour, thick)
+    g.globalAlpha *= 0.35
+    if (copy) this.arrow(...this.px(...copy), force, colour, thick)
     g.globalAlpha = 1
   }
 

@@ -19,7 +19,7 @@ export function desk(most) {
         <button type="button" class="tourist">Tour</button>
       </span>
     </div>
-    <p class="special"></p><p class="says" aria-live="polite"></p><button type="button" class="mend" hidden></button>
+    <p class="says" aria-live="polite"></p><button type="button" class="mend" hidden></button>
     <div class="own" hidden></div>
     <section class="card" role="dialog" aria-labelledby="small-title" hidden>
       <div><h2 id="small-title" tabindex="-1"></h2><p></p></div>
@@ -35,7 +35,7 @@ export function desk(most) {
         <canvas class="space" tabindex="0" role="img" aria-label="S: every point is one set of forces. Arrow keys move the point"></canvas>
         <div class="plane" hidden><label>horizontal axis <select aria-label="force shown across"></select></label>
           <label>vertical axis <select aria-label="force shown upwards"></select></label></div></figure>
-      <div class="sums"><p class="count"></p>
+      <div class="sums"><p class="special"></p><p class="count"></p>
         <details class="ranges"><summary class="key"></summary><div class="bars" role="list"></div></details></div>
     </div>
     <details class="lesson" hidden><summary>The groove: a one-page lesson with three questions</summary>

@@ -15,7 +15,7 @@ export function drawValues(arrows, F) {
     const text = `${force % 2 ? "tangential" : "normal"} ${number(F[force])}`, wide = g.measureText(text).width / 2 + 3
     const ends = arrows.ends().filter(({ contact }) => contact === force >> 1), { at, across } = ends[0]
     const inward = ends.reduce((sum, end) => sum.map((v, k) => v + end.inward[k]), [0, 0]) // 0 between two disks
-    const out = wide * Math.abs(across[0]) + 9, along = Math.max(0.3 * body.scene.r[ends[0].disk] * arrows.unit, wide + 4) // clear of a wall
+    const out = wide * Math.abs(across[0]) + 13, along = Math.max(0.3 * body.scene.r[ends[0].disk] * arrows.unit, wide + 4) // clear of a wall
     const [x, y] = arrows.px(...at).map((v, k) => v + along * [inward[0], -inward[1]][k])
     const places = [1, -1].map((side) => [x + side * out * across[0], y - side * out * across[1]])
     const room = places.map((place) => Math.min(...arrows.shafts.map(([a, b]) => distance(a, b, ...place))))

@@ -388,9 +388,9 @@ class View(TabView):
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
         )  # fmt: skip
         fig.text(
-            "x", "y", source=self.here, text=value("drag me"), x_offset=-14, y_offset=8, text_align="right",
-            text_color="white", text_font_size="13px", background_fill_color=DOT, padding=4,
-            border_radius=5, name="invitation", visible=False,
+            "x", "y", source=self.here, text=value("drag me"), x_offset=-14, y_offset=8,
+            text_align="right", text_color="white", text_font_size="13px",
+            background_fill_color=DOT, padding=4, border_radius=5, name="invitation", visible=False,
         )  # fmt: skip
         here.tags, fig.name = MOVES, "path_figure"
         # The state on screen moves too often to be looked at for the range.

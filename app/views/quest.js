@@ -5,6 +5,7 @@ import { forceName, number } from "./saying.js"
 
 const NEAR = 0.01 // of what is possible: this near to an end it has been found
 const FIND = "Drag the red dot and find out."
+const GUESS = "Guess first, with the flag."
 const SLIDE = "Drag the friction slider."
 
 const single = (body) => !body.empty && body.whole && body.corners.length === 1
@@ -22,7 +23,7 @@ const OWN = {
     { ask: "from which friction on can the walls press as hard as you like?", reached: endless, done: "✓ As steep as the walls are, the wedges let them: the disk has jammed itself." },
   ],
   box: [
-    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot up, and along the edge, as high as it goes.", largest: true, done: "✓ That large, and all is in balance." },
+    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot up, as high as it goes; where it stops, go along there.", largest: true, done: "✓ That large, and all is in balance." },
     ONE_LEFT,
     { ask: "from which friction on can they press as hard as you like?", reached: endless, done: "✓ The disks have jammed themselves." },
   ],
@@ -53,26 +54,31 @@ export class Quest {
 
   /**
    * Ask of the normal force that goes up in the picture of S, or across, and have that show what is asked;
-   * bounds: of all contacts, where S is not drawn whole; moved: whether by hand.
+   * bounds: of all contacts, where S is not drawn whole; moved: whether by hand; hides: whether the answer is to
+   * be found out, and may be guessed before.
    */
-  ask(space, { bounds, moved }) {
+  ask(space, { bounds, moved, hides }) {
     const { body, axed, read } = space, contact = body.count && body.h && !body.empty ? read.at(-1) ?? 0 : null
     const ends = contact === null ? null : body.whole ? body.interval(2 * contact) : bounds?.[contact]
     const colour = axed.at(-1) === 2 * contact ? "violet " : ""
-    this.look(body, contact, { colour, ends, place: space.flat(body.u), moved })
-    Object.assign(space, { ray: this.times, goal: this.goal })
+    this.look(body, contact, { colour, ends, place: space.flat(body.u), moved, hides, guess: space.flag.value })
+    const asks = hides && this.asked?.largest, told = this.step === 1 && space.flag.value !== null
+    Object.assign(space, { ray: this.times, goal: this.goal, flagged: Boolean(asks || told) })
   }
 
   /**
    * Of the normal force of a contact, with its [least, largest] if known; colour: of its axis, in
-   * words; place: of the dot, across and up; moved: by hand.
+   * words; place: of the dot, across and up; moved: by hand; guess: of what is asked, or null.
    */
-  look(body, contact, { colour, ends, place, moved }) {
+  look(body, contact, { colour, ends, place, moved, hides, guess }) {
     const [low, high] = (body.bounded && ends) || [NaN, NaN], room = high - low
     const steps = OWN[body.scene.name] ?? [], value = contact === null ? NaN : body.forces()[2 * contact]
-    const now = { body, value, low, high, times: place[1] / place[0] }
+    const now = { body, value, low, high, times: place[1] / place[0], hides }
     const own = this.step >= steps.length || steps[this.step].reached || body.scene.names[contact]?.startsWith(steps[this.step].of ?? "")
-    if (steps.length && own && reaches(steps[this.step], now, moved)) this.told = steps[this.step++].done
+    if (steps.length && own && reaches(steps[this.step], now, moved)) {
+      const { done, largest } = steps[this.step++]
+      this.told = largest && guess !== null ? `${done} It is ${number(high)}; you guessed ${number(guess)}.` : done
+    }
     const step = own ? steps[this.step] : undefined, over = steps.length > 0 && this.step === steps.length
     const none = !over && !step?.reached && !(room > 1e-6 * body.scaleOf())
     this.host.classList.toggle("none", none)
@@ -105,9 +111,9 @@ function reaches(step, { body, value, low, high, times }, moved) {
 }
 
 /** What is to be done. */
-function hint({ most, times, reached, how }, { low, times: by }) {
+function hint({ most, times, reached, largest, how }, { low, times: by, hides }) {
   if (reached) return SLIDE
-  if (how) return how
+  if (how) return largest && hides ? `${GUESS} ${how}` : how
   if (low > most) return "Not with this friction: try another."
   return times ? `${FIND} It is ${by.toFixed(1)} times as strong now.` : FIND
 }

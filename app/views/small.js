@@ -90,7 +90,7 @@ export function render({ model, view }) {
     tell("legend", legend(body))
     tell("special", special(body))
     tell("key", barred(body))
-    quest.ask(space, now)
+    quest.ask(space, { ...now, hides: hides() })
     hide()
     const seen = { ...now, fog: space.fog }
     tell("what", pictured(body, seen))
@@ -103,9 +103,13 @@ export function render({ model, view }) {
   }
 
   /** What the first question asks for is not seen by who was never here; but of scenes in the tour, which speaks of S. */
-  function hide() {
+  function hides() {
     if (root.classList.contains("touring")) toured.add(body.scene.name)
-    space.fog = later.new && quest.fog && !toured.has(body.scene.name)
+    return later.new && !toured.has(body.scene.name)
+  }
+
+  function hide() {
+    space.fog = hides() && quest.fog
     part("ranges").hidden = space.fog // which would tell
   }
 
@@ -131,6 +135,7 @@ export function render({ model, view }) {
     if (what === "go" || what === "pull") byHand()
     if (what === "go") { going.pause(); body.goTo(given); say() }
     if (what === "pull") { going.pause(); body.pull(given.contact, given.normal, given.tangential); say() }
+    if (what === "guess") say() // by the flag
     if (what === "press") return press(given)
     if (what === "carry") carry(given)
     if (what === "release" && builds()) builder.release()
@@ -250,6 +255,7 @@ export function render({ model, view }) {
     pushes(false)
     going.pause()
     quest.begin()
+    space.flag.begin()
     mu = scene.mu
     body = new Body(scene).cut(mu)
     returning = false

@@ -3,6 +3,7 @@
 
 import { distance, dot, solve } from "./body.js"
 import { Easel } from "./easel.js"
+import { Flag } from "./flag.js"
 import { Fog } from "./fog.js"
 import { shadeGoal } from "./goal.js"
 import { axisForce, drawAxis, drawSegment, signOf } from "./line.js"
@@ -31,6 +32,7 @@ export class Space {
     this.shadow = [0, 2] // forces that are its axes above three dimensions: 2 c for f_n, 2 c + 1 for f_t
     this.outline = { points: [], stale: true } // of S on them, flat, by linear programs
     this.dots = []
+    this.flag = new Flag() // a guess of what is asked, while `flagged`
     this.been = new Fog() // what was found of S, while that is in fog
     const at = (event) => this.easel.at(event)
     canvas.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
@@ -200,6 +202,7 @@ export class Space {
     if (body.h === 3) drawSolid(this)
     if (body.h === 3 && look.contact !== null) drawInterval(this, look.contact)
     if (this.fog && this.over) this.been.draw(this)
+    if (this.flagged && this.flag.axis) this.flag.draw(this)
     this.drawPath(path)
     const at = this.flat(body.u), [x, y] = this.px(at)
     circle(g, [x, y], 8)
@@ -385,6 +388,10 @@ export class Space {
     if (!body || body.empty) return
     const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 24
     this.canvas.setPointerCapture(event.pointerId)
+    if (this.flagged && !near && this.flag.near(px, py)) {
+      this.held = { flag: true }
+      return event.preventDefault()
+    }
     this.held = { turns: body.h === 3 && !near, px, py, u: [...body.u] }
     this.told("begin")
     this.told("point", this.read)
@@ -401,6 +408,10 @@ export class Space {
     if (!held) {
       const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 14
       return near ? this.told("point", this.read) : this.told("side", this.sideAt(px, py))
+    }
+    if (held.flag) {
+      this.flag.move(px, py)
+      return this.told("guess")
     }
     if (held.turns) {
       this.turn((px - held.px) * TURN, (py - held.py) * TURN)

@@ -30,7 +30,7 @@ class Standing:
         outlines: list[tuple[GlyphRenderer, float, float]],
         packed: list[GlyphRenderer],
     ) -> None:
-        """outlines: (renderer, opacity of its inside, of its edge). packed: of the network as packed."""
+        """outlines: (renderer, opacity of its inside, of its edge); packed: network as packed."""
         self.figure, self.outlines, self.packed = fig, outlines, packed
         self.hidden = False  # whether the outline is to be found out
         self.half = ColumnDataSource({"x": [], "y": []})
