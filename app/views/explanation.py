@@ -18,7 +18,9 @@ def lead(state: AppState) -> str:
     """The question that the picture answers, and what is seen, as HTML."""
     if state.work.moving and not state.selection.imported:
         return jamming(state.selection)
-    return "" if state.seen is None else first(state.seen.summary, state.looks.tab)
+    if state.seen is None:
+        return ""
+    return first(state.seen.summary, state.looks.tab, state.looks.fresh)
 
 
 # What the packing is looked at for, by tabs, where it is not what is free; and what is seen of it.
@@ -36,8 +38,11 @@ ASKED = {
 }
 
 
-def first(summary: Summary, tab: str = "") -> str:
-    """What does not move, what is free, and what playing shows; or what is asked beside."""
+def first(summary: Summary, tab: str = "", fresh: bool = False) -> str:
+    """What does not move, what is free, and what playing shows; or what is asked beside.
+
+    fresh: whether to somebody who is new, for whom playing waits.
+    """
     n, free = summary["n"], summary["dimension"]
     if free == 0:
         found = f"These {n} disks never move, and the forces between them are fixed."
@@ -50,8 +55,12 @@ def first(summary: Summary, tab: str = "") -> str:
         found = f"These {n} disks never move, yet the forces between them can differ."
         told = "Each line is the force between two touching disks: the thicker, the stronger. "
         told += f"<b>Balance leaves {free} numbers free</b>, so countless sets of forces, "
-        told += f"{term('network', 'networks')}, hold the very same disks. Play goes through some, "
-        told += "found at random: alternatives, not moments in time."
+        told += f"{term('network', 'networks')}, hold the very same disks"
+        told += (
+            ": no photograph shows how much each of them carries."
+            if fresh
+            else ". Play goes through some, found at random: alternatives, not moments in time."
+        )
     return f"<h2>{found}</h2><p>{told}</p>"
 
 

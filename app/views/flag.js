@@ -1,11 +1,11 @@
-// A guess before the hand finds out: a flag on the axis of the force that is asked for.
+// A guess before the hand finds out: a marker on the axis of the force that is asked for.
 
-import { line } from "./pen.js"
+import { polygon } from "./pen.js"
 import { number } from "./saying.js"
 
-const HIGH = 26, WIDE = 16 // pixels of its pole and its cloth
+const HIGH = 16, WIDE = 16 // pixels
 const REACH = 22 // pixels around it in which it is taken
-const BEGIN = 0.88 // of its axis, where it waits
+const BEGIN = 0.05 // of its axis, where it waits
 
 export class Flag {
   constructor() { this.begin() }
@@ -40,16 +40,11 @@ export class Flag {
 
   draw(space) {
     const { context: g, look } = space, { axis: { d }, value } = this, [x, y] = this.foot
-    const [tx, ty] = d ? [x + HIGH, y] : [x, y - HIGH]
-    g.strokeStyle = g.fillStyle = look.guess
-    g.lineWidth = 2
-    line(g, [x, y], [tx, ty])
-    g.beginPath()
-    g.moveTo(tx, ty)
-    if (d) for (const [a, b] of [[-WIDE, 0], [-WIDE / 2, -WIDE * 0.7]]) g.lineTo(tx + a, ty + b)
-    else for (const [a, b] of [[0, WIDE * 0.7], [-WIDE, WIDE * 0.35]]) g.lineTo(tx + a, ty + b)
+    const sides = [-WIDE / 2, WIDE / 2].map((half) => (d ? [x + HIGH, y + half] : [x + half, y - HIGH]))
+    polygon(g, [[x, y], ...sides])
+    g.fillStyle = look.guess
     g.fill()
-    const words = value === null ? "your guess: drag" : `your guess ${number(value)}`
-    space.write(d ? tx + 5 : tx, d ? ty : ty - 9, words, look.guess, 12, d ? "left" : "center")
+    const words = value === null ? "your guess: drag me" : `your guess ${number(value)}`
+    space.write(d ? x + HIGH + 5 : x, d ? y : y - HIGH - 9, words, look.guess, 12, d ? "left" : "center")
   }
 }

@@ -30,7 +30,7 @@ APART = 100  # bars up to which there is room between them, and for large dots
 GOAL = "goal {:g} →"
 ALONE = "the line marked in the packing, one of {} contacts"
 CORNER = "possible: exact; seen: in the networks so far"
-CORNER_ALONE = "blue: values so far; red: now"
+CORNER_ALONE = "blue: so far; red: now"
 AROUND = 1.5  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
@@ -49,8 +49,8 @@ LEAD = (
     "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
 )
 LEAD_ALONE = (
-    "<b>How far can this force go?</b> The blue bar: values that the force of the marked line had "
-    "in the networks shown so far, found at random. Drag the line to find out how far it can go."
+    "<b>How far can this force go?</b> The blue bar: where it has been so far, while the forces "
+    "changed at random. Drag the marked line to find out how far it can go."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -184,6 +184,7 @@ class View(TabView):
         self.packed_item.visible = not self.alone  # a line through all bars
         self.figure.legend[0].visible = not self.alone
         self.figure.xgrid.visible = not self.alone
+        self.figure.height = 440 if self.alone else 320
         self.corner.text = CORNER_ALONE if self.alone else CORNER
         ends = [replay.low[contacts[0], 0], replay.high[contacts[0], 0]] if self.alone else []
         self.unknown.data = {"rank": [1.0] * len(ends), "at": ends, "off": [28, -10][: len(ends)]}

@@ -8,13 +8,14 @@ const FINGER = matchMedia("(pointer: coarse)").matches
 const DRAG = FINGER ? "tap, then drag ↕" : "drag me ↕"
 // What the tag says, if there is one, and what stands above.
 const WORDS = {
+  watch: ["", "<b>Watch: the forces change, no disk moves.</b> At every moment all disks are in balance."],
   drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
-  strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
+  strong: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the marked line and drag up: no disk moves, all forces follow (now {now})."],
   push: ["", "<b>Your turn: how hard can these two disks be pushed apart?</b> Drag the slider until something moves; or click another line."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
-  first: ["", "<b>Your turn: no dot has a green force above {seen}. How far can you take it?</b> Drag the red dot."],
+  first: ["", "<b>Your turn: drag the red dot to the right, past the dashed line. Does anything stop it?</b>"],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
-  guess: ["this contact", "<b>Your turn: guess.</b> Draw a curve in the plot, or pick one of the four."],
+  guess: ["this contact", "<b>Your turn: with more friction, would this force vary more, or less?</b>"],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
 }
 
@@ -29,7 +30,8 @@ export class Invitation {
   /** What can be done first, one of WORDS: nothing was dragged yet, and a line can be, or the point; or null. */
   get what() {
     const { model, replay, live, difference, predict, points, plots, pushes, pushed, took, scene, opens } = this.player
-    if (opens || replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
+    if (replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
+    if (opens) return "watch"
     if (points && !plots.invites) return null
     if (points && model.fresh && plots.plane.pair?.length) return "first"
     if (points) return this.target ? "reach" : "point"

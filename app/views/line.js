@@ -60,10 +60,11 @@ export function drawAxis(space, index, at, d = 0) {
   }
   g.strokeStyle = own ?? look.edge
   g.lineWidth = 1
-  line(g, ...ends.map((x) => (d ? [at, x] : [x, at])))
+  const least = index % 2 ? ends[0] : (d ? Math.min : Math.max)(ends[0], place(0)) // no normal force is below 0
+  line(g, ...[slope > 0 ? least : ends[0], ends[1]].map((x) => (d ? [at, x] : [x, at])))
   const free = (x, k) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > (d ? 16 : 40))
   const ticks = [], [first, last] = ends.map((x) => (x - place(0)) / (place(1) - place(0)) / step).sort((a, b) => a - b)
-  for (let k = Math.ceil(index % 2 ? first : Math.max(first, 0)); k <= last; k++) { // no normal force is below 0
+  for (let k = Math.ceil(index % 2 ? first : Math.max(first, 0)); k <= last; k++) {
     const x = place(k * step)
     stroke(x, at - 4, at + 4)
     ticks.push([x, String(Number((k * step).toPrecision(6)))])

@@ -1,22 +1,25 @@
 // Slider for the push on a contact. Where it is moved, arrows in the packing grow and the network follows
-// (pushed.js); it stops where the disks set off, which is not told before.
+// (pushed.js); it stops where the disks set off, which is not told before, but can be guessed on its scale.
 
 import { ask } from "./ask.js"
 
 const STEPS = 400 // of the slider
 const RISE_S = 5 // from nothing to the end, by the button
 const ROOM = 1.25 // of the scale beyond its end, where it ends beyond the scale
+const TICKS = 8 // numbers on the scale, about
+const THUMB = 8 // px from the slider's ends to where its thumb stands for them
 
 export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "load"
-  root.innerHTML = `<label>push <input type="range" min="0" value="0" aria-label="push, in mean forces"></label>
-    <span><output></output> × mean force<b>: something moves</b></span>
+  root.innerHTML = `<label>push <span class="rail"><input type="range" min="0" value="0" aria-label="push, in mean forces">
+      <span class="scale" title="click: your guess"></span></span></label>
+    <span class="told"><output></output> × mean force<b></b></span>
     <button type="button" class="soft">Push until something moves</button>`
-  const range = root.querySelector("input"), told = root.querySelector("output"), run = root.querySelector("button")
+  const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player
   const known = () => model.path.loads?.length > 0, end = () => (known() ? model.path.loads.at(-1) : Infinity)
-  let load = 0, asked = false, gave = false, rising = 0, by = null // by: whom the load is shown by
+  let load = 0, guess = null, asked = false, gave = false, rising = 0, by = null // by: whom the load is shown by
 
   function set(value) {
     load = Math.min(value, end())
@@ -31,11 +34,11 @@ export function render({ model, view }) {
   }
 
   function show() {
-    const there = load >= end()
+    const there = load >= end(), said = there ? `: something moves${guess === null ? "" : ` (you guessed ${guess.toFixed(1)})`}` : ""
     range.value = load
     told.textContent = load.toFixed(2)
-    root.classList.toggle("there", there)
-    range.setAttribute("aria-valuetext", `${told.textContent} mean forces${there ? ": something moves" : ""}`)
+    part("b").textContent = said
+    range.setAttribute("aria-valuetext", `${told.textContent} mean forces${said}`)
     run.disabled = model.contact === null || rising > 0
     by = player()?.pushed
     by?.take(model.contact, model.path, load, load / Number(range.max))
@@ -45,6 +48,7 @@ export function render({ model, view }) {
   function anew() {
     load = rising = 0
     asked = gave = false
+    guess = null
     scale()
   }
 
@@ -52,21 +56,34 @@ export function render({ model, view }) {
     range.max = known() ? Math.max(model.most, ROOM * end()) : model.most
     range.step = range.max / STEPS
     range.disabled = model.contact === null
+    drawScale()
     set(load)
+  }
+
+  const along = (value) => `calc(${THUMB}px + (100% - ${2 * THUMB}px) * ${value / range.max})`
+  const mark = (kind, value, words) => `<span class="${kind}" style="left:${along(value)}">${words}</span>`
+
+  /** Numbers, how strong the force of the contact is, and where a guess was put. */
+  function drawScale() {
+    const most = Number(range.max), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => most / size <= TICKS) ?? most
+    let drawn = ""
+    for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
+    if (model.carries > 0) drawn += mark("now", model.carries, `▲ its force ${model.carries.toFixed(2)}`)
+    line.innerHTML = drawn + (guess === null ? "" : mark("guess", guess, "▼"))
   }
 
   /** By itself, as soon as it is known how far. */
   function rise() {
-    anew()
+    load = 0
     const way = rising = Math.random()
-    if (!known()) { asked = true; ask(model, view, { push: true }) }
+    if (!known() && !asked) { asked = true; ask(model, view, { push: true }) }
     let before = null
     const step = (now) => {
       if (way !== rising || !root.isConnected) return
       if (known()) {
         set(load + ((before === null ? 0 : now - before) / 1000 / RISE_S) * end())
         before = now
-        if (load >= end()) { rising = 0; return show() }
+        if (load >= end()) { rising = 0; by?.leave(); return show() }
       }
       requestAnimationFrame(step)
     }
@@ -77,8 +94,14 @@ export function render({ model, view }) {
   range.addEventListener("input", () => { rising = 0; set(Number(range.value)) })
   range.addEventListener("change", () => by?.leave())
   run.addEventListener("click", rise)
+  line.addEventListener("click", (event) => {
+    const { left, width } = line.getBoundingClientRect()
+    guess = Math.min(1, Math.max(0, (event.clientX - left - THUMB) / (width - 2 * THUMB))) * range.max
+    drawScale()
+    event.preventDefault() // the label would hand it to the slider
+  })
   model.on("contact", anew)
-  model.on("most", scale)
+  model.on(["most", "carries"], scale)
   model.on("path", () => { asked = known(); scale() })
   model.on("running", () => { if (!model.running && !known()) { asked = false; rising = 0; show() } })
   scale()

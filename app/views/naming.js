@@ -43,7 +43,7 @@ export function drawNames(arrows, F) {
   }
   for (const { contact, at, inward, across } of arrows.ends()) {
     const [px, py] = arrows.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
-    const along = [t * across[0], t * across[1]], way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? (along[1] > 0 ? ", up" : ", down") : along[0] > 0 ? ", right" : ", left"
+    const along = [t * across[0], t * across[1]], slanted = Math.min(...across.map(Math.abs)) > 0.1 ? " the wall" : "", way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? `, ${along[1] > 0 ? "up" : "down"}${slanted}` : along[0] > 0 ? ", right" : ", left"
     const rubs = ["friction", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? arrows.easel.wide - x : x
     const fits = (line) => g.measureText(line).width < room - 4
     const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs

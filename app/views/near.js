@@ -1,12 +1,16 @@
 // Who is new sees at first a few disks, around what is to be dragged, and forces without colour. When the
 // hand lets go, the view goes out to the whole packing, where colours show what has changed, and where.
 
+import { made } from "./made.js"
+
+const INSET = 92 // px, of the whole packing in a corner
 const AROUND = 6.5 // half width of what is seen, in largest radii
 const MARGIN = 3 // around two lines that are seen at once, in largest radii
 
 export class Near {
   constructor(player) {
     this.player = player
+    this.inset = player.scene.root.appendChild(made("canvas", { className: "inset", hidden: true }))
     player.later.listeners.push(() => {
       if (player.look) player.look.quiet = false
       this.go(player.scene.whole)
@@ -41,5 +45,26 @@ export class Near {
     scene.view = view
     scene.changed()
     live.glide(from)
+  }
+
+  /** In a corner the whole packing, with the part of it that is seen. */
+  draw() {
+    const { inset, player: { scene, later, live } } = this, { view, whole, geometry, palette } = scene
+    inset.hidden = !later.waits || live.moves || view.half > 0.9 * whole.half
+    if (inset.hidden) return
+    const ratio = window.devicePixelRatio || 1, size = INSET * ratio, unit = size / (2 * whole.half), g = inset.getContext("2d")
+    inset.width = inset.height = size
+    g.setTransform(unit, 0, 0, -unit, size / 2 - unit * whole.x, size / 2 + unit * whole.y)
+    g.fillStyle = palette.edge
+    g.beginPath()
+    for (let k = 0; k < geometry.x.length; k++) {
+      const r = 0.8 * geometry.r[k]
+      g.moveTo(geometry.x[k] + r, geometry.y[k])
+      g.arc(geometry.x[k], geometry.y[k], r, 0, 2 * Math.PI)
+    }
+    g.fill()
+    g.strokeStyle = palette.selected
+    g.lineWidth = (2 * ratio) / unit
+    g.strokeRect(view.x - view.half, view.y - view.half, 2 * view.half, 2 * view.half)
   }
 }

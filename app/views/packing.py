@@ -28,7 +28,7 @@ SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
 
 LARGE = 4.0  # ⟨f_n⟩, up to which widths are shown: few forces are larger
 LEGEND = """
-<span class="colour" tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
+<span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
 <span tabindex="0" data-term="{width_term}">width: {width}, up to
  <svg width="40" height="12"><polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5"
   fill="currentColor" fill-opacity="0.65"/></svg>
@@ -86,7 +86,8 @@ class PackingView:
         state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
         looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
         looks.param.watch(
-            self._explain, ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab"]
+            self._explain,
+            ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab", "fresh"],
         )
         state.param.watch(self._explain, ["seen", "exact", "loads"])
         state.knowledge.param.watch(self._explain, "narrowed")

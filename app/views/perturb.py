@@ -57,10 +57,13 @@ LEAD = (
     "long as some set of forces balances your push."
 )
 WHERE = (
-    "Pushed is contact {number}, marked in the packing (fainter where the box repeats); click "
-    "another line to push there. For scale: the mean force is 1, the largest here {most:.1f}. "
-    "Colours show what the push changes: orange carries more, blue less. Of all sets of forces "
-    "that balance it, those nearest to the forces as packed are shown."
+    "Click another line to push there. Click the scale to guess. Forces are in mean forces: the "
+    "largest here is {most:.1f}."
+)
+SHOWN = (
+    "Pushed is contact {number}, in the picture fainter where the box repeats. Of all sets of "
+    "forces that balance the push, those nearest to the forces as packed are shown; orange carries "
+    "more than before, blue less. The push grows until contact dynamics finds no rest."
 )
 ISOSTATIC = (
     "<b>Without friction the least push moves the packing:</b> it has just as many contacts as it "
@@ -135,6 +138,7 @@ class View(TabView):
             return
         self.load.param.update(
             contact=self.contact,
+            carries=0 if self.contact is None else float(state.replay.normal[0, self.contact]),
             path={} if self.pushed is None else path(self.pushed[0]),
             most=float(f"{SCALE * state.replay.normal[0].max(initial=0.5):.2g}"),
         )
@@ -187,10 +191,11 @@ class View(TabView):
             return
         tiles = [("carries as packed", f"{replay.normal[0, contact]:.2f}")]
         if not self.gave:
-            if self.loads is not None:
-                tiles.append(("limit load", f"{self.loads.load[contact]:.2f}"))
-            where = WHERE.format(number=replay.backbone[contact], most=replay.normal[0].max())
-            self._say(where, numbers=_tiles(tiles), lead=drawn)
+            said = WHERE.format(most=replay.normal[0].max())
+            how = folded(SHOWN.format(number=replay.backbone[contact]))
+            loads = [] if self.loads is None else [self.loads.load[contact]]
+            known = _tiles([("limit load", f"{load:.2f}") for load in loads])
+            self._say(said + how, numbers=known, lead=drawn)
             return
         pushed = self.pushed[0]
         tiles += [("gives way at", f"{pushed.low:.2f}"), ("limit load", f"{pushed.limit:.2f}")]

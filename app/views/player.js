@@ -80,7 +80,7 @@ class Player {
     this.split = new Split(this)
     this.sway = new Sway(this.scene)
     this.pushed = new Pushed(this)
-    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView() }
+    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView(); this.near.draw() }
     this.scene.describe = {
       contact: (k) => this.look.contact(k, this.replay),
       grain: (k) => this.look.grain(k, this.replay),

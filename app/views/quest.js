@@ -5,7 +5,7 @@ import { forceName, number } from "./saying.js"
 
 const NEAR = 0.01 // of what is possible: this near to an end it has been found
 const FIND = "Drag the red dot and find out."
-const GUESS = "Guess first, with the flag."
+const GUESS = "Guess first: drag the grey marker."
 const SLIDE = "Drag the friction slider."
 
 const single = (body) => !body.empty && body.whole && body.corners.length === 1
@@ -23,12 +23,12 @@ const OWN = {
     { ask: "from which friction on can the walls press as hard as you like?", reached: endless, done: "✓ As steep as the walls are, the wedges let them: the disk has jammed itself." },
   ],
   box: [
-    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot up, as high as it goes; where it stops, go along there.", largest: true, done: "✓ That large, and all is in balance." },
+    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot up until it stops, then left or right along that edge, as high as it goes.", largest: true, done: "✓ That large, and all is in balance." },
     ONE_LEFT,
     { ask: "from which friction on can they press as hard as you like?", reached: endless, done: "✓ The disks have jammed themselves." },
   ],
   thirteen: [
-    { ask: "can you make the violet normal force three times as strong as the green one?", times: 3, hides: true, done: "✓ And everything still balances." },
+    { ask: "can you make the violet normal force three times the green one?", times: 3, hides: true, done: "✓ And everything still balances." },
     { ask: "can you bring the violet force below 2?", most: 2, done: "✓ That, too." },
     { ask: "with how little friction do these disks still hold?", reached: (body) => body.empty, done: "✓ Below that nothing balances: these disks need some friction." },
   ],

@@ -12,7 +12,7 @@ const FINE = 16 // colours; of more, every second serves where chains are gather
 const GRAB = 6 // px from a chain that still mean it
 const ZOOM = [0.02, 4] // least and largest part of the whole view
 const ARROW = 1.3 // of the largest force on a disk, in largest radii
-const AXIS = 0.3 // width of a line whose force is an axis of force space, in largest radii
+const AXIS = [0.3, 7] // width of a line whose force is an axis of force space, in largest radii, and px at most
 const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
 
 export class Scene {
@@ -314,7 +314,7 @@ export class Scene {
     const { marks, scale, palette } = this
     marks.lineCap = "round"
     for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
-      marks.lineWidth = Math.max(AXIS, 5 / scale) + more
+      marks.lineWidth = Math.max(Math.min(AXIS[0], AXIS[1] / scale), 5 / scale) + more
       marks.strokeStyle = paint
       for (const { a, b } of this.segments((contact) => contact === chosen)) line(marks, a, b)
     }

@@ -51,11 +51,11 @@ SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both s
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> Each blue dot is the force at one contact, that marked in the packing, in "
-    "one network found at random. It varies by ±{:.2f} of the mean force, as is typical in this "
-    "packing, made with friction {:g}. <b>And in packings made with less friction, or more?</b> "
-    "Draw a curve through the ring, or pick:"
+    "<b>Guess first.</b> A blue dot is the force at the marked contact in one network found at "
+    "random. They spread by ±{:.2f} (standard deviation; mean force 1), as is typical in this "
+    "packing."
 )
+ASKED = "<b>In packings made with more friction, this spread …</b> (or draw it below)"
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
 STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:100%;display:block"
  role="img" aria-label="the forces at the marked contact, with their spread" fill="none"
@@ -65,9 +65,9 @@ STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:10
  <g fill="currentColor" stroke="none">{ticks}
  <text x="10" y="15">force at the marked contact, mean force = 1</text>
  <text x="{beside:.0f}" y="15" fill="{mark}">± {spread:.2f}</text></g></svg>"""
-SHOW = "Show the curve"
+SHOW = "Just show me"
 DRAWN_FIRST = "The grey line is your guess. "
-GUESSES = ("It rises ↗", "It falls ↘", "It rises, then falls ∩", "It falls, then rises ∪")
+GUESSES = ("grows ↗", "shrinks ↘", "grows, then shrinks ∩", "shrinks, then grows ∪")
 RIGHT, ANSWERS = 2, ("Not quite. ", "Well guessed. ")
 EACH = (
     "<b>Each dot is one contact:</b> the farther up, the less its force is determined; the farther "
@@ -367,7 +367,7 @@ DRAWN: dict[str, Callable[[list[Row], list[Row], Row, bool], Drawn]] = {
 
 def _guess_first(replay: Replay) -> str:
     """What is asked, and the forces of a typical contact as SVG."""
-    return GUESS.format(replay.summary["eta1"], replay.summary["mu"]) + _strip(replay)
+    return GUESS.format(replay.summary["eta1"]) + _strip(replay) + ASKED
 
 
 def _strip(replay: Replay) -> str:

@@ -530,7 +530,7 @@ def test_the_question_of_a_scene_is_answered_by_the_hand(look):
 def test_thirteen_disks_ask_for_a_ratio_a_value_and_a_friction(look):
     page = look("?scene=thirteen")
     quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
-    quest.get_by_text("three times as strong").wait_for()
+    quest.get_by_text("three times the green one").wait_for()
     assert ask(page, "small.space.ray") == 3 and not ask(page, "small.space.fog")
     space.focus()
     for _ in range(30):
