@@ -130,7 +130,7 @@ def names(packing: Packing, count: int) -> list[str]:
     several, lids = count > 1, len(packing.info.get("pressing", []))
     for i, j, (n_x, n_y) in zip(contacts.i, contacts.j, contacts.normal, strict=True):
         if j < count:
-            said.append(f"between {i + 1} and {j + 1}")
+            said.append(f"between disks {i + 1} and {j + 1}")
             continue
         wall = "floor" if n_y < -0.9 else "ceiling" if n_y > 0.9 else "right wall"
         wall = "left wall" if wall == "right wall" and n_x < 0 else wall

@@ -8,7 +8,7 @@ import { circle, line } from "./pen.js"
 
 const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
 const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
-const QUIET = 0.35 // opacity of forces that are not spoken of yet
+const QUIET = 0.5 // opacity of forces that are not spoken of yet
 const NAMED = 3 // disks, and contacts of a single one, up to which the parts of forces are drawn that numbers tell
 
 /** Whether a scene is so much higher than wide that it needs a picture like that. */

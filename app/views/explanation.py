@@ -54,7 +54,9 @@ def first(summary: Summary, tab: str = "", fresh: bool = False) -> str:
     else:
         found = f"These {n} disks never move, yet the forces between them can differ."
         told = "Each line is the force between two touching disks: the thicker, the stronger. "
-        told += f"<b>Balance leaves {free} numbers free</b>, so countless sets of forces, "
+        contacts = summary["contacts"]
+        told += f"{2 * contacts} unknown forces, {2 * contacts - free} equations: "
+        told += f"<b>balance leaves {free} numbers free</b>, so countless sets of forces, "
         told += f"{term('network', 'networks')}, hold the very same disks"
         told += (
             ": no photograph shows how much each of them carries."

@@ -6,7 +6,8 @@ import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 from bokeh.core.properties import value
-from bokeh.models import ColumnDataSource, Range1d, Span, TapTool
+from bokeh.events import Tap
+from bokeh.models import ColumnDataSource, Label, Node, Range1d, Span, TapTool
 from bokeh.plotting import figure as Figure
 
 from granforce.records import Integers
@@ -22,7 +23,7 @@ from .hints import term
 from .known import Known
 from .packing import Bounds, exact_intervals
 from .parts import LATER, MOVES, OUTLINED, TabView, figure, folded_away, note, plotted, question
-from .style import DARK, DOT, ORIGINAL, PALE, SERIES, corner, hover, legend_above
+from .style import DARK, DOT, GUESS, ORIGINAL, PALE, SERIES, corner, hover, legend_above
 
 MOST_BARS = 1500  # more than there are pixels would only cost time; of more, evenly many are shown
 SOME = 16  # bars that can be told apart at a glance
@@ -49,8 +50,8 @@ LEAD = (
     "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
 )
 LEAD_ALONE = (
-    "<b>How far can this force go?</b> The blue bar: where it has been so far, while the forces "
-    "changed at random. Drag the marked line to find out how far it can go."
+    "<b>How far can this force go?</b> Blue: where it is in some sets of forces that were found at "
+    "random. Click the plot where you think it ends; then drag the marked line."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -77,6 +78,13 @@ class View(TabView):
         self.chosen = _source("chosen", ("rank", "low", "high"))
         self.invited = _source("invited", ("rank", "at", "words", "low", "high"))
         self.unknown = _source("unknown", ("rank", "at", "off"))  # beyond what was seen
+        self.guess = Span(
+            dimension="width", line_color=GUESS, line_width=2, line_dash="dashed", visible=False
+        )
+        self.guess_words = Label(
+            x=Node(target="frame", symbol="left", offset=6), y=0, y_offset=3, text_color=GUESS,
+            text_font_size="12px", visible=False,
+        )  # fmt: skip
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
         ]
@@ -113,6 +121,7 @@ class View(TabView):
         state = self.state
         self.exact.on_click(lambda event: state.compute_exact())
         self.bars.selected.on_change("indices", self._tapped)
+        self.figure.on_event(Tap, self._guess)
         state.knowledge.param.watch(self.refresh, "narrowed")
         state.hand.param.watch(lambda event: self._invite(), "pulls")
         state.param.watch(self._offer, ["seen", "exact"])
@@ -141,6 +150,7 @@ class View(TabView):
         self._show_bars(replay, exact)
         self._offer()
         if replay is not self._grown:
+            self.guess.visible = self.guess_words.visible = False
             self._show_growth(replay)
         self._mark()
 
@@ -222,6 +232,12 @@ class View(TabView):
         if new:
             self.looks.contact = int(self.contacts[new[0]])
             self.bars.selected.indices = []
+
+    def _guess(self, event: Any) -> None:
+        """Who is new clicks where the bar may end, before finding out."""
+        if self.alone and event.y > 0:
+            self.guess.update(location=event.y, visible=True)
+            self.guess_words.update(y=event.y, text=f"your guess {event.y:.1f}", visible=True)
 
     def _mark(self) -> None:
         """Show where the selected contact stands, if it is drawn."""
@@ -312,6 +328,8 @@ class View(TabView):
             text_font_size="20px", text_color=DARK,
         )  # fmt: skip
         fig.name = "bars_figure"
+        fig.add_layout(self.guess)
+        fig.add_layout(self.guess_words)
         fig.segment("rank", "low", "rank", "high", source=self.chosen, color=DOT, line_width=2)
         self.whole_item, self.exact_item = fig.legend[0].items[:2]
         self.packed_item = fig.legend[0].items[3]

@@ -15,7 +15,7 @@ export function render({ model, view }) {
   root.innerHTML = `<label>push <span class="rail"><input type="range" min="0" value="0" aria-label="push, in mean forces">
       <span class="scale" title="click: your guess"></span></span></label>
     <span class="told"><output></output> × mean force<b></b></span>
-    <button type="button" class="soft">Push until something moves</button>`
+    <button type="button" class="soft">Let the push grow</button>`
   const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player
   const known = () => model.path.loads?.length > 0, end = () => (known() ? model.path.loads.at(-1) : Infinity)
@@ -68,7 +68,7 @@ export function render({ model, view }) {
     const most = Number(range.max), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => most / size <= TICKS) ?? most
     let drawn = ""
     for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
-    if (model.carries > 0) drawn += mark("now", model.carries, `▲ its force ${model.carries.toFixed(2)}`)
+    if (model.carries > 0) drawn += mark("now", model.carries, `▲ the disks press with ${model.carries.toFixed(2)}`)
     line.innerHTML = drawn + (guess === null ? "" : mark("guess", guess, "▼"))
   }
 

@@ -54,12 +54,9 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
 LEAD = (
     "<b>You push two touching disks apart, harder and harder,</b> by two opposite forces. At first "
     "they only press less on each other; then their neighbours have to hold them. Nothing moves as "
-    "long as some set of forces balances your push."
+    "long as the disks find forces that balance your push."
 )
-WHERE = (
-    "Click another line to push there. Click the scale to guess. Forces are in mean forces: the "
-    "largest here is {most:.1f}."
-)
+WHERE = "Click another line to push there. The mean force is 1, the largest here {most:.1f}."
 SHOWN = (
     "Pushed is contact {number}, in the picture fainter where the box repeats. Of all sets of "
     "forces that balance the push, those nearest to the forces as packed are shown; orange carries "

@@ -5,7 +5,7 @@ import { forceName, number } from "./saying.js"
 
 const NEAR = 0.01 // of what is possible: this near to an end it has been found
 const FIND = "Drag the red dot and find out."
-const GUESS = "Guess first: drag the grey marker."
+const GUESS = "Guess first: drag the grey marker to where you think it ends."
 const SLIDE = "Drag the friction slider."
 
 const single = (body) => !body.empty && body.whole && body.corners.length === 1
@@ -23,7 +23,7 @@ const OWN = {
     { ask: "from which friction on can the walls press as hard as you like?", reached: endless, done: "✓ As steep as the walls are, the wedges let them: the disk has jammed itself." },
   ],
   box: [
-    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot up until it stops, then left or right along that edge, as high as it goes.", largest: true, done: "✓ That large, and all is in balance." },
+    { of: "between", ask: "how large can the violet normal force get? (Each disk weighs 1.)", how: "Drag the red dot to the highest point that it reaches.", largest: true, done: "✓ That large: wedged between the walls, the disks press far harder than they weigh." },
     ONE_LEFT,
     { ask: "from which friction on can they press as hard as you like?", reached: endless, done: "✓ The disks have jammed themselves." },
   ],
@@ -73,7 +73,7 @@ export class Quest {
   look(body, contact, { colour, ends, place, moved, hides, guess }) {
     const [low, high] = (body.bounded && ends) || [NaN, NaN], room = high - low
     const steps = OWN[body.scene.name] ?? [], value = contact === null ? NaN : body.forces()[2 * contact]
-    const now = { body, value, low, high, times: place[1] / place[0], hides }
+    const now = { body, value, low, high, times: place[1] / place[0], hides, guess, moved }
     const own = this.step >= steps.length || steps[this.step].reached || body.scene.names[contact]?.startsWith(steps[this.step].of ?? "")
     if (steps.length && own && reaches(steps[this.step], now, moved)) {
       const { done, largest } = steps[this.step++]
@@ -111,9 +111,9 @@ function reaches(step, { body, value, low, high, times }, moved) {
 }
 
 /** What is to be done. */
-function hint({ most, times, reached, largest, how }, { low, times: by, hides }) {
+function hint({ most, times, reached, largest, how }, { low, times: by, hides, guess, moved }) {
   if (reached) return SLIDE
-  if (how) return largest && hides ? `${GUESS} ${how}` : how
+  if (how) return largest && hides && guess === null && !moved ? GUESS : how
   if (low > most) return "Not with this friction: try another."
   return times ? `${FIND} It is ${by.toFixed(1)} times as strong now.` : FIND
 }

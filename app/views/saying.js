@@ -61,8 +61,8 @@ function slips(body) {
   return Array.from(body.scene.i).some((_, c) => F[2 * c] > 1e-9 && body.slides(F[2 * c], F[2 * c + 1]))
 }
 
-/** Forces less equations, as HTML; where S is empty, that no solution is allowed. */
-export function counted({ h, count, scene, empty, consistent, whole, corners }) {
+/** Forces less equations, as HTML; in fog, what is free is what the hand moves; where S is empty, that no solution is allowed. */
+export function counted({ h, count, scene, empty, consistent, whole, corners }, fog) {
   const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
   const forces = plural(count, "contact") + ", each with a normal and a tangential component"
   if (empty && !scene.idle) {
@@ -71,7 +71,8 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }) 
     return `<b>${2 * count} unknown force components, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
-  const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${h === 1 ? "number" : "numbers"}${point}</b>`
+  const free = h === 1 ? "number" : "numbers", dot = fog ? `: where the red dot is${h > 2 ? `, and ${h - 2} more` : ""}` : ""
+  const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point || dot}</b>`
   return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}${why})</span>`
 }
 
@@ -90,9 +91,9 @@ export function barred({ empty, h, scene }) {
   return empty || !h || scene.idle ? "" : "The range of each normal force (pale), and its value now (red):"
 }
 
-/** What is special about a scene, besides its forces; empty for most. */
-export function special({ scene }) {
-  if (!scene.box[0]) return ""
+/** What is special about a scene, besides its forces; empty for most, and where the sentence over it says so. */
+export function special({ scene }, fog) {
+  if (!scene.box[0] || fog) return ""
   const touched = new Set([...scene.i, ...scene.j])
   const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
   const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
@@ -127,14 +128,14 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3 && now.fresh) return `These ${scene.r.length} disks are squeezed from all sides. Which forces hold them? Not just one set: ${h} numbers are free. Drag the red dot to change two of the forces, green and violet; the others follow, as little as balance allows. Friction is at most μ times the normal force, and disks cannot pull: that sets limits.`
+  if (h > 3 && now.fresh) return `These ${scene.r.length} disks are squeezed from all sides; the dashed square repeats on and on, and pale disks are copies. Drag the red dot to change two of the forces, green and violet: all others readjust so that every disk stays in balance. Limits: friction is at most μ times the normal force, and disks cannot pull.`
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
   const opens = body.sides.some(({ stops }) => stops.some(([, what]) => what === OPENS))
   const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
-  const grips = gripped(body) ? " Here friction points down: the walls grip the disk as if it had been pressed in." : ""
+  const grips = gripped(body) ? " Here friction points down the walls, as if the disk had been pressed in; it can point up, too." : ""
   const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
   if (now.fog) return `Move the red dot: the forces change, and the ${several ? "disks stay" : "disk stays"} at rest all the same. Friction may be anything up to μ times the normal force, so more than one set of forces balances.${grips}`
   if (now.fresh) return `${every} ${FREE}` // the rest once something was touched

@@ -86,12 +86,12 @@ export function render({ model, view }) {
   }
 
   function say(note = pushed.on ? now.note : "") {
-    tell("count", counted(body), "innerHTML")
-    tell("legend", legend(body))
-    tell("special", special(body))
-    tell("key", barred(body))
     quest.ask(space, { ...now, hides: hides() })
     hide()
+    tell("count", counted(body, space.fog), "innerHTML")
+    tell("legend", legend(body))
+    tell("special", special(body, space.fog))
+    tell("key", barred(body))
     const seen = { ...now, fog: space.fog }
     tell("what", pictured(body, seen))
     tell("says", note || sentence(body, mu, seen))

@@ -214,7 +214,7 @@ export class Space {
     if (this.ray) this.write(x + 12, y + 18, `${(at[1] / at[0]).toFixed(1)} ×`, look.hand, 13, "left")
     const determined = !body.h || (body.whole && body.corners.length === 1)
     if (determined) this.write(x, y - 28, "one point: everything is determined", look.ink, 13)
-    else if (look.fresh) this.invite(x, y)
+    else if (look.fresh && !(this.flagged && this.flag.value === null)) this.invite(x, y)
     return moves
   }
 

@@ -13,7 +13,7 @@ from ..replays import Replay
 from .style import DARK, DOT, corner, lines, text
 
 CORNER = "outline: exact; dots: networks found at random"
-CORNER_FIRST = "dots: networks found at random"
+CORNER_FIRST = "dots: sets of forces found at random"
 NAMED = "possible up to here", "halfway"  # of the outline, and within it
 # The page's theme gives all axes one colour.
 KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
@@ -90,7 +90,7 @@ class Standing:
         self.clear()
         if self.hidden:
             seen = planes.seen(found.plane)
-            return self._mark(seen, f"no dot beyond {seen:g}", "left")
+            return self._mark(seen, f"none beyond {seen:g}", "left")
         middle, goal = found.outer.mean(axis=0), found.plane.goal
         x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
         self.name_of_s.update(x=x, y=y, visible=True)

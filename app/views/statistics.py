@@ -27,7 +27,7 @@ from ..jobs import Job, reading
 from ..looks import AXES, FIGURES
 from ..replays import Replay
 from ..state import AppState
-from . import studied
+from . import studied, style
 from .packing import exact_intervals
 from .parts import (
     LATER,
@@ -46,16 +46,14 @@ from .parts import (
 from .studied import Drawn
 from .style import DARK, DOT, ORIGINAL, PALE, STATES, corner, hover, legend_above
 
-GUESS_COLOUR = "#888888"
 SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both scales, the usual one
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> A blue dot is the force at the marked contact in one network found at "
-    "random. They spread by ±{:.2f} (standard deviation; mean force 1), as is typical in this "
-    "packing."
+    "<b>Guess first.</b> A blue dot is the force at the marked contact, a typical one, in one set "
+    "of forces found at random. They spread by ±{:.2f} (standard deviation; mean force 1)."
 )
-ASKED = "<b>In packings made with more friction, this spread …</b> (or draw it below)"
+ASKED = "<b>In packings made with more friction, this spread typically …</b>"
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
 STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:100%;display:block"
  role="img" aria-label="the forces at the marked contact, with their spread" fill="none"
@@ -202,12 +200,12 @@ class View(TabView):
             self._pencil = None
         if hidden and self._pencil is None and replay is not None:
             line = fig.multi_line(
-                "xs", "ys", source=self.guessed, line_color=GUESS_COLOUR, line_width=3,
+                "xs", "ys", source=self.guessed, line_color=style.GUESS, line_width=3,
                 name=studied.GUESS,
             )  # fmt: skip
             mu, eta = (replay.summary[name] for name in ("mu", "eta1"))
             fig.text(
-                [mu], [eta], ["draw your guess through here"], x_offset=-14, y_offset=4,
+                [mu], [eta], ["or draw it through here"], x_offset=-14, y_offset=4,
                 text_align="right", text_color=DOT, text_font_size="12px", name=studied.DRAW,
             )  # fmt: skip
             self._pencil = FreehandDrawTool(renderers=[line], num_objects=1)

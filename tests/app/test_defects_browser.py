@@ -311,7 +311,7 @@ def test_ticks_of_friction_stand_apart(lasting):
 
 def test_a_link_to_perturb_leaves_no_warning_in_the_log(visit, served):
     page = visit("?tab=perturb&contact=5")
-    page.get_by_role("button", name="Push until something moves").click()
+    page.get_by_role("button", name="Let the push grow").click()
     page.get_by_text("the packing gives way:").wait_for()
     page.get_by_role("tab", name="Friction").click()
     page.get_by_text("Forces vary most at friction").wait_for()

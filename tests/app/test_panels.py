@@ -726,7 +726,7 @@ def test_the_outline_is_hidden_until_it_was_found_out_how_far_it_goes(state):
     assert all(r.glyph.line_alpha == r.glyph.fill_alpha == 0 for r, _, _ in view.standing.outlines)
     assert not view.standing.name_of_s.visible and not view.finding.visible
     assert 0 <= view.standing.goal.location - max(view.path.data["x"]) < 0.1
-    assert view.standing.goal_words.text == f"no dot beyond {view.standing.goal.location:g}"
+    assert view.standing.goal_words.text == f"none beyond {view.standing.goal.location:g}"
     assert not len(view.standing.half.data["x"])
     assert not any(renderer.visible for renderer in view.standing.packed)
     across, up = view.figure.xaxis[0], view.figure.yaxis[0]  # in the colours of their lines

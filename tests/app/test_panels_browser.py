@@ -147,7 +147,7 @@ def test_statistics_by_night_on_a_narrow_screen(visit):
 def test_a_contact_is_pushed_and_its_field_seen(visit):
     page = visit("?tab=perturb&contact=5")
     before = scene(page, "scene.offset")
-    page.get_by_role("button", name="Push until something moves").click()
+    page.get_by_role("button", name="Let the push grow").click()
     page.get_by_text("the packing gives way:").wait_for()
     assert before is None
     until(page, "Math.abs(scene.offset?.amplitude) > 0.001")

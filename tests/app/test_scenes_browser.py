@@ -393,7 +393,7 @@ def test_above_three_dimensions_a_shadow_with_its_exact_outline_is_shown(look):
     assert "10 numbers are free" in says(page)
     desk(page).get_by_role("button", name="Random points").click()
     desk(page).get_by_role("combobox", name="force shown upwards").select_option(
-        "tangential force between 1 and 2"
+        "tangential force between disks 1 and 2"
     )
     until(page, "small.space.shadow.join() === '0,1' && !small.space.outline.stale")
     S = gf.ensemble(gf.scene("column"))

@@ -100,7 +100,7 @@ def test_the_tour_is_walked_through_and_closes_into_the_page(visit, width, heigh
         press(page, "Next" if step < STEPS else "Finish")
     card(page).wait_for(state="hidden")
     assert "tab=perturb" in page.evaluate("location.search")  # the page as it is
-    page.get_by_role("button", name="Push until something moves").wait_for()
+    page.get_by_role("button", name="Let the push grow").wait_for()
 
 
 def test_on_a_narrow_page_the_sidebar_waits_until_it_is_asked_for(visit):
