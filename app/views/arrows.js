@@ -231,15 +231,17 @@ export class Arrows {
     }
     const force = [0, 1].map((k) => normal * inward[k] + tangential * across[k])
     const own = this.axisColour(contact), named = body.scene.r.length === 1 && body.count <= NAMED
-    if (named || (own && body.scene.r.length <= NAMED)) { // the part that its number tells
+    const apart = own && body.scene.r.length <= NAMED // the part that its number tells, by itself
+    if (named) {
       g.globalAlpha = 0.45
-      this.arrow(px, py, inward.map((v) => v * normal), own ?? look.cold, 1.5)
+      this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
       g.globalAlpha = 1
     }
     if (named) this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     g.globalAlpha = look.fresh && body.crowded && !own && !lit ? QUIET : 1 // at first only those that are plotted count
-    const colour = lit ? look.hand : slides ? look.warm : own ?? look.cold, thick = lit || own ? 3.5 : 2.5
+    const colour = lit ? look.hand : slides ? look.warm : (!apart && own) || look.cold, thick = lit || (own && !apart) ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)
+    if (apart) this.arrow(px, py, inward.map((v) => v * normal), own, 3.5)
     g.globalAlpha *= 0.35
     if (copy) this.arrow(...this.px(...copy), force, colour, thick)
     g.globalAlpha = 1

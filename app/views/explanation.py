@@ -38,6 +38,16 @@ ASKED = {
 }
 
 
+# The same to somebody who is new.
+ASKED_FIRST = {
+    "plane": (
+        "Each way to hold these {n} disks is one dot.",
+        "The lines are the forces between touching disks, just now those of the red dot. "
+        "Its place says how strong the green and the violet one are.",
+    ),
+}
+
+
 def first(summary: Summary, tab: str = "", fresh: bool = False) -> str:
     """What does not move, what is free, and what playing shows; or what is asked beside.
 
@@ -48,20 +58,21 @@ def first(summary: Summary, tab: str = "", fresh: bool = False) -> str:
         found = f"These {n} disks never move, and the forces between them are fixed."
         told = f"No number is free: there is just one {term('network', 'force network')}."
         told += " Choose some friction to see more." if summary["mu"] == 0 else ""
-    elif tab in ASKED:
-        found, told = ASKED[tab]
-        told = told.format(mu=summary["mu"])
+    elif tab in ASKED or (fresh and tab in ASKED_FIRST):
+        found, told = ASKED.get(tab) or ASKED_FIRST[tab]
+        found, told = found.format(n=n), told.format(mu=summary["mu"])
     else:
         found = f"These {n} disks never move, yet the forces between them can differ."
-        told = "Each line is the force between two touching disks: the thicker, the stronger. "
+        told = "Lines are the forces between touching disks: the thicker, the stronger. "
         contacts = summary["contacts"]
-        told += f"{2 * contacts} unknown forces, {2 * contacts - free} equations: "
+        told += f"{2 * contacts} unknown components, {2 * contacts - free} equations: "
         told += f"<b>balance leaves {free} numbers free</b>, so countless sets of forces, "
-        told += f"{term('network', 'networks')}, hold the very same disks"
+        told += "hold the very same disks. "
         told += (
-            ": no photograph shows how much each of them carries."
+            "Which of them is there, no photograph tells."
             if fresh
-            else ". Play goes through some, found at random: alternatives, not moments in time."
+            else f"Play goes through some such {term('network', 'networks')}, found at random: "
+            "alternatives, not moments in time."
         )
     return f"<h2>{found}</h2><p>{told}</p>"
 

@@ -1,11 +1,11 @@
 // A guess before the hand finds out: a marker on the axis of the force that is asked for.
 
-import { polygon } from "./pen.js"
+import { line, polygon } from "./pen.js"
 import { number } from "./saying.js"
 
 const HIGH = 16, WIDE = 16 // pixels
 const REACH = 22 // pixels around it in which it is taken
-const BEGIN = 0.05 // of its axis, where it waits
+const WAITS = [72, 28] // pixels across and up beyond where the force is, until it was dragged: clear of its number
 
 export class Flag {
   constructor() { this.begin() }
@@ -13,13 +13,13 @@ export class Flag {
   /** It waits for a guess: in a new scene. */
   begin() { Object.assign(this, { value: null, axis: null }) }
 
-  /** Which axis it stands on: d = 1 for one that goes up; its other coordinate, its ends, and pixels of a value 0 and 1. */
+  /** Which axis it stands on: d = 1 for one that goes up; its other coordinate, its ends; now: where the force is, and pixels of a value 0 and 1. */
   on(axis) { this.axis = axis }
 
   /** How far along its axis it is, in pixels. */
   get along() {
-    const { value, axis: { ends, zero, one } } = this
-    return value === null ? ends[0] + BEGIN * (ends[1] - ends[0]) : zero + value * (one - zero)
+    const { value, axis: { d, now, zero, one } } = this
+    return value === null ? now + Math.sign(one - zero) * WAITS[d] : zero + value * (one - zero)
   }
 
   get foot() {
@@ -40,6 +40,11 @@ export class Flag {
 
   draw(space) {
     const { context: g, look } = space, { axis: { d }, value } = this, [x, y] = this.foot
+    g.strokeStyle = look.guess
+    g.lineWidth = 1
+    g.setLineDash([3, 5])
+    line(g, [x, y], d ? [space.easel.wide - 10, y] : [x, 20])
+    g.setLineDash([])
     const sides = [-WIDE / 2, WIDE / 2].map((half) => (d ? [x + HIGH, y + half] : [x + half, y - HIGH]))
     polygon(g, [[x, y], ...sides])
     g.fillStyle = look.guess

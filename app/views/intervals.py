@@ -29,9 +29,10 @@ MOST_BARS = 1500  # more than there are pixels would only cost time; of more, ev
 SOME = 16  # bars that can be told apart at a glance
 APART = 100  # bars up to which there is room between them, and for large dots
 GOAL = "goal {:g} →"
-ALONE = "the line marked in the packing, one of {} contacts"
+ALONE = "the marked line"
 CORNER = "possible: exact; seen: in the networks so far"
-CORNER_ALONE = "blue: so far; red: now"
+CORNER_ALONE = "blue: found at random; red: now"
+ASK = "Guess: click the height that it can reach."
 AROUND = 1.5  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
@@ -50,8 +51,8 @@ LEAD = (
     "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
 )
 LEAD_ALONE = (
-    "<b>How far can this force go?</b> Blue: where it is in some sets of forces that were found at "
-    "random. Click the plot where you think it ends; then drag the marked line."
+    "<b>How far can this force go?</b> The blue bar shows its values in some sets of forces that "
+    "hold the disks, found at random."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -83,7 +84,7 @@ class View(TabView):
         )
         self.guess_words = Label(
             x=Node(target="frame", symbol="left", offset=6), y=0, y_offset=3, text_color=GUESS,
-            text_font_size="12px", visible=False,
+            text_font_size="13px", visible=False,
         )  # fmt: skip
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
@@ -204,8 +205,13 @@ class View(TabView):
         _set_range(self.figure.y_range, 0, top)
         some = f"{len(contacts)} of {of} " if len(contacts) < of else ""
         ranked = f"{some}contacts, sorted by {SORTS[self.looks.sort]}"
-        self.figure.xaxis.axis_label = ALONE.format(of) if self.alone else ranked
-        self.figure.yaxis.axis_label = f"normal force fₙ ({SCALES[self.looks.scale]})"
+        self.figure.xaxis.axis_label = ALONE if self.alone else ranked
+        name = "normal force" if self.alone else "normal force fₙ"
+        self.figure.yaxis.axis_label = f"{name} ({SCALES[self.looks.scale]})"
+        if self.alone and not self.guess.visible:
+            self.guess_words.update(y=0.85 * top, text=ASK, visible=True)
+        elif self.guess_words.text == ASK:
+            self.guess_words.visible = False
 
     def _show_growth(self, replay: Replay) -> None:
         self._grown, grows = replay, self.state.growing

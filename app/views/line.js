@@ -70,7 +70,7 @@ export function drawAxis(space, index, at, d = 0) {
     ticks.push([x, String(Number((k * step).toPrecision(6)))])
   }
   for (const [x, text] of ticks) write(x, text, look.ink, 11)
-  if (index === 2 * space.read.at(-1)) space.flag.on({ d, at, ends, zero: place(0), one: place(1) })
+  if (index === 2 * space.read.at(-1)) space.flag.on({ d, at, ends, now: place(value(body.u)), zero: place(0), one: place(1) })
   if (goal > Math.min(...ends) && goal < Math.max(...ends)) drawGoal(space, goal, at, d)
   g.lineWidth = 1
   g.setLineDash([2, 4])

@@ -7,13 +7,14 @@ const STEPS = 400 // of the slider
 const RISE_S = 5 // from nothing to the end, by the button
 const ROOM = 1.25 // of the scale beyond its end, where it ends beyond the scale
 const TICKS = 8 // numbers on the scale, about
+const WAITS = 0.02 // of the scale, where a guess waits
 const THUMB = 8 // px from the slider's ends to where its thumb stands for them
 
 export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "load"
   root.innerHTML = `<label>push <span class="rail"><input type="range" min="0" value="0" aria-label="push, in mean forces">
-      <span class="scale" title="click: your guess"></span></span></label>
+      <span class="scale"></span></span></label>
     <span class="told"><output></output> × mean force<b></b></span>
     <button type="button" class="soft">Let the push grow</button>`
   const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
@@ -63,13 +64,19 @@ export function render({ model, view }) {
   const along = (value) => `calc(${THUMB}px + (100% - ${2 * THUMB}px) * ${value / range.max})`
   const mark = (kind, value, words) => `<span class="${kind}" style="left:${along(value)}">${words}</span>`
 
-  /** Numbers, how strong the force of the contact is, and where a guess was put. */
+  /** Numbers, and a guess, which waits at the left. */
   function drawScale() {
     const most = Number(range.max), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => most / size <= TICKS) ?? most
     let drawn = ""
     for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
-    if (model.carries > 0) drawn += mark("now", model.carries, `▲ the disks press with ${model.carries.toFixed(2)}`)
-    line.innerHTML = drawn + (guess === null ? "" : mark("guess", guess, "▼"))
+    const words = guess === null ? "your guess: drag me" : `your guess ${guess.toFixed(1)}`
+    line.innerHTML = drawn + mark("guess", guess ?? WAITS * most, `▲ ${words}`)
+  }
+
+  function put(event) {
+    const { left, width } = line.getBoundingClientRect()
+    guess = Math.min(1, Math.max(0, (event.clientX - left - THUMB) / (width - 2 * THUMB))) * range.max
+    drawScale()
   }
 
   /** By itself, as soon as it is known how far. */
@@ -94,14 +101,11 @@ export function render({ model, view }) {
   range.addEventListener("input", () => { rising = 0; set(Number(range.value)) })
   range.addEventListener("change", () => by?.leave())
   run.addEventListener("click", rise)
-  line.addEventListener("click", (event) => {
-    const { left, width } = line.getBoundingClientRect()
-    guess = Math.min(1, Math.max(0, (event.clientX - left - THUMB) / (width - 2 * THUMB))) * range.max
-    drawScale()
-    event.preventDefault() // the label would hand it to the slider
-  })
+  line.addEventListener("pointerdown", (event) => { line.setPointerCapture(event.pointerId); put(event) })
+  line.addEventListener("pointermove", (event) => { if (line.hasPointerCapture(event.pointerId)) put(event) })
+  line.addEventListener("click", (event) => event.preventDefault()) // the label would hand it to the slider
   model.on("contact", anew)
-  model.on(["most", "carries"], scale)
+  model.on("most", scale)
   model.on("path", () => { asked = known(); scale() })
   model.on("running", () => { if (!model.running && !known()) { asked = false; rising = 0; show() } })
   scale()

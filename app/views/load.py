@@ -13,7 +13,6 @@ class LoadSlider(Scripted):
 
     contact = param.Integer(default=None, allow_None=True, doc="the one that is pushed")
     path = param.Dict(default={}, doc="networks under growing loads, see perturb.path; {} unknown")
-    carries = param.Number(default=0.0, doc="its force as packed")
     most = param.Number(default=1.0, doc="end of the scale while it is not known what they hold")
     running = param.Boolean(doc="whether it is being found out")
 

@@ -33,7 +33,7 @@ LEGEND = """
  <svg width="40" height="12"><polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5"
   fill="currentColor" fill-opacity="0.65"/></svg>
  {shown:.3g} × mean force</span>
-<span class="loose" tabindex="0" data-term="rattler">pale disks: carry nothing</span>
+<span class="loose" tabindex="0" data-term="rattler">pale disks: loose, no force on them</span>
 {marks}
 """
 JAMMING = """

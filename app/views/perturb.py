@@ -54,9 +54,12 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
 LEAD = (
     "<b>You push two touching disks apart, harder and harder,</b> by two opposite forces. At first "
     "they only press less on each other; then their neighbours have to hold them. Nothing moves as "
-    "long as the disks find forces that balance your push."
+    "long as some set of forces balances your push."
 )
-WHERE = "Click another line to push there. The mean force is 1, the largest here {most:.1f}."
+WHERE = (
+    "At rest the two disks press on each other with {now:.2f}; the mean force in the packing is 1, "
+    "the largest {most:.1f}. Click another line to push there."
+)
 SHOWN = (
     "Pushed is contact {number}, in the picture fainter where the box repeats. Of all sets of "
     "forces that balance the push, those nearest to the forces as packed are shown; orange carries "
@@ -135,7 +138,6 @@ class View(TabView):
             return
         self.load.param.update(
             contact=self.contact,
-            carries=0 if self.contact is None else float(state.replay.normal[0, self.contact]),
             path={} if self.pushed is None else path(self.pushed[0]),
             most=float(f"{SCALE * state.replay.normal[0].max(initial=0.5):.2g}"),
         )
@@ -188,7 +190,7 @@ class View(TabView):
             return
         tiles = [("carries as packed", f"{replay.normal[0, contact]:.2f}")]
         if not self.gave:
-            said = WHERE.format(most=replay.normal[0].max())
+            said = WHERE.format(now=replay.normal[0, contact], most=replay.normal[0].max())
             how = folded(SHOWN.format(number=replay.backbone[contact]))
             loads = [] if self.loads is None else [self.loads.load[contact]]
             known = _tiles([("limit load", f"{load:.2f}") for load in loads])

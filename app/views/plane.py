@@ -55,9 +55,9 @@ LEAD = (
 )
 # Before the first gesture, which is to find out how far S goes.
 LEAD_FIRST = (
-    "<b>Each dot is one whole set of forces.</b> Across: its green force. Up: its violet force. "
-    "<b>The red dot is what you see in the packing.</b> The blue ones were found by kicking all "
-    "forces at random and restoring balance: none lies beyond the line. Law, or luck?"
+    "<b>Each dot is one whole set of forces.</b> Across: its green force. Up: its violet one. "
+    "<b>The red dot is what you see in the packing.</b> The blue ones were found at random, and "
+    "none lies beyond the dashed line. Is that a law, or luck?"
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")

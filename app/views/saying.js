@@ -49,8 +49,8 @@ export function legend(body) {
   const weights = Array.from(scene.r, (_, d) => Math.hypot(load[3 * d], load[3 * d + 1]))
   const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
-  const parts = scene.r.length > 1 && !body.crowded && scene.r.length < 4 ? " (pale: normal part)" : " on the right"
-  const axes = h === 2 || h > 3 ? `; green, violet: plotted${parts}` : ""
+  const parts = scene.r.length < 4 ? "normal parts, " : ""
+  const axes = h === 2 || h > 3 ? `; green, violet: ${parts}plotted on the right` : ""
   const heads = scene.r.length > 2 ? " (a pair between two disks)" : ""
   return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
 }
@@ -128,7 +128,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3 && now.fresh) return `These ${scene.r.length} disks are squeezed from all sides; the dashed square repeats on and on, and pale disks are copies. Drag the red dot to change two of the forces, green and violet: all others readjust so that every disk stays in balance. Limits: friction is at most μ times the normal force, and disks cannot pull.`
+  if (h > 3 && now.fresh) return `These ${scene.r.length} disks are squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats on and on, and pale disks are copies. Drag the red dot to change two of the forces, green and violet: all others readjust, no more than keeps every disk in balance. Limits: friction is at most μ times the normal force, and disks cannot pull.`
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
@@ -137,7 +137,7 @@ export function sentence(body, mu, now) {
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
   const grips = gripped(body) ? " Here friction points down the walls, as if the disk had been pressed in; it can point up, too." : ""
   const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
-  if (now.fog) return `Move the red dot: the forces change, and the ${several ? "disks stay" : "disk stays"} at rest all the same. Friction may be anything up to μ times the normal force, so more than one set of forces balances.${grips}`
+  if (now.fog) return `Each place of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}${grips}`
   if (now.fresh) return `${every} ${FREE}` // the rest once something was touched
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }

@@ -50,10 +50,10 @@ SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both s
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> A blue dot is the force at the marked contact, a typical one, in one set "
-    "of forces found at random. They spread by ±{:.2f} (standard deviation; mean force 1)."
+    "<b>Guess first.</b> A blue dot is the force at the marked contact in one set of forces, found "
+    "at random. They vary by ±{:.2f} (standard deviation; mean force 1)."
 )
-ASKED = "<b>In packings made with more friction, this spread typically …</b>"
+ASKED = "<b>In packings made with more friction, forces vary …</b>"
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
 STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:100%;display:block"
  role="img" aria-label="the forces at the marked contact, with their spread" fill="none"
@@ -65,7 +65,7 @@ STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:10
  <text x="{beside:.0f}" y="15" fill="{mark}">± {spread:.2f}</text></g></svg>"""
 SHOW = "Just show me"
 DRAWN_FIRST = "The grey line is your guess. "
-GUESSES = ("grows ↗", "shrinks ↘", "grows, then shrinks ∩", "shrinks, then grows ∪")
+GUESSES = ("more ↗", "less ↘", "more, then less ∩", "less, then more ∪")
 RIGHT, ANSWERS = 2, ("Not quite. ", "Well guessed. ")
 EACH = (
     "<b>Each dot is one contact:</b> the farther up, the less its force is determined; the farther "
@@ -205,7 +205,7 @@ class View(TabView):
             )  # fmt: skip
             mu, eta = (replay.summary[name] for name in ("mu", "eta1"))
             fig.text(
-                [mu], [eta], ["or draw it through here"], x_offset=-14, y_offset=4,
+                [mu], [eta], ["or draw a curve through here"], x_offset=-14, y_offset=4,
                 text_align="right", text_color=DOT, text_font_size="12px", name=studied.DRAW,
             )  # fmt: skip
             self._pencil = FreehandDrawTool(renderers=[line], num_objects=1)
