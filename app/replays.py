@@ -44,10 +44,9 @@ class Replay(NamedTuple):
 
     @property
     def typical(self) -> int:
-        """The contact whose f_n scatters over the frames most nearly as it does on average (η1)."""
-        if not len(self.backbone):
-            return -1
-        return int(np.argmin(np.abs(self.normal.std(axis=0) - self.summary["eta1"])))
+        """The contact whose f_n scatters most nearly as that of all does on average; or -1."""
+        spread = self.normal.std(axis=0)
+        return int(np.argmin(np.abs(spread - spread.mean()))) if len(spread) else -1
 
 
 def make_replay(

@@ -26,9 +26,9 @@ def lead(state: AppState) -> str:
 # What the packing is looked at for, by tabs, where it is not what is free; and what is seen of it.
 ASKED = {
     "statistics": (
-        "How does friction change how much forces vary?",
+        "How much can one force vary while no disk moves?",
         "Here is a packing made with friction μ = {mu:g}. With another friction the disks would "
-        "have come to rest in other places.",
+        "have come to rest in other places, and forces would vary more, or less.",
     ),
     "perturb": (
         "How hard can you push until something moves?",
@@ -41,9 +41,9 @@ ASKED = {
 # The same to somebody who is new.
 ASKED_FIRST = {
     "plane": (
-        "Each way to hold these {n} disks is one dot.",
-        "The lines are the forces between touching disks, just now those of the red dot. "
-        "Its place says how strong the green and the violet one are.",
+        "Every dot is a way to hold these {n} disks.",
+        "The picture shows the forces of the red dot. Drag the dot, and watch how all lines "
+        "change.",
     ),
 }
 

@@ -7,6 +7,17 @@ const HIGH = 16, WIDE = 16 // pixels
 const REACH = 22 // pixels around it in which it is taken
 const WAITS = [72, 28] // pixels across and up beyond where the force is, until it was dragged: clear of its number
 
+/** The first gesture, pointed out. */
+function tag({ context: g, look }, [x, y], words) {
+  g.font = "13px sans-serif"
+  g.textAlign = "left"
+  g.textBaseline = "middle"
+  g.fillStyle = look.hand
+  g.fillRect(x, y - 11, g.measureText(words).width + 12, 21)
+  g.fillStyle = look.paper
+  g.fillText(words, x + 6, y)
+}
+
 export class Flag {
   constructor() { this.begin() }
 
@@ -50,6 +61,8 @@ export class Flag {
     g.fillStyle = look.guess
     g.fill()
     const words = value === null ? "your guess: drag me" : `your guess ${number(value)}`
-    space.write(d ? x + HIGH + 5 : x, d ? y : y - HIGH - 9, words, look.guess, 12, d ? "left" : "center")
+    const place = d ? [x + HIGH + 5, y - 12] : [x + 5, y - HIGH - 12]
+    if (value === null) tag(space, place, words)
+    else space.write(...place, words, look.guess, 12, "left")
   }
 }

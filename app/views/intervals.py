@@ -32,7 +32,7 @@ GOAL = "goal {:g} →"
 ALONE = "the marked line"
 CORNER = "possible: exact; seen: in the networks so far"
 CORNER_ALONE = "blue: found at random; red: now"
-ASK = "Guess: click the height that it can reach."
+ASK = "your guess: click the height that it can reach"
 AROUND = 1.5  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
@@ -84,7 +84,7 @@ class View(TabView):
         )
         self.guess_words = Label(
             x=Node(target="frame", symbol="left", offset=6), y=0, y_offset=3, text_color=GUESS,
-            text_font_size="13px", visible=False,
+            text_font_size="13px", padding=4, border_radius=4, visible=False,
         )  # fmt: skip
         self.finals = [
             Span(dimension="width", line_dash="dashed", line_color=colour) for colour in SERIES
@@ -209,7 +209,7 @@ class View(TabView):
         name = "normal force" if self.alone else "normal force fₙ"
         self.figure.yaxis.axis_label = f"{name} ({SCALES[self.looks.scale]})"
         if self.alone and not self.guess.visible:
-            self.guess_words.update(y=0.85 * top, text=ASK, visible=True)
+            self._word(0.83 * top, ASK, "white", DOT)
         elif self.guess_words.text == ASK:
             self.guess_words.visible = False
 
@@ -243,7 +243,11 @@ class View(TabView):
         """Who is new clicks where the bar may end, before finding out."""
         if self.alone and event.y > 0:
             self.guess.update(location=event.y, visible=True)
-            self.guess_words.update(y=event.y, text=f"your guess {event.y:.1f}", visible=True)
+            self._word(event.y, f"your guess {event.y:.1f}", GUESS, None)
+
+    def _word(self, y: float, text: str, colour: str, behind: str | None) -> None:
+        look = {"text_color": colour, "background_fill_color": behind}
+        self.guess_words.update(y=y, text=text, visible=True, **look)
 
     def _mark(self) -> None:
         """Show where the selected contact stands, if it is drawn."""

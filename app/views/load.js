@@ -70,7 +70,7 @@ export function render({ model, view }) {
     let drawn = ""
     for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
     const words = guess === null ? "your guess: drag me" : `your guess ${guess.toFixed(1)}`
-    line.innerHTML = drawn + mark("guess", guess ?? WAITS * most, `▲ ${words}`)
+    line.innerHTML = drawn + mark(guess === null ? "guess waits" : "guess", guess ?? WAITS * most, `▲ <i>${words}</i>`)
   }
 
   function put(event) {

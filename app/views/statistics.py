@@ -28,6 +28,7 @@ from ..looks import AXES, FIGURES
 from ..replays import Replay
 from ..state import AppState
 from . import studied, style
+from .glimpse import Glimpses, glimpse
 from .packing import exact_intervals
 from .parts import (
     LATER,
@@ -50,10 +51,13 @@ SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both s
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>Guess first.</b> A blue dot is the force at the marked contact in one set of forces, found "
-    "at random. They vary by ±{:.2f} (standard deviation; mean force 1)."
+    "<b>One force, while no disk moves.</b> A blue dot is the force at the marked contact in one "
+    "set of forces that holds the disks. It varies by ±{:.2f} (standard deviation; mean force 1)."
 )
-ASKED = "<b>In packings made with more friction, forces vary …</b>"
+ASKED = "<b>In packings made with more friction, one force varies …</b>"
+ASKED_OF = "<b>In which of these packings does a force vary most, typically?</b> Click it."
+# Frictions whose packings are to be chosen among, about, and what they are like.
+OFFERED = {0.01: ": slippery", 0.2: "", 10.0: ": like cogwheels"}
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
 STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:100%;display:block"
  role="img" aria-label="the forces at the marked contact, with their spread" fill="none"
@@ -61,7 +65,7 @@ STRIP = """<svg viewBox="0 0 520 58" width="520" height="58" style="max-width:10
  <path d="M10 34H510" stroke-opacity="0.4"/><g fill="{dots}" stroke="none">{points}</g>
  <path d="M{low:.0f} 14V8H{high:.0f}V14" stroke="{mark}" stroke-width="2"/>
  <g fill="currentColor" stroke="none">{ticks}
- <text x="10" y="15">force at the marked contact, mean force = 1</text>
+ <text x="{named}" y="15" text-anchor="{anchor}">force at the marked contact</text>
  <text x="{beside:.0f}" y="15" fill="{mark}">± {spread:.2f}</text></g></svg>"""
 SHOW = "Just show me"
 DRAWN_FIRST = "The grey line is your guess. "
@@ -87,6 +91,9 @@ class View(TabView):
             ),
             visible=False,
         )
+        self.glimpses = Glimpses(self._picked)
+        self.offered: list[Cell] = []  # whose packings are to be chosen among
+        self.showing = state.work.task(reading, told=False)
         self._curve: Figure | None = None  # over friction, where it is drawn
         self._found = self._said = ""  # what figures over μ show, and what is said on a guess
         self.what = question("Question", FIGURES, self.looks, "figure")
@@ -117,6 +124,7 @@ class View(TabView):
             self.bar,
             self.lead,
             self.guesses,
+            self.glimpses,
             self.plots,
             self.more,
             pn.Column(self.scale, self.told, styles=LATER, **wide),
@@ -177,18 +185,52 @@ class View(TabView):
             self._said = ANSWERS[k == RIGHT] + self._said
         self.looks.guess = False
 
+    def _picked(self, k: int) -> None:
+        measured = [row["eta1"] for row in distributions.rows(self.offered)]
+        self._said = ANSWERS[int(np.argmax(measured)) == k]
+        self._said += DRAWN_FIRST if len(self.guessed.data["xs"]) else ""
+        self.looks.guess = False
+
+    def _offer(self) -> None:
+        """Have pictures made of packings of other frictions, where there are enough of them."""
+        state, made = self.state, self.state.cell.selection.packing
+        like = [
+            cell
+            for cell in distributions.alike(state.catalogue, state.cell)
+            if cell.mu in OFFERED and cell.selection.packing["seed"] == made.get("seed")
+        ]
+        if len(like) != len(OFFERED) or self.glimpses.items:
+            return
+        self.offered = sorted(like, key=lambda cell: cell.mu)
+
+        def work(job: Job) -> list[list[str]]:
+            packings = [state.library.packing(cell.params["packing"]) for cell in self.offered]
+            return [
+                [glimpse(packing), f"friction {cell.mu:g}{OFFERED[cell.mu]}"]
+                for cell, packing in zip(self.offered, packings, strict=True)
+            ]
+
+        def done(items: list[list[str]]) -> None:
+            self.glimpses.items = items
+            self._hide()
+
+        self.showing.start(work, done)
+
     def _hide(self) -> None:
         """Hide what a guess is asked of, and show it, with what was found, once there was one."""
         what, replay = self.what.value, self.state.replay
         hidden = what == "eta" and self.looks.guess and replay is not None
-        self.guesses.visible = hidden
+        shown = len(self.glimpses.items) > 0
+        if hidden and not shown:
+            self._offer()
+        self.guesses.visible, self.glimpses.visible = hidden and not shown, hidden and shown
         self.scale.visible = what in SCALED and not hidden
         self.more.visible = what == "eta" and not hidden
         if self._curve is not None:
             studied.hide_curve(self._curve, hidden)
             self._give_pencil(self._curve, replay, hidden)
         if hidden:
-            self.lead.object = _guess_first(replay)
+            self.lead.object = _guess_first(replay) + (ASKED_OF if shown else ASKED)
         elif what in DRAWN:
             self.lead.object = (self._said if what == "eta" else "") + self._found
 
@@ -365,7 +407,7 @@ DRAWN: dict[str, Callable[[list[Row], list[Row], Row, bool], Drawn]] = {
 
 def _guess_first(replay: Replay) -> str:
     """What is asked, and the forces of a typical contact as SVG."""
-    return GUESS.format(replay.summary["eta1"]) + _strip(replay) + ASKED
+    return GUESS.format(replay.summary["eta1"]) + _strip(replay)
 
 
 def _strip(replay: Replay) -> str:
@@ -385,5 +427,6 @@ def _strip(replay: Replay) -> str:
     )
     return STRIP.format(
         points=points, low=low, high=high, beside=high + 8, spread=typical,
+        named=10 if low > 200 else 510, anchor="start" if low > 200 else "end",
         ticks=ticks, dots=STATES, mark=DOT,
     )  # fmt: skip

@@ -35,7 +35,7 @@ SAMPLERS = {
 }
 OWN, HERE = "on this page", "this packing"
 # Names of this packing's ring, of what a visitor draws, and of the word that asks for it.
-THIS, GUESS, DRAW, HERE = "own", "guess", "draw", "here"
+THIS, GUESS, DRAW, HERE = "own", "guess", "draw", "friction here"
 PEAK = "↓ most here: click"
 LIKE = {0.03: "like ice", 1.0: "like rubber"}  # about, against themselves or a road
 RISES = "friction gives\neach force room"
