@@ -7,6 +7,7 @@ import shutil
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -560,6 +561,9 @@ def test_one_bar_without_its_ends_is_drawn_until_a_force_was_dragged(state):
     assert view.contacts.tolist() == [state.seen.invited] and not view.exact_item.visible
     assert np.isnan(view.bars.data["exact_high"]).all() and len(view.unknown.data["at"]) == 2
     assert not len(view.invited.data["rank"])  # what is to be found out
+    assert "your guess" in view.guess_words.text and not view.guess.visible
+    view._guess(SimpleNamespace(y=3.5))
+    assert view.guess.visible and view.guess.location == 3.5 and "3.5" in view.guess_words.text
     state.looks.fresh = False
     assert len(view.contacts) > 8 and view.exact_item.visible
     assert np.isfinite(view.bars.data["exact_high"]).all() and not len(view.unknown.data["at"])

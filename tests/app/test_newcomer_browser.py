@@ -318,13 +318,17 @@ def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
     offered = page.locator(OFFERED).filter(visible=True)
     assert not offered.count()
     page.locator("button.all").wait_for()
+    page.locator(".turn").get_by_text("Watch: the forces change, no disk moves").wait_for()
     page.locator(".turn").get_by_text("how strong can you make this force?").wait_for()
     until(page, "!scene.hand.player.playing")
+    bins = "new Set(scene.style.bin).size"
+    assert scene(page, bins) == 1  # colours come with what they show
     x, y = inviting(page)
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x, y - 20, steps=4)
     until(page, "scene.hand.moved")
+    until(page, f"{bins} > 1")
     assert not offered.count()  # nothing moves while the hand holds
     page.mouse.up()
     page.locator(".scrub").filter(visible=True).wait_for()
@@ -337,7 +341,7 @@ def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
 def test_who_is_new_finds_out_how_far_networks_go(visit):
     """Force space without its outline, and one bar without its ends, until a force was dragged."""
     page = visit(AT + "&tab=plane", first=True)
-    page.locator(".turn").get_by_text("How far can you take it?").wait_for()
+    page.locator(".turn").get_by_text("past the dashed line").wait_for()
     page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 0")
     page.get_by_text("less than halfway").first.wait_for(
         state="hidden"
@@ -361,9 +365,9 @@ def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     page = visit(AT + "&tab=statistics")
     page.locator(".turn").get_by_text("at which friction do forces vary most?").wait_for()
     scene(page, "scene.hand.player.model.guess = true")
-    guess = page.get_by_role("button", name="It rises, then falls")
+    guess = page.get_by_role("button", name="more, then less")
     guess.wait_for()
-    page.locator(".turn").get_by_text("how does friction change").wait_for()
+    page.locator(".turn").get_by_text("at which friction can one force vary most?").wait_for()
     assert not page.locator(".hill").filter(visible=True).count()  # it would give it away
     models = "[...Bokeh.documents[0].all_models]"
     pencil = "model => model.type === 'FreehandDrawTool' && model.active"

@@ -379,7 +379,7 @@ def test_the_curve_over_friction_is_hidden_until_it_was_guessed(state):
     wait_for(state)
     fig = view.plots.objects[0].object
     assert view.guesses.visible and not any(seen())
-    view.guesses.objects[2].clicks += 1  # it rises, then falls
+    view.guesses.objects[2].clicks += 1  # more, then less
     guess, asked = (fig.select(name=name)[0] for name in ("guess", "draw"))
     assert guess.visible and not asked.visible and fig.toolbar.active_drag == "auto"
     assert all(seen()) and fig.select(name="peak")[0].visible

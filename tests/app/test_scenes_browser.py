@@ -570,6 +570,24 @@ def test_who_is_new_finds_out_how_far_s_goes(look):
     assert not ask(page, "small.space.fog")
 
 
+def test_a_guess_comes_first_and_is_told_beside_the_answer(look):
+    page = look("?scene=groove", first=True)
+    quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
+    quest.get_by_text("Guess first").wait_for()
+    box, (x, y) = space.bounding_box(), ask(page, "small.space.flag.foot")
+    before = ask(page, "[...small.body.u]")
+    page.mouse.move(box["x"] + x, box["y"] + y - 8)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x + 60, box["y"] + y - 8, steps=4)
+    page.mouse.up()
+    quest.get_by_text("Drag the red dot to the right until it stops").wait_for()
+    assert ask(page, "[...small.body.u]") == before  # a guess moves no force
+    space.focus()
+    for _ in range(40):
+        page.keyboard.press("ArrowRight")
+    quest.get_by_text("It is 1.414; you guessed 1.").wait_for()
+
+
 def test_a_scene_outlives_its_server(opening, shipped, tmp_path):
     port = free_port()
     with serve(tmp_path, port=port, GRANFORCE_DATA=str(shipped)) as (url, server):
