@@ -64,9 +64,8 @@ def first(summary: Summary, tab: str = "", fresh: bool = False) -> str:
     else:
         found = f"These {n} disks never move, yet the forces between them can differ."
         told = "Lines are the forces between touching disks: the thicker, the stronger. "
-        contacts = summary["contacts"]
-        told += f"{2 * contacts} unknown components, {2 * contacts - free} equations: "
-        told += f"<b>balance leaves {free} numbers free</b>, so countless sets of forces, "
+        told += f"<b>Balance leaves {term('h', f'{free} numbers')} free</b>, so countless sets of "
+        told += "forces "
         told += "hold the very same disks. "
         told += (
             "Which of them is there, no photograph tells."

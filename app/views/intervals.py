@@ -32,7 +32,7 @@ GOAL = "goal {:g} →"
 ALONE = "the marked line"
 CORNER = "possible: exact; seen: in the networks so far"
 CORNER_ALONE = "blue: found at random; red: now"
-ASK = "your guess: click the height that it can reach"
+ASK = "your guess: click how high it can get"
 AROUND = 1.5  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
@@ -209,7 +209,7 @@ class View(TabView):
         name = "normal force" if self.alone else "normal force fₙ"
         self.figure.yaxis.axis_label = f"{name} ({SCALES[self.looks.scale]})"
         if self.alone and not self.guess.visible:
-            self._word(0.83 * top, ASK, "white", DOT)
+            self._word(0.05 * top, ASK, "white", DOT)
         elif self.guess_words.text == ASK:
             self.guess_words.visible = False
 

@@ -3,6 +3,7 @@
 import { line } from "./pen.js"
 import { forceName, number } from "./saying.js"
 
+const UNKNOWN = 56 // pixels beyond what was found of a line, where a question mark stands: clear of the number
 const TICKS = 70 // pixels between two numbers of an axis, at least
 
 /** The line, with what stops it at its ends; in fog only what was found of it. */
@@ -11,12 +12,12 @@ export function drawSegment(space) {
   const whole = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = whole[0][1]
   const known = space.fog ? space.been.reached(space, whole) : whole.map((at) => ({ at, found: true })), ends = known.map(({ at }) => at)
   const index = axisForce(body, look.contact)
-  if (index !== null) drawAxis(space, index, Math.min(easel.high - 46, y0 + 80))
+  if (index !== null) drawAxis(space, index, space.fog ? y0 : Math.min(easel.high - 46, y0 + 80)) // in fog the dot is on it
   g.strokeStyle = look.cold
   g.lineWidth = 7
   g.lineCap = "butt"
   line(g, ends[0], ends[1] ?? ends[0])
-  known.forEach(({ at, found }, k) => { if (!found) space.write(at[0] + (at[0] < whole[k][0] ? 24 : -24), y0, "?", look.edge, 22) })
+  known.forEach(({ at, found }, k) => { if (!found) space.write(at[0] + (at[0] < whole[k][0] ? UNKNOWN : -UNKNOWN), y0, "?", look.edge, 22) })
   const [a, b] = [ends[0], ends.at(-1)]
   if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
   g.font = "13px sans-serif"

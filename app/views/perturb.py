@@ -57,8 +57,8 @@ LEAD = (
     "long as some set of forces balances your push."
 )
 WHERE = (
-    "At rest the two disks press on each other with {now:.2f}; the mean force in the packing is 1, "
-    "the largest {most:.1f}. Click another line to push there."
+    "The mean force between disks is 1, the largest here {most:.1f}. Click another line to push "
+    "there."
 )
 SHOWN = (
     "Pushed is contact {number}, in the picture fainter where the box repeats. Of all sets of "
@@ -190,7 +190,7 @@ class View(TabView):
             return
         tiles = [("carries as packed", f"{replay.normal[0, contact]:.2f}")]
         if not self.gave:
-            said = WHERE.format(now=replay.normal[0, contact], most=replay.normal[0].max())
+            said = WHERE.format(most=replay.normal[0].max())
             how = folded(SHOWN.format(number=replay.backbone[contact]))
             loads = [] if self.loads is None else [self.loads.load[contact]]
             known = _tiles([("limit load", f"{load:.2f}") for load in loads])

@@ -5,7 +5,7 @@ import { arrow, circle } from "./pen.js"
 import { plain } from "./plain.js"
 
 const PIN = 17 // px, its height
-const ARROW_PX = 20, GROWN_PX = 90 // beyond the edge of the disk that is pushed: at least, and more at most
+const ARROW_PX = 10, GROWN_PX = 100 // beyond the edge of the disk that is pushed: at least, and more at most
 const COPY = 0.35 // opacity of the arrows at a periodic copy
 const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
 

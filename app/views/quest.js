@@ -5,7 +5,7 @@ import { forceName, number } from "./saying.js"
 
 const NEAR = 0.01 // of what is possible: this near to an end it has been found
 const FIND = "Drag the red dot and find out."
-const GUESS = "Guess first: drag the grey marker."
+const GUESS = "Guess first, with the grey marker; then drag the red dot."
 const SLIDE = "Drag the friction slider."
 
 const single = (body) => !body.empty && body.whole && body.corners.length === 1

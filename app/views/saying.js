@@ -106,7 +106,7 @@ export function pictured(body, { filled: dotted, fog }) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
-  if (fog && h < 3) return `every way to hold the ${scene.r.length > 1 ? "disks" : "disk"}: drag to find out how far it goes`
+  if (fog && h < 3) return h < 2 ? "the red dot goes only as far as friction allows" : "the red dot goes only where friction allows: there is an edge, to be found"
   if (fog && h > 3) return "all possible pairs of the green and the violet force: drag to find out how far they go"
   return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
@@ -128,7 +128,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3 && now.fresh) return `These ${scene.r.length} disks are squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats on and on, and pale disks are copies. Drag the red dot to change two of the forces, green and violet: all others change too, as little as they must to keep every disk in balance. Limits: friction is at most μ times the normal force, and disks cannot pull.`
+  if (h > 3 && now.fresh) return `${scene.r.length} disks, squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats on and on. Drag the red dot: it sets the green and the violet force, and all others change as little as they must to keep every disk in balance.`
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
@@ -136,8 +136,8 @@ export function sentence(body, mu, now) {
   const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
   const grips = gripped(body) ? " Here friction points down the walls, as if the disk had been pressed in; it can point up, too." : ""
-  const wedged = several && wedges(body) ? " Wedged between the walls, the disks can press far harder than they weigh." : ""
-  if (now.fog) return `Each place of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}${grips}`
+  const wedged = several && wedges(body) ? " Wedged between the walls, disks can press harder than they weigh." : ""
+  if (now.fog) return `Each place of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}${grips}${wedged}`
   if (now.fresh) return `${every} ${FREE}` // the rest once something was touched
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }

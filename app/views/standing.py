@@ -3,18 +3,22 @@
 Who is new is to find out how far S goes: its outline hides then, and a line says how far dots do.
 """
 
+from typing import Any
+
 import numpy as np
+from bokeh.events import Tap
 from bokeh.models import ColumnDataSource, CustomJS, GlyphRenderer, Label, Node, Span
 from bokeh.plotting import figure as Figure
 
 from .. import planes
 from ..planes import Outlined, Plane
 from ..replays import Replay
-from .style import DARK, DOT, corner, lines, text
+from .style import DARK, DOT, GUESS, corner, lines, text
 
 CORNER = "outline: exact; dots: networks found at random"
 CORNER_FIRST = "dots: sets of forces found at random"
 NAMED = "possible up to here", "halfway"  # of the outline, and within it
+ASK = "your guess: click how far to the right"
 # The page's theme gives all axes one colour.
 KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
 
@@ -53,6 +57,17 @@ class Standing:
         )  # fmt: skip
         for part in (self.name_of_s, self.goal, self.goal_words):
             fig.add_layout(part)
+        self.guess = Span(
+            dimension="height", line_color=GUESS, line_width=2, line_dash="dashed", visible=False
+        )
+        self.guess_words = Label(
+            x=_edge("left", 10), y=_edge("bottom", -12), text=ASK, text_color="white",
+            background_fill_color=DOT, padding=4, border_radius=4, text_font_size="13px",
+            visible=False,
+        )  # fmt: skip
+        for part in (self.guess, self.guess_words):
+            fig.add_layout(part)
+        fig.on_event(Tap, self._guess)
         for axis in (*fig.xaxis, *fig.yaxis):
             axis.js_on_change("axis_label_text_color", CustomJS(code=KEEP))
         self.corner = corner(fig, CORNER)
@@ -82,6 +97,7 @@ class Standing:
         for packed in self.packed:
             packed.visible = not hidden
         self.corner.text = CORNER_FIRST if hidden else CORNER
+        self.guess_words.visible = hidden or self.guess.visible
         if found is not None:
             self.show(found)
 
@@ -90,7 +106,7 @@ class Standing:
         self.clear()
         if self.hidden:
             seen = planes.seen(found.plane)
-            return self._mark(seen, f"none beyond {seen:g}", "left")
+            return self._mark(seen, f"none found beyond {seen:g}", "left")
         middle, goal = found.outer.mean(axis=0), found.plane.goal
         x, y = middle + 0.75 * (found.outer[np.argmax(found.outer[:, 0])] - middle)
         self.name_of_s.update(x=x, y=y, visible=True)
@@ -101,6 +117,14 @@ class Standing:
             self.half.data = {"x": half[:, 0], "y": half[:, 1]}
             tops = np.array([part[np.argmax(part[:, 1])] for part in (found.outer, half)])
             self.words.data = {"x": tops[:, 0], "y": tops[:, 1], "words": [*NAMED]}
+
+    def _guess(self, event: Any) -> None:
+        """Who is new clicks how far the dot may go, before finding out."""
+        if self.hidden:
+            words = f"your guess {event.x:.1f}"
+            look = {"text_color": GUESS, "background_fill_color": None}
+            self.guess.update(location=event.x, visible=True)
+            self.guess_words.update(x=event.x, text=words, x_offset=4, **look)
 
     def _mark(self, x: float, words: str, align: str) -> None:
         """A line at x, with words at its upper end."""

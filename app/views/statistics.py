@@ -52,10 +52,13 @@ LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into ho
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
     "<b>One force, while no disk moves.</b> A blue dot is the force at the marked contact in one "
-    "set of forces that holds the disks. It varies by ±{:.2f} (standard deviation; mean force 1)."
+    "set of forces that holds the disks. It varies by ±{:.2f} (in units of the mean force)."
 )
 ASKED = "<b>In packings made with more friction, one force varies …</b>"
-ASKED_OF = "<b>In which of these packings does a force vary most, typically?</b> Click it."
+ASKED_OF = (
+    "<b>In which of these packings does a force vary most, typically?</b> Click it. (Each picture "
+    "shows one set of forces; how much they vary is not to be seen.)"
+)
 # Frictions whose packings are to be chosen among, about, and what they are like.
 OFFERED = {0.01: ": slippery", 0.2: "", 10.0: ": like cogwheels"}
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
@@ -224,6 +227,7 @@ class View(TabView):
         if hidden and not shown:
             self._offer()
         self.guesses.visible, self.glimpses.visible = hidden and not shown, hidden and shown
+        self.plots.visible = not self.glimpses.visible
         self.scale.visible = what in SCALED and not hidden
         self.more.visible = what == "eta" and not hidden
         if self._curve is not None:

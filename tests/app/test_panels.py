@@ -2,6 +2,7 @@
 
 import io
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -387,6 +388,26 @@ def test_the_curve_over_friction_is_hidden_until_it_was_guessed(state):
     assert view.lead.object.startswith("Well guessed.") and "at friction" in view.lead.object
 
 
+def test_where_packings_of_three_frictions_are_at_hand_one_is_chosen_among_pictures(
+    state, monkeypatch
+):
+    offered = {cell.mu: "" for cell in state.catalogue if cell.mu}  # of this small store
+    monkeypatch.setattr(statistics_view, "OFFERED", offered)
+    state.looks.param.update(tab="statistics", guess=True)
+    view = statistics_view.View(state)
+    wait_for(state, lambda: view.glimpses.visible)
+    assert not view.guesses.visible and not view.plots.visible
+    assert [words for _, words in view.glimpses.items] == [f"friction {mu:g}" for mu in offered]
+    for picture, _ in view.glimpses.items:
+        assert picture.count("<circle") > 10 and picture.count("<path") > 10
+    measured = [row["eta1"] for row in distributions.rows(view.offered)]
+    view.glimpses.hear({"pick": len(offered)})  # none of them
+    assert state.looks.guess
+    view.glimpses.hear({"pick": int(np.argmax(measured))})
+    assert not state.looks.guess and not view.glimpses.visible and view.plots.visible
+    assert view.lead.object.startswith("Well guessed.")
+
+
 def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
     state.looks.tab = "statistics"
     view = statistics_view.View(state)
@@ -726,7 +747,10 @@ def test_the_outline_is_hidden_until_it_was_found_out_how_far_it_goes(state):
     assert all(r.glyph.line_alpha == r.glyph.fill_alpha == 0 for r, _, _ in view.standing.outlines)
     assert not view.standing.name_of_s.visible and not view.finding.visible
     assert 0 <= view.standing.goal.location - max(view.path.data["x"]) < 0.1
-    assert view.standing.goal_words.text == f"none beyond {view.standing.goal.location:g}"
+    assert "your guess" in view.standing.guess_words.text and not view.standing.guess.visible
+    view.standing._guess(SimpleNamespace(x=2.5))
+    assert view.standing.guess.location == 2.5 and "2.5" in view.standing.guess_words.text
+    assert view.standing.goal_words.text == f"none found beyond {view.standing.goal.location:g}"
     assert not len(view.standing.half.data["x"])
     assert not any(renderer.visible for renderer in view.standing.packed)
     across, up = view.figure.xaxis[0], view.figure.yaxis[0]  # in the colours of their lines
