@@ -277,7 +277,7 @@ class View(TabView):
         if self.state.cell.mu > 0:
             here = Span(
                 location=self.state.cell.mu, dimension="height", line_width=9, line_alpha=0.18,
-                line_color="#888888", name=studied.HERE,
+                line_color="#888888", name=studied.BAND,
             )  # fmt: skip
             fig.add_layout(here)
 

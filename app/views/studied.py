@@ -35,7 +35,7 @@ SAMPLERS = {
 }
 OWN, HERE = "on this page", "this packing"
 # Names of this packing's ring, of what a visitor draws, and of the word that asks for it.
-THIS, GUESS, DRAW, HERE = "own", "guess", "draw", "friction here"
+THIS, GUESS, DRAW, BAND = "own", "guess", "draw", "band"
 PEAK = "↓ most here: click"
 LIKE = {0.03: "like ice", 1.0: "like rubber"}  # about, against themselves or a road
 RISES = "friction gives\neach force room"
@@ -155,7 +155,7 @@ def hide_curve(fig: Figure, hidden: bool) -> None:
             part.visible = not hidden
         elif isinstance(part, Label) and part.name in ("peak", "rises", "falls"):
             part.visible = not hidden
-    for said in (*fig.select(Title), *fig.select(name=HERE)):
+    for said in (*fig.select(Title), *fig.select(name=BAND)):
         said.visible = not hidden
     fig.legend.visible = not hidden
 
