@@ -131,7 +131,7 @@ def seen(plane: Plane) -> float:
 def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
     """Titles of the two axes, in words."""
     if plane.pair:  # whose lines have colours
-        return tuple(f"normal force of the {colour} line (mean force = 1)" for colour in PAIR)
+        return tuple(f"normal force at the {colour} line (mean force = 1)" for colour in PAIR)
     if plane.components:
         return tuple(
             f"{'normal force fₙ' if component == 0 else 'tangential force fₜ'} of contact "

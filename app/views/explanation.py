@@ -27,13 +27,12 @@ def lead(state: AppState) -> str:
 ASKED = {
     "statistics": (
         "How much can one force vary while no disk moves?",
-        "Here is a packing made with friction μ = {mu:g}. With another friction the disks would "
-        "have come to rest in other places, and forces would vary more, or less.",
+        "Here is a packing made with friction μ = {mu:g}. With different friction the disks "
+        "would have settled elsewhere.",
     ),
     "perturb": (
-        "How hard can you push until something moves?",
-        "Each line is the force between two touching disks, as they came to rest: the thicker, "
-        "the stronger.",
+        "How hard can you push before something moves?",
+        "Each line is the force between two touching disks at rest: thicker means stronger.",
     ),
 }
 
@@ -41,9 +40,8 @@ ASKED = {
 # The same to somebody who is new.
 ASKED_FIRST = {
     "plane": (
-        "Every dot is a way to hold these {n} disks.",
-        "The picture shows the forces of the red dot. Drag the dot, and watch how all lines "
-        "change.",
+        "Each dot is one way to hold these {n} disks still.",
+        "The picture shows the red dot's forces. Drag the dot, and watch all the lines change.",
     ),
 }
 
@@ -62,13 +60,13 @@ def first(summary: Summary, tab: str = "", fresh: bool = False) -> str:
         found, told = ASKED.get(tab) or ASKED_FIRST[tab]
         found, told = found.format(n=n), told.format(mu=summary["mu"])
     else:
-        found = f"These {n} disks never move, yet the forces between them can differ."
+        found = f"These {n} disks never move, yet the forces between them can vary."
         told = "Lines are the forces between touching disks: the thicker, the stronger. "
         told += f"<b>Balance leaves {term('h', f'{free} numbers')} free</b>, so countless sets of "
         told += "forces "
         told += "hold the very same disks. "
         told += (
-            "Which of them is there, no photograph tells."
+            "No photograph shows which of them is there."
             if fresh
             else f"Play goes through some such {term('network', 'networks')}, found at random: "
             "alternatives, not moments in time."

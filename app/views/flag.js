@@ -5,7 +5,7 @@ import { number } from "./saying.js"
 
 const HIGH = 16, WIDE = 16 // pixels
 const REACH = 22 // pixels around it in which it is taken
-const WAITS = [72, 28] // pixels across and up beyond where the force is, until it was dragged: clear of its number
+const WAITS = [110, 28] // pixels across and up beyond where the force is, until it was dragged: clear of its number
 
 /** The first gesture, pointed out. */
 function tag({ context: g, look }, [x, y], words) {

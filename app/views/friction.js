@@ -12,7 +12,7 @@ export function render({ model, view }) {
   const root = document.createElement("div")
   root.className = "friction"
   root.innerHTML = `
-    <div class="head"><label for="mu">Friction μ</label> <small>(repacks the disks)</small>
+    <div class="head"><label for="mu">Friction μ</label> <small>(changes the packing)</small>
       <input id="mu" class="typed" inputmode="decimal" aria-label="μ"></div>
     <div class="hill"></div>
     <div class="rail"><div class="ticks"></div>

@@ -1,17 +1,45 @@
-// Pictures side by side, one of which is clicked.
+// Pictures side by side, one of which is clicked. Meanwhile each goes from one network to the next, by
+// straight lines, all at the same pace.
 
 import { ask } from "./ask.js"
 import { made } from "./made.js"
 
+const STEP_MS = 700 // from one network to the next
+const STILL = matchMedia("(prefers-reduced-motion: reduce)")
+
 export function render({ model, view }) {
   const root = made("div", { className: "glimpses" })
+  let shown = [] // of each picture its lines, their widths, and how many networks these are of
 
   function show() {
-    root.replaceChildren(...model.items.map(([picture, words], k) => {
+    root.replaceChildren(...model.items.map(([picture, , words], k) => {
       const button = made("button", { type: "button", className: "soft", innerHTML: `${picture}<span>${words}</span>` })
       button.addEventListener("click", () => ask(model, view, { pick: k }))
       return button
     }))
+    shown = model.items.map(([, widths], k) => {
+      const lines = [...root.children[k].querySelectorAll("path")]
+      return { lines, widths, count: widths.length / lines.length }
+    })
+    paint(0)
+    if (shown.length && !STILL.matches) requestAnimationFrame(step)
+  }
+
+  function step(now) {
+    if (!root.isConnected && shown.painted) return
+    shown.painted ||= root.isConnected
+    if (root.offsetParent) paint(now / STEP_MS)
+    requestAnimationFrame(step)
+  }
+
+  function paint(at) {
+    for (const { lines, widths, count } of shown) {
+      const k = Math.floor(at) % count, next = (k + 1) % count, part = at - Math.floor(at)
+      lines.forEach((line, c) => {
+        const width = (1 - part) * widths[k * lines.length + c] + part * widths[next * lines.length + c]
+        line.setAttribute("stroke-width", width.toFixed(3))
+      })
+    }
   }
 
   model.on("items", show)

@@ -32,7 +32,7 @@ GOAL = "goal {:g} →"
 ALONE = "the marked line"
 CORNER = "possible: exact; seen: in the networks so far"
 CORNER_ALONE = "blue: found at random; red: now"
-ASK = "your guess: click how high it can get"
+ASK = "your guess: click here, higher or lower"
 AROUND = 1.5  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
 STRONGEST = 60  # contacts that are drawn by how much what is known shortened their interval
@@ -51,8 +51,8 @@ LEAD = (
     "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
 )
 LEAD_ALONE = (
-    "<b>How far can this force go?</b> The blue bar shows its values in some sets of forces that "
-    "hold the disks, found at random."
+    "<b>How large can this force get?</b> The blue bar spans its values in the sets of forces seen "
+    "so far, which were found at random."
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -209,7 +209,7 @@ class View(TabView):
         name = "normal force" if self.alone else "normal force fₙ"
         self.figure.yaxis.axis_label = f"{name} ({SCALES[self.looks.scale]})"
         if self.alone and not self.guess.visible:
-            self._word(0.05 * top, ASK, "white", DOT)
+            self._word(0.3 * top, ASK, "white", DOT)
         elif self.guess_words.text == ASK:
             self.guess_words.visible = False
 

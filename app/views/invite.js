@@ -10,12 +10,12 @@ const DRAG = FINGER ? "tap, then drag ↕" : "drag me ↕", THEN = FINGER ? "the
 const WORDS = {
   watch: ["", "<b>Watch: the forces change, no disk moves.</b> At every moment all disks are in balance."],
   drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
-  strong: [THEN, "<b>Your turn: how strong can you make this force?</b> Guess in the plot; then drag the marked line upwards, or the red dot in the plot (now {now})."],
+  strong: [THEN, "<b>Your turn: how strong can you make this force?</b> Guess in the plot; then drag the marked line up, or the red dot (now {now})."],
   push: ["", "<b>Your turn: how hard can these two disks be pushed apart?</b> Guess on the scale, then drag the slider."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
-  first: ["", "<b>Your turn: how far to the right can the red dot go?</b> Guess in the plot; then drag it past the dashed line."],
+  first: ["", "<b>Your turn: how far to the right can the red dot go?</b> Guess in the plot; then drag the dot as far as it goes."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
-  guess: ["this contact", "<b>Your turn: at which friction can one force vary most?</b> Choose on the right."],
+  guess: ["this contact", "<b>Your turn: in which packing does a typical force vary most?</b> Choose on the right."],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
 }
 

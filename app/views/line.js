@@ -17,7 +17,7 @@ export function drawSegment(space) {
   g.lineWidth = 7
   g.lineCap = "butt"
   line(g, ends[0], ends[1] ?? ends[0])
-  known.forEach(({ at, found }, k) => { if (!found) space.write(at[0] + (at[0] < whole[k][0] ? UNKNOWN : -UNKNOWN), y0, "?", look.edge, 22) })
+  known.forEach(({ at, found }, k) => { if (!found && !look.fresh) space.write(at[0] + (at[0] < whole[k][0] ? UNKNOWN : -UNKNOWN), y0, "?", look.edge, 22) })
   const [a, b] = [ends[0], ends.at(-1)]
   if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
   g.font = "13px sans-serif"

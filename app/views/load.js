@@ -7,7 +7,7 @@ const STEPS = 400 // of the slider
 const RISE_S = 5 // from nothing to the end, by the button
 const ROOM = 1.25 // of the scale beyond its end, where it ends beyond the scale
 const TICKS = 8 // numbers on the scale, about
-const WAITS = 0.5 // of the scale, where a guess waits
+const WAITS = 0.2 // of the scale, where a guess waits
 const THUMB = 8 // px from the slider's ends to where its thumb stands for them
 
 export function render({ model, view }) {

@@ -52,13 +52,13 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
  <text x="122" y="98">your push</text><text x="198" y="98">your push</text></g>
 </svg>"""
 LEAD = (
-    "<b>You push two touching disks apart, harder and harder,</b> by two opposite forces. At first "
-    "they only press less on each other; then their neighbours have to hold them. Nothing moves as "
-    "long as some set of forces balances your push."
+    "<b>You push two touching disks apart, harder and harder,</b> with two opposite forces. At "
+    "first they only press less on each other; then their neighbours have to hold them. Nothing "
+    "need move while some set of forces balances your push."
 )
 WHERE = (
-    "The mean force between disks is 1, the largest here {most:.1f}. Click another line to push "
-    "there."
+    "At rest these two press on each other with {now:.1f}; the mean force is 1, the largest in "
+    "this packing {most:.1f}. Click another line to push there."
 )
 SHOWN = (
     "Pushed is contact {number}, in the picture fainter where the box repeats. Of all sets of "
@@ -190,7 +190,7 @@ class View(TabView):
             return
         tiles = [("carries as packed", f"{replay.normal[0, contact]:.2f}")]
         if not self.gave:
-            said = WHERE.format(most=replay.normal[0].max())
+            said = WHERE.format(now=replay.normal[0, contact], most=replay.normal[0].max())
             how = folded(SHOWN.format(number=replay.backbone[contact]))
             loads = [] if self.loads is None else [self.loads.load[contact]]
             known = _tiles([("limit load", f"{load:.2f}") for load in loads])

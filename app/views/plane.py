@@ -55,7 +55,7 @@ LEAD = (
 )
 # Before the first gesture, which is to find out how far S goes.
 LEAD_FIRST = (
-    "<b>Each dot is one whole set of forces.</b> Across: its green force. Up: its violet one. "
+    "<b>Each dot is one whole set of forces:</b> across its green force, up its violet one. "
     "<b>The red dot is what you see in the packing.</b> The blue ones were found at random, and "
     "none lies beyond the dashed line. Is that a law, or luck?"
 )

@@ -115,5 +115,5 @@ function hint({ most, times, reached, largest, how }, { low, times: by, hides, g
   if (reached) return SLIDE
   if (how) return largest && hides && guess === null && !moved ? GUESS : how
   if (low > most) return "Not with this friction: try another."
-  return times ? `${FIND} It is ${by.toFixed(1)} times as strong now.` : FIND
+  return times ? `${FIND} It is ${by.toFixed(1)} times the green one now.` : FIND
 }

@@ -51,7 +51,7 @@ export function legend(body) {
   const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
   const parts = scene.r.length < 4 ? "normal parts, " : ""
   const axes = h === 2 || h > 3 ? `; green, violet: ${parts}plotted on the right` : ""
-  const heads = scene.r.length > 2 ? " (a pair between two disks)" : ""
+  const heads = scene.r.length > 2 ? " (equal and opposite between two disks)" : ""
   return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
 }
 
@@ -71,7 +71,7 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }, 
     return `<b>${2 * count} unknown force components, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
   }
   const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
-  const free = h === 1 ? "number" : "numbers", dot = fog ? `: where the red dot is${h > 2 ? `, and ${h - 2} more` : ""}` : ""
+  const free = h === 1 ? "number" : "numbers", dot = fog ? `: the red dot's position${h > 2 ? `, and ${h - 2} more` : ""}` : ""
   const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point || dot}</b>`
   return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}${why})</span>`
 }
@@ -80,7 +80,7 @@ export function counted({ h, count, scene, empty, consistent, whole, corners }, 
 function equationsOf({ grains, r, pressing, box, equations }) {
   const disks = [...(grains ?? [])].filter((grain) => grain < r.length).length, walls = 2 * pressing.length
   const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
-  const said = "no net force sideways, none up or down, and no turning, for each disk"
+  const said = `no net force sideways, none up or down, and no turning${disks > 1 ? ", for each disk" : ""}`
   if (whole !== equations) return [said, ""]
   if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, less two that follow from the others, plus one for the pressure`]
   return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
@@ -106,8 +106,8 @@ export function pictured(body, { filled: dotted, fog }) {
   if (scene.idle) return "S: not before something presses"
   if (empty) return "S: empty"
   if (!h || (whole && corners.length === 1)) return `${S} a single point)`
-  if (fog && h < 3) return h < 2 ? "the red dot goes only as far as friction allows" : "the red dot goes only where friction allows: there is an edge, to be found"
-  if (fog && h > 3) return "all possible pairs of the green and the violet force: drag to find out how far they go"
+  if (fog && h < 3) return h < 2 ? "the red dot goes only as far as friction allows" : "the red dot goes only where friction allows: find the edge"
+  if (fog && h > 3) return "one pair of green and violet forces: drag to find the limits"
   return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
     : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
 }
@@ -128,7 +128,7 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3 && now.fresh) return `${scene.r.length} disks, squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats on and on. Drag the red dot: it sets the green and the violet force, and all others change as little as they must to keep every disk in balance.`
+  if (h > 3 && now.fresh) return `${scene.r.length} disks under pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats endlessly. Drag the red dot: it sets the green and violet forces, and the others change as little as they must to keep every disk in balance.`
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
@@ -136,8 +136,8 @@ export function sentence(body, mu, now) {
   const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
   const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
   const grips = gripped(body) ? " Here friction points down the walls, as if the disk had been pressed in; it can point up, too." : ""
-  const wedged = several && wedges(body) ? " Wedged between the walls, disks can press harder than they weigh." : ""
-  if (now.fog) return `Each place of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}${grips}${wedged}`
+  const wedged = several && wedges(body) ? " Wedged between the walls, disks can press with more than their weight." : ""
+  if (now.fog) return `Each position of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}${grips}${wedged}`
   if (now.fresh) return `${every} ${FREE}` // the rest once something was touched
   return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
 }

@@ -16,9 +16,9 @@ from ..replays import Replay
 from .style import DARK, DOT, GUESS, corner, lines, text
 
 CORNER = "outline: exact; dots: networks found at random"
-CORNER_FIRST = "dots: sets of forces found at random"
+CORNER_FIRST = "blue: found at random; red: now"
 NAMED = "possible up to here", "halfway"  # of the outline, and within it
-ASK = "your guess: click how far to the right"
+ASK = "your guess: click how far right"
 # The page's theme gives all axes one colour.
 KEEP = "if (cb_obj.tags.length) cb_obj.axis_label_text_color = cb_obj.tags[0]"
 

@@ -52,12 +52,12 @@ LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into ho
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
     "<b>One force, while no disk moves.</b> A blue dot is the force at the marked contact in one "
-    "set of forces that holds the disks. It varies by ±{:.2f} (in units of the mean force)."
+    "set of forces that holds the disks. It varies by ±{:.2f} (standard deviation; mean force 1)."
 )
 ASKED = "<b>In packings made with more friction, one force varies …</b>"
 ASKED_OF = (
-    "<b>In which of these packings does a force vary most, typically?</b> Click it. (Each picture "
-    "shows one set of forces; how much they vary is not to be seen.)"
+    "<b>In which packing does a typical force vary most?</b> Each picture goes through sets of "
+    "forces that hold its disks. Click one."
 )
 # Frictions whose packings are to be chosen among, about, and what they are like.
 OFFERED = {0.01: ": slippery", 0.2: "", 10.0: ": like cogwheels"}
@@ -206,14 +206,13 @@ class View(TabView):
             return
         self.offered = sorted(like, key=lambda cell: cell.mu)
 
-        def work(job: Job) -> list[list[str]]:
-            packings = [state.library.packing(cell.params["packing"]) for cell in self.offered]
+        def work(job: Job) -> list[list[Any]]:
             return [
-                [glimpse(packing), f"friction {cell.mu:g}{OFFERED[cell.mu]}"]
-                for cell, packing in zip(self.offered, packings, strict=True)
+                [*_glimpse(state.library, cell), f"friction {cell.mu:g}{OFFERED[cell.mu]}"]
+                for cell in self.offered
             ]
 
-        def done(items: list[list[str]]) -> None:
+        def done(items: list[list[Any]]) -> None:
             self.glimpses.items = items
             self._hide()
 
@@ -407,6 +406,13 @@ DRAWN: dict[str, Callable[[list[Row], list[Row], Row, bool], Drawn]] = {
     "extent": lambda rows, exact, here, log: studied.extents(rows, here["mu"], log),
     "correlation": lambda rows, exact, here, log: studied.correlations(rows, exact),
 }
+
+
+def _glimpse(library: Library, cell: Cell) -> list[Any]:
+    """What Glimpses draw of a cell's packing and of its states."""
+    found = library.dataset(cell)
+    normal = found["states"].values[:, :, 0] / found["force_scale"].item()
+    return glimpse(library.packing(cell.params["packing"]), found["backbone"].values, normal)
 
 
 def _guess_first(replay: Replay) -> str:

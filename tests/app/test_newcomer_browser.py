@@ -341,7 +341,7 @@ def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
 def test_who_is_new_finds_out_how_far_networks_go(visit):
     """Force space without its outline, and one bar without its ends, until a force was dragged."""
     page = visit(AT + "&tab=plane", first=True)
-    page.locator(".turn").get_by_text("past the dashed line").wait_for()
+    page.locator(".turn").get_by_text("as far as it goes").wait_for()
     page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 0")
     page.get_by_text("less than halfway").first.wait_for(
         state="hidden"
@@ -367,7 +367,7 @@ def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     scene(page, "scene.hand.player.model.guess = true")
     guess = page.get_by_role("button", name="more, then less")
     guess.wait_for()
-    page.locator(".turn").get_by_text("at which friction can one force vary most?").wait_for()
+    page.locator(".turn").get_by_text("in which packing does a typical force vary most?").wait_for()
     assert not page.locator(".hill").filter(visible=True).count()  # it would give it away
     models = "[...Bokeh.documents[0].all_models]"
     pencil = "model => model.type === 'FreehandDrawTool' && model.active"

@@ -29,6 +29,7 @@ from app.views import studied as drawn_study
 from app.views import upload as upload_view
 from app.views.controls import Controls
 from app.views.dropper import Dropper
+from app.views.glimpse import FRAMES
 from app.views.messages import TO_BROWSER, listed
 from app.views.style import lines, palettes
 from granforce import measures
@@ -397,9 +398,13 @@ def test_where_packings_of_three_frictions_are_at_hand_one_is_chosen_among_pictu
     view = statistics_view.View(state)
     wait_for(state, lambda: view.glimpses.visible)
     assert not view.guesses.visible and not view.plots.visible
-    assert [words for _, words in view.glimpses.items] == [f"friction {mu:g}" for mu in offered]
-    for picture, _ in view.glimpses.items:
-        assert picture.count("<circle") > 10 and picture.count("<path") > 10
+    assert [words for *_, words in view.glimpses.items] == [f"friction {mu:g}" for mu in offered]
+    for picture, widths, _ in view.glimpses.items:
+        lines = picture.count("<path")
+        assert picture.count("<circle") > 10 and lines > 10
+        assert (
+            len(widths) == FRAMES * lines and np.ptp(np.reshape(widths, (FRAMES, -1)), axis=0).any()
+        )
     measured = [row["eta1"] for row in distributions.rows(view.offered)]
     view.glimpses.hear({"pick": len(offered)})  # none of them
     assert state.looks.guess
