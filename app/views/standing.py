@@ -122,9 +122,9 @@ class Standing:
         """Who is new clicks how far the dot may go, before finding out."""
         if self.hidden:
             words = f"your guess {event.x:.1f}"
-            look = {"text_color": GUESS, "background_fill_color": None}
+            look = {"text_color": GUESS, "background_fill_color": None, "text_align": "right"}
             self.guess.update(location=event.x, visible=True)
-            self.guess_words.update(x=event.x, text=words, x_offset=4, **look)
+            self.guess_words.update(x=event.x, text=words, x_offset=-6, **look)
 
     def _mark(self, x: float, words: str, align: str) -> None:
         """A line at x, with words at its upper end."""

@@ -202,7 +202,7 @@ def _peak(fig: Figure, points: Points) -> None:
         (x, y + error, PEAK, "left", DOT, "peak"),
         (points[1][0], 0.45 * y, RISES, "left", "#808080", "rises"),
         (points[-1][0], 0.22 * y, FALLS, "right", "#808080", "falls"),
-        *((at, 1.05 * (y + error), word, "center", "#808080", "like") for at, word in LIKE.items()),
+        *((at, 0.0, word, "center", "#808080", "like") for at, word in LIKE.items()),
     )
     for at, up, text, align, colour, name in told:
         fig.add_layout(
