@@ -31,7 +31,7 @@ APART = 100  # bars up to which there is room between them, and for large dots
 GOAL = "goal {:g} →"
 ALONE = "the marked line"
 CORNER = "possible: exact; seen: in the networks so far"
-CORNER_ALONE = "blue: found at random; red: now"
+CORNER_ALONE = "blue: found at random, so far; red: now"
 ASK = "your guess: click here, higher or lower"
 AROUND = 1.5  # of its width, beside a bar that is alone
 BARS = ("at", "rank", "contact", "original", "exact_low", "exact_high", "low", "high", "now")
@@ -51,8 +51,8 @@ LEAD = (
     "By chance a force hardly varies (dark); on purpose it can go much further (pale)."
 )
 LEAD_ALONE = (
-    "<b>How large can this force get?</b> The blue bar spans its values in the sets of forces seen "
-    "so far, which were found at random."
+    "<b>How large can this force get?</b> In {:d} sets of forces found at random it stayed between "
+    "{:.1f} and {:.1f} (blue: so far). Can you beat that?"
 )
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
@@ -146,7 +146,8 @@ class View(TabView):
         if self.alone:
             order, exact = np.array(named), {}
         free = replay.summary["dimension"] > 0
-        self.lead.object = FIXED if not free else LEAD_ALONE if self.alone else LEAD
+        lead = _challenge(replay, named[0]) if self.alone else LEAD
+        self.lead.object = lead if free else FIXED
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact)
         self._offer()
@@ -410,6 +411,12 @@ def picked(order: Integers, most: int, named: list[int]) -> Integers:
     """Ranks (k,) of contacts to be drawn of an order: evenly spaced, at most so many, and named."""
     step = -(-len(order) // most)
     return np.union1d(np.arange(0, len(order), step), np.flatnonzero(np.isin(order, named)))
+
+
+def _challenge(replay: Replay, contact: int) -> str:
+    """How far the force of a contact went by chance, as HTML."""
+    reached = replay.low[contact, 0], replay.high[contact, 0]
+    return LEAD_ALONE.format(replay.summary["states"], *map(float, reached))
 
 
 def _top(replay: Replay, exact: Bounds) -> float:

@@ -13,7 +13,7 @@ const WORDS = {
   strong: [THEN, "<b>Your turn: how strong can you make this force?</b> Guess in the plot; then drag the marked line up, or the red dot (now {now})."],
   push: ["", "<b>Your turn: how hard can these two disks be pushed apart?</b> Guess on the scale, then drag the slider."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
-  first: ["", "<b>Your turn: how far to the right can the red dot go?</b> Guess in the plot; then drag the dot as far as it goes."],
+  first: ["", "<b>Your turn: is {seen} a law, or luck?</b> Guess in the plot how far right the red dot can go; then drag it."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
   guess: ["this contact", "<b>Your turn: in which packing does a typical force vary most?</b> Choose on the right."],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],

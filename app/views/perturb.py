@@ -53,8 +53,8 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
 </svg>"""
 LEAD = (
     "<b>You push two touching disks apart, harder and harder,</b> with two opposite forces. At "
-    "first they only press less on each other; then their neighbours have to hold them. Nothing "
-    "need move while some set of forces balances your push."
+    "first they only press less on each other; then their neighbours have to hold them. It holds "
+    "as long as they find forces that balance your push."
 )
 WHERE = (
     "At rest these two press on each other with {now:.1f}; the mean force is 1, the largest in "

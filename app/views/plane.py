@@ -57,7 +57,7 @@ LEAD = (
 LEAD_FIRST = (
     "<b>Each dot is one whole set of forces:</b> across its green force, up its violet one. "
     "<b>The red dot is what you see in the packing.</b> The blue ones were found at random, and "
-    "none lies beyond the dashed line. Is that a law, or luck?"
+    "none lies beyond the dashed line."
 )
 # The point goes along an axis by itself, see point.js.
 SWEEPS = ("Sweep across ↔", "Sweep up and down ↕")

@@ -51,13 +51,14 @@ SCALED = {"eta": "linear", "extent": "log", "force": "log"}  # those with both s
 LARGEST, BINS = 6.0, 40  # of P(f_n): ⟨f_n⟩ at most on its axis, and into how many bins it is cut
 # Before the curve over friction is shown to who has never seen it, and what is said then.
 GUESS = (
-    "<b>One force, while no disk moves.</b> A blue dot is the force at the marked contact in one "
-    "set of forces that holds the disks. It varies by ±{:.2f} (standard deviation; mean force 1)."
+    "<b>One force, while no disk moves:</b> a dot is the force at the marked contact on the left, "
+    "in one set of forces that holds its disks. It varies by ±{:.2f} (standard deviation; mean "
+    "force 1)."
 )
-ASKED = "<b>In packings made with more friction, one force varies …</b>"
+ASKED = "<b>Guess first: in packings made with more friction, one force varies …</b>"
 ASKED_OF = (
-    "<b>In which packing does a typical force vary most?</b> Each picture goes through sets of "
-    "forces that hold its disks. Click one."
+    "<b>In which packing does a typical force vary most?</b> No disk moves; watch the lines become "
+    "thicker and thinner. Click one."
 )
 # Frictions whose packings are to be chosen among, about, and what they are like.
 OFFERED = {0.01: ": slippery", 0.2: "", 10.0: ": like cogwheels"}
@@ -105,7 +106,7 @@ class View(TabView):
         # Always on the page: what React draws must not leave it meanwhile.
         self.folded = [pn.Column(sizing_mode="stretch_width") for _ in studied.FOLDED]
         self.more = folded_away(*chain(*zip(studied.FOLDED, self.folded, strict=True)))
-        self.lead, self.told = note(), note()
+        self.lead, self.told, self.meant = note(), note(), note()  # the last: what varying means
         self.task = state.work.task(reading)
         self.bar = pmui.LinearProgress(visible=False, sizing_mode="stretch_width")
         self.chosen = ColumnDataSource({"x": [], "y": []})
@@ -128,6 +129,7 @@ class View(TabView):
             self.lead,
             self.guesses,
             self.glimpses,
+            self.meant,
             self.plots,
             self.more,
             pn.Column(self.scale, self.told, styles=LATER, **wide),
@@ -232,8 +234,9 @@ class View(TabView):
         if self._curve is not None:
             studied.hide_curve(self._curve, hidden)
             self._give_pencil(self._curve, replay, hidden)
+        self.meant.object = _guess_first(replay) if hidden else ""
         if hidden:
-            self.lead.object = _guess_first(replay) + (ASKED_OF if shown else ASKED)
+            self.lead.object = ASKED_OF if shown else ASKED
         elif what in DRAWN:
             self.lead.object = (self._said if what == "eta" else "") + self._found
 

@@ -341,7 +341,7 @@ def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
 def test_who_is_new_finds_out_how_far_networks_go(visit):
     """Force space without its outline, and one bar without its ends, until a force was dragged."""
     page = visit(AT + "&tab=plane", first=True)
-    page.locator(".turn").get_by_text("as far as it goes").wait_for()
+    page.locator(".turn").get_by_text("a law, or luck?").wait_for()
     page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 0")
     page.get_by_text("less than halfway").first.wait_for(
         state="hidden"

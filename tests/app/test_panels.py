@@ -373,7 +373,7 @@ def test_the_curve_over_friction_is_hidden_until_it_was_guessed(state):
     ring, guess, asked = (fig.select(name=name)[0] for name in ("own", "guess", "draw"))
     assert ring.visible and guess.visible and asked.visible
     assert not any(seen()) and not fig.select(name="peak")[0].visible
-    assert isinstance(fig.toolbar.active_drag, FreehandDrawTool) and "<svg" in view.lead.object
+    assert isinstance(fig.toolbar.active_drag, FreehandDrawTool) and "<svg" in view.meant.object
     assert view.guesses.visible and not view.more.visible and "at friction" not in view.lead.object
     view.what.value = "scatter"  # another figure asks for nothing
     assert not view.guesses.visible and view.lead.object
