@@ -22,4 +22,8 @@ class LoadSlider(Scripted):
         self._pushed, self._gave = pushed, gave
 
     def _heard(self, message: Message) -> None:
-        (self._pushed if "push" in message else self._gave)()
+        match message:
+            case {"push": True}:
+                self._pushed()
+            case {"gave": True}:
+                self._gave()

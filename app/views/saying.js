@@ -128,7 +128,8 @@ export function sentence(body, mu, now) {
     const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
     return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
   }
-  if (h > 3 && now.fresh) return `${scene.r.length} disks under pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats endlessly. Drag the red dot: it sets the green and violet forces, and the others change as little as they must to keep every disk in balance.`
+  if (h > 3 && now.fog && scene.box[0]) return `${scene.r.length} disks under pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats endlessly. Drag the red dot: it sets the green and violet forces, and the others change as little as they must to keep every disk in balance.`
+  if (h > 3 && now.fresh) return `${h} numbers are free; the red dot sets the green and violet forces. Drag it: the others change as little as they must to keep every disk in balance. Friction is at most μ times the normal force, and disks cannot pull: that sets limits.`
   if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
   const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
   const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""

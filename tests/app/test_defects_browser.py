@@ -347,7 +347,8 @@ def test_curves_of_the_shown_states_end_at_their_targets(page):
     targets = page.evaluate(
         """() => [...Bokeh.documents[0].all_models]
             .filter((m) => m.type === "Span" && m.line_dash === "dashed" ||
-                m.type === "Span" && m.line_dash.length > 0).map((m) => m.location)"""
+                m.type === "Span" && m.line_dash.length > 0)
+            .filter((m) => m.visible).map((m) => m.location)"""
     )
     assert sorted(targets) == pytest.approx(sorted(ends), rel=1e-3)
 

@@ -13,8 +13,10 @@ from app.views import (
     address,
     dropper,
     friction,
+    glimpse,
     handover,
     known,
+    load,
     mine,
     number,
     player,
@@ -29,7 +31,8 @@ from app.views.scripts import Scripted, module
 COMPONENTS = {
     kind.__name__: kind
     for kind in (
-        address.Address, dropper.Dropper, friction.FrictionSlider, handover.Handover, known.Known,
+        address.Address, dropper.Dropper, friction.FrictionSlider, glimpse.Glimpses,
+        handover.Handover, known.Known, load.LoadSlider,
         mine.Mine, number.NumberField, player.Player, progress.Progress, small.Small, tour.Tour,
     )
 }  # fmt: skip

@@ -255,7 +255,7 @@ def test_what_is_pointed_at_lights_up_everywhere(look):
 
 def test_the_walls_grip_the_disk_only_while_friction_points_down(look):
     page = look("?scene=groove&mu=0.5")
-    grips = desk(page).get_by_text("the walls grip the disk")
+    grips = desk(page).get_by_text("friction points down the walls")
     desk(page).locator("canvas.space").focus()
     for key, holds in (("ArrowRight", True), ("ArrowLeft", False)):
         for _ in range(70):
@@ -571,7 +571,7 @@ def test_who_is_new_finds_out_how_far_s_goes(look):
 
 
 def test_a_guess_comes_first_and_is_told_beside_the_answer(look):
-    page = look("?scene=groove", first=True)
+    page = look("?scene=groove&mu=0.5", first=True)
     quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
     quest.get_by_text("Guess first").wait_for()
     box, (x, y) = space.bounding_box(), ask(page, "small.space.flag.foot")
