@@ -54,7 +54,7 @@ SKETCH = """<svg viewBox="0 -10 320 174" width="320" height="174" role="img"
 LEAD = (
     "<b>You push two touching disks apart, harder and harder,</b> with two opposite forces. At "
     "first they only press less on each other; then their neighbours have to hold them. It holds "
-    "as long as they find forces that balance your push."
+    "as long as they find forces that balance your push; then disks begin to move."
 )
 WHERE = (
     "At rest these two press on each other with {now:.1f}; the mean force is 1, the largest in "
@@ -190,11 +190,11 @@ class View(TabView):
             return
         tiles = [("carries as packed", f"{replay.normal[0, contact]:.2f}")]
         if not self.gave:
-            said = WHERE.format(now=replay.normal[0, contact], most=replay.normal[0].max())
+            where = WHERE.format(now=replay.normal[0, contact], most=replay.normal[0].max())
             how = folded(SHOWN.format(number=replay.backbone[contact]))
             loads = [] if self.loads is None else [self.loads.load[contact]]
             known = _tiles([("limit load", f"{load:.2f}") for load in loads])
-            self._say(said + how, numbers=known, lead=drawn)
+            self._say(how, numbers=known, lead=drawn + where)
             return
         pushed = self.pushed[0]
         tiles += [("gives way at", f"{pushed.low:.2f}"), ("limit load", f"{pushed.limit:.2f}")]

@@ -125,6 +125,7 @@ class View(TabView):
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)
         self.standing.hide(bool(first), self.found)
+        self.invitation.glyph.text = value("then drag me" if first else "drag me")
         self.finding.visible = not first
         wanted = replay, self.kind, *self._depends()
         same = self.shown is not None and self.shown[0] is replay and self.shown[1:] == wanted[1:]
@@ -387,7 +388,7 @@ class View(TabView):
         here = fig.scatter(
             "x", "y", source=self.here, size=11, color=DOT, line_color="white", line_width=1.5,
         )  # fmt: skip
-        fig.text(
+        self.invitation = fig.text(
             "x", "y", source=self.here, text=value("drag me"), x_offset=-14, y_offset=8,
             text_align="right", text_color="white", text_font_size="13px",
             background_fill_color=DOT, padding=4, border_radius=5, name="invitation", visible=False,
