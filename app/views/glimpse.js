@@ -9,6 +9,7 @@ const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 
 export function render({ model, view }) {
   const root = made("div", { className: "glimpses" })
+  let moving = false // while they are seen
   let shown = [] // of each picture its lines, their widths, and how many networks these are of
 
   function show() {
@@ -22,13 +23,11 @@ export function render({ model, view }) {
       return { lines, widths, count: widths.length / lines.length }
     })
     paint(0)
-    if (shown.length && !STILL.matches) requestAnimationFrame(step)
   }
 
   function step(now) {
-    if (!root.isConnected && shown.painted) return
-    shown.painted ||= root.isConnected
-    if (root.offsetParent) paint(now / STEP_MS)
+    if (!moving) return
+    paint(now / STEP_MS)
     requestAnimationFrame(step)
   }
 
@@ -42,6 +41,14 @@ export function render({ model, view }) {
     }
   }
 
+  const seen = new IntersectionObserver((told) => {
+    const { isIntersecting } = told.at(-1)
+    const begins = isIntersecting && !moving && !STILL.matches
+    moving = isIntersecting
+    if (begins) requestAnimationFrame(step)
+  })
+  seen.observe(root)
+  model.on("remove", () => { moving = false; seen.disconnect() })
   model.on("items", show)
   show()
   return root

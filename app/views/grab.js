@@ -144,6 +144,7 @@ export class Grab {
 
   forget() {
     if (this.replay) this.replay.held = null
+    this.player.pushed.end()
     this.settle()
     this.player.tellHeld(false)
     this.player.say("")

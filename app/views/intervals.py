@@ -209,9 +209,10 @@ class View(TabView):
         self.figure.xaxis.axis_label = ALONE if self.alone else ranked
         name = "normal force" if self.alone else "normal force fₙ"
         self.figure.yaxis.axis_label = f"{name} ({SCALES[self.looks.scale]})"
+        self.guess.visible = self.guess.visible and self.looks.scale == "mean"
         if self.alone and not self.guess.visible:
             self._word(0.3 * top, ASK, "white", DOT)
-        elif self.guess_words.text == ASK:
+        elif not self.guess.visible:
             self.guess_words.visible = False
 
     def _show_growth(self, replay: Replay) -> None:

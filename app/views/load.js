@@ -34,6 +34,14 @@ export function render({ model, view }) {
     ask(model, view, { gave: true })
   }
 
+  /** Where another network came into view than that which is pushed, nothing is pushed any more. */
+  function look() {
+    if (!(load > 0 && known()) || player().replay?.held === by?.held) return
+    by?.end()
+    load = rising = 0
+    show()
+  }
+
   function show() {
     const there = load >= end(), said = there ? `: something moves${guess === null ? "" : ` (you guessed ${guess.toFixed(1)})`}` : ""
     range.value = load
@@ -41,6 +49,7 @@ export function render({ model, view }) {
     part("b").textContent = said
     range.setAttribute("aria-valuetext", `${told.textContent} mean forces${said}`)
     run.disabled = model.contact === null || rising > 0
+    if (!by && player()) player().listeners.add(look)
     by = player()?.pushed
     by?.take(model.contact, model.path, load, load / Number(range.max))
   }
@@ -106,7 +115,11 @@ export function render({ model, view }) {
   line.addEventListener("click", (event) => event.preventDefault()) // the label would hand it to the slider
   model.on("contact", anew)
   model.on("most", scale)
-  model.on("path", () => { asked = known(); scale() })
+  model.on("path", () => {
+    if (!known()) return anew() // of another packing
+    asked = true
+    scale()
+  })
   model.on("running", () => { if (!model.running && !known()) { asked = false; rising = 0; show() } })
   scale()
   return root

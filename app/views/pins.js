@@ -10,7 +10,10 @@ const COPY = 0.35 // opacity of the arrows at a periodic copy
 const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
 
 export class Pins {
-  constructor(model) { this.model = model }
+  constructor(player) {
+    this.player = player
+    this.model = player.model
+  }
 
   get pins() { return plain(this.model.pins ?? {}) }
 
@@ -37,7 +40,7 @@ export class Pins {
   /** The two forces that push the disks of a contact apart, the selected one or the one that is pointed out;
    * faintly at its periodic copies. */
   push(context, scene) {
-    const { geometry, ratio, palette, scale } = scene, { replay, pushed } = scene.hand.player
+    const { geometry, ratio, palette, scale } = scene, { replay, pushed } = this.player
     const contact = scene.selected ?? replay.walk.contact[replay.walk.inviting] ?? -1
     const first = geometry.contact.indexOf(contact), arrow_px = ARROW_PX + GROWN_PX * pushed.part
     if (scene.selected === null) scene.drawSelected(contact)

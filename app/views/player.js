@@ -62,7 +62,7 @@ class Player {
     this.playing = this.follows = false // the newest state of a walk under way
     this.live = new Live(this, (live) => tell({ live }))
     this.hand = this.scene.hand = new Grab(this, tell)
-    this.pins = new Pins(model)
+    this.pins = new Pins(this)
     this.later = new Later("network", this.buttons.part("all"), shown())
     this.near = new Near(this)
     this.tell = tell
@@ -116,6 +116,7 @@ class Player {
     this.look = new Look(model, this.replay.walk, this.later.waits)
     this.hand.settle()
     this.tellHeld(false)
+    this.pushed.end()
     this.tellTab()
     scene.mixed = this.replay.mixed
     scene.palette = plain(plain(model.palettes).scene)
@@ -374,9 +375,7 @@ class Player {
     const { model, scene, buttons } = this
     const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
     return {
-      tab: loaded((replay) => {
-        if (this.pushes && this.playing && this.resting === null) this.pause(replay)
-      }),
+      tab: loaded((replay) => { if (this.pushes && this.playing && this.resting === null) this.pause(replay) }),
       lead: () => { buttons.part("lead").innerHTML = model.lead },
       legend: () => { buttons.part("legend").innerHTML = model.legend },
       source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
