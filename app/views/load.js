@@ -20,7 +20,7 @@ export function render({ model, view }) {
   const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player
   const known = () => model.path.loads?.length > 0, end = () => (known() ? model.path.loads.at(-1) : Infinity)
-  let load = 0, guess = null, asked = false, gave = false, rising = 0, by = null // by: whom the load is shown by
+  let load = 0, guess = null, asked = false, gave = false, rising = 0, by = null, shows = false // by: whom the load is shown by
 
   function set(value) {
     load = Math.min(value, end())
@@ -36,8 +36,8 @@ export function render({ model, view }) {
 
   /** Where another network came into view than that which is pushed, nothing is pushed any more. */
   function look() {
-    if (!(load > 0 && known()) || player().replay?.held === by?.held) return
-    by?.end()
+    if (shows || !(load > 0 && known()) || (by.held && player().replay?.held === by.held)) return
+    by.end()
     load = rising = 0
     show()
   }
@@ -51,7 +51,9 @@ export function render({ model, view }) {
     run.disabled = model.contact === null || rising > 0
     if (!by && player()) player().listeners.add(look)
     by = player()?.pushed
+    shows = true
     by?.take(model.contact, model.path, load, load / Number(range.max))
+    shows = false
   }
 
   /** Another contact, or other networks. */

@@ -170,6 +170,9 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit):
     # A small push is taken over by the contact itself, as far as balance goes.
     assert 0 < load and now[5] < packed[5] + 1e-6 and now != packed
     assert scene(page, "scene.offset") is None
+    page.keyboard.press("Escape")  # which lets all go
+    until(page, "scene.hand.player.replay.held === null")
+    assert slider.evaluate("e => e.value") == "0"
     slider.evaluate("e => { e.value = e.max; e.dispatchEvent(new Event('input')) }")
     page.get_by_text("the packing gives way:").wait_for()
     end = scene(page, "scene.hand.player.pushed.load")
@@ -179,7 +182,11 @@ def test_a_push_is_followed_by_the_network_and_ends_where_disks_move(visit):
     until(page, "scene.offset === null")
     until(page, "scene.hand.player.replay.held === null")
     page.locator(".state").get_by_text("as packed").wait_for()
+    slider.evaluate("e => { e.value = e.step; e.dispatchEvent(new Event('input')) }")
+    until(page, "scene.hand.player.pushed.held !== null")
     page.get_by_role("tab", name="How far?").click()
+    until(page, "scene.hand.player.replay.held === null")
+    assert scene(page, "scene.hand.player.pushed.load") == 0
 
 
 def test_dumps_are_dropped_reported_and_shown(visit):
