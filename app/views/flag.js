@@ -8,14 +8,15 @@ const REACH = 22 // pixels around it in which it is taken
 const WAITS = [110, 28] // pixels across and up beyond where the force is, until it was dragged: clear of its number
 
 /** The first gesture, pointed out. */
-function tag({ context: g, look }, [x, y], words) {
+function tag({ context: g, look, easel }, [x, y], words) {
   g.font = "13px sans-serif"
   g.textAlign = "left"
   g.textBaseline = "middle"
   g.fillStyle = look.hand
-  g.fillRect(x, y - 11, g.measureText(words).width + 12, 21)
+  const wide = g.measureText(words).width + 12, left = Math.min(x, easel.wide - wide - 2)
+  g.fillRect(left, y - 11, wide, 21)
   g.fillStyle = look.paper
-  g.fillText(words, x + 6, y)
+  g.fillText(words, left + 6, y)
 }
 
 export class Flag {

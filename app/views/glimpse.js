@@ -8,18 +8,19 @@ const STEP_MS = 700 // from one network to the next
 const STILL = matchMedia("(prefers-reduced-motion: reduce)")
 
 export function render({ model, view }) {
-  const root = made("div", { className: "glimpses" })
+  const root = document.createElement("div"), buttons = root.appendChild(made("div", { className: "glimpses" }))
+  if (!STILL.matches) root.append(made("p", { textContent: "No disk moves; watch the lines become thicker and thinner." }))
   let moving = false // while they are seen
   let shown = [] // of each picture its lines, their widths, and how many networks these are of
 
   function show() {
-    root.replaceChildren(...model.items.map(([picture, , words], k) => {
+    buttons.replaceChildren(...model.items.map(([picture, , words], k) => {
       const button = made("button", { type: "button", className: "soft", innerHTML: `${picture}<span>${words}</span>` })
       button.addEventListener("click", () => ask(model, view, { pick: k }))
       return button
     }))
     shown = model.items.map(([, widths], k) => {
-      const lines = [...root.children[k].querySelectorAll("path")]
+      const lines = [...buttons.children[k].querySelectorAll("path")]
       return { lines, widths, count: widths.length / lines.length }
     })
     paint(0)

@@ -163,7 +163,8 @@ export class Grab {
   hear({ rail, fan, held }) {
     if (rail !== undefined) this.ride(rail && plain(rail))
     if (fan !== undefined) this.spot.spread(fan && plain(fan))
-    if (held !== undefined && !this.active) this.keep(held && plain(held))
+    const pushed = !held && this.player.pushed.held // which came after what is no longer pulled
+    if (held !== undefined && !this.active && !pushed) this.keep(held && plain(held))
   }
 
   ride(rail) {

@@ -54,6 +54,9 @@ LEAD_ALONE = (
     "<b>How large can this force get?</b> In {:d} sets of forces found at random it stayed between "
     "{:.1f} and {:.1f} (blue: so far). Can you beat that?"
 )
+LEAD_GROWING = (
+    "<b>How large can this force get?</b> The blue bar grows as sets of forces are found at random."
+)
 FIXED = "<b>How far can each force go?</b> Nowhere: balance leaves every force one value."
 HELP = f"""<details><summary>What do the bars and curves show?</summary>
 Pale: every force that a contact can have in any network in balance
@@ -93,6 +96,7 @@ class View(TabView):
         self.contacts = np.array([], dtype=int)
         self.alone = False  # whether only the contact is drawn that a visitor is asked to drag
         self._grown: Replay | None = None  # whose growth is drawn
+        self._guessed_of: tuple[Replay | None, int | None] = None, None  # and its contact
         self.choices = [
             question("Contacts", DRAWN, self.looks, "drawn", **SMALL),
             question("Sorted by", SORTS, self.looks, "sort", **SMALL),
@@ -142,17 +146,17 @@ class View(TabView):
         order = sorted_contacts(replay, exact, looks.sort, state.knowledge.narrowed)
         named = [one.contact for one in state.knowledge.known]
         named += self._invited() if looks.contact is None else [looks.contact]
-        self.alone = looks.fresh and len(named) == 1  # one thing first, to be found out
+        free = replay.summary["dimension"] > 0
+        self.alone = looks.fresh and free and len(named) == 1  # one thing first, to be found out
         if self.alone:
             order, exact = np.array(named), {}
-        free = replay.summary["dimension"] > 0
-        lead = _challenge(replay, named[0]) if self.alone else LEAD
+        self._forget_guess(replay, named)
+        lead = self._challenge(replay, named[0]) if self.alone else LEAD
         self.lead.object = lead if free else FIXED
         self.contacts = order[picked(order, SOME if looks.drawn == "some" else MOST_BARS, named)]
         self._show_bars(replay, exact)
         self._offer()
         if replay is not self._grown:
-            self.guess.visible = self.guess_words.visible = False
             self._show_growth(replay)
         self._mark()
 
@@ -198,7 +202,8 @@ class View(TabView):
         self.figure.xgrid.visible = not self.alone
         self.figure.height = 440 if self.alone else 320
         self.corner.text = CORNER_ALONE if self.alone else CORNER
-        ends = [replay.low[contacts[0], 0], replay.high[contacts[0], 0]] if self.alone else []
+        told = self.alone and not self.state.growing
+        ends = [replay.low[contacts[0], 0], replay.high[contacts[0], 0]] if told else []
         self.unknown.data = {"rank": [1.0] * len(ends), "at": ends, "off": [28, -10][: len(ends)]}
         top = 3.0 if self.looks.scale == "own" else _top(replay, before or exact)
         if self.state.growing or self.alone:
@@ -240,6 +245,20 @@ class View(TabView):
         if new:
             self.looks.contact = int(self.contacts[new[0]])
             self.bars.selected.indices = []
+
+    def _challenge(self, replay: Replay, contact: int) -> str:
+        """How far the force of a contact went by chance, as HTML."""
+        if self.state.growing:
+            return LEAD_GROWING
+        reached = replay.low[contact, 0], replay.high[contact, 0]
+        return LEAD_ALONE.format(replay.summary["states"], *map(float, reached))
+
+    def _forget_guess(self, replay: Replay, named: list[int]) -> None:
+        """A guess is of one force of one packing."""
+        of, contact = self._guessed_of
+        if replay is not of or (self.alone and contact != named[0]):
+            self.guess.visible = self.guess_words.visible = False
+            self._guessed_of = replay, named[0] if self.alone else None
 
     def _guess(self, event: Any) -> None:
         """Who is new clicks where the bar may end, before finding out."""
@@ -412,12 +431,6 @@ def picked(order: Integers, most: int, named: list[int]) -> Integers:
     """Ranks (k,) of contacts to be drawn of an order: evenly spaced, at most so many, and named."""
     step = -(-len(order) // most)
     return np.union1d(np.arange(0, len(order), step), np.flatnonzero(np.isin(order, named)))
-
-
-def _challenge(replay: Replay, contact: int) -> str:
-    """How far the force of a contact went by chance, as HTML."""
-    reached = replay.low[contact, 0], replay.high[contact, 0]
-    return LEAD_ALONE.format(replay.summary["states"], *map(float, reached))
 
 
 def _top(replay: Replay, exact: Bounds) -> float:

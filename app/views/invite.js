@@ -1,6 +1,6 @@
 // The first gesture, pointed out: one strong line near the middle of the packing says that it can be dragged,
-// until one was. What there is to find out stands above,
-// also of the point in force space, which has a tag of its own (layer.js).
+// until one was; or a contact is the one that is spoken of. What there is to find out stands above, also of
+// the point in force space, which has a tag of its own (layer.js).
 
 import { made } from "./made.js"
 
@@ -11,11 +11,12 @@ const WORDS = {
   watch: ["", "<b>Watch: the forces change, no disk moves.</b> At every moment all disks are in balance."],
   drag: [DRAG, "<b>Your turn: can you make this force larger than {goal}?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   strong: [THEN, "<b>Your turn: how strong can you make this force?</b> Guess in the plot; then drag the marked line up, or the red dot (now {now})."],
+  free: [DRAG, "<b>Your turn: how strong can you make this force?</b> Press on the marked line and drag upwards: no disk moves, all forces follow (now {now})."],
   push: ["", "<b>Your turn: how hard can these two disks be pushed apart?</b> Guess on the scale, then drag the slider."],
   point: ["", "<b>Your turn: how far out can you take the red dot?</b> Drag it in the plot, and watch the lines."],
   first: ["", "<b>Your turn: is {seen} a law, or luck?</b> Guess in the plot how far right the red dot can go; then drag it."],
   reach: ["", "<b>Your turn: no dot lies beyond {seen}. Can you bring the green force above {goal}?</b> Drag the red dot."],
-  guess: ["this contact", "<b>Your turn: in which packing does a typical force vary most?</b> Choose on the right."],
+  guess: ["this contact", "<b>Your turn: how does friction change how much a force varies?</b> Choose on the right."],
   click: ["", "<b>Your turn: at which friction do forces vary most?</b> Click a point of the curve to see such a packing."],
 }
 
@@ -32,15 +33,16 @@ export class Invitation {
     const { model, replay, live, difference, predict, points, plots, pushes, pushed, took, scene, opens } = this.player
     if (replay === null || !scene.hand || live.moves || difference.on || predict.shown || !replay.walk.free) return null
     if (opens) return "watch"
+    if (this.guesses) return "guess"
     if (points && !plots.invites) return null
     if (points && model.fresh && plots.plane.pair?.length) return "first"
     if (points) return this.target ? "reach" : "point"
     if (pushes) return model.pushing === "one" && !pushed.load ? "push" : null
     if ((model.contact ?? null) !== null) return null
     if (took) return null
-    if (model.tab !== "statistics") return model.goal && !model.fresh ? "drag" : "strong" // who is new finds out how far it goes
+    if (model.tab !== "statistics") return model.fresh ? "strong" : model.goal ? "drag" : "free"
     if (model.figure !== "eta") return null
-    return model.guess ? "guess" : "click"
+    return "click"
   }
 
   /** Whether the curve over friction is to be guessed. */

@@ -49,7 +49,7 @@ export function render({ model, view }) {
     part("b").textContent = said
     range.setAttribute("aria-valuetext", `${told.textContent} mean forces${said}`)
     run.disabled = model.contact === null || rising > 0
-    if (!by && player()) player().listeners.add(look)
+    player()?.listeners.add(look)
     by = player()?.pushed
     shows = true
     by?.take(model.contact, model.path, load, load / Number(range.max))
@@ -97,7 +97,8 @@ export function render({ model, view }) {
     if (!known() && !asked) { asked = true; ask(model, view, { push: true }) }
     let before = null
     const step = (now) => {
-      if (way !== rising || !root.isConnected) return
+      if (way !== rising) return
+      if (!root.isConnected || !player()?.pushable) return void (rising = 0)
       if (known()) {
         set(load + ((before === null ? 0 : now - before) / 1000 / RISE_S) * end())
         before = now
@@ -115,6 +116,7 @@ export function render({ model, view }) {
   line.addEventListener("pointerdown", (event) => { line.setPointerCapture(event.pointerId); put(event) })
   line.addEventListener("pointermove", (event) => { if (line.hasPointerCapture(event.pointerId)) put(event) })
   line.addEventListener("click", (event) => event.preventDefault()) // the label would hand it to the slider
+  model.on("remove", () => player()?.listeners.delete(look))
   model.on("contact", anew)
   model.on("most", scale)
   model.on("path", () => {

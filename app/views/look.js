@@ -107,7 +107,7 @@ export class Look {
       ["force as packed", walk.normal[c].toFixed(3)],
     ]
     if (seen) rows.push(["fₙ seen", told(low[c], high[c])])
-    if (exact) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])
+    if (exact && !this.quiet) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])
     return rows
   }
 

@@ -12,7 +12,8 @@ export class Near {
     this.player = player
     this.inset = player.scene.root.appendChild(made("canvas", { className: "inset", hidden: true }))
     player.later.listeners.push(() => {
-      if (player.look) player.look.quiet = false
+      if (!player.replay) return
+      player.look.quiet = false
       this.go(player.scene.whole)
       player.again()
     })
@@ -20,9 +21,9 @@ export class Near {
 
   /** The view that a newcomer begins with, or null. */
   get view() {
-    const { player: { scene, later, replay, invite } } = this
+    const { player: { scene, later, replay, invite, points } } = this
     if (!later.waits || !(replay?.walk.inviting >= 0)) return null
-    const places = scene.pair.length ? scene.pair.map((contact) => scene.geometry.contact.indexOf(contact)) : [invite.row]
+    const places = points && scene.pair.length ? scene.pair.map((contact) => scene.geometry.contact.indexOf(contact)) : [invite.row]
     const ends = places.map((k) => scene.ends(k)), { whole } = scene
     const [x, y] = [0, 1].map((d) => ends.flatMap((end) => [end[d], end[d + 2]]))
     const [left, right, low, high] = [Math.min(...x), Math.max(...x), Math.min(...y), Math.max(...y)]

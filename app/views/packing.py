@@ -241,8 +241,7 @@ def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
 
 def colour_words(looks: Looks, pulled: bool) -> str:
     """What colours mean just now."""
-    by = "the push" if looks.tab == "perturb" else "what was pulled"
-    return f"change by {by}" if pulled else COLOURS[looks.colour]
+    return "change by what was pulled" if pulled else COLOURS[looks.colour]
 
 
 def _largest(loads: Floats | None, full: float | None) -> str:
@@ -264,6 +263,9 @@ def legend(state: AppState, pulled: bool = False) -> str:
         bar = "(nothing is known: select a contact and press H)"
     widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
     shown = min(widest, LARGE)
+    told = colour_words(looks, pulled)
+    if pulled and looks.tab == "perturb" and not state.hand.pulls:
+        told = "change by the push"
     return LEGEND.format(
         width=WIDTHS[looks.thickness],
         shown=shown,
@@ -271,7 +273,7 @@ def legend(state: AppState, pulled: bool = False) -> str:
         low=6 - 6 * shown / widest,
         width_term=EXPLAINED[looks.thickness],
         colour_term=EXPLAINED[looks.colour],
-        colour=DEFINED.get("" if pulled else looks.colour, colour_words(looks, pulled)),
+        colour=DEFINED.get("" if pulled else looks.colour, told),
         bar=bar,
         marks=_marks(looks.dark) if looks.overlay else "",
     )

@@ -123,7 +123,7 @@ class View(TabView):
         )
 
     def update(self) -> None:
-        """Show what is chosen; what is not known yet waits for a click, but for Fig. 2."""
+        """Show what is chosen; what is not known yet waits for a hand, but for Fig. 2."""
         state, what = self.state, self.what.value
         if state.replay is not self._shown:
             self._shown, self.loads = state.replay, None
@@ -201,7 +201,7 @@ class View(TabView):
         lead = (
             f"<b>Pushed apart with about {pushed.low:.2g} times the mean force, the packing gives "
             f"way:</b> {pushed.opened} of its contacts open, {pushed.slid} slide, {pushed.kept} "
-            "hold. The disks set off as the packing shows."
+            "hold. At the end of the slider the packing shows how disks set off."
         )
         text = (
             f"The {term('critical_force', 'critical force')} of contact "

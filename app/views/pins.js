@@ -22,7 +22,7 @@ export class Pins {
 
   draw(context, scene) {
     const { contacts = [], exact = [], ranked = [] } = this.pins
-    if (this.model.tab === "perturb") this.push(context, scene)
+    if (this.player.pushable && !scene.frozen) this.push(context, scene)
     if (!contacts.length && !ranked.length) return
     const held = new Map(), rank = new Map(), { ratio } = scene
     for (let k = 0; k < contacts.length; k++) held.set(contacts[k], exact[k])

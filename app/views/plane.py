@@ -120,7 +120,7 @@ class View(TabView):
             return
         free = replay.summary["dimension"]
         pair = self.kind == "pair"
-        first = self.looks.fresh and pair
+        first = self.looks.fresh and pair and free > 0
         self.lead.object = "" if not free else LEAD_FIRST if first else LEAD.format(free=free)
         for button, label in zip(self.sweeps, SWEEPS_OF_A_PAIR if pair else SWEEPS, strict=True):
             button.param.update(label=label, visible=free > 0 and not state.growing)

@@ -91,10 +91,13 @@ class Player {
   /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
   get pushes() { return this.model.tab === "perturb" }
 
+  /** Whether a contact is to be pushed, and there is something to be held against that. */
+  get pushable() { return this.pushes && this.model.pushing === "one" && this.replay?.walk.free > 0 }
+
   /** What the tab that is open asks of the packing. */
   tellTab() {
     this.buttons.root.classList.toggle("pushes", this.pushes)
-    if (!this.pushes) this.pushed.end()
+    if (!this.pushable) this.pushed.end()
     this.buttons.root.classList.toggle("guesses", this.invite.guesses)
   }
 
@@ -161,7 +164,7 @@ class Player {
   /** More exact bounds of the packing on screen. */
   arrive(bounds) {
     const { replay, plots } = this
-    if (!replay || bounds.low.length !== replay.walk.contacts) return
+    if (!replay || bounds.low.length !== replay.walk.contacts || this.later.waits) return // or to be found out
     replay.bounds = bounds
     if (this.model.tab === "intervals") plots.showBounds(replay, this.model.scale)
   }

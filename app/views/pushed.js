@@ -23,7 +23,9 @@ export class Pushed {
   /** path: networks under loads up to the largest one that is held; part: of the longest arrow. */
   take(contact, path, load, part) {
     const { player } = this, { replay, scene } = player
-    if (!replay || !player.pushes) return
+    if (!player.pushable || player.live.moves || player.grows) return
+    if (load > 0 && player.playing) player.play(false)
+    if (load > 0 && replay.held && replay.held !== this.held) player.hand.free() // what was pulled
     Object.assign(this, { load, part, there: load > 0 && load >= (path.loads?.at(-1) ?? Infinity) })
     this.tellMotion()
     if (!(load > 0 && path.loads?.length) || path.normal.length !== path.loads.length * replay.walk.contacts) {
@@ -31,7 +33,6 @@ export class Pushed {
       return scene.style && scene.drawMarks(scene.style)
     }
     if (replay.position) player.show(0)
-    player.took = true
     this.follow(path, load)
   }
 

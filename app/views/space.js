@@ -388,7 +388,7 @@ export class Space {
     if (!body || body.empty) return
     const [x, y] = this.px(this.flat(body.u)), near = Math.hypot(px - x, py - y) < 24
     this.canvas.setPointerCapture(event.pointerId)
-    if (this.flagged && !near && this.flag.near(px, py)) {
+    if (this.flagged && this.fog && !near && this.flag.near(px, py)) {
       this.held = { flag: true }
       return event.preventDefault()
     }

@@ -37,6 +37,7 @@ class Standing:
         """outlines: (renderer, opacity of its inside, of its edge); packed: network as packed."""
         self.figure, self.outlines, self.packed = fig, outlines, packed
         self.hidden = False  # whether the outline is to be found out
+        self._guessed_of: tuple[Replay | None, Any] = None, None  # and the plane
         self.half = ColumnDataSource({"x": [], "y": []})
         self.words = ColumnDataSource({"x": [], "y": [], "words": []})
         fig.patch(
@@ -80,7 +81,11 @@ class Standing:
             part.visible = False
 
     def title(self, replay: Replay, plane: Plane, dark: bool) -> None:
-        """Titles of the axes, in the colours of the lines whose forces they are."""
+        """Titles of the axes of a plane, in the colours of the lines whose forces they are."""
+        of, shown = self._guessed_of
+        if replay is not of or shown != (plane.kind, plane.pair):
+            self._guessed_of = replay, (plane.kind, plane.pair)
+            self._ask()
         colours = lines(dark) if plane.pair else (text(dark),) * 2
         axes = self.figure.xaxis[0], self.figure.yaxis[0]
         for axis, words, colour in zip(axes, planes.labels(replay, plane), colours, strict=True):
@@ -117,6 +122,14 @@ class Standing:
             self.half.data = {"x": half[:, 0], "y": half[:, 1]}
             tops = np.array([part[np.argmax(part[:, 1])] for part in (found.outer, half)])
             self.words.data = {"x": tops[:, 0], "y": tops[:, 1], "words": [*NAMED]}
+
+    def _ask(self) -> None:
+        """Nothing was guessed yet; who is new is asked to."""
+        look = {"text_color": "white", "background_fill_color": DOT, "text_align": "left"}
+        self.guess.visible = False
+        self.guess_words.update(
+            x=_edge("left", 10), x_offset=0, text=ASK, visible=self.hidden, **look
+        )
 
     def _guess(self, event: Any) -> None:
         """Who is new clicks how far the dot may go, before finding out."""

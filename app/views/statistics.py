@@ -56,10 +56,7 @@ GUESS = (
     "force 1)."
 )
 ASKED = "<b>Guess first: in packings made with more friction, one force varies …</b>"
-ASKED_OF = (
-    "<b>In which packing does a typical force vary most?</b> No disk moves; watch the lines become "
-    "thicker and thinner. Click one."
-)
+ASKED_OF = "<b>In which packing does a typical force vary most?</b> Click one."
 # Frictions whose packings are to be chosen among, about, and what they are like.
 OFFERED = {0.01: ": slippery", 0.2: "", 10.0: ": like cogwheels"}
 # One contact's forces, a dot each, on a line from 0, with its mean and what is typical about it.
@@ -96,7 +93,8 @@ class View(TabView):
             visible=False,
         )
         self.glimpses = Glimpses(self._picked)
-        self.offered: list[Cell] = []  # whose packings are to be chosen among
+        self.offered: list[Cell] = []  # whose packings are to be chosen among,
+        self.offered_for: tuple[Any, ...] = ()  # and for whom: number of disks and seed
         self.showing = state.work.task(reading, told=False)
         self._curve: Figure | None = None  # over friction, where it is drawn
         self._found = self._said = ""  # what figures over μ show, and what is said on a guess
@@ -199,12 +197,13 @@ class View(TabView):
     def _offer(self) -> None:
         """Have pictures made of packings of other frictions, where there are enough of them."""
         state, made = self.state, self.state.cell.selection.packing
+        self.glimpses.items = []
         like = [
             cell
             for cell in distributions.alike(state.catalogue, state.cell)
-            if cell.mu in OFFERED and cell.selection.packing["seed"] == made.get("seed")
+            if cell.mu in OFFERED and cell.selection.packing.get("seed") == made.get("seed")
         ]
-        if len(like) != len(OFFERED) or self.glimpses.items:
+        if len(like) != len(OFFERED) or state.cell.selection.imported:
             return
         self.offered = sorted(like, key=lambda cell: cell.mu)
 
@@ -224,9 +223,11 @@ class View(TabView):
         """Hide what a guess is asked of, and show it, with what was found, once there was one."""
         what, replay = self.what.value, self.state.replay
         hidden = what == "eta" and self.looks.guess and replay is not None
-        shown = len(self.glimpses.items) > 0
-        if hidden and not shown:
+        made = replay and self.state.cell.selection.packing
+        if hidden and self.offered_for != (made.get("n"), made.get("seed")):
+            self.offered_for = made.get("n"), made.get("seed")
             self._offer()
+        shown = len(self.glimpses.items) > 0
         self.guesses.visible, self.glimpses.visible = hidden and not shown, hidden and shown
         self.plots.visible = not self.glimpses.visible
         self.scale.visible = what in SCALED and not hidden
@@ -419,8 +420,8 @@ def _glimpse(library: Library, cell: Cell) -> list[Any]:
 
 
 def _guess_first(replay: Replay) -> str:
-    """What is asked, and the forces of a typical contact as SVG."""
-    return GUESS.format(replay.summary["eta1"]) + _strip(replay)
+    """What varying means, by the forces of a typical contact, as HTML."""
+    return GUESS.format(replay.normal[:, replay.typical].std()) + _strip(replay)
 
 
 def _strip(replay: Replay) -> str:

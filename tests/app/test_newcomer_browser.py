@@ -367,7 +367,9 @@ def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     scene(page, "scene.hand.player.model.guess = true")
     guess = page.get_by_role("button", name="more, then less")
     guess.wait_for()
-    page.locator(".turn").get_by_text("in which packing does a typical force vary most?").wait_for()
+    page.locator(".turn").get_by_text(
+        "how does friction change how much a force varies?"
+    ).wait_for()
     assert not page.locator(".hill").filter(visible=True).count()  # it would give it away
     models = "[...Bokeh.documents[0].all_models]"
     pencil = "model => model.type === 'FreehandDrawTool' && model.active"
