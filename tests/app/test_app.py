@@ -562,8 +562,12 @@ def test_one_bar_without_its_ends_is_drawn_until_a_force_was_dragged(state):
     assert np.isnan(view.bars.data["exact_high"]).all() and len(view.unknown.data["at"]) == 2
     assert not len(view.invited.data["rank"])  # what is to be found out
     assert "your guess" in view.guess_words.text and not view.guess.visible
+    assert view.guess_words.visible
     view._guess(SimpleNamespace(y=3.5))
     assert view.guess.visible and view.guess.location == 3.5 and "3.5" in view.guess_words.text
+    state.looks.contact = next(c for c in range(9) if c != state.seen.invited)
+    assert not view.guess.visible and "click" in view.guess_words.text  # of another force
+    state.looks.contact = None
     state.looks.fresh = False
     assert len(view.contacts) > 8 and view.exact_item.visible
     assert np.isfinite(view.bars.data["exact_high"]).all() and not len(view.unknown.data["at"])
