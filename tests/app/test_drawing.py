@@ -376,17 +376,19 @@ def test_who_is_new_sees_the_disks_around_what_is_to_be_dragged(run):
             const near = new Near(player), views = [near.view]
             player.invite.row = 1
             views.push(near.view)
-            scene.pair = [4, 9]
+            scene.pair = [4, 9] // which counts where force space is looked at
+            views.push(near.view.half)
+            player.points = true
             views.push(near.view)
             later.waits = false
             return [...views, near.view, later.listeners.length]
         }""",
         half=10.0,
     )
-    middle, corner, both, none, listens = views
+    middle, corner, other, both, none, listens = views
     assert middle == {"x": 10, "y": 10, "half": 6.5}
     assert corner == {"x": 6.5, "y": 6.5, "half": 6.5}  # nothing beyond the packing
-    assert both["half"] >= 4 + 2 and abs(both["y"] - 7) < 1e-9
+    assert other == 6.5 and both["half"] >= 4 + 2 and abs(both["y"] - 7) < 1e-9
     assert none is None and listens == 1
 
 
