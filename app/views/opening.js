@@ -2,9 +2,18 @@
 // a first gesture is to be made, for some seconds. The speed stays what it was: who then plays sees what was
 // seen before.
 
+// What a link may hold that opens a page as it is at first.
+const PLAIN = ["scene", "mu", "n", "seed", "states", "source", "relax", "packed_mu", "tab", "dark"]
+const UNASKED = ["upload", "export"] // tabs that come later to somebody new
 const SLOW = 0 // log2 of states per second
 const AGAIN_MS = 700 // rest at the end
 const FIRST_MS = 6000 // after which it rests, and the first gesture is pointed out
+
+/** Whether the page was opened by a link that shows something of its own. */
+export function shown() {
+  const asked = new URLSearchParams(location.search)
+  return UNASKED.includes(asked.get("tab")) || [...asked.keys()].some((name) => !PLAIN.includes(name))
+}
 
 export function openMoving(player) {
   const { model, buttons } = player

@@ -13,7 +13,7 @@ import { plain } from "./plain.js"
 import { Later } from "./later.js"
 import { knows, remember } from "./memory.js"
 import { Near } from "./near.js"
-import { openMoving } from "./opening.js"
+import { openMoving, shown } from "./opening.js"
 import { Pins } from "./pins.js"
 import { Plots } from "./plots.js"
 import { Predict } from "./predict.js"
@@ -24,9 +24,6 @@ import { closeSidebar } from "./sidebar.js"
 import { Split } from "./split.js"
 import { Sway } from "./sway.js"
 
-// What a link may hold that opens a page as it is at first.
-const PLAIN = ["scene", "mu", "n", "seed", "states", "source", "relax", "packed_mu", "tab", "dark"]
-const UNASKED = ["upload", "export"] // tabs that come later to somebody new
 const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
 const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
 const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
@@ -414,12 +411,6 @@ class Player {
     this.buttons.tellTrack(replay)
     this.show(replay.swinging ? 0 : frame)
   }
-}
-
-/** Whether the page was opened by a link that shows something of its own. */
-function shown() {
-  const asked = new URLSearchParams(location.search)
-  return UNASKED.includes(asked.get("tab")) || [...asked.keys()].some((name) => !PLAIN.includes(name))
 }
 
 export function render({ model, view }) {
