@@ -23,6 +23,7 @@ class Replay(NamedTuple):
     tilt: float  # of the cell
     window: tuple[float, float, float, float]  # x_low, x_high, y_low, y_high of the view, a square
     inviting: int  # row of links that a visitor is asked to drag first, or -1
+    typical: int  # the contact whose f_n scatters most nearly as that of all does on average, or -1
     backbone: Integers  # (N_c,) positions of the contacts in the packing
     force_scale: float  # ⟨f_n⟩, force
     normal: Any  # (F, N_c) float32 f_n: the original network, then the states kept
@@ -41,12 +42,6 @@ class Replay(NamedTuple):
     def invited(self) -> int | None:
         """The contact of the row `inviting`; None without any."""
         return None if self.inviting < 0 else int(self.links.contact[self.inviting])
-
-    @property
-    def typical(self) -> int:
-        """The contact whose f_n scatters most nearly as that of all does on average; or -1."""
-        spread = self.normal.std(axis=0)
-        return int(np.argmin(np.abs(spread - spread.mean()))) if len(spread) else -1
 
 
 def make_replay(
@@ -125,6 +120,12 @@ def first_replay(S: Any, states: int) -> Replay:
     )
 
 
+def _typical(normal: Any) -> int:
+    """The contact of frames (F, N_c) that scatters as all do on average; -1 without any."""
+    spread = normal.std(axis=0)
+    return int(np.argmin(np.abs(spread - spread.mean()))) if len(spread) else -1
+
+
 def _replay(
     packing: Packing, backbone: Integers, scale: float, frames: Any, **numbers: Any
 ) -> Replay:
@@ -138,6 +139,7 @@ def _replay(
         tilt=packing.tilt,
         window=window,
         inviting=geometry.inviting(links, frames[0, :, 0], window),
+        typical=_typical(frames[:, :, 0]),
         backbone=backbone,
         force_scale=scale,
         normal=np.ascontiguousarray(frames[..., 0]),

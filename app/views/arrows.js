@@ -236,8 +236,8 @@ export class Arrows {
       g.globalAlpha = 0.45
       this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
       g.globalAlpha = 1
+      this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     }
-    if (named) this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
     g.globalAlpha = look.fresh && body.crowded && !own && !lit ? QUIET : 1 // at first only those that are plotted count
     const colour = lit ? look.hand : slides ? look.warm : (!apart && own) || look.cold, thick = lit || (own && !apart) ? 3.5 : 2.5
     this.arrow(px, py, force, colour, thick)

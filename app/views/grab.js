@@ -6,7 +6,7 @@ import { CARRYING } from "./look.js"
 import { circle, line } from "./pen.js"
 import { plain } from "./plain.js"
 import { PointHand } from "./point.js"
-import { between } from "./replay.js"
+import { networkAt } from "./replay.js"
 
 const RAIL = 190 // px, the longest
 const EDGE = 14 // px between a rail and the edge of the picture
@@ -206,16 +206,10 @@ export class Grab {
 
   /** The network of this value, by straight lines between those of the rail. */
   set(value) {
-    const { rail, replay } = this, { values } = rail, size = replay.walk.contacts
+    const { rail } = this, { values } = rail
     this.value = Math.max(values[0], Math.min(values[values.length - 1], value))
-    let k = 0
-    while (k < values.length - 2 && values[k + 1] < this.value) k++
-    const part = (this.value - values[k]) / (values[k + 1] - values[k] || 1)
-    const held = { normal: new Float32Array(size), tangential: new Float32Array(size) }
-    for (const [name, out] of Object.entries(held)) between(rail[name], k, k + 1, part, out)
-    held.residual = Math.max(rail.residual[k], rail.residual[k + 1])
     this.describe(this.contact, this.value)
-    this.show(held)
+    this.show(networkAt(rail, this.value))
   }
 
   /** Put a network on screen with the next painted frame. */

@@ -19,15 +19,18 @@ export function render({ model, view }) {
     <button type="button" class="soft">Let the push grow</button>`
   const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
   const player = () => view.model.document.get_model_by_name("player")?.player
-  const known = () => model.path.loads?.length > 0, end = () => (known() ? model.path.loads.at(-1) : Infinity)
-  let load = 0, guess = null, asked = false, gave = false, rising = 0, by = null, shows = false // by: whom the load is shown by
+  const known = () => model.path.values?.length > 0, end = () => (known() ? model.path.values.at(-1) : Infinity)
+  let load = 0, guess = null, asked = false, gave = false, rises = 0, rising = 0, by = null, shows = false // by: whom the load is shown by
+
+  function find() {
+    if (known() || asked) return
+    asked = true
+    ask(model, view, { push: true })
+  }
 
   function set(value) {
     load = Math.min(value, end())
-    if (load > 0 && !known() && !asked) {
-      asked = true
-      ask(model, view, { push: true })
-    }
+    if (load > 0) find()
     show()
     if (load < end() || gave) return
     gave = true
@@ -52,7 +55,7 @@ export function render({ model, view }) {
     player()?.listeners.add(look)
     by = player()?.pushed
     shows = true
-    by?.take(model.contact, model.path, load, load / Number(range.max))
+    by?.take(model.path, load, load / Number(range.max))
     shows = false
   }
 
@@ -93,8 +96,9 @@ export function render({ model, view }) {
   /** By itself, as soon as it is known how far. */
   function rise() {
     load = 0
-    const way = rising = Math.random()
-    if (!known() && !asked) { asked = true; ask(model, view, { push: true }) }
+    const way = ++rises
+    rising = way
+    find()
     let before = null
     const step = (now) => {
       if (way !== rising) return

@@ -321,7 +321,7 @@ class View(TabView):
 def path(pushed: Pushed) -> dict[str, Any]:
     """Networks under growing loads as the slider takes them: flat arrays, forces in ⟨f_n⟩."""
     return {
-        "loads": pushed.loads,
+        "values": pushed.loads,
         "normal": pushed.states[..., 0].astype(np.float32).ravel(),
         "tangential": pushed.states[..., 1].astype(np.float32).ravel(),
         "residual": pushed.residual,

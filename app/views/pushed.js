@@ -2,7 +2,7 @@
 // networks that the server made. Between two of them the straight line balances the load in between (S under
 // all loads is convex, too). Where the last of them is reached, disks set off.
 
-import { between } from "./replay.js"
+import { networkAt } from "./replay.js"
 
 export class Pushed {
   constructor(player) {
@@ -21,32 +21,20 @@ export class Pushed {
   }
 
   /** path: networks under loads up to the largest one that is held; part: of the longest arrow. */
-  take(contact, path, load, part) {
+  take(path, load, part) {
     const { player } = this, { replay, scene } = player
     if (!player.pushable || player.live.moves || player.grows) return
     if (load > 0 && player.playing) player.play(false)
     if (load > 0 && replay.held && replay.held !== this.held) player.hand.free() // what was pulled
-    Object.assign(this, { load, part, there: load > 0 && load >= (path.loads?.at(-1) ?? Infinity) })
+    Object.assign(this, { load, part, there: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
     this.tellMotion()
-    if (!(load > 0 && path.loads?.length) || path.normal.length !== path.loads.length * replay.walk.contacts) {
+    if (!(load > 0 && path.values?.length) || path.normal.length !== path.values.length * replay.walk.contacts) {
       if (this.held) this.end()
       return scene.style && scene.drawMarks(scene.style)
     }
     if (replay.position) player.show(0)
-    this.follow(path, load)
-  }
-
-  follow({ loads, normal, tangential, residual }, load) {
-    const { player } = this, { replay } = player, size = replay.walk.contacts
-    let k = 0
-    while (k < loads.length - 2 && loads[k + 1] < load) k++
-    const part = Math.min(1, (load - loads[k]) / (loads[k + 1] - loads[k] || 1))
-    const held = { normal: new Float32Array(size), tangential: new Float32Array(size), place: "pushed" }
-    between(normal, k, k + 1, part, held.normal)
-    between(tangential, k, k + 1, part, held.tangential)
-    held.residual = Math.max(residual[k], residual[k + 1])
-    player.look.before = replay.walk.normal.subarray(0, size)
-    player.hand.show((this.held = held))
+    player.look.before = replay.walk.normal.subarray(0, replay.walk.contacts)
+    player.hand.show((this.held = { ...networkAt(path, load), place: "pushed" }))
   }
 
   /** The slider was let go. */

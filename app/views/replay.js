@@ -2,11 +2,23 @@
 // Between two states the straight line is shown: S is convex, so every point of it is admissible too.
 
 /** Forces a part of the way from network a to network b of `all`, one after the other. */
-export function between(all, a, b, part, out) {
+function between(all, a, b, part, out) {
   const size = out.length, from = a * size, to = b * size
   for (let c = 0; c < size; c++) {
     out[c] = part ? (1 - part) * all[from + c] + part * all[to + c] : all[from + c]
   }
+}
+
+/** The network at a value, by straight lines between those of a path (flat), whose values ascend. */
+export function networkAt({ values, normal, tangential, residual }, value) {
+  const size = normal.length / values.length
+  let k = 0
+  while (k < values.length - 2 && values[k + 1] < value) k++
+  const part = (value - values[k]) / (values[k + 1] - values[k] || 1)
+  const held = { normal: new Float32Array(size), tangential: new Float32Array(size) }
+  between(normal, k, k + 1, part, held.normal)
+  between(tangential, k, k + 1, part, held.tangential)
+  return { ...held, residual: Math.max(residual[k], residual[k + 1]) }
 }
 
 export class Replay {

@@ -19,6 +19,7 @@ from bokeh.models import (
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
+from granforce.records import Floats
 
 from .. import distributions
 from ..data import Cell, Library
@@ -183,21 +184,24 @@ class View(TabView):
     # The curve over friction is guessed before it is seen for the first time
 
     def _guessed(self, k: int, event: Any) -> None:
-        self._said = DRAWN_FIRST if len(self.guessed.data["xs"]) else ""
-        if k < len(GUESSES):
-            self._said = ANSWERS[k == RIGHT] + self._said
-        self.looks.guess = False
+        self._answer(k == RIGHT if k < len(GUESSES) else None)
 
     def _picked(self, k: int) -> None:
         measured = [row["eta1"] for row in distributions.rows(self.offered)]
-        self._said = ANSWERS[int(np.argmax(measured)) == k]
+        self._answer(bool(np.argmax(measured) == k))
+
+    def _answer(self, right: bool | None) -> None:
+        """Show the curve, and say whether the guess was right; None: none was made in words."""
+        self._said = "" if right is None else ANSWERS[right]
         self._said += DRAWN_FIRST if len(self.guessed.data["xs"]) else ""
         self.looks.guess = False
 
     def _offer(self) -> None:
-        """Have pictures made of packings of other frictions, where there are enough of them."""
+        """Have pictures made of packings of other frictions, where there are enough; once."""
         state, made = self.state, self.state.cell.selection.packing
-        self.glimpses.items = []
+        if self.offered_for == (made.get("n"), made.get("seed")):
+            return
+        self.offered_for, self.glimpses.items = (made.get("n"), made.get("seed")), []
         like = [
             cell
             for cell in distributions.alike(state.catalogue, state.cell)
@@ -223,9 +227,7 @@ class View(TabView):
         """Hide what a guess is asked of, and show it, with what was found, once there was one."""
         what, replay = self.what.value, self.state.replay
         hidden = what == "eta" and self.looks.guess and replay is not None
-        made = replay and self.state.cell.selection.packing
-        if hidden and self.offered_for != (made.get("n"), made.get("seed")):
-            self.offered_for = made.get("n"), made.get("seed")
+        if hidden:
             self._offer()
         shown = len(self.glimpses.items) > 0
         self.guesses.visible, self.glimpses.visible = hidden and not shown, hidden and shown
@@ -421,13 +423,13 @@ def _glimpse(library: Library, cell: Cell) -> list[Any]:
 
 def _guess_first(replay: Replay) -> str:
     """What varying means, by the forces of a typical contact, as HTML."""
-    return GUESS.format(replay.normal[:, replay.typical].std()) + _strip(replay)
+    forces = replay.normal[:, replay.typical]
+    return GUESS.format(forces.std()) + _strip(forces)
 
 
-def _strip(replay: Replay) -> str:
-    contact, spread = replay.typical, replay.normal.std(axis=0)
-    forces, typical = replay.normal[:, contact], float(spread[contact])
-    mean = float(forces.mean())
+def _strip(forces: Floats) -> str:
+    """Forces (k,), a dot each, with their mean and standard deviation, as SVG."""
+    mean, typical = float(forces.mean()), float(forces.std())
     scale = 500 / max(1.25 * float(forces.max()), 1e-9)
     low, high = (10 + scale * (mean + sign * typical) for sign in (-1, 1))
     heights = 34 + 7 * np.sin(2.4 * np.arange(len(forces)))  # so that dots do not hide each other

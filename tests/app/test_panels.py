@@ -575,8 +575,8 @@ def test_a_pushed_contact_gives_way_between_its_bounds(state):
 def test_the_slider_of_a_push_has_networks_in_balance_from_none_to_the_critical_force(state):
     view = pushed(state)
     path, replay, low = view.load.path, state.replay, view.pushed[0].low
-    count = len(path["loads"])
-    assert path["loads"][0] == 0 and path["loads"][-1] == pytest.approx(low)
+    count = len(path["values"])
+    assert path["values"][0] == 0 and path["values"][-1] == pytest.approx(low)
     normal = path["normal"].reshape(count, -1)
     assert np.allclose(normal[0], replay.normal[0], atol=1e-6)
     tangential = path["tangential"].reshape(count, -1)
