@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 LONGEST = 600  # characters of a message
 EXAMPLE = argparse.RawDescriptionHelpFormatter
@@ -28,10 +28,17 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         self.exit(refused(f"{message}; see {self.prog} --help"))
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse unknown options here: argparse would pass those of a subcommand to its parent."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
 
 def subcommand(
     commands: Commands, name: str, summary: str, example: str, *, reports: bool = True
-) -> argparse.ArgumentParser:
+) -> Parser:
     """A command, which the function of its name in `granforce.cli.commands` runs."""
     command = commands.add_parser(
         name,
@@ -46,6 +53,40 @@ def subcommand(
     if reports:
         command.add_argument("--json", action="store_true", help="print the report as JSON")
     return command
+
+
+def import_format(
+    formats: Commands,
+    name: str,
+    summary: str,
+    example: str,
+    grains: str,
+    contacts: str,
+    *,
+    contacts_needed: bool = True,
+) -> Parser:
+    """A format of `granforce import`, with what all formats take; options are added to it.
+
+    Options are named as the arguments of the format's reader in `granforce.packing.importers`.
+    """
+    command = subcommand(
+        formats, name, summary, f"granforce import {name} {example} --mu 0.3 --out packing.npz"
+    )
+    command.set_defaults(run="import_")
+    command.add_argument("grains", help=grains)
+    command.add_argument("contacts", nargs=None if contacts_needed else "?", help=contacts)
+    command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
+    command.add_argument("--out", metavar="FILE.npz", help="save the packing to this file")
+    return command
+
+
+def add_cell(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="sides of the box (default: open)"
+    )
+    command.add_argument(
+        "--tilt", type=float, default=0.0, help="tilt of the box, LAMMPS' xy (default 0)"
+    )
 
 
 def add_store(command: argparse.ArgumentParser) -> None:
@@ -173,7 +214,7 @@ def add_exact(command: argparse.ArgumentParser) -> None:
     add_store(command)
 
 
-def add_reading(group: argparse._ArgumentGroup) -> None:
+def add_reading(group: argparse._ActionsContainer) -> None:
     group.add_argument(
         "--reach",
         type=float,
@@ -190,7 +231,7 @@ def add_reading(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def add_flaws_and_walls(group: argparse._ArgumentGroup) -> None:
+def add_flaws_and_walls(group: argparse._ActionsContainer) -> None:
     group.add_argument(
         "--repair",
         type=float,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from granforce.cli.options import (
     Commands,
     add_any_packing,
+    add_cell,
     add_conditions,
     add_exact,
     add_flaws_and_walls,
@@ -15,6 +16,7 @@ from granforce.cli.options import (
     add_source,
     add_store,
     add_walk_options,
+    import_format,
     subcommand,
 )
 
@@ -344,34 +346,44 @@ def add_import(commands: Commands) -> None:
         "  granforce import table grains.csv contacts.csv --box 30 30 --mu 0.3 --out packing.npz\n"
         "  granforce import pegs positions.txt adjacency.txt --mu 0.5 --out frame.npz "
         "--measured frame.csv",
+        reports=False,
     )
-    command.add_argument("format", choices=["lammps", "yade", "mercury", "table", "pegs"])
-    command.add_argument(
-        "grains",
-        help="LAMMPS particle dump, bodies of YADE, .data of MercuryDPM, table with x, y, r, "
-        "positions, or a *_solved.mat of PeGS 2",
+    # A parser for each format: it takes the options that its reader uses, and refuses all others.
+    formats = command.add_subparsers(dest="format", metavar="FORMAT", required=True)
+    import_format(
+        *(formats, "lammps", "read a particle dump and a contact dump of LAMMPS"),
+        *("particles.dump contacts.dump", "dump custom of the particles", "dump local of contacts"),
     )
-    command.add_argument(
-        "contacts", nargs="?", help="LAMMPS contact dump, interactions, .fstat, table, or adjacency"
+    yade = import_format(
+        *(formats, "yade", "read the bodies and interactions of YADE"),
+        *("bodies.txt interactions.txt", "bodies, by export.textExt", "interactions"),
     )
-    command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
-    command.add_argument(
-        "--box", type=float, nargs=2, metavar=("LX", "LY"), help="table, yade, mercury: box sides"
+    add_cell(yade)
+    mercury = import_format(
+        *(formats, "mercury", "read the .data and .fstat of MercuryDPM"),
+        *("run.data run.fstat", "particles: NAME.data", "contacts: NAME.fstat"),
     )
-    command.add_argument(
-        "--columns", metavar="x=…,y=…", help="table: what columns are called in the files"
+    add_cell(mercury)
+    table = import_format(
+        *(formats, "table", "read a table of grains and, if there is one, a table of contacts"),
+        *("grains.csv contacts.csv", "columns x, y, r", "columns i, j, and fn, ft if known"),
+        contacts_needed=False,
     )
-    command.add_argument(
-        "--tilt", type=float, default=0.0, help="table: tilt of the box, LAMMPS' xy (default 0)"
+    add_cell(table)
+    table.add_argument("--columns", metavar="x=…,y=…", help="names of the columns in the files")
+    table.add_argument("--forces", action="store_true", default=None, help="require fn and ft")
+    table.add_argument(
+        "--pressure", type=float, help="pressure P0 of a table without forces (default 1)"
     )
-    command.add_argument("--forces", action="store_true", help="table: fn, ft must be given")
-    command.add_argument("--pressure", type=float, default=1.0, help="table without forces: P0")
-    command.add_argument("--out", metavar="FILE.npz", help="save the packing to this file")
-    group = command.add_argument_group("photoelastic frames (pegs)")
-    group.add_argument("--frame", type=float, help="number of the frame (default: the last)")
-    add_reading(group)
-    add_flaws_and_walls(group)
-    group.add_argument(
+    pegs = import_format(
+        *(formats, "pegs", "read a photoelastic frame: what PeGS writes"),
+        *("positions.txt adjacency.txt", "positions, or a *_solved.mat of PeGS 2", "adjacency"),
+        contacts_needed=False,
+    )
+    pegs.add_argument("--frame", type=float, help="number of the frame (default: the last)")
+    add_reading(pegs)
+    add_flaws_and_walls(pegs)
+    pegs.add_argument(
         "--measured", metavar="FILE.csv", help="write the measured forces, for granforce infer"
     )
 

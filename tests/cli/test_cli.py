@@ -298,7 +298,6 @@ def test_cache_commands(run):
         (["intervals", "-n", "20", "--mu", "0.3", "--slice", "0.5,0.2,0,1"], "slice"),
         (["limit-loads", "-n", "20", "--mu", "0.3", "--slice", "0,1"], "four numbers"),
         (["import", "lammps", "no-such.dump", "nor-this.dump", "--mu", "0.3"], "no-such.dump"),
-        (["import", "lammps", "one.dump", "--mu", "0.3"], "two dumps"),
         (["import", "table", "no-such.csv", "--mu", "-1"], ""),
         (["walk", "--mu", "0.1", "--states", "0"], "states"),
         (["scan", "--mu", "0.1;1"], "--mu"),

@@ -1,6 +1,7 @@
 """Packings: made, or from elsewhere."""
 
 import argparse
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from granforce.cli.asked import (
     write_csv,
 )
 from granforce.packing import importers, scenes
-from granforce.records import InputError, whole
+from granforce.records import InputError, Packing, whole
 from granforce.study.store import open_store
 from granforce.system.terminal import print_report
 
@@ -43,33 +44,29 @@ def _scene(arguments: argparse.Namespace) -> None:
     print_report({"scene": arguments.scene, **importers.report(packing)}, arguments.json)
 
 
+# What reads each format; pegs gives more than a packing.
+READERS: dict[str, Callable[..., Packing]] = {
+    "lammps": importers.read_lammps,
+    "yade": importers.read_yade,
+    "mercury": importers.read_mercury,
+    "table": importers.read_table,
+}
+# What of the arguments is not an option of a reader.
+_NO_OPTIONS = ("command", "format", "run", "json", "grains", "contacts", "out")
+
+
 def import_(arguments: argparse.Namespace) -> None:
     """Read a packing from elsewhere; report and save it."""
     check_outputs(arguments.out)
     if arguments.format == "pegs":
         _import_pegs(arguments)
         return
-    if arguments.format == "lammps":
-        if arguments.contacts is None:
-            raise InputError("import lammps needs two dumps: particles and contacts")
-        packing = importers.read_lammps(arguments.grains, arguments.contacts, arguments.mu)
-    elif arguments.format in ("yade", "mercury"):
-        if arguments.contacts is None:
-            raise InputError(f"import {arguments.format} needs two files: grains and contacts")
-        read = importers.read_yade if arguments.format == "yade" else importers.read_mercury
-        packing = read(arguments.grains, arguments.contacts, arguments.mu, box=arguments.box)
-    else:
-        columns = None if arguments.columns is None else importers.read_columns(arguments.columns)
-        packing = importers.read_table(
-            arguments.grains,
-            arguments.contacts,
-            mu=arguments.mu,
-            box=arguments.box,
-            tilt=arguments.tilt,
-            columns=columns,
-            forces=True if arguments.forces else None,
-            pressure=arguments.pressure,
-        )
+    options = {k: v for k, v in vars(arguments).items() if k not in _NO_OPTIONS and v is not None}
+    if "columns" in options:
+        options["columns"] = importers.read_columns(options["columns"])
+    packing = READERS[arguments.format](arguments.grains, arguments.contacts, **options)
+    if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
+        raise InputError("--pressure is of a table without forces or loads: leave it out")
     lines = importers.report(packing) | {
         k: v for k, v in packing.info.items() if k == "contacts_skipped"
     }

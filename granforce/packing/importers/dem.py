@@ -55,12 +55,13 @@ def read_yade(
     mu: Any,
     *,
     box: npt.ArrayLike | None = None,
+    tilt: float = 0.0,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from YADE's bodies and interactions (paths or open files).
 
-    box: (L_x, L_y) of the plane, inf for an open direction; None: open. Raises InputError naming
-    file and line.
+    box: (L_x, L_y) of the plane, inf for an open direction; None: open. tilt: of the cell, whose
+    upper side begins at (tilt, L_y). Raises InputError naming file and line.
     """
     grains, links = _yade_bodies(bodies), _lines_of(interactions, _INTERACTION)
     plane = _plane(grains, 3)
@@ -71,7 +72,9 @@ def read_yade(
     )
     i, j = links.lookup("id1", ids), links.lookup("id2", ids)
     force = np.column_stack([links.numbers(f"fn{k}") + links.numbers(f"fs{k}") for k in plane])
-    return _packing(grains, plane, links, i, j, force, friction(mu), box, most_grains, "yade")
+    return _packing(
+        *(grains, plane, links, i, j, force, friction(mu), _cell(box, tilt), most_grains, "yade")
+    )
 
 
 def read_mercury(
@@ -81,13 +84,15 @@ def read_mercury(
     *,
     step: int | None = None,
     box: npt.ArrayLike | None = None,
+    tilt: float = 0.0,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from MercuryDPM's .data and .fstat (paths or open files).
 
-    step: number of the time step in the files, from 0; by default the last. box: as for
-    `read_yade`. Raises InputError naming file and line.
+    step: number of the time step in the files, from 0; by default the last. box, tilt: as
+    for `read_yade`. Raises InputError naming file and line.
     """
+    cell = _cell(box, tilt)
     grains, time = _mercury_particles(data, step)
     links = _mercury_contacts(fstat, time)
     plane = _plane(grains, 3 if "z" in grains.header else 2)
@@ -104,7 +109,7 @@ def read_mercury(
     )
     force = links.numbers("fn")[:, None] * normal + links.numbers("ft")[:, None] * tangent
     # That of the grain that n points to.
-    to_first = np.sum(normal * _cell(box).nearest(x[j] - x[i]), axis=1) < 0
+    to_first = np.sum(normal * cell.nearest(x[j] - x[i]), axis=1) < 0
     force[to_first] *= -1
     once, keep = set(), []
     for k, pair in enumerate(zip(i.tolist(), j.tolist(), strict=True)):
@@ -113,7 +118,7 @@ def read_mercury(
             keep.append(k)
     return _packing(
         *(grains, plane, links.some(keep), i[keep], j[keep], force[keep]),
-        *(friction(mu), box, most_grains, "mercury"),
+        *(friction(mu), cell, most_grains, "mercury"),
     )
 
 
@@ -125,13 +130,12 @@ def _packing(
     j: Integers,
     force: Floats,
     mu: float,
-    box: npt.ArrayLike | None,
+    cell: Cell,
     most_grains: int | None,
     source: str,
 ) -> Packing:
     """The packing of disks and of the forces (N_c, 2) on j."""
     check_grains(len(grains.rows), most_grains, grains.name)
-    cell = _cell(box)
     x = cell.wrapped(np.column_stack([grains.numbers(axis) for axis in plane]))
     r = grains.numbers("r")
     check_disks(x, r, cell, grains.place)
@@ -141,11 +145,13 @@ def _packing(
     joined = listed(x, r, cell, i[carrying], j[carrying], lambda c: links.place(carrying[c]))
     forces = components(force[carrying], joined.normal)
     info = {"source": source, "contacts_skipped": len(force) - len(carrying)}
-    return adopt(make_packing(x, r, cell.box, joined, forces, mu, info=info), forces="given")
+    return adopt(
+        make_packing(x, r, cell.box, joined, forces, mu, info=info, tilt=cell.tilt), forces="given"
+    )
 
 
-def _cell(box: npt.ArrayLike | None) -> Cell:
-    return make_cell((np.inf, np.inf) if box is None else box, 0.0)
+def _cell(box: npt.ArrayLike | None, tilt: float) -> Cell:
+    return make_cell((np.inf, np.inf) if box is None else box, tilt)
 
 
 def _plane(table: Table, dimensions: int) -> str:
