@@ -187,12 +187,12 @@ def _rank(rows: sparse.csr_matrix) -> int:
         return 0
     scale, unit = sparse.diags(1 / np.sqrt(diagonal[there])), sparse.identity(len(there))
     square = scale @ square[there][:, there] @ scale
-    less, more = (_log_determinant(square + shift * unit) for shift in _SHIFTS)
+    less, more = (cancelling.apart(_log_determinant, square + shift * unit) for shift in _SHIFTS)
     return len(there) - round((more - less) / np.log(_SHIFTS[1] / _SHIFTS[0]))
 
 
 def _log_determinant(square: sparse.csc_matrix) -> float:
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
     options["options"] = {"SymmetricMode": True}
-    factors = cancelling.apart(lambda: splu(sparse.csc_matrix(square), **options))
+    factors = splu(sparse.csc_matrix(square), **options)
     return np.log(np.abs(factors.U.diagonal())).sum()

@@ -140,7 +140,13 @@ def vertex(
     A: sparse.csr_matrix, b: Floats, cost: Floats, rows: Integers, columns: Integers
 ) -> tuple[Floats, Floats]:
     """y and λ of a basis by its own LU factors: rounding error in place of tolerances."""
-    factors = cancelling.apart(splu, sparse.csc_matrix(A.tocsr()[rows][:, columns]))
+    return cancelling.apart(_vertex, A, b, cost, rows, columns)
+
+
+def _vertex(
+    A: sparse.csr_matrix, b: Floats, cost: Floats, rows: Integers, columns: Integers
+) -> tuple[Floats, Floats]:
+    factors = splu(sparse.csc_matrix(A.tocsr()[rows][:, columns]))
     y, multiplier = np.zeros(A.shape[1]), np.zeros(A.shape[0])
     for _ in range(2):
         y[columns] += factors.solve((b - A @ y)[rows])

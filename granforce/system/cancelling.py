@@ -164,7 +164,8 @@ def apart(
 ) -> T:
     """call(*arguments), which cannot read the flag, in a thread that is left behind if need be.
 
-    interrupt(): asks it to end, where that is possible.
+    interrupt(): asks it to end, where that is possible. The call must return numbers: memory that
+    SuperLU takes in one thread is lost if another frees it.
     """
     if _scope.get().cancel is None:
         return call(*arguments)
