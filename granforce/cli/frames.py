@@ -22,9 +22,6 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
         raise InputError("give the friction coefficient: --mu 0.5")
     if not arguments.files:
         raise InputError("--frames needs a folder, *_solved.mat files, or positions and adjacency")
-    for name in ("measured", "packing", "csv"):
-        if getattr(arguments, name) is not None:
-            raise InputError(f"--{name} is of a single packing: leave it out with --frames")
     whole(arguments.workers, "--workers", 1)
     frames = _chosen(series.frames_of(*arguments.files), arguments.frames)
     if arguments.out is not None:
@@ -37,7 +34,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
             mu=arguments.mu,
             states=series.STATES if arguments.states is None else arguments.states,
             seed=arguments.sample_seed,
-            unmeasured=arguments.unmeasured or series.UNMEASURED,
+            unmeasured=series.UNMEASURED if arguments.unmeasured is None else arguments.unmeasured,
             workers=arguments.workers,
             scheduler=arguments.scheduler,
             progress=progress,

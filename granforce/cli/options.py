@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from typing import Any, NoReturn, TypeAlias
+from typing import TypeAlias
 
-LONGEST = 600  # characters of a message
+from granforce.cli.parsing import Input, Kept, Output, Parser
+
 EXAMPLE = argparse.RawDescriptionHelpFormatter
 # Commands whose names are taken in Python, or by a room: their functions end in an underscore.
 _TAKEN = ("import", "study")
 # What subcommands are added to.
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
-
-
-def refused(reason: str) -> int:
-    line = " ".join(str(reason).split())
-    if len(line) > LONGEST:  # a name of thousands of characters, say
-        line = f"{line[: LONGEST // 2]} … {line[-LONGEST // 2 :]}"
-    print(f"granforce: {line}", file=sys.stderr)
-    return 2
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser that tells what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(refused(f"{message}; see {self.prog} --help"))
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Refuse unknown options here: argparse would pass those of a subcommand to its parent."""
-        found, unknown = super().parse_known_args(args, namespace)
-        if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return found, unknown
 
 
 def subcommand(
@@ -73,14 +51,18 @@ def import_format(
         formats, name, summary, f"granforce import {name} {example} --mu 0.3 --out packing.npz"
     )
     command.set_defaults(run="import_")
-    command.add_argument("grains", help=grains)
-    command.add_argument("contacts", nargs=None if contacts_needed else "?", help=contacts)
+    command.add_argument("grains", type=Input, help=grains)
+    command.add_argument(
+        "contacts", type=Input, nargs=None if contacts_needed else "?", help=contacts
+    )
     command.add_argument("--mu", type=float, required=True, help="friction coefficient μ")
-    command.add_argument("--out", metavar="FILE.npz", help="save the packing to this file")
+    command.add_argument(
+        "--out", type=Output, metavar="FILE.npz", help="save the packing to this file"
+    )
     return command
 
 
-def add_cell(command: argparse.ArgumentParser) -> None:
+def add_cell(command: Parser) -> None:
     command.add_argument(
         "--box", type=float, nargs=2, metavar=("LX", "LY"), help="sides of the box (default: open)"
     )
@@ -89,15 +71,21 @@ def add_cell(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_store(command: argparse.ArgumentParser) -> None:
+def add_store(command: Parser) -> None:
     command.add_argument(
         "--cache",
+        type=Kept,
         metavar="FOLDER",
         help="store of results (default: $GRANFORCE_CACHE, else the user's cache folder)",
     )
 
 
-def add_packing(command: argparse.ArgumentParser, several: bool = False) -> None:
+def spec_or_file(word: str) -> str:
+    """Radii as they are typed: a distribution with its numbers, or a file."""
+    return word if ":" in word else Input(word)
+
+
+def add_packing(command: Parser, several: bool = False) -> None:
     group = command.add_argument_group("the packing")
     group.add_argument("-n", type=int, default=400, help="number of disks (default 400)")
     if not several:
@@ -105,6 +93,7 @@ def add_packing(command: argparse.ArgumentParser, several: bool = False) -> None
         group.add_argument("--seed", type=int, default=1, help="random seed (default 1)")
     group.add_argument(
         "--radii",
+        type=spec_or_file,
         default="uniform:0.5,1",
         help="uniform:LOW,HIGH or bidisperse:SMALL,LARGE,FRACTION_LARGE, or a file with a radius "
         "per line (default uniform:0.5,1)",
@@ -133,12 +122,17 @@ def add_packing(command: argparse.ArgumentParser, several: bool = False) -> None
     )
 
 
-def add_any_packing(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--packing", metavar="FILE.npz", help="take this packing, make none")
+def add_any_packing(command: Parser) -> None:
+    command.add_argument(
+        "--packing", type=Input, metavar="FILE.npz", help="take this packing, make none"
+    )
+    others = set(command.options)
     add_packing(command)
+    own = command.options.keys() - others
+    command.leaves_out("with --packing", lambda asked: asked.packing is not None, own)
 
 
-def add_conditions(command: argparse.ArgumentParser, known: bool = True) -> None:
+def add_conditions(command: Parser, known: bool = True) -> None:
     group = command.add_argument_group(
         "what the forces have to satisfy, beside balance and friction"
     )
@@ -150,6 +144,7 @@ def add_conditions(command: argparse.ArgumentParser, known: bool = True) -> None
     )
     group.add_argument(
         "--stress",
+        type=str,
         metavar="XX,YY,XY",
         help="the stress that --prescribe stress asks for (default: that of the packing's forces)",
     )
@@ -160,13 +155,14 @@ def add_conditions(command: argparse.ArgumentParser, known: bool = True) -> None
 def add_known(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--known",
+        type=Input,
         metavar="FILE.csv",
         help="forces that are known: columns contact, and f_n, f_t (exactly) or f_n_min, f_n_max, "
         "f_t_min, f_t_max (bounds); empty fields say nothing",
     )
 
 
-def add_walk_options(command: argparse.ArgumentParser) -> None:
+def add_walk_options(command: Parser) -> None:
     group = command.add_argument_group("the random walk")
     group.add_argument("--states", type=int, default=1000, help="accepted states (default 1000)")
     group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
@@ -182,34 +178,40 @@ def add_walk_options(command: argparse.ArgumentParser) -> None:
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
 
 
-def add_source(command: argparse.ArgumentParser) -> None:
+def add_source(command: Parser) -> None:
     add_any_packing(command)
     add_walk_options(command)
     add_conditions(command)
     add_store(command)
 
 
-def add_scheduler(command: argparse.ArgumentParser) -> None:
+def add_scheduler(command: Parser) -> None:
     command.add_argument(
         "--scheduler",
+        type=str,
         metavar="ADDRESS",
         help="run on the workers of this dask scheduler, such as tcp://head:8786, which see the "
         "same store, in place of processes on this machine",
     )
 
 
-def add_exact(command: argparse.ArgumentParser) -> None:
+def add_exact(command: Parser) -> None:
     add_any_packing(command)
     group = command.add_argument_group("the ensemble")
     group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
-    group.add_argument("--contacts", help="only these contacts, numbers separated by commas")
+    group.add_argument(
+        "--contacts", type=str, help="only these contacts, numbers separated by commas"
+    )
     group.add_argument(
         "--slice",
+        type=str,
         metavar="X0,X1,Y0,Y1",
         help="freeze the forces on contacts outside this part of the box, such as 0.2,0.8,0,1",
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument("--csv", metavar="FILE.csv", help="write the result per contact")
+    group.add_argument(
+        "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
+    )
     add_conditions(command)
     add_store(command)
 
@@ -231,7 +233,8 @@ def add_reading(group: argparse._ActionsContainer) -> None:
     )
 
 
-def add_flaws_and_walls(group: argparse._ActionsContainer) -> None:
+def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> None:
+    """The options of how a frame is mended and of its walls, in a group of a command."""
     group.add_argument(
         "--repair",
         type=float,
@@ -241,6 +244,7 @@ def add_flaws_and_walls(group: argparse._ActionsContainer) -> None:
     group.add_argument("--strict", action="store_true", help="mend nothing: the first flaw ends it")
     group.add_argument(
         "--walls",
+        type=str,
         metavar="SHAPE",
         help="walls that count: box, annulus or circle, found from the grains at them or with "
         "numbers (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); open: left open "
@@ -248,9 +252,11 @@ def add_flaws_and_walls(group: argparse._ActionsContainer) -> None:
     )
     group.add_argument(
         "--wall-force",
+        type=str,
         metavar="'WALL: FX FY SIGMA'",
         action="append",
         default=[],
         help="force of the grains on a wall of a box (left, right, bottom, top: by x and y), as a "
         "load cell measured it; may be given several times",
     )
+    command.leaves_out("with --strict", lambda asked: asked.strict, {"repair"})

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from granforce.cli import words
-from granforce.cli.options import EXAMPLE, Parser, refused
+from granforce.cli.options import EXAMPLE
+from granforce.cli.parsing import Input, Kept, Output, Parser, Workplace, refused
 from granforce.system import interrupts
 
 # Only the standard library in what this needs: --help must not wait for numba, xarray and HiGHS.
@@ -18,11 +19,12 @@ from granforce.system import interrupts
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0, 1 (some cells failed), 2 (bad input) or 130 (Ctrl-C)."""
-    arguments = make_parser().parse_args(argv)
+    parser = make_parser()
+    arguments = parser.parse_args(argv)
     usual = warnings.formatwarning
     with interrupts.noted():
         try:
-            return _run(arguments)
+            return _run(arguments, parser)
         except KeyboardInterrupt:
             return _told_interrupted()
         except BrokenPipeError:
@@ -47,7 +49,7 @@ def command() -> NoReturn:
     sys.exit(code)
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def _run(arguments: argparse.Namespace, parser: Parser) -> int:
     from granforce.records import Cancelled, InputError
     from granforce.system.terminal import one_line
 
@@ -58,6 +60,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
         interrupts.check()  # an import may have swallowed it
         tell_when_compiling(_say_compiling)
+        _check_paths(arguments, parser.chosen(arguments))
         return getattr(commands, arguments.run)(arguments) or 0
     except InputError as error:
         return refused(str(error))
@@ -65,6 +68,22 @@ def _run(arguments: argparse.Namespace) -> int:
         return refused(f"not enough memory: {str(error) or 'ask for less'}")
     except Cancelled:
         return _told_interrupted()
+
+
+def _check_paths(arguments: argparse.Namespace, command: Parser) -> None:
+    """InputError where a file that is read would be replaced, or two results have one name."""
+    from granforce.study.store import default_path
+    from granforce.system.files import check_apart
+
+    named = list(command.paths(arguments))
+    if "cache" in command.options and not any(isinstance(path, Kept) for _, path in named):
+        named.append(("the store", Kept(default_path())))
+    check_apart(
+        replaced=[(typed, path) for typed, path in named if isinstance(path, Output)],
+        folders=[(typed, path) for typed, path in named if isinstance(path, Workplace)],
+        stores=[(typed, path) for typed, path in named if isinstance(path, Kept)],
+        read=[(typed, path) for typed, path in named if isinstance(path, Input)],
+    )
 
 
 def _told_interrupted() -> int:
@@ -77,7 +96,7 @@ def _say_compiling() -> None:
     print("\rgranforce: compiling, once per machine …", file=sys.stderr)
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     parser = Parser(
         prog="granforce",
         description="Explore how undetermined the forces in a packing of rigid disks are.",

@@ -19,6 +19,7 @@ from granforce.cli.options import (
     import_format,
     subcommand,
 )
+from granforce.cli.parsing import Edited, Input, Kept, Output, Workplace
 
 
 def add_pack(commands: Commands) -> None:
@@ -31,6 +32,7 @@ def add_pack(commands: Commands) -> None:
     )
     command.add_argument(
         "--scene",
+        type=str,
         metavar="NAME",
         help="a small scene in place of a packing made from a gas: groove, box, pyramid, press, "
         "leaning, six, solid, column, thirteen or many; of the other options, it takes --mu alone",
@@ -38,7 +40,11 @@ def add_pack(commands: Commands) -> None:
     add_packing(command)
     add_store(command)
     command.add_argument("--max-steps", type=int, default=100_000, help="step budget")
-    command.add_argument("--out", metavar="FILE.npz", help="also save the packing to this file")
+    command.add_argument(
+        "--out", type=Output, metavar="FILE.npz", help="also save the packing to this file"
+    )
+    made = command.options.keys() - {"scene", "mu", "out", "json"}
+    command.leaves_out("with --scene", lambda asked: asked.scene is not None, made)
 
 
 def add_walk(commands: Commands) -> None:
@@ -104,6 +110,7 @@ def add_infer(commands: Commands) -> None:
     )
     command.add_argument(
         "files",
+        type=Input,
         nargs="*",
         help="with --frames: a folder, *_solved.mat files, or positions and adjacency",
     )
@@ -111,6 +118,7 @@ def add_infer(commands: Commands) -> None:
     group = command.add_argument_group("the inference")
     group.add_argument(
         "--measured",
+        type=Input,
         metavar="FILE.csv",
         help="columns contact, f_n, f_t, sigma_n, sigma_t; empty or nan where not measured",
     )
@@ -138,17 +146,32 @@ def add_infer(commands: Commands) -> None:
     group.add_argument("--ensemble-mu", type=float, help="friction of the cones, if not --mu")
     group.add_argument("--chains", type=int, default=4, help="independent chains (default 4)")
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument("--csv", metavar="FILE.csv", help="write the result per contact")
+    group.add_argument(
+        "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
+    )
     add_conditions(command)
     add_store(command)
+    single = command.options.keys() - {"files"}
+    # Those of a single packing, which many frames have in common, and those of many frames.
+    shared = {"json", "mu", "cache", "workers", "unmeasured", "states", "sample_seed"}
     series = command.add_argument_group("many photoelastic frames")
     series.add_argument(
-        "--frames", help="all, or numbers separated by commas: import and infer each of them"
+        "--frames",
+        type=str,
+        help="all, or numbers separated by commas: import and infer each of them",
     )
-    series.add_argument("--out", metavar="FOLDER.zarr", help="write all frames as one dataset")
+    series.add_argument(
+        "--out", type=Output, metavar="FOLDER.zarr", help="write all frames as one dataset"
+    )
     add_reading(series)
-    add_flaws_and_walls(series)
+    add_flaws_and_walls(command, series)
     add_scheduler(command)
+    many = command.options.keys() - single - {"frames"} | {"files"}
+    command.leaves_out("without --frames", lambda asked: asked.frames is None, many)
+    command.leaves_out("with --frames", lambda asked: asked.frames is not None, single - shared)
+    command.leaves_out(
+        "with --states 0", lambda asked: asked.states == 0, {"sample_seed", "chains", "again"}
+    )
 
 
 def add_measure(commands: Commands) -> None:
@@ -160,7 +183,7 @@ def add_measure(commands: Commands) -> None:
     )
     add_source(command)
     command.add_argument(
-        "--contacts", metavar="FILE.csv", help="write f_n and its interval per contact"
+        "--contacts", type=Output, metavar="FILE.csv", help="write f_n and its interval per contact"
     )
 
 
@@ -171,15 +194,18 @@ def add_scan(commands: Commands) -> None:
         "packings and walks for many μ and seeds, over processes, resumable",
         "granforce scan --mu 0,0.01,0.1,1,10 --seeds 2 -n 400 --states 1000 --out scan.zarr",
     )
-    command.add_argument("--mu", required=True, help="friction coefficients, separated by commas")
+    command.add_argument(
+        "--mu", type=str, required=True, help="friction coefficients, separated by commas"
+    )
     command.add_argument("--seeds", type=int, default=1, help="packings per μ: seeds 1 … SEEDS")
     add_packing(command, several=True)
     add_walk_options(command)
-    command.add_argument("--out", metavar="STORE", help="store for the results")
+    command.add_argument("--out", type=Kept, metavar="STORE", help="store for the results")
     add_store(command)
     command.add_argument("--keep", type=int, help="store only so many states, evenly spaced")
     command.add_argument("--float32", action="store_true", help="store states in single precision")
     add_scheduler(command)
+    command.leaves_out("with --out", lambda asked: asked.out is not None, {"cache"})
 
 
 def add_study(commands: Commands) -> None:
@@ -190,11 +216,15 @@ def add_study(commands: Commands) -> None:
         "granforce study --out study\n  granforce study --quick --out quick",
     )
     command.add_argument("--quick", action="store_true", help="a small version, in minutes")
-    command.add_argument("--out", metavar="FOLDER", default="study", help="(default study)")
+    command.add_argument(
+        "--out", type=Workplace, metavar="FOLDER", default="study", help="(default study)"
+    )
     command.add_argument(
         "--paper", action="store_true", help="compute what the paper did, with its own relaxation"
     )
-    command.add_argument("--parts", help="compute only these parts, names separated by commas")
+    command.add_argument(
+        "--parts", type=str, help="compute only these parts, names separated by commas"
+    )
     command.add_argument(
         "--minutes",
         type=float,
@@ -207,23 +237,27 @@ def add_study(commands: Commands) -> None:
     )
     command.add_argument(
         "--table",
+        type=Input,
         metavar="STORE",
         help="compute nothing: take this reduced study, as data/study.zarr",
     )
     command.add_argument(
         "--reduce",
+        type=Input,
         metavar="STORE",
         help="compute nothing: reduce the cells of this store, and take what it lacks from --table",
     )
     command.add_argument(
         "--documents",
+        type=Edited,
         metavar="FILES",
         help="renew the tables in these files, between <!-- study: claims --> (or measures) and "
         "<!-- end -->; names separated by commas",
     )
+    others = set(command.options)
     group = command.add_argument_group("size")
     group.add_argument("-n", type=int, help="number of disks (default 400)")
-    group.add_argument("--mu", help="friction coefficients, separated by commas")
+    group.add_argument("--mu", type=str, help="friction coefficients, separated by commas")
     group.add_argument("--packings", type=int, help="packings at each μ (default 10)")
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
     group.add_argument(
@@ -236,10 +270,25 @@ def add_study(commands: Commands) -> None:
     group.add_argument("--response-contacts", type=int, help="contacts pushed in each (default 20)")
     group.add_argument("--perturb-packings", type=int, help="pushed in larger steps (default 3)")
     group.add_argument("--perturb-contacts", type=int, help="contacts pushed in each (default 30)")
-    group.add_argument("--sizes", help="other numbers of disks (default 100,200,800,1600)")
+    group.add_argument(
+        "--sizes", type=str, help="other numbers of disks (default 100,200,800,1600)"
+    )
+    sized = command.options.keys() - others
     command.add_argument("--workers", type=int, default=2, help="processes (default 2)")
-    command.add_argument("--formats", default="html,png,svg", help="of the figures; empty: none")
+    command.add_argument(
+        "--formats", type=str, default="html,png,svg", help="of the figures; empty: none"
+    )
     add_scheduler(command)
+    computing = {"minutes", "workers", "scheduler"}
+    drawing = {"table", "reduce", "documents", "formats"}
+    command.leaves_out("with --status", lambda asked: asked.status, computing | drawing)
+    reducing = computing | {"paper", "parts"}
+    command.leaves_out("with --reduce", lambda asked: asked.reduce is not None, reducing)
+    command.leaves_out(
+        "with --table alone",
+        lambda asked: asked.table is not None and asked.reduce is None,
+        reducing | sized | {"quick"},
+    )
 
 
 def add_intervals(commands: Commands) -> None:
@@ -275,7 +324,9 @@ def add_stress(commands: Commands) -> None:
     group.add_argument("--angles", type=int, default=64, help="directions told (default 64)")
     add_known(group)
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument("--csv", metavar="FILE.csv", help="write the largest stress by direction")
+    group.add_argument(
+        "--csv", type=Output, metavar="FILE.csv", help="write the largest stress by direction"
+    )
     add_store(command)
 
 
@@ -290,7 +341,7 @@ def add_perturb(commands: Commands) -> None:
     group = command.add_argument_group("the perturbation")
     which = group.add_mutually_exclusive_group()
     which.add_argument("--random", type=int, default=50, help="so many contacts (default 50)")
-    which.add_argument("--contacts", help="these contacts, numbers separated by commas")
+    which.add_argument("--contacts", type=str, help="these contacts, numbers separated by commas")
     which.add_argument("--all", action="store_true", help="all contacts that carry")
     group.add_argument("--draw-seed", type=int, default=0, help="seed of --random (default 0)")
     group.add_argument("--ensemble-mu", type=float, help="friction of the contacts, if not --mu")
@@ -298,9 +349,14 @@ def add_perturb(commands: Commands) -> None:
         "--precision", type=float, default=0.01, help="of F_crit, in ⟨f_n⟩ (default 0.01)"
     )
     group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
-    group.add_argument("--csv", metavar="FILE.csv", help="write the result per contact")
+    group.add_argument(
+        "--csv", type=Output, metavar="FILE.csv", help="write the result per contact"
+    )
     add_conditions(command, known=False)
     add_store(command)
+    drawn = {"draw_seed"}
+    command.leaves_out("with --all", lambda asked: asked.all, drawn)
+    command.leaves_out("with --contacts", lambda asked: asked.contacts is not None, drawn)
 
 
 def add_app(commands: Commands) -> None:
@@ -313,10 +369,14 @@ def add_app(commands: Commands) -> None:
     )
     command.add_argument("--port", type=int, default=5006, help="(default 5006; 0: any free one)")
     command.add_argument(
-        "--address", default="localhost", help="to listen at (default localhost: this machine only)"
+        "--address",
+        type=str,
+        default="localhost",
+        help="to listen at (default localhost: this machine only)",
     )
     command.add_argument(
         "--allow-websocket-origin",
+        type=str,
         metavar="HOST[:PORT]",
         action="append",
         default=[],
@@ -334,7 +394,9 @@ def add_docs(commands: Commands) -> None:
         "granforce docs\n  granforce docs --out reference.html",
         reports=False,
     )
-    command.add_argument("--out", metavar="FILE.html", help="write it to this file, open nothing")
+    command.add_argument(
+        "--out", type=Output, metavar="FILE.html", help="write it to this file, open nothing"
+    )
 
 
 def add_import(commands: Commands) -> None:
@@ -370,7 +432,9 @@ def add_import(commands: Commands) -> None:
         contacts_needed=False,
     )
     add_cell(table)
-    table.add_argument("--columns", metavar="x=…,y=…", help="names of the columns in the files")
+    table.add_argument(
+        "--columns", type=str, metavar="x=…,y=…", help="names of the columns in the files"
+    )
     table.add_argument("--forces", action="store_true", default=None, help="require fn and ft")
     table.add_argument(
         "--pressure", type=float, help="pressure P0 of a table without forces (default 1)"
@@ -382,9 +446,12 @@ def add_import(commands: Commands) -> None:
     )
     pegs.add_argument("--frame", type=float, help="number of the frame (default: the last)")
     add_reading(pegs)
-    add_flaws_and_walls(pegs)
+    add_flaws_and_walls(pegs, pegs)
     pegs.add_argument(
-        "--measured", metavar="FILE.csv", help="write the measured forces, for granforce infer"
+        "--measured",
+        type=Output,
+        metavar="FILE.csv",
+        help="write the measured forces, for granforce infer",
     )
 
 
@@ -396,7 +463,9 @@ def add_bench(commands: Commands) -> None:
         "granforce bench --quick --out bench",
     )
     command.add_argument("--quick", action="store_true", help="small sizes, under 3 minutes")
-    command.add_argument("--out", metavar="FOLDER", help="write the rows as JSON to this folder")
+    command.add_argument(
+        "--out", type=Workplace, metavar="FOLDER", help="write the rows as JSON to this folder"
+    )
 
 
 def add_cache(commands: Commands) -> None:
@@ -407,7 +476,7 @@ def add_cache(commands: Commands) -> None:
         "granforce cache verify --cache scan.zarr",
     )
     command.add_argument("action", choices=["list", "size", "clear", "verify"])
-    command.add_argument("--kind", help="only entries of this kind (packing, walk, …)")
+    command.add_argument("--kind", type=str, help="only entries of this kind (packing, walk, …)")
     add_store(command)
 
 

@@ -14,7 +14,7 @@ from granforce.records import InputError, friction, positive, whole
 from granforce.study import scan
 from granforce.study.cells import Cell
 from granforce.study.store import open_store
-from granforce.system.files import make_folder, written
+from granforce.system.files import check_apart, make_folder, written
 from granforce.system.memory import check_memory
 from granforce.system.plain import json_text
 from granforce.system.terminal import Bar, print_list, table
@@ -44,6 +44,7 @@ def main(arguments: argparse.Namespace) -> int:
     renewed = documents.named(arguments.documents)
     if arguments.status:
         return status(arguments)
+    _check_apart(arguments)
     failed = []
     if arguments.reduce is not None:
         reduced = tables.reduce(arguments.reduce, plan_of(arguments))
@@ -74,6 +75,16 @@ def main(arguments: argparse.Namespace) -> int:
     documents.renew(renewed, reduced, told["claims"])
     print_claims(told, arguments.json)
     return 1 if failed else 0
+
+
+def _check_apart(arguments: argparse.Namespace) -> None:
+    """InputError where a store that is written inside the folder is one that is read."""
+    if arguments.reduce is not None:
+        own = "the reduced study", Path(arguments.out) / "study.zarr"
+        read = [("--reduce", arguments.reduce), ("--table", arguments.table)]
+        check_apart(
+            replaced=[own], read=[(typed, path) for typed, path in read if path is not None]
+        )
 
 
 def status(arguments: argparse.Namespace) -> int:

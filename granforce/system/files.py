@@ -5,7 +5,7 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
@@ -60,6 +60,57 @@ def check_file(path: str | Path) -> None:
         kept = _regular(path)
         if kept is not None and not _may_write(kept[0].parent):
             raise PermissionError(errno.EACCES, f"the folder {kept[0].parent} is not writable")
+
+
+# Paths, each with what names it: an option, say.
+Named = Sequence[tuple[str, str | Path]]
+
+
+def check_apart(
+    *, replaced: Named = (), folders: Named = (), stores: Named = (), read: Named = ()
+) -> None:
+    """InputError where writing would destroy what is read or written elsewhere, links resolved.
+
+    replaced: files, or whole folders, that will be replaced; folders: those that get files of their
+    own; stores: those that get entries; read: files and folders that are read.
+    """
+    every = [(said, path, _places(path)) for said, path in (*replaced, *folders, *stores, *read)]
+    first_store, first_read = len(replaced) + len(folders), len(every) - len(read)
+    for k, (said, path, places) in enumerate(every[:first_store]):
+        for j, (other, its_path, its_places) in enumerate(every):
+            if j == k or not places or not its_places:
+                continue
+            within = k < len(replaced) and places[0] in its_places
+            stored = first_store <= j < first_read and its_places[0] in places
+            if places[0] == its_places[0] or within or stored:
+                raise InputError(
+                    f"{said} {path} would overwrite {other} {its_path}; choose another name"
+                )
+
+
+def _places(path: str | Path) -> list[object]:
+    """What tells a file or folder from all others, then the same of the folders that hold it.
+
+    Empty for what cannot be replaced, such as a device or a pipe.
+    """
+    target = Path(os.path.realpath(expanded(path)))
+    try:
+        mode = target.stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            return []
+    except FileNotFoundError:
+        pass
+    except OSError:  # told where it is opened
+        return []
+    return [_place(one) for one in (target, *target.parents)]
+
+
+def _place(path: Path) -> object:
+    try:
+        found = path.stat()
+    except OSError:
+        return str(path)
+    return found.st_dev, found.st_ino
 
 
 def make_folder(path: str | Path) -> Path:

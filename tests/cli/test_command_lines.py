@@ -9,8 +9,8 @@ from pathlib import Path
 import command_lines
 import pytest
 
-from granforce.cli.options import LONGEST
 from granforce.cli.parser import main
+from granforce.cli.parsing import LONGEST
 
 PACKING = Path(__file__).parents[1] / "reference" / "n100_mu0.1_s11.npz"
 LINES = command_lines.lines()

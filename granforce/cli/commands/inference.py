@@ -23,7 +23,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
     """The likeliest network of measured forces, with error bars if wanted; report it."""
     if arguments.frames is not None:
         return frames.infer_frames(arguments, flaws_and_walls(arguments))
-    if arguments.files or arguments.measured is None:
+    if arguments.measured is None:
         raise InputError(
             "give --measured FILE.csv and a packing, or files of frames with --frames all"
         )

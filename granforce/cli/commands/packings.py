@@ -96,8 +96,6 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
 
 def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:
     """What the options say of flaws and walls, as `importers.read_pegs` takes it."""
-    if arguments.strict and arguments.repair is not None:
-        raise InputError("--strict mends nothing: leave out --repair")
     repair = True if arguments.repair is None else arguments.repair
     forces = dict(importers.read_wall_force(text) for text in arguments.wall_force)
     return {

@@ -1,0 +1,134 @@
+"""How a command line is read: every option is used or refused, every path has a role.
+
+Only the standard library, as for all that `--help` needs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple, NoReturn
+
+LONGEST = 600  # characters of a message
+
+
+class Input(str):
+    """A file or folder that a command reads."""
+
+
+class Output(str):
+    """A file or folder that a command writes, in place of one that is there."""
+
+
+class Workplace(str):
+    """A folder in which a command writes files of its own, beside others."""
+
+
+class Kept(str):
+    """A store of results, which a command reads and adds to."""
+
+
+class Edited(str):
+    """Files, separated by commas, in which a command replaces a part."""
+
+    @property
+    def files(self) -> list[Output]:
+        return [Output(name) for name in self.split(",") if name]
+
+
+ROLES = (Input, Output, Workplace, Kept, Edited)
+
+
+class Unused(NamedTuple):
+    """Options that one way of calling a command makes no use of."""
+
+    said: str  # that way in words: "with --packing"
+    holds: Callable[[argparse.Namespace], bool]  # whether a command line takes it
+    names: frozenset[str]  # of the options, as attributes
+
+
+def refused(reason: str) -> int:
+    """Print why a command does nothing, as one line on stderr; returns the exit code 2."""
+    line = " ".join(str(reason).split())
+    if len(line) > LONGEST:  # a name of thousands of characters, say
+        line = f"{line[: LONGEST // 2]} … {line[-LONGEST // 2 :]}"
+    print(f"granforce: {line}", file=sys.stderr)
+    return 2
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says in one line what is wrong, and refuses options that have no effect."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.unused: list[Unused] = []
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(refused(f"{message}; see {self.prog} --help"))
+
+    @property
+    def options(self) -> dict[str, str]:
+        """{attribute: as it is typed} of all options and positional arguments but --help."""
+        return {
+            action.dest: action.option_strings[-1] if action.option_strings else action.dest
+            for action in self._actions
+            if action.dest != "help"
+        }
+
+    def leaves_out(
+        self, said: str, holds: Callable[[argparse.Namespace], bool], names: Iterable[str]
+    ) -> None:
+        """Refuse these options (attributes) in command lines for which holds(arguments) is true."""
+        names = frozenset(names)
+        if strange := names - self.options.keys():
+            raise KeyError(f"{self.prog} has no option {min(strange)!r}")
+        self.unused.append(Unused(said, holds, names))
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> tuple[Any, list[str]]:
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:  # said here: argparse would pass those of a subcommand to its parent
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        ways = [way for way in self.unused if way.holds(found)]
+        if ways:
+            given = self._given(args)
+            for way in ways:
+                if useless := [typed for name, typed in given.items() if name in way.names]:
+                    have, them = ("has", "it") if len(useless) == 1 else ("have", "them")
+                    self.error(
+                        f"{' and '.join(useless)} {have} no effect {way.said}; leave {them} out"
+                    )
+        return found, unknown
+
+    def _given(self, args: Sequence[str] | None) -> dict[str, str]:
+        """Of the options, those that a command line gives, whatever their values."""
+        defaults = [(action, action.default) for action in self._actions]
+        try:
+            for action, _ in defaults:
+                action.default = argparse.SUPPRESS
+            values = vars(super().parse_known_args(args)[0])
+        finally:
+            for action, default in defaults:
+                action.default = default
+        # A positional argument that is left out may get its default all the same.
+        given = {name for name, value in values.items() if value != argparse.SUPPRESS}
+        return {name: typed for name, typed in self.options.items() if name in given}
+
+    def chosen(self, arguments: argparse.Namespace) -> Parser:
+        """The parser of the command that was typed."""
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                chosen: Parser = action.choices[getattr(arguments, action.dest)]
+                return chosen.chosen(arguments)
+        return self
+
+    def paths(self, arguments: argparse.Namespace) -> Iterator[tuple[str, str]]:
+        """(as it is typed, path in its role) of every path that a command line names."""
+        for name, typed in self.options.items():
+            value = getattr(arguments, name, None)
+            for word in value if isinstance(value, list) else [value]:
+                for path in word.files if isinstance(word, Edited) else [word]:
+                    if isinstance(path, ROLES):
+                        yield typed, path
