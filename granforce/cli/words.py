@@ -354,7 +354,7 @@ def add_perturb(commands: Commands) -> None:
     )
     add_conditions(command, known=False)
     add_store(command)
-    drawn = {"draw_seed"}
+    drawn = {"random", "draw_seed"}
     command.leaves_out("with --all", lambda asked: asked.all, drawn)
     command.leaves_out("with --contacts", lambda asked: asked.contacts is not None, drawn)
 

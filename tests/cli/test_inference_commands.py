@@ -66,7 +66,7 @@ def test_what_was_mended_is_told_and_may_be_forbidden(folder, capsys):
     assert found["contacts_of_missing_grains"] == 1 and "99999" in found["findings"][0]
     assert main(words.split()) == 0
     assert "99999" in capsys.readouterr().out
-    for options in ("--strict", "--repair 2", "--strict --repair 0.1", "--walls cube"):
+    for options in ("--strict", "--repair 2", "--walls cube"):
         assert main([*words.split(), *options.split()]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     assert main([*words.split(), "--walls", "box", "--wall-force", "right: 1 2"]) == 2

@@ -1,0 +1,294 @@
+"""Over the whole parser: every option is used or refused, no output replaces what is read."""
+
+import argparse
+import os
+import shlex
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import frames
+import pytest
+from packings import packed
+
+from granforce.cli import commands, parser, parsing
+from granforce.packing.importers import load_packing, save_packing
+from granforce.study.store import open_store
+
+MU = "-n 8 --mu 0.3"
+FRAMES = "positions.txt adjacency.txt"
+
+# Command lines, one at least for each way of calling a command, as its parser knows them.
+LINES = {
+    "pack": [MU, "--scene groove --mu 0.5"],
+    "walk": [f"{MU} --states 3", "--packing p.npz --states 3"],
+    "measure": [f"{MU} --states 3", "--packing p.npz --states 3"],
+    "uniform": [f"{MU} --states 8", "--packing p.npz --states 8"],
+    "volume": [f"{MU} --accuracy 0.5", "--packing p.npz --accuracy 0.5"],
+    "infer": [
+        f"{MU} --measured m.csv --states 8",
+        f"{MU} --measured m.csv --states 0",
+        "--packing p.npz --measured m.csv --states 8",
+        f"{FRAMES} --frames all --mu 0.3 --states 4 --workers 1 --strict",
+    ],
+    "scan": ["-n 8 --mu 0.3 --states 3", "-n 8 --mu 0.3 --states 3 --out scan.zarr"],
+    "intervals": [MU, "--packing p.npz"],
+    "limit-loads": [MU, "--packing p.npz"],
+    "stress": [f"{MU} --angles 4", "--packing p.npz --angles 4"],
+    "perturb": [
+        f"{MU} --random 1",
+        "--packing p.npz --random 1",
+        f"{MU} --all",
+        f"{MU} --contacts 1",
+    ],
+    "study": [
+        "--quick",
+        "--quick --status --out done",
+        "--quick --reduce done/cells.zarr --out here",
+        "--table table.zarr --out here",
+    ],
+    "app": [""],
+    "docs": ["--out reference.html"],
+    "import lammps": ["particles.dump contacts.dump --mu 0.5"],
+    "import yade": ["bodies.txt interactions.txt --mu 0.5"],
+    "import mercury": ["run.data run.fstat --mu 0.5"],
+    "import table": ["grains.csv --mu 0.3"],
+    "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
+    "bench": ["--quick"],
+    "cache": ["list", "size", "verify", "clear"],
+}
+
+
+def parsers(of=None, words=()):
+    """(words, parser) of every command, and of every format of `import`."""
+    of = parser.make_parser() if of is None else of
+    inner = [a for a in of._actions if isinstance(a, argparse._SubParsersAction)]
+    if not inner:
+        yield " ".join(words), of
+    for action in inner:
+        for name, one in action.choices.items():
+            if one.prog.endswith(f" {name}"):  # not a former name
+                yield from parsers(one, (*words, name))
+
+
+PARSERS = dict(parsers())
+CASES = [(command, line) for command, lines in LINES.items() for line in lines]
+
+
+class Recording(argparse.Namespace):
+    """Arguments that note which of them a command reads."""
+
+    def __getattribute__(self, name):
+        values = object.__getattribute__(self, "__dict__")
+        # Handed on by name as a whole: a reader refuses what it does not know (test_import.py).
+        values["_read"] |= values.keys() if name == "__dict__" else {name}
+        return object.__getattribute__(self, name)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with the files that the command lines name, and a store of its own."""
+    folder = tmp_path_factory.mktemp("place")
+    save_packing(packed(8, 0.3), folder / "p.npz")
+    (folder / "m.csv").write_text("contact,f_n,f_t,sigma_n,sigma_t\n0,1,0,0.1,0.1\n")
+    (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
+    (folder / "r.txt").write_text("1\n" * 8)
+    (folder / "known.csv").write_text("contact,f_n_min\n0,0\n")
+    grains, rows, _ = frames.frame(40, missing=0.1, noise=0.1)
+    frames.write(folder, grains, rows)
+    open_store(folder / "done" / "cells.zarr")
+    return folder
+
+
+@pytest.fixture
+def here(place, monkeypatch):
+    monkeypatch.chdir(place)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(place / "cache"))
+    # What opens a page, and what computes for minutes; what they are given is read before.
+    monkeypatch.setattr(commands.service.runpy, "run_module", lambda *args, **kwargs: None)
+    monkeypatch.setattr("granforce.bench.main", lambda *args: None)
+    monkeypatch.setattr(commands.states.scans, "scan", lambda *args, **kwargs: ([], []))
+    reduced = SimpleNamespace(skipped={"missing_cells": 0})
+    for name, value in {
+        "plans.compute": [],
+        "plans.remaining": [],
+        "tables.reduce": reduced,
+        "tables.load": reduced,
+        "tables.merged": reduced,
+        "tables.save": None,
+        "drawings.draw": None,
+        "claims.judged": [],
+        "findings.found": [],
+    }.items():
+        monkeypatch.setattr(f"granforce.paper.main.{name}", lambda *a, value=value, **k: value)
+    for name in commands.packings.READERS:
+        monkeypatch.setitem(
+            commands.packings.READERS, name, lambda *files, **options: load_packing("p.npz")
+        )
+    return place
+
+
+def parsed(command, line):
+    words = [*command.split(), *shlex.split(line)]
+    return parser.make_parser().parse_args(words)
+
+
+def test_every_command_and_every_way_has_a_line():
+    assert LINES.keys() == PARSERS.keys()
+    for command, one in PARSERS.items():
+        given = [parsed(command, line) for line in LINES[command]]
+        for way in one.unused:
+            held = {bool(way.holds(arguments)) for arguments in given}
+            assert held == {True, False}, (command, way.said)
+
+
+@pytest.mark.parametrize("command, line", CASES)
+def test_every_option_is_read_or_refused(command, line, here):
+    arguments = parsed(command, line)
+    one = PARSERS[command]
+    left_out = {name for way in one.unused if way.holds(arguments) for name in way.names}
+    recording = Recording(**vars(arguments), _read=set())
+    getattr(commands, arguments.run)(recording)
+    read = recording._read
+    assert one.options.keys() - read - left_out == set()
+
+
+def _typed(action):
+    """Words that give an option a value which its type takes."""
+    word = str(action.choices[0]) if action.choices else "1"
+    return [action.option_strings[-1], *([word] * (1 if action.nargs is None else action.nargs))]
+
+
+WAYS = [
+    (command, line, way.said)
+    for command, line in CASES
+    for way in PARSERS[command].unused
+    if way.holds(parsed(command, line))
+]
+
+
+@pytest.mark.parametrize("command, line, said", WAYS)
+def test_what_is_not_used_is_refused(command, line, said, capsys):
+    one = PARSERS[command]
+    (way,) = (way for way in one.unused if way.said == said)
+    for action in one._actions:
+        if action.dest in way.names and action.option_strings:
+            words = [*command.split(), *shlex.split(line), *_typed(action)]
+            with pytest.raises(SystemExit) as stop:
+                parser.main(words)
+            told = capsys.readouterr()
+            assert stop.value.code == 2 and told.out == "" and told.err.count("\n") == 1
+            # Another way may come first: two options of which only one may be given, say.
+            assert "no effect" in told.err or "not allowed with" in told.err
+
+
+def test_a_positional_argument_that_is_not_used_is_refused(capsys):
+    with pytest.raises(SystemExit) as stop:
+        parser.main(["infer", "positions.txt", "--packing", "p.npz", "--measured", "m.csv"])
+    assert stop.value.code == 2 and "files has no effect" in capsys.readouterr().err
+
+
+def test_a_default_that_is_typed_counts_as_given(capsys):
+    with pytest.raises(SystemExit):
+        parser.main(["walk", "--packing", "p.npz", "--seed", "1"])
+    assert "--seed has no effect with --packing" in capsys.readouterr().err
+
+
+def test_every_option_says_what_its_words_are():
+    """A path is an input, an output, a store …; `str` is for words that name none."""
+    for command, one in PARSERS.items():
+        for action in one._actions:
+            takes_words = action.nargs != 0 and not action.choices
+            assert not takes_words or action.type is not None, (command, action.dest)
+            names_path = any(
+                word in str(action.metavar) for word in ("FILE", "FOLDER", "STORE")
+            ) or action.dest in ("grains", "files", "out", "csv", "cache")
+            assert action.type in parsing.ROLES or not names_path, (command, action.dest)
+
+
+def _of_role(one, *roles):
+    return [action for action in one._actions if action.type in roles]
+
+
+def _clashes():
+    """(command, words) in which an output is an input, another output, or inside the store."""
+    for command, one in PARSERS.items():
+        outputs = _of_role(one, parsing.Output, parsing.Workplace)
+        others = [*outputs, *_of_role(one, parsing.Input, parsing.Kept)]
+        for out in outputs:
+            for other in others:
+                if other is not out:
+                    yield command, out, other
+
+
+@pytest.mark.parametrize("alias", ["same", "symbolic", "hard"])
+def test_no_output_is_an_input_or_another_output(alias, tmp_path, monkeypatch, capsys):
+    """All pairs of paths of all commands, each under another name of the same file."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    tried = 0
+    for command, out, other in _clashes():
+        name, file = "data", Path("data")
+        folder = parsing.Workplace in (out.type, other.type) or other.type is parsing.Kept
+        if folder and alias == "hard":
+            continue
+        file.mkdir() if folder else file.write_text("precious")
+        twin = {"same": "./data", "symbolic": "twin", "hard": "twin"}[alias]
+        if alias == "symbolic":
+            os.symlink(name, twin)
+        elif alias == "hard":
+            os.link(name, twin)
+        words = [*command.split(), *_clash_line(command, {out.dest: twin, other.dest: name})]
+        before = sorted(Path().iterdir())
+        try:
+            code = parser.main(words)
+        except SystemExit as stop:
+            code = stop.code
+        told = capsys.readouterr()
+        assert code == 2, words
+        assert "would overwrite" in told.err or "no effect" in told.err, (words, told.err)
+        assert told.err.count("\n") == 1 and told.out == ""
+        assert sorted(Path().iterdir()) == before
+        assert folder or file.read_text() == "precious"
+        for path in (Path("twin"), file):
+            if path.is_symlink() or path.is_file():
+                path.unlink()
+            elif path.is_dir():
+                shutil.rmtree(path)
+        tried += "would overwrite" in told.err
+    assert tried >= 20
+
+
+def _clash_line(command, given):
+    """Words that give these options, and what else the command has to be given."""
+    one, words = PARSERS[command], []
+    for action in one._actions:
+        if action.dest in given:
+            words += [*action.option_strings[-1:], given[action.dest]]
+        elif action.required or action.dest in ("grains", "contacts"):
+            words += [*action.option_strings[-1:], "0.3" if action.dest == "mu" else "nowhere"]
+    if command == "infer" and ("files" in given or "out" in given):
+        words += ["--frames", "all"]
+    return words
+
+
+def test_outputs_keep_off_the_store_and_what_is_inside_a_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GRANFORCE_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "cache").mkdir()
+    for words in (
+        "intervals -n 8 --mu 0.3 --csv cache/zarr.json",
+        "pack -n 8 --mu 0.3 --cache kept --out kept/packing.npz",
+        "infer frames.zarr/positions.txt frames.zarr/adjacency.txt --frames all --out frames.zarr",
+        "infer positions.txt adjacency.txt --frames all --out cache",
+        "study --reduce done/cells.zarr --table done/study.zarr --out done",
+        "pack -n 8 --mu 0.3 --radii r.txt --out r.txt",
+        "import pegs positions.txt adjacency.txt --mu 0.3 --out new --measured ./new",
+    ):
+        assert parser.main(words.split()) == 2, words
+        assert "would overwrite" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.rglob("*")] == ["cache"]
+    # Devices may be named more than once, and nothing there can be lost.
+    words = "import table /dev/null --mu 0.3 --out /dev/null"
+    assert parser.main(words.split()) == 2
+    assert "overwrite" not in capsys.readouterr().err
