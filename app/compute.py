@@ -61,7 +61,8 @@ def states(library: Library, selection: Selection) -> Work:
                         **_watched(job, selection, params),
                     )
                 cell = library.find(selection.kind, kind.reached(params, dataset))
-            assert cell is not None  # as it was kept
+            if cell is None:
+                raise InputError("these states were removed from the cache; ask for them again")
         return library.shown(cell)
 
     return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))

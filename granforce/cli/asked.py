@@ -74,7 +74,10 @@ def required_mu(arguments: argparse.Namespace) -> float:
 
 
 def prepared(
-    arguments: argparse.Namespace, name: Callable[[Parameters], Parameters], *outputs: str | None
+    arguments: argparse.Namespace,
+    kind: Kind,
+    name: Callable[[Parameters], Parameters],
+    *outputs: str | None,
 ) -> tuple[Store, Parameters]:
     """The store, with the packing in it, and the parameters that name(packing's) gives.
 
@@ -90,6 +93,7 @@ def prepared(
     parameters = name(named)
     check_outputs(*outputs)
     store = open_store(arguments.cache)
+    store.refuse_file(study.entry_name(store, kind, parameters))
     if packing is None:
         get_packing(store, named)
     else:
@@ -131,6 +135,7 @@ def found(
     """
     store, parameters = prepared(
         arguments,
+        kind,
         lambda packing: kind.parameters(packing, mu=arguments.ensemble_mu, **named),
         *outputs,
     )

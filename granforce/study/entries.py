@@ -4,17 +4,20 @@ import functools
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import xarray as xr
 import zarr
+from zarr.abc.store import ByteRequest
 from zarr.codecs import ZstdCodec
+from zarr.core.buffer import Buffer, BufferPrototype, default_buffer_prototype
 from zarr.core.metadata import ArrayV3Metadata
+from zarr.storage import LocalStore, MemoryStore
 
 from granforce.records import InputError
 from granforce.study import keys
@@ -23,10 +26,14 @@ from granforce.study.schema import VARIABLES, declared, to_builtin
 STATES_PER_CHUNK = 100  # frames are read one by one; 100 × 700 contacts are 1.1 MB
 
 Variables = Mapping[Any, xr.Variable]  # of a dataset, by name
+T = TypeVar("T")
 
 _LIBRARIES = ("granforce", "numpy", "numba", "xarray", "zarr")
 _IDENTITY = ("kind", "parameters", "seed", "algorithm_version", "schema_version")
-_PROVENANCE = ("created", "checksum", *(f"{library}_version" for library in _LIBRARIES))
+_PROVENANCE = (
+    *("created", "checksum", "metadata_checksum"),
+    *(f"{library}_version" for library in _LIBRARIES),
+)
 
 
 def conforming(dataset: xr.Dataset, dtypes: Mapping[Any, str]) -> dict[Any, xr.Variable]:
@@ -82,11 +89,18 @@ def _checksum(variables: Variables, attrs: Mapping[str, Any]) -> str:
 
 
 def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
-    """Write an entry into a new folder."""
-    group = zarr.create_group(folder, zarr_format=3, attributes=dict(attrs))
+    """Write an entry into a new folder.
+
+    Zarr compresses into memory and the files are written here, one after the other: where one
+    cannot be written, no thread of Zarr's is left that would go on writing the others.
+    """
+    encoded: dict[str, Buffer] = {}
+    memory = MemoryStore(encoded)
+    arrays = {}
     for name, variable in variables.items():
-        array = group.create_array(
-            name,
+        array = zarr.create_array(
+            memory,
+            name=name,
             shape=variable.shape,
             dtype=variable.dtype,
             chunks=_chunks(variable),
@@ -94,8 +108,56 @@ def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
             dimension_names=[str(name) for name in variable.dims],
             attributes={"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name},
             config={"write_empty_chunks": True},  # else Zarr 3.0 loses a chunk of −0.0
+            zarr_format=3,
         )
-        array[...] = variable.values
+        arrays[str(name)] = json.loads(encoded[f"{name}/zarr.json"].to_bytes())
+        for rows in _by_chunks(variable):
+            array[rows] = variable.values[rows]
+            _move(encoded, folder)
+    seal(folder, arrays, attrs)
+
+
+def _move(encoded: dict[str, Buffer], folder: Path) -> None:
+    """Write out what Zarr has encoded, by its keys."""
+    for key in list(encoded):
+        path = folder / key
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(encoded.pop(key).to_bytes())
+
+
+def seal(folder: Path, arrays: Mapping[str, Any], attrs: Mapping[str, Any]) -> None:
+    """Write an entry's own metadata, those of its arrays among them ("consolidated").
+
+    xarray and Zarr look for these first, and warn where there are none.
+    """
+    group = {
+        "attributes": {**attrs, "metadata_checksum": _metadata_checksum(arrays, attrs)},
+        "zarr_format": 3,
+        "consolidated_metadata": _consolidated(arrays),
+        "node_type": "group",
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "zarr.json").write_text(json.dumps(group, indent=2))
+
+
+def _consolidated(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    return {"kind": "inline", "must_understand": False, "metadata": dict(arrays)}
+
+
+def _metadata_checksum(arrays: Mapping[str, Any], attrs: Mapping[str, Any]) -> str:
+    """sha256 over what `checksum` leaves out: units, names, and what made the entry when."""
+    told = {key: value for key, value in attrs.items() if key != "metadata_checksum"}
+    return hashlib.sha256(json.dumps([arrays, told], sort_keys=True).encode()).hexdigest()
+
+
+def _by_chunks(variable: xr.Variable) -> Iterator[Any]:
+    """Indices of a variable's chunks, which divide its first dimension at most."""
+    if not variable.ndim:
+        yield ()
+        return
+    step = _chunks(variable)[0]
+    for first in range(0, max(1, variable.shape[0]), step):
+        yield slice(first, first + step)
 
 
 def _chunks(variable: xr.Variable) -> tuple[int, ...]:
@@ -118,46 +180,143 @@ def read_attributes(folder: Path) -> dict[str, Any] | None:
         return None
 
 
-def opened(folder: Path) -> xr.Dataset:
-    """The dataset of an entry, its arrays not read yet; InputError where it is damaged."""
-    damaged = _damaged_array(folder)
-    if damaged:
-        raise InputError(f"entry {folder.name} in {folder.parent} is damaged ({damaged})")
-    return _lazily(folder)
+# What a look at an entry gives: what was found, and the reason why it was not.
+Look = tuple[T | None, str]
+UNREADABLE = "its metadata cannot be read"
 
 
-def _lazily(folder: Path) -> xr.Dataset:
-    # Not decoded: what was saved are plain numbers, and "units" must not turn them into times.
-    return xr.open_zarr(folder, consolidated=False, chunks=None, decode_cf=False)
+def _unmoved(folder: Path, look: Callable[[Path], Look[T]]) -> Look[T]:
+    """look(folder); (None, "") where there is none.
+
+    What others removed meanwhile is absent, and what they put in its place is looked at anew.
+    """
+    while True:
+        before = _identity(folder)
+        found, reason = (None, "") if before is None else look(folder)
+        if not reason or _identity(folder) == before:
+            return found, reason
 
 
-def checked(folder: Path) -> tuple[xr.Dataset | None, str]:
-    """(dataset in memory, "") if the entry is whole, else (None, reason)."""
-    if read_attributes(folder) is None:
-        return None, "its metadata cannot be read"
-    damaged = _damaged_array(folder)
-    if damaged:
-        return None, damaged
+def _identity(folder: Path) -> tuple[int, int, int] | None:
+    """Which folder has this name just now, or None; renaming one changes it."""
     try:
-        dataset = _lazily(folder).load()
+        found = folder.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_ctime_ns
+
+
+def described(folder: Path) -> Look[dict[str, Any]]:
+    """(attributes, "") of an entry, or as `checked`."""
+    return _unmoved(folder, _described)
+
+
+def _described(folder: Path) -> Look[dict[str, Any]]:
+    attrs = read_attributes(folder)
+    return attrs, UNREADABLE if attrs is None else ""
+
+
+class _Metadata(NamedTuple):
+    """What the files of an entry say of it, beside its numbers."""
+
+    group: dict[str, Any]
+    arrays: dict[str, Any]  # of each array, as its own file has it, whatever is consolidated
+
+
+def _metadata(folder: Path) -> Look[_Metadata]:
+    try:
+        group = json.loads((folder / "zarr.json").read_bytes())
+        with os.scandir(folder) as items:
+            names = sorted(item.name for item in items if item.is_dir())
+    except (OSError, ValueError):
+        return None, UNREADABLE
+    found = _Metadata(group, {})
+    for name in names:
+        try:
+            found.arrays[name] = json.loads((folder / name / "zarr.json").read_bytes())
+            ArrayV3Metadata.from_dict(dict(found.arrays[name]))
+        except Exception:  # what damage raises depends on zarr
+            return None, f"the metadata of its array {name} cannot be read"
+    return found, ""
+
+
+def opened(folder: Path) -> Look[xr.Dataset]:
+    """As `checked`, its arrays not read yet; reading one that is lost raises InputError."""
+    return _unmoved(folder, lambda folder: _lazily(folder, *_metadata(folder)))
+
+
+def _lazily(folder: Path, metadata: _Metadata | None, reason: str) -> Look[xr.Dataset]:
+    if metadata is None:
+        return None, reason
+    try:
+        # Not decoded: what was saved are plain numbers, and "units" must not turn them into times.
+        store = _Whole(folder, metadata)
+        return xr.open_zarr(store, consolidated=True, chunks=None, decode_cf=False), ""
     except Exception as error:  # what damage raises depends on codec, zarr and xarray
+        return None, f"an array cannot be read: {type(error).__name__}"
+
+
+class _Whole(LocalStore):
+    """A folder whose metadata were read once, and of which every chunk must be there.
+
+    Zarr takes a chunk that is missing for zeros; of several metadata that are missing it tells one,
+    and asyncio prints the tracebacks of the others.
+    """
+
+    def __init__(self, root: Path, metadata: _Metadata) -> None:
+        super().__init__(root, read_only=True)
+        whole = metadata.group | {"consolidated_metadata": _consolidated(metadata.arrays)}
+        self._metadata = json.dumps(whole).encode()
+
+    async def get(
+        self,
+        key: str,
+        prototype: BufferPrototype | None = None,
+        byte_range: ByteRequest | None = None,
+    ) -> Buffer | None:
+        """As LocalStore has it; raises InputError for a chunk that is missing."""
+        if key == "zarr.json":
+            return (prototype or default_buffer_prototype()).buffer.from_bytes(self._metadata)
+        found = await super().get(key, prototype, byte_range)
+        if found is None and "c" in key.split("/")[1:]:
+            raise InputError(
+                f"entry {self.root.name} in {self.root.parent} has lost its part {key} since it "
+                "was opened: was it removed meanwhile?"
+            )
+        return found
+
+
+def checked(folder: Path) -> Look[xr.Dataset]:
+    """(dataset in memory, "") of a whole entry, (None, reason) of another, (None, "") of none."""
+    return _unmoved(folder, _checked)
+
+
+def _checked(folder: Path) -> Look[xr.Dataset]:
+    if not folder.is_dir():
+        return None, "it is a file, not a folder"
+    if read_attributes(folder) is None:
+        return None, UNREADABLE
+    metadata, reason = _metadata(folder)
+    dataset, reason = _lazily(folder, metadata, reason)
+    if dataset is None or metadata is None:
+        return None, reason
+    try:
+        dataset.load()
+    except InputError:
+        return None, "a part of an array is missing"
+    except Exception as error:  # as above
         return None, f"an array cannot be read: {type(error).__name__}"
     if _checksum(dataset.variables, dataset.attrs) != dataset.attrs["checksum"]:
         return None, "its data do not match its checksum"
+    if not _is_sealed(metadata):
+        return None, "its names, units or dates do not match their checksum"
     return dataset, ""
 
 
-def _damaged_array(folder: Path) -> str:
-    """Which array's metadata is damaged, in words, or "" if none is seen to be.
-
-    Asked before zarr reads them all at once: of several that fail it tells one, and asyncio prints
-    the tracebacks of the others.
-    """
-    with os.scandir(folder) as items:
-        names = sorted(item.name for item in items if item.is_dir())
-    for name in names:
-        try:
-            ArrayV3Metadata.from_dict(json.loads((folder / name / "zarr.json").read_bytes()))
-        except Exception:  # what damage raises depends on zarr
-            return f"the metadata of its array {name} cannot be read"
-    return ""
+def _is_sealed(metadata: _Metadata) -> bool:
+    """Whether metadata are as they were written; those of older entries have no checksum."""
+    (group, arrays), attrs = metadata, metadata.group["attributes"]
+    if "metadata_checksum" not in attrs:
+        return "consolidated_metadata" not in group
+    written = attrs["metadata_checksum"] == _metadata_checksum(arrays, attrs)
+    return written and group.get("consolidated_metadata") == _consolidated(arrays)

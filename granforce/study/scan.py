@@ -15,9 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn, cast
-
-from xarray import Dataset
+from typing import Any, NoReturn
 
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
@@ -59,7 +57,8 @@ def scan(
     named = [Cell(kinds.WALK, parameters) for parameters in cells]
 
     def done(k: int, cached: bool) -> None:
-        rows[k] = row(cells[k], cast("Dataset", load(store, *named[k])), cached)
+        # Computed anew where others have removed it meanwhile.
+        rows[k] = row(cells[k], get(store, *named[k])[0], cached)
         if on_row is not None:
             on_row(rows[k])
 

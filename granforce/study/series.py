@@ -12,7 +12,7 @@ import shutil
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -33,7 +33,7 @@ from granforce.records import (
     random_seed,
     whole,
 )
-from granforce.study.cells import Cell, Kind, load
+from granforce.study.cells import Cell, Kind, get
 from granforce.study.keys import Parameters
 from granforce.study.scan import run
 from granforce.study.schema import labelled, packing_dataset, to_builtin
@@ -286,7 +286,7 @@ def infer_series(
     lost = {id(cell): message for cell, message in failed}
     store = open_store(path)
     done = [
-        (frame.number, cast("xr.Dataset", load(store, *cell)))
+        (frame.number, get(store, *cell, workers=workers)[0])  # which others may have removed
         for frame, cell in zip(frames, cells, strict=True)
         if id(cell) not in lost
     ]
@@ -378,9 +378,10 @@ def save_series(dataset: xr.Dataset, path: str | Path) -> None:
     aside = beside(path)
     try:
         with warnings.catch_warnings():
-            # Of names as text, which Zarr has not laid down for good; xarray reads them.
+            # Of names as text and of consolidated metadata, which Zarr has not laid down for good;
+            # xarray reads both, and warns where metadata are not consolidated.
             warnings.simplefilter("ignore")
-            dataset.to_zarr(aside, mode="w", consolidated=False)
+            dataset.to_zarr(aside, mode="w", consolidated=True)
         if path.exists():
             shutil.rmtree(path)
         aside.rename(path)

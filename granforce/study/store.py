@@ -176,7 +176,12 @@ class Store(Mapping[str, xr.Dataset]):
     def __getitem__(self, name: str) -> xr.Dataset:
         if name not in self:
             raise KeyError(name)
-        return entries.opened(self.path / name)
+        dataset, reason = entries.opened(self.path / name)
+        if reason:
+            raise InputError(f"entry {name} in {self.path} is damaged ({reason})")
+        if dataset is None:  # removed meanwhile
+            raise KeyError(name)
+        return dataset
 
     def name(self, kind: str, params: Mapping[str, Any], *, version: int | str) -> str:
         """Name of the entry for these parameters: <kind>-<20 hexadecimal digits>.
@@ -192,10 +197,11 @@ class Store(Mapping[str, xr.Dataset]):
 
         A damaged entry is reported as a warning and counts as missing; saving replaces it.
         Arrays have the dtype they were stored with.
+
+        Raises InputError where a file has the place of the entry: nothing could be saved there.
         """
         name = self.name(kind, params, version=version)
-        if not (self.path / name).is_dir():
-            return None
+        self.refuse_file(name)
         dataset, reason = entries.checked(self.path / name)
         if reason:
             self._warn(name, reason)
@@ -224,7 +230,8 @@ class Store(Mapping[str, xr.Dataset]):
         with self._writing():
             if _schema(self.path) is None:
                 _create_root(self.path)
-            if not (self.path / name).is_dir() or entries.checked(self.path / name)[1]:
+            self.refuse_file(name)
+            if entries.checked(self.path / name)[0] is None:
                 self._publish(name, variables, attrs)
         return name
 
@@ -235,11 +242,20 @@ class Store(Mapping[str, xr.Dataset]):
             if self.path.is_dir() and not os.access(self.path, os.W_OK, effective_ids=own):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
+    def refuse_file(self, name: str) -> None:
+        """Raise InputError where a file has the place of an entry: it may be somebody's."""
+        path = self.path / name
+        with suppress(OSError):
+            mode = path.lstat().st_mode
+            if not (stat.S_ISDIR(mode) or (stat.S_ISLNK(mode) and path.is_dir())):
+                raise InputError(f"{path} is a file where an entry of the store belongs: remove it")
+
     def entry(self, name: str) -> Entry | None:
         """The `Entry` of this name, or None if there is none that can be read; reads no arrays."""
         attrs = self._attrs(name)
-        if attrs is None:
-            return None
+        return None if attrs is None else self._entry(name, attrs)
+
+    def _entry(self, name: str, attrs: Mapping[str, Any]) -> Entry:
         params = json.loads(attrs["parameters"])
         size = _folder_bytes(self.path / name)
         return Entry(
@@ -258,11 +274,11 @@ class Store(Mapping[str, xr.Dataset]):
     def _read(self, names: list[str]) -> list[Entry]:
         found = []
         for name in names:
-            entry = self.entry(name)
-            if entry is None:
-                self._warn(name, "its metadata cannot be read")
-            else:
-                found.append(entry)
+            attrs, reason = entries.described(self.path / name)
+            if reason:
+                self._warn(name, reason)
+            elif attrs is not None:
+                found.append(self._entry(name, attrs))
         return found
 
     def find(self, kind: str | None = None, **params: Any) -> list[Entry]:
@@ -320,16 +336,16 @@ class Store(Mapping[str, xr.Dataset]):
         """A list of `Verdict`: every entry read in full and compared with its checksum."""
         verdicts = []
         for name in self._names():
-            reason = entries.checked(self.path / name)[1]
-            verdicts.append(Verdict(name, not reason, reason))
+            dataset, reason = entries.checked(self.path / name)
+            if dataset is not None or reason:  # else it was removed meanwhile
+                verdicts.append(Verdict(name, not reason, reason))
         return verdicts
 
     def _names(self) -> list[str]:
-        """Folders that are named like entries, readable or not, sorted."""
+        """What is named like an entry, readable or not, sorted."""
         if not self.path.is_dir():
             return []
-        with os.scandir(self.path) as items:
-            return sorted(i.name for i in items if keys.ENTRY.fullmatch(i.name) and i.is_dir())
+        return sorted(name for name in os.listdir(self.path) if keys.ENTRY.fullmatch(name))
 
     def _attrs(self, name: str) -> dict[str, Any] | None:
         return entries.read_attributes(self.path / name) if keys.ENTRY.fullmatch(name) else None
@@ -349,13 +365,15 @@ class Store(Mapping[str, xr.Dataset]):
                 try:
                     os.rename(temporary, self.path / name)
                     return
-                except OSError:
-                    if not (self.path / name).is_dir():
+                except OSError as error:
+                    if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                         raise
                 # Someone was faster. An intact copy is as good as ours; a damaged one goes.
-                if not entries.checked(self.path / name)[1]:
+                dataset, reason = entries.checked(self.path / name)
+                if dataset is not None:
                     return
-                self._retire(name)
+                if reason:
+                    self._retire(name)
         finally:
             _remove(temporary)
 

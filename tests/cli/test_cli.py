@@ -15,6 +15,7 @@ from heeding import heed, heeding, interrupted, until_it_computes, until_it_left
 import granforce as gf
 from granforce.cli import commands
 from granforce.cli.parser import main
+from granforce.study.store import open_store
 from granforce.system import interrupts
 
 SMALL = ["-n", "20", "--mu", "0.3", "--relax", "nearest", "--states", "5"]
@@ -280,6 +281,24 @@ def test_cache_commands(run):
     assert run("cache", "verify")[0] == 0
     assert json.loads(run("cache", "clear", "--kind", "walk", "--json")[1])["removed"] == 1
     assert len(json.loads(run("cache", "list", "--json")[1])) == 1
+
+
+@pytest.mark.parametrize("action", ["list", "size", "verify", "clear"])
+def test_cache_commands_make_no_store(run, tmp_path, action):
+    code, out, err = run("cache", action, "--cache", tmp_path / "typo")
+    assert (code, out, err.count("\n")) == (2, "", 1) and "there is no store at" in err
+    assert not (tmp_path / "typo").exists()
+
+
+def test_a_file_in_the_place_of_a_result_is_told_before_anything_is_computed(run, tmp_path):
+    run("walk", *SMALL, "--cache", tmp_path / "s")
+    (entry,) = (tmp_path / "s").glob("walk-*")
+    open_store(tmp_path / "s").clear()
+    entry.write_text("")
+    code, out, err = run("walk", *SMALL, "--cache", tmp_path / "s")
+    assert (code, out) == (2, "") and f"{entry} is a file" in err.splitlines()[-1]
+    assert not list((tmp_path / "s").glob("packing-*"))
+    assert run("cache", "verify", "--cache", tmp_path / "s")[0] == 1
 
 
 @pytest.mark.parametrize(

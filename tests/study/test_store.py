@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -308,7 +309,17 @@ def test_mapping_opens_lazily(store):
         if chunk.name != "1":
             shutil.rmtree(chunk)
     np.testing.assert_array_equal(frame.values, walk_dataset()["states"][120])
-    assert not np.any(dataset["states"][0])
+    with pytest.raises(InputError, match="has lost its part states/c/0/0/0"):
+        dataset["states"][0].load()
+
+
+def test_what_was_opened_and_then_cleared_is_no_zeros(store):
+    name = store.save("walk", PARAMS, walk_dataset().assign(force_scale=2.5), version=1)
+    dataset = store[name]
+    open_store(store.path).clear()
+    for variable in dataset:
+        with pytest.raises(InputError, match=f"{name}.*has lost its part {variable}/c"):
+            dataset[variable].load()
 
 
 def test_zarr_and_xarray_read_the_folder(store):
@@ -318,10 +329,23 @@ def test_zarr_and_xarray_read_the_folder(store):
     assert group[name]["states"].chunks == (100, 7, 2)
     assert group[name]["sweeps"].chunks == (250,)
     assert "Zstd" in str(group[name]["states"].compressors)
-    opened = xr.open_zarr(store.path, group=name, consolidated=False)
-    xr.testing.assert_equal(opened.load(), walk_dataset())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        opened = [xr.open_zarr(store.path / name), xr.open_zarr(store.path / name, chunks=None)]
+        opened.append(xr.open_zarr(store.path, group=name, consolidated=False))
+    for one in opened:
+        xr.testing.assert_equal(one.load(), walk_dataset())
     tree = xr.open_datatree(store.path, engine="zarr", consolidated=False)
     xr.testing.assert_equal(tree[name].to_dataset().load(), walk_dataset())
+
+
+def test_metadata_are_consolidated_as_zarr_does_it(store):
+    name = store.save("walk", PARAMS, walk_dataset(), version=1)
+    ours = json.loads((store.path / name / "zarr.json").read_text())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it is no part of Zarr's specification yet
+        zarr.consolidate_metadata(store.path / name)
+    assert json.loads((store.path / name / "zarr.json").read_text()) == ours
 
 
 # damage
@@ -358,6 +382,17 @@ def damage_attribute(entry):
     (entry / "zarr.json").write_text(text.replace("first note", "other note"))
 
 
+def edit(name, old, new):
+    """A function that changes a word in one of an entry's files of metadata."""
+
+    def damage(entry):
+        text = (entry / name / "zarr.json").read_text()
+        assert old in text
+        (entry / name / "zarr.json").write_text(text.replace(old, new))
+
+    return damage
+
+
 DAMAGES = {
     "truncated metadata": damage_metadata,
     "no metadata": lambda entry: (entry / "zarr.json").unlink(),
@@ -370,7 +405,96 @@ DAMAGES = {
     "another number": damage_number,
     "other parameters": damage_parameters,
     "another attribute": damage_attribute,
+    "another unit": edit("states", VARIABLES["states"].units, "kN"),
+    "another name": edit("residual", VARIABLES["residual"].long_name, "no residual"),
+    "another unit where it is consolidated": edit("", VARIABLES["states"].units, "kN"),
+    "another date": edit("", '"created": "20', '"created": "19'),
+    "no checksum of the metadata": edit("", "metadata_checksum", "metadata_nothing"),
 }
+
+
+def test_a_file_where_an_entry_belongs_is_told_at_once_and_left(store):
+    name = store.name("walk", PARAMS, version=1)
+    (store.path / name).write_text("somebody's")
+    for use in (
+        lambda: store.load("walk", PARAMS, version=1),
+        lambda: store.save("walk", PARAMS, walk_dataset(), version=1),
+    ):
+        with pytest.raises(InputError, match=f"{name} is a file where an entry"):
+            use()
+    assert store.verify() == [(name, False, "it is a file, not a folder")]
+    with pytest.warns(UserWarning, match="metadata"):
+        assert store.find("walk") == []
+    assert list(store) == [] and (store.path / name).read_text() == "somebody's"
+    assert store.clear() == 1 and store.verify() == []
+
+
+# What a look at an entry uses, each of which others may overtake.
+LOOKS = {
+    "load": lambda store: store.load("walk", PARAMS, version=1),
+    "verify": lambda store: store.verify() or None,
+    "entries": lambda store: store.entries() or None,
+    "find": lambda store: store.find("walk", mu=0.1) or None,
+    "open": lambda store: store.get(store.name("walk", PARAMS, version=1)),
+}
+
+
+@pytest.mark.parametrize("step", ["read_attributes", "_metadata", "_lazily"])
+@pytest.mark.parametrize("look", LOOKS.values(), ids=LOOKS.keys())
+@pytest.mark.parametrize("again", [False, True])
+def test_what_vanishes_meanwhile_is_absent(store, monkeypatch, step, look, again):
+    """At each step of a look another process clears the store, and may save the entry again."""
+    store.save("walk", PARAMS, walk_dataset(0), version=1)
+    rival, before = open_store(store.path), getattr(entries, step)
+
+    def overtaken(*args):
+        monkeypatch.setattr(entries, step, before)
+        rival.clear()
+        if again:
+            rival.save("walk", PARAMS, walk_dataset(1), version=1)
+        return before(*args)
+
+    monkeypatch.setattr(entries, step, overtaken)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = look(store)
+    overtook = getattr(entries, step) is before
+    monkeypatch.setattr(entries, step, before)
+    assert again or not overtook or found is None or step == "read_attributes"
+    if isinstance(found, xr.Dataset):
+        xr.testing.assert_equal(found.load(), walk_dataset(int(again)))
+    elif found is not None:
+        assert len(found) == 1 and getattr(found[0], "ok", True)
+
+
+def test_one_clears_while_others_read_and_write(tmp_path, caplog):
+    """Nothing is told of damage, nor by asyncio, and what is found is what was saved."""
+    store, saved, left = open_store(tmp_path / "store"), walk_dataset(), [60]
+
+    def clears():
+        while left[0]:
+            open_store(store.path).clear()
+
+    def uses(seed):
+        while left[0]:
+            left[0] = max(0, left[0] - 1)
+            store.save("walk", {"seed": seed}, saved, version=1)
+            found = store.load("walk", {"seed": seed}, version=1)
+            assert found is None or found.equals(saved)
+            assert all(verdict.ok for verdict in store.verify())
+            assert all(entry.kind == "walk" for entry in store.find("walk"))
+
+    with warnings.catch_warnings(), ThreadPoolExecutor(3) as threads:
+        warnings.simplefilter("error")
+        running = [threads.submit(clears), *(threads.submit(uses, seed) for seed in (1, 1))]
+        try:
+            for one in running[1:]:
+                one.result()
+        finally:
+            left[0] = 0
+        running[0].result()
+    assert not caplog.records
+    assert not list(store.path.glob(".tmp-*"))
 
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES.keys())

@@ -92,8 +92,9 @@ def bench(arguments: argparse.Namespace) -> None:
 
 def cache(arguments: argparse.Namespace) -> int:
     """List, measure, clear or verify a store. Returns 1 if an entry is damaged."""
-    store = open_store(arguments.cache)
+    store = open_store(arguments.cache, readonly=True)  # which makes none where there is none
     if arguments.action == "clear":
+        store = open_store(store.path)
         lines = {"removed": store.clear(arguments.kind), "temporaries": store.clean()}
         print_report(lines, arguments.json)
     elif arguments.action == "size":
