@@ -6,6 +6,7 @@ one of a radius equal to the number of walls (Nesterov, Nemirovskii, Interior-po
 algorithms, 1994): it is nearly round. Slacks move together as the matrix K of `wall_matrix` says.
 """
 
+import copy
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -359,6 +360,8 @@ def _walls(frame: _Frame, y: Floats, thin: bool) -> Walls:
         plain = np.maximum(known, knowledge.units(ensemble.mu) ** 2)
         units = _shape(frame, np.zeros_like(y), plain)[1] - shape
         matrix, moving = _matrix(frame, y)
+        # Its own, or whoever changes a sample's would change the ensemble's.
+        matrix = matrix._replace(network=copy.deepcopy(matrix.network))
         matrix = wall_matrix.restored(matrix)
     root = np.sqrt(frame.weight).ravel()
     return Walls(y, moving, matrix, h, frame.pull(y), root, units)

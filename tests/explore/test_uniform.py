@@ -185,6 +185,23 @@ def test_same_seed_same_states_for_any_number_of_workers(S):
     assert not np.allclose(one.states[0], one.states[1])
 
 
+def test_a_sample_has_its_walls_for_itself():
+    one, two = (ensemble(packed(20, 0.3, 1)) for _ in range(2))
+    for array in _arrays(sample_uniform(one, 4).walls):
+        array[...] = 0
+    found, wanted = sample_uniform(one, 4), sample_uniform(two, 4)
+    np.testing.assert_array_equal(found.flat, wanted.flat)
+
+
+def _arrays(part):
+    """All arrays of nested tuples."""
+    if isinstance(part, np.ndarray):
+        yield part
+    elif isinstance(part, tuple):
+        for inner in part:
+            yield from _arrays(inner)
+
+
 def test_a_sample_goes_on_as_if_it_had_never_ended(S):
     whole = sample_uniform(S, 80, seed=3)
     part = sample_uniform(S, 52, seed=3)
