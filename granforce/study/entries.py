@@ -137,7 +137,7 @@ def seal(folder: Path, arrays: Mapping[str, Any], attrs: Mapping[str, Any]) -> N
         "node_type": "group",
     }
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "zarr.json").write_text(json.dumps(group, indent=2))
+    (folder / "zarr.json").write_text(json.dumps(group))
 
 
 def _consolidated(arrays: Mapping[str, Any]) -> dict[str, Any]:
