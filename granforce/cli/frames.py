@@ -70,7 +70,6 @@ def _rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
         one, unit = dataset.isel(frame=k), float(dataset["unit"][k])
         account = dict(zip(dataset["kind"].values, one["account"].values, strict=True))
         mended = sum(int(account[kind]) for kind in KINDS if kind != "beyond_friction")
-        moved = np.abs(one["change"].values) > 3 * one["change_error"].values
         rows.append(
             {
                 "frame": number,
@@ -80,8 +79,10 @@ def _rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
                 "unbalanced": int(account["unbalanced"]),
                 "chi_square": float(one["chi_square"]),
                 "freedom": int(one["freedom"]),
-                "standard_error": float(np.nanmean(one["standard_error"].values) / unit),
-                "changed": int(moved.any(axis=1).sum()),
             }
         )
+        if "standard_error" in one:
+            moved = np.abs(one["change"].values) > 3 * one["change_error"].values
+            rows[-1]["standard_error"] = float(np.nanmean(one["standard_error"].values) / unit)
+            rows[-1]["changed"] = int(moved.any(axis=1).sum())
     return rows

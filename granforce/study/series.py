@@ -11,14 +11,16 @@ import re
 import shutil
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from granforce.explore.infer import infer
 from granforce.explore.remeasured import remeasured
-from granforce.forces.ensemble import ensemble
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.importers.geometry import vectors
 from granforce.packing.importers.pegs import Photoelastic, open_frames, read_pegs
 from granforce.packing.importers.repair import KINDS
@@ -140,7 +142,7 @@ def parameters(
         "content": _digest(frame.positions, frame.adjacency),
         "frame": frame.number,
         "mu": friction(mu),
-        "states": whole(states, "states", 2),
+        "states": whole(states, "states", 2) if states else 0,
         "seed": random_seed(seed),
         "unmeasured": positive(unmeasured, "unmeasured"),
         "wall_forces": {name: list(map(float, values)) for name, values in forces.items()},
@@ -188,21 +190,23 @@ def infer_frame(
     """Dataset of a Photoelastic: its packing, forces, errors, stresses by region, its account.
 
     Forces are those of `remeasured`, on all contacts (0 where nothing can carry); options as there.
+    Without states it has no errors.
     """
     S = ensemble(found.packing)
-    drawn = remeasured(
+    drawn = (remeasured if states else infer)(
         *(S, found.measured[S.index], found.sigma[S.index]),
         states=states,
         unmeasured=unmeasured,
         **options,
     )
-    whole_packing = np.zeros((3, *found.measured.shape))
-    whole_packing[2] = np.nan
-    for values, of in zip(whole_packing, (drawn.forces, drawn.error, drawn.deviation), strict=True):
-        values[S.index] = of
-    grains = len(found.packing.r) - len(found.walls)
-    stress = regional_stress(S.contacts, found.packing.x, grains, drawn.forces)
-    off = regional_stress(S.contacts, found.packing.x, grains, drawn.drawn.flat) - stress
+    stress_of = partial(
+        regional_stress, S.contacts, found.packing.x, len(found.packing.r) - len(found.walls)
+    )
+    stress, errors = stress_of(drawn.forces), {}
+    if states:
+        off = stress_of(drawn.drawn.flat) - stress
+        errors["standard_error"] = _on_all(found, S, drawn.error, 0.0)
+        errors["regional_stress_error"] = np.sqrt(np.mean(off**2, axis=0))
     dataset = packing_dataset(found.packing).merge(
         labelled(
             {
@@ -210,14 +214,13 @@ def infer_frame(
                 "added": found.added,
                 "measured": found.measured,
                 "sigma": found.sigma,
-                "inferred": whole_packing[0],
-                "standard_error": whole_packing[1],
-                "deviation": whole_packing[2],
+                "inferred": _on_all(found, S, drawn.forces, 0.0),
+                "deviation": _on_all(found, S, drawn.deviation, np.nan),
                 "suspect": drawn.suspects,
                 "chi_square": drawn.chi_square,
                 "freedom": drawn.freedom,
                 "regional_stress": stress,
-                "regional_stress_error": np.sqrt(np.mean(off**2, axis=0)),
+                **errors,
             }
         )
     )
@@ -228,6 +231,13 @@ def infer_frame(
     told |= {"at_wall": np.flatnonzero(found.at_wall).tolist()}
     dataset.attrs["account"] = json.dumps(told, default=to_builtin)
     return dataset
+
+
+def _on_all(found: Photoelastic, S: Ensemble, values: Floats, elsewhere: float) -> Floats:
+    """Values (N_c of S, 2) on all contacts of the frame, and what the others have."""
+    whole_packing = np.full(found.measured.shape, elsewhere)
+    whole_packing[S.index] = values
+    return whole_packing
 
 
 def regional_stress(contacts: Contacts, x: Floats, grains: Any, forces: Floats) -> Floats:
@@ -275,9 +285,10 @@ def infer_series(
     """All frames inferred into the store at path, found there where they are: (dataset, failed).
 
     frames: by `frames_of`. workers: processes; scheduler: address of a dask scheduler to use in
-    their place. progress(done, total) counts frames. options: mu, states (draws for each frame),
-    seed and unmeasured as for `infer`, others as for `read_pegs`. The dataset has a line for each
-    frame; failed: (frame, message) of frames that were refused, which the dataset does not have.
+    their place. progress(done, total) counts frames. options: mu, states (draws for each frame,
+    at least 2, or 0 for no error bars), seed and unmeasured as for `infer`, others as for
+    `read_pegs`. The dataset has a line for each frame; failed: (frame, message) of frames that were
+    refused, which the dataset does not have.
 
     Raises InputError where the store cannot be written.
     """
@@ -302,15 +313,16 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     """One dataset (frame, contact, component) of [(number, dataset of a frame), …].
 
     A contact is a pair of names, over all frames; NaN where a frame does not have it. change: its
-    inferred force less that in the frame before, and change_error, by both errors.
+    inferred force less that in the frame before, and change_error, by both errors. Without draws
+    there are no errors.
     """
     named = [_names(one) for _, one in done]
     pairs = sorted({pair for names in named for pair in names if pair is not None})
     row = {pair: k for k, pair in enumerate(pairs)}
     shape = (len(done), len(pairs), 2)
-    arrays = {
-        name: np.full(shape, np.nan) for name in ("measured", "sigma", "inferred", "standard_error")
-    }
+    told = ["measured", "sigma", "inferred"]
+    told += ["standard_error"] if all("standard_error" in one for _, one in done) else []
+    arrays = {name: np.full(shape, np.nan) for name in told}
     added = np.zeros(shape[:2], dtype=bool)
     for k, ((_, one), names) in enumerate(zip(done, named, strict=True)):
         here = [c for c, pair in enumerate(names) if pair is not None]
@@ -318,9 +330,8 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
         for name, values in arrays.items():
             values[k, into] = one[name].values[here]
         added[k, into] = one["added"].values[here]
-    change, change_error = np.full((2, *shape), np.nan)
+    change = np.full(shape, np.nan)
     change[1:] = np.diff(arrays["inferred"], axis=0)
-    change_error[1:] = np.hypot(arrays["standard_error"][1:], arrays["standard_error"][:-1])
     accounts = [json.loads(one.attrs["account"])["report"] for _, one in done]
     forces, single = ("frame", "contact", "component"), ("frame",)
     variables: dict[str, Any] = {
@@ -329,12 +340,15 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     variables |= {
         "added": (forces[:2], added, {"long_name": "contact was not listed"}),
         "change": (forces, change, {"units": "force", "long_name": "since the frame before"}),
-        "change_error": (forces, change_error, {"units": "force"}),
         "chi_square": (single, [float(one["chi_square"]) for _, one in done]),
         "freedom": (single, [int(one["freedom"]) for _, one in done]),
         "unit": (single, [one["mean_measured_normal_force"] for one in accounts]),
         "account": (("frame", "kind"), [[one[kind] for kind in _COUNTS] for one in accounts]),
     }
+    if "standard_error" in arrays:
+        change_error, error = np.full(shape, np.nan), arrays["standard_error"]
+        change_error[1:] = np.hypot(error[1:], error[:-1])
+        variables["change_error"] = forces, change_error, {"units": "force"}
     ends = np.array(pairs, dtype=float).reshape(-1, 2)
     return xr.Dataset(
         variables,

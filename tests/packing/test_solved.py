@@ -28,12 +28,17 @@ def mat(particles, name="Step09-0007_solved.mat", **options):
     return made
 
 
+MATLAB_73 = (
+    b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Thu Nov 26 2026 HDF5 schema 1.00 ."
+)
+
+
 def mat73(particles, name="Step09-0007_solved.mat"):
     """The same of version 7.3: each field a column of references to arrays with swapped axes."""
     import h5py
 
     made = io.BytesIO()
-    with h5py.File(made, "w") as file:
+    with h5py.File(made, "w", userblock_size=512) as file:
         group, refs = file.create_group("particle"), file.create_group("#refs#")
         for field in particles[0]:
             column = group.create_dataset(field, (len(particles), 1), dtype=h5py.ref_dtype)
@@ -45,6 +50,8 @@ def mat73(particles, name="Step09-0007_solved.mat"):
                 if empty:
                     stored.attrs["MATLAB_empty"] = np.uint8(1)
                 column[k, 0] = stored.ref
+    made.seek(0)
+    made.write(MATLAB_73.ljust(128))
     made.seek(0)
     made.name = name
     return made
@@ -183,4 +190,12 @@ def test_version_7_3_without_h5py_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     given = io.BytesIO(b"MATLAB 7.3 MAT-file" + b" " * 500)
     with pytest.raises(InputError, match="install h5py"):
+        read_pegs(given, mu=0.3)
+
+
+def test_version_7_3_that_is_damaged_is_told():
+    """The head that MATLAB writes, and nothing after the signature of HDF5."""
+    pytest.importorskip("h5py")
+    given = io.BytesIO(MATLAB_73.ljust(512) + b"\x89HDF\r\n\x1a\n" + bytes(200))
+    with pytest.raises(InputError, match=r"version 7.3 \(HDF5\) that is damaged; .*'-v7'"):
         read_pegs(given, mu=0.3)

@@ -135,6 +135,24 @@ def test_by_the_command_line(away, capsys):
     assert len(list(open_store(away / "cache").find("frame"))) == 2
 
 
+def test_without_states_there_are_no_error_bars(away, capsys):
+    """The same forces as with them."""
+    (away / "lab").mkdir()
+    folder_of(away / "lab", (1, 2))
+    words = "infer lab --frames all --mu 0.3 --reach 0.1 --out series.zarr --json --states"
+    forces = {}
+    for states in (0, 4):
+        assert main([*words.split(), str(states)]) == 0
+        assert all(
+            ("changed" in row) == (states > 0) for row in json.loads(capsys.readouterr().out)
+        )
+        written = xr.open_zarr(away / "series.zarr", consolidated=False)
+        assert ("standard_error" in written) == ("change_error" in written) == (states > 0)
+        forces[states] = written["inferred"].values
+    assert np.array_equal(forces[0], forces[4], equal_nan=True)
+    assert main([*words.split(), "1"]) == 2
+
+
 def test_names_of_files_of_positions_and_adjacency(tmp_path):
     import frames as made
 

@@ -55,8 +55,10 @@ def read_solved(source: Source) -> SolvedFrame:
     Raises InputError for what is no such file.
     """
     name, content = _content(source)
+    hdf5 = content[:8] == b"\x89HDF\r\n\x1a\n" or content[:15] == b"MATLAB 7.3 MAT-"
+    wanted = f"{name}: a MATLAB file of version 7.3 (HDF5)" if hdf5 else name
     try:
-        if content[:8] == b"\x89HDF\r\n\x1a\n" or content[:15] == b"MATLAB 7.3 MAT-":
+        if hdf5:
             particles = _version_73(name, content)
         else:
             particles = read_struct(content, "particle", _FIELDS, _LARGEST_FILE)
@@ -65,10 +67,14 @@ def read_solved(source: Source) -> SolvedFrame:
         raise
     except Exception:
         # A damaged file fails anywhere: in zlib, in the tags, in shapes that do not fit.
-        raise InputError(f"{name}: no MATLAB file with a struct array, or damaged") from None
+        raise InputError(
+            f"{wanted} that is damaged; save it again in MATLAB with save(…, '-v7')"
+            if hdf5
+            else f"{name}: no MATLAB file with a struct array, or damaged"
+        ) from None
     if columns is None:
         raise InputError(
-            f"{name}: no struct array `particle` with {', '.join(_NEEDED)}; is it a *_solved.mat "
+            f"{wanted}: no struct array `particle` with {', '.join(_NEEDED)}; is it a *_solved.mat "
             "of PeGS 2 (after diskSolve)?"
         )
     digits = re.findall(r"\d+", re.sub(r"\.mat$", "", name))
@@ -101,8 +107,8 @@ def _version_73(name: str, content: bytes) -> list[dict[str, Any]]:
         import h5py
     except ImportError:
         raise InputError(
-            f"{name}: a MATLAB file of version 7.3; install h5py to read it, or save it in MATLAB "
-            "by save(…, '-v7')"
+            f"{name}: a MATLAB file of version 7.3 (HDF5); install h5py to read it, or save it in "
+            "MATLAB with save(…, '-v7')"
         ) from None
     with h5py.File(io.BytesIO(content), "r") as file:
         if "particle" not in file or not hasattr(_own(file, "particle"), "keys"):
