@@ -71,7 +71,7 @@ class LimitLoads(NamedTuple):
     """Largest force pairs that S can carry on k contacts."""
 
     contacts: Integers  # (k,) their numbers in the packing
-    load: Floats  # (k,) limit load F, force; NaN where cancelled before, or not certified
+    load: Floats  # (k,) limit load F, force; inf without a limit; NaN: cancelled, or not certified
     gap: Floats  # (k,) duality gap in ⟨f_n⟩
     max_gap: float
     converged: bool  # every load was reached with a gap ≤ INTERVAL_GAP
@@ -232,15 +232,20 @@ def limit_load_bounds(
     One program per contact (numbers in the packing; default all of S), for the static limit load of
     PRE 79, 052302. The pair adds F to the normal force on the contact, in the balance and in the
     pressure, but not in the contact's own cone. (Left out of the pressure, the limit would be
-    F/(1 − F ℓ/2P0V).) Options and errors as in `intervals`.
+    F/(1 − F ℓ/2P0V).) Infinite where the balance of both grains is left open, as no equation then
+    has the load. Options and errors as in `intervals`.
     """
-    keys = [int(place) for place in _positions(ensemble, contacts)]
+    places = [int(place) for place in _positions(ensemble, contacts)]
+    met = np.diff(ensemble.A.tocsc().indptr)[:: ensemble.per_contact] > 0
+    keys = [place for place in places if met[place]]
     solver = Solver(make_system(ensemble), workers=workers, progress=progress, total=len(keys))
     # Of each contact: maximise F, where f_n + F and f_t act on the grains.
     bounds = solver.solve(keys, [Program([], [], key) for key in keys])
-    attained, gap = told(bounds, keys)
+    bounds |= {place: (0.0, 0.0) for place in places if not met[place]}
+    attained, gap = told(bounds, places)
     load = np.where(gap <= INTERVAL_GAP, -attained * ensemble.force_scale, np.nan)
-    return LimitLoads(ensemble.index[keys], load, gap, *_judged(gap), solver.counts)
+    load[~met[places]] = np.inf
+    return LimitLoads(ensemble.index[places], load, gap, *_judged(gap), solver.counts)
 
 
 def told(bounds: dict[Any, tuple[float, float]], keys: Sequence[Any]) -> tuple[Floats, Floats]:

@@ -102,7 +102,7 @@ def walls(
     if thin:
         centre = _centred(frame, y, _thin_matrix)
     if centre is None:
-        raise InputError("the forces on these contacts are not bounded: is a pressure or load set?")
+        raise InputError(certificates.UNBOUNDED)
     if not np.all(centre >= 0):
         raise UndecidedError(
             "these conditions leave so little room to the forces that rounding hides it: take a "

@@ -86,8 +86,9 @@ class Ensemble:
 
         2N_c − (3M − 1) in a disordered packing with prescribed pressure (N_c − (2M − 1) at μ = 0),
         more in crystals, whose rows depend on each other: rows are counted by the eigenvalues of
-        A Aᵀ. Two less where the whole stress is prescribed. Beyond LARGEST_RANK rows the generic
-        value is given.
+        A Aᵀ. Two less where the whole stress is prescribed, and 2 N_c (N_c at μ = 0) without
+        equations, where the balance of all grains is left open. Beyond LARGEST_RANK rows the
+        generic value is given.
         """
         A = self.free_columns
         rows, unknowns = A.shape
@@ -95,8 +96,8 @@ class Ensemble:
             dependent = 2 if self.has_pressure_row else 3
             dependent = 0 if balance.left_open_in(self.packing).any() else dependent
             return max(0, unknowns - (rows - dependent))
-        if not unknowns:
-            return 0
+        if not (rows and unknowns):  # the balance of every grain is left open, or all is known
+            return unknowns
         square = cancelling.apart(np.linalg.eigvalsh, (A @ A.T).toarray())
         return unknowns - int(np.sum(square > 1e-12 * square[-1]))
 
@@ -114,8 +115,8 @@ class Ensemble:
 
     @property
     def coordination(self) -> float:
-        """Mean coordination number z = 2 N_c / M of the backbone."""
-        return 2 * len(self.index) / max(1, len(self.grains))
+        """Mean coordination number z = 2 N_c / M of the backbone; NaN without grains to balance."""
+        return 2 * len(self.index) / len(self.grains) if len(self.grains) else np.nan
 
     @cached_property
     def cone_form(self) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:

@@ -24,6 +24,10 @@ _LARGEST_MEAN = 1e4
 _BALANCED_DIRECTION = 1e-13
 # Mean of y (in ⟨f_n⟩) up to which a contact is shown to carry nothing: it is 1 in S.
 _USUAL_MEAN = 2.0
+UNBOUNDED = (
+    "the forces on these contacts are not bounded: prescribe a pressure or a load, give bounds on "
+    "single forces, or freeze contacts all around them"
+)
 
 
 def why_unsolved(
@@ -41,10 +45,7 @@ def why_unsolved(
     if empty_ray(A, b, slack) is not None:
         return NotJammedError(empty)
     if recession(A) is not None:
-        return InputError(
-            "the forces on these contacts are not bounded: prescribe a pressure or a load, or "
-            "freeze contacts all around them"
-        )
+        return InputError(UNBOUNDED)
     return UndecidedError(
         "whether these contacts can be in balance is undecided: linear programs over their forces "
         "ended without a result that could be checked; change a contact or the friction slightly"

@@ -146,6 +146,10 @@ def critical_forces(
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
         cancelling.check("critical force")  # which leaves limit loads open
+    for number in np.asarray(contacts)[np.isposinf(limit_loads)]:
+        raise InputError(
+            f"the balance of both grains of contact {number} is left open: no load sets them off"
+        )
     if not np.isfinite(limit_loads).all():
         number = np.asarray(contacts)[~np.isfinite(limit_loads)][0]
         raise UndecidedError(f"the limit load of contact {number} could not be certified")
