@@ -71,6 +71,31 @@ def add_cell(command: Parser) -> None:
     )
 
 
+def add_frame(command: Parser, number: str) -> None:
+    command.add_argument("--frame", type=int, help=f"{number} (default: the last that is whole)")
+
+
+def add_columns(command: Parser) -> None:
+    command.add_argument(
+        "--columns", type=str, metavar="x=…,y=…", help="names of the columns in the files"
+    )
+
+
+def add_reverse(command: argparse._ActionsContainer) -> None:
+    command.add_argument(
+        "--reverse", action="store_true", help="tangential forces have the other sign"
+    )
+
+
+def add_wall_contacts(command: Parser) -> None:
+    command.add_argument(
+        "--walls",
+        action="store_true",
+        help="walls are grains, with the force on each as its load (default: what walls do to "
+        "grains is the grains' load)",
+    )
+
+
 def add_store(command: Parser) -> None:
     command.add_argument(
         "--cache",
@@ -228,9 +253,7 @@ def add_reading(group: argparse._ActionsContainer) -> None:
     group.add_argument(
         "--error", type=float, help="standard error of a force (default: as the data suggest)"
     )
-    group.add_argument(
-        "--reverse", action="store_true", help="tangential forces have the other sign"
-    )
+    add_reverse(group)
 
 
 def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> None:

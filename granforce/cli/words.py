@@ -6,16 +6,20 @@ from granforce.cli.options import (
     Commands,
     add_any_packing,
     add_cell,
+    add_columns,
     add_conditions,
     add_exact,
     add_flaws_and_walls,
+    add_frame,
     add_known,
     add_packing,
     add_reading,
+    add_reverse,
     add_scheduler,
     add_source,
     add_store,
     add_walk_options,
+    add_wall_contacts,
     import_format,
     subcommand,
 )
@@ -412,29 +416,37 @@ def add_import(commands: Commands) -> None:
     )
     # A parser for each format: it takes the options that its reader uses, and refuses all others.
     formats = command.add_subparsers(dest="format", metavar="FORMAT", required=True)
-    import_format(
+    lammps = import_format(
         *(formats, "lammps", "read a particle dump and a contact dump of LAMMPS"),
         *("particles.dump contacts.dump", "dump custom of the particles", "dump local of contacts"),
     )
+    add_frame(lammps, "timestep")
+    add_columns(lammps)
+    add_reverse(lammps)
     yade = import_format(
         *(formats, "yade", "read the bodies and interactions of YADE"),
         *("bodies.txt interactions.txt", "bodies, by export.textExt", "interactions"),
     )
     add_cell(yade)
+    add_columns(yade)
+    add_wall_contacts(yade)
+    add_reverse(yade)
     mercury = import_format(
         *(formats, "mercury", "read the .data and .fstat of MercuryDPM"),
         *("run.data run.fstat", "particles: NAME.data", "contacts: NAME.fstat"),
     )
+    add_frame(mercury, "number of the time step in the files, from 0")
     add_cell(mercury)
+    add_wall_contacts(mercury)
+    add_reverse(mercury)
     table = import_format(
         *(formats, "table", "read a table of grains and, if there is one, a table of contacts"),
         *("grains.csv contacts.csv", "columns x, y, r", "columns i, j, and fn, ft if known"),
         contacts_needed=False,
     )
     add_cell(table)
-    table.add_argument(
-        "--columns", type=str, metavar="x=…,y=…", help="names of the columns in the files"
-    )
+    add_columns(table)
+    add_reverse(table)
     table.add_argument("--forces", action="store_true", default=None, help="require fn and ft")
     table.add_argument(
         "--pressure", type=float, help="pressure P0 of a table without forces (default 1)"

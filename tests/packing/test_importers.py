@@ -284,7 +284,8 @@ def test_lammps_columns_may_be_named():
         return [head, *(["7", *row] for row in rows[1:])]
 
     dumps = rewritten(contacts=extra)
-    packing = read_lammps(*dumps, 0.3, columns=list("abcdefg"))
+    columns = dict(zip(lammps.CONTACT_COLUMNS, "abcdefg", strict=True))
+    packing = read_lammps(*dumps, 0.3, columns=columns)
     assert_same(packing, read_lammps(PARTICLES, CONTACTS, 0.3))
     with pytest.raises(InputError, match=r"8 columns .* by columns="):
         read_lammps(*rewritten(contacts=extra), 0.3)
@@ -339,7 +340,7 @@ def tilted_text(flags, xy, xz):
     return io.StringIO("\n".join(text)), CONTACTS
 
 
-def triclinic(packing, basis):
+def triclinic(packing, basis, scaled=False):
     """The dumps of a packing in another cell of its lattice, turned so that a lies along x.
 
     Written as LAMMPS documents it (docs.lammps.org, Howto triclinic): bounds are those of the
@@ -354,7 +355,7 @@ def triclinic(packing, basis):
         f"{low[1]!r} {low[1] + height!r} 0.0",
         "-0.5 0.5 0.0",
     ]
-    x = other.cell.wrapped(other.x) + low
+    x = other.cell.parts(other.x) if scaled else other.cell.wrapped(other.x) + low
 
     def placed(row):
         across, up = x[int(row[0]) - 1].tolist()
@@ -368,17 +369,19 @@ def triclinic(packing, basis):
     for path, change in ((PARTICLES, placed), (CONTACTS, turned)):
         text = lines(path)
         rows = [change(line.split()) for line in text[9:]]
-        files.append(io.StringIO("\n".join([*text[:4], *bounds, text[8], *rows])))
+        head = text[8].replace(" x y ", " xs ys ") if scaled else text[8]
+        files.append(io.StringIO("\n".join([*text[:4], *bounds, head, *rows])))
     return files
 
 
 @pytest.mark.parametrize(
     "basis", [((2, 1), (1, 1)), ((1, 1), (0, 1)), ((1, -1), (1, 0)), ((1, 3), (0, 1))]
 )
-def test_lammps_tilted_boxes_are_read(basis):
+@pytest.mark.parametrize("scaled", [False, True])
+def test_lammps_tilted_boxes_are_read(basis, scaled):
     """The same structure in another cell: the same forces, pressure, contacts and dimension."""
     plain = read_lammps(PARTICLES, CONTACTS, 0.3)
-    packing = read_lammps(*triclinic(plain, basis), 0.3)
+    packing = read_lammps(*triclinic(plain, basis, scaled), 0.3)
     other, turn = skewed(plain, basis)
     assert packing.tilt == pytest.approx(other.tilt, abs=1e-9) and packing.tilt != 0
     np.testing.assert_allclose(packing.box, other.box, rtol=1e-12)
@@ -431,18 +434,20 @@ def test_isotropic_packings_come_back_from_lammps():
     assert S.dimension == ensemble(packing, prescribed="stress").dimension
 
 
+def written(text):
+    return io.StringIO("\n".join(text))
+
+
 def test_lammps_bounds_are_those_of_the_manual():
     """A box of sides 9.838049, 8.52 tilted by 4.91902 is dumped as 0 … 14.757069."""
     text = lines(PARTICLES)
     text[3] = "1"
     text[4:8] = ["ITEM: BOX BOUNDS xy xz yz", "0 14.757069 4.91902", "0 8.52 0", "0 15 0"]
-    items = lammps.snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
-    low, cell = lammps.cell_of("dump", items)
+    low, _, cell = lammps.box_of("dump", lammps.read_dump(written(text[:10])).items(1900000))
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == 4.91902
     text[5] = "-4.91902 9.838049 -4.91902"
-    items = lammps.snapshots(io.StringIO("\n".join(text[:10])))[1][1900000]
-    low, cell = lammps.cell_of("dump", items)
+    low, _, cell = lammps.box_of("dump", lammps.read_dump(written(text[:10])).items(1900000))
     assert low.tolist() == [0, 0] and cell.box == pytest.approx([9.838049, 8.52])
     assert cell.tilt == -4.91902
 
@@ -472,6 +477,13 @@ def swapped_columns(rows):
     return [rows[0], *([*row[:3], *row[5:], *row[3:5]] for row in rows[1:])]
 
 
+def other_force(rows):
+    """The last row tells of the pair of the first, from the other side, half of its force."""
+    j, i, length, *forces = rows[1]
+    half = [repr(-0.5 * float(force)) for force in forces]
+    return [*rows[:-1], [i, j, length, *half]]
+
+
 @pytest.mark.parametrize(
     "dumps, message",
     [
@@ -499,12 +511,12 @@ def swapped_columns(rows):
         (lambda: particle_text("0.971220598135208", "nan"), "line 10: radius is 'nan'"),
         (lambda: particle_text("\n2 1 2.47", "\n1 1 2.47"), "line 11: id '1' was given in line 10"),
         (lambda: particle_text("22.6549104243892", "23.1"), "overlap by .* check positions"),
-        (lambda: contact_text("\n110 400 1.49", "\n110 4000 1.49"), "line 10: c_pl.* '4000'"),
+        (lambda: contact_text("\n110 400 1.49", "\n110 4000 1.49"), "line 10: atom2 .* '4000'"),
         (lambda: contact_text("\n110 400 1.49", "\n110 400 1.45"), "line 10: centre distance 1.45"),
         (lambda: contact_text("\n110 400 1.49", "\n110 110 1.49"), "line 10: .* join one point"),
-        (lambda: contact_text("0.000310905322829523", "1e999"), r"line 10: c_fl\[3\] is '1e999'"),
+        (lambda: contact_text("0.000310905322829523", "1e999"), "line 10: fy is '1e999'"),
         (lambda: rewritten(contacts=swapped_columns), "normal force does not point .* columns="),
-        (lambda: rewritten(contacts=lambda rows: [*rows[:-1], rows[1]]), "line 993.* given before"),
+        (lambda: rewritten(contacts=other_force), "given before .* with another force"),
     ],
 )  # fmt: skip
 def test_wrong_dumps_are_refused_with_a_reason(dumps, message):

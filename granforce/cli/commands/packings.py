@@ -1,6 +1,7 @@
 """Packings: made, or from elsewhere."""
 
 import argparse
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -67,9 +68,11 @@ def import_(arguments: argparse.Namespace) -> None:
     packing = READERS[arguments.format](arguments.grains, arguments.contacts, **options)
     if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
         raise InputError("--pressure is of a table without forces or loads: leave it out")
-    lines = importers.report(packing) | {
-        k: v for k, v in packing.info.items() if k == "contacts_skipped"
-    }
+    for note in packing.info.get("notes", []):
+        print(f"granforce: {note}", file=sys.stderr)
+    named = ("timestep", "time", "contacts_skipped", "walls")
+    info = {name: packing.info[name] for name in named if name in packing.info}
+    lines = importers.report(packing) | info
     if arguments.out is not None:
         importers.save_packing(packing, arguments.out)
     print_report(lines, arguments.json)

@@ -11,7 +11,8 @@ from granforce.packing.importers.network import report
 from granforce.packing.importers.npz import load_packing, save_packing
 from granforce.packing.importers.pegs import Photoelastic, read_pegs
 from granforce.packing.importers.synthetic import SyntheticFrame, synthetic_frame
-from granforce.packing.importers.tables import read_columns, read_table
+from granforce.packing.importers.tables import read_table
+from granforce.packing.importers.text import read_columns
 from granforce.packing.importers.walls import read_wall_force
 
 __all__ = [

@@ -16,28 +16,42 @@ Both are three-dimensional; a layer of disks (spheres) is taken, in the plane in
 lie. What walls and gravity do to grains becomes their load.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing.importers.geometry import check_disks, components, listed
-from granforce.packing.importers.network import adopt
-from granforce.packing.importers.text import Source, Table, check_grains, make_table, read_text
+from granforce.packing.importers.geometry import check_disks, components, listed, once
+from granforce.packing.importers.network import LOAD_MISFIT, adopt
+from granforce.packing.importers.snapshots import Snapshot, Snapshots
+from granforce.packing.importers.text import (
+    Source,
+    Table,
+    check_grains,
+    make_table,
+    read_text,
+    renamed,
+    some_of,
+)
 from granforce.records import (
     Cell,
+    Contacts,
     Floats,
     InputError,
     Integers,
     Packing,
     friction,
     make_cell,
+    make_contacts,
     make_packing,
 )
 
 # Centres lie in a plane where they leave it by less than this part of a radius.
 _FLAT = 1e-3
+# Of a force that is nothing, so that its direction is none.
+_TINY = 1e-300
+_BODY = ("x", "y", "z", "r", "id")
 _INTERACTION = ("id1", "id2", "fnx", "fny", "fnz", "fsx", "fsy", "fsz")
 _FSTAT = ("time", "i", "j", "x", "y", "z", "delta", "deltat", "fn", "ft")
 _FSTAT += ("nx", "ny", "nz", "tx", "ty", "tz")
@@ -49,6 +63,16 @@ _DATA = {
 }
 
 
+class _OnWalls(NamedTuple):
+    """Contacts of grains with walls."""
+
+    grain: Integers  # (w,)
+    wall: Integers  # (w,) number of the wall
+    normal: Floats  # (w, 2) from the grain to the wall
+    force: Floats  # (w, 2) on the wall
+    names: Sequence[str]  # of the walls in the files
+
+
 def read_yade(
     bodies: Source,
     interactions: Source,
@@ -56,25 +80,63 @@ def read_yade(
     *,
     box: npt.ArrayLike | None = None,
     tilt: float = 0.0,
+    columns: Mapping[str, str] | None = None,
+    walls: bool = False,
+    reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from YADE's bodies and interactions (paths or open files).
 
     box: (L_x, L_y) of the plane, inf for an open direction; None: open. tilt: of the cell, whose
-    upper side begins at (tilt, L_y). Raises InputError naming file and line.
+    upper side begins at (tilt, L_y). columns: {name here: name in the files} of columns x, y, z, r,
+    id, id1, id2, fnx … fsz that are called otherwise. reverse: take shear forces with the other
+    sign.
+
+    Bodies that interact and are not listed are walls, where the list has ids. What they do to
+    grains becomes the grains' load or, with `walls`, forces of contacts: each wall is then one more
+    grain, whose load is the force that the grains exert on it. packing.info has notes of this.
+    Raises InputError naming file and line.
     """
-    grains, links = _yade_bodies(bodies), _lines_of(interactions, _INTERACTION)
+    cell = _cell(box, tilt)
+    tables = _yade_bodies(bodies), _yade_links(interactions, bool(columns))
+    grains, links = renamed(columns or {}, _BODY + _INTERACTION, *tables)
+    links.require(*_INTERACTION)
     plane = _plane(grains, 3)
-    ids = (
-        grains.index("id")
-        if "id" in grains.header
-        else {row: row for row in range(len(grains.rows))}
-    )
+    named = "id" in grains.header
+    ids = grains.index("id") if named else {row: row for row in range(len(grains.rows))}
+    one, two = (links.among(end, ids) for end in ("id1", "id2"))
+    at_wall = np.flatnonzero((one != two) & named)
+    on_walls = None
+    if len(at_wall):
+        there = links.some(at_wall)
+        normal, shear = _yade_forces(there, plane)
+        # Forces are on the second of both.
+        wall = one[at_wall].astype(int)
+        ends = np.array([there.fields("id1"), there.fields("id2")])
+        places = np.arange(len(wall))
+        grain = there._replace(header=("id",), rows=[[end] for end in ends[1 - wall, places]])
+        names, number = np.unique(ends[wall, places], return_inverse=True)
+        sign = np.where(wall, 1.0, -1.0)[:, None]
+        unit = np.maximum(np.hypot(*normal.T), _TINY)[:, None]
+        on_walls = _OnWalls(
+            *(grain.lookup("id", ids), number, sign * normal / unit, sign * (normal + shear)),
+            names.tolist(),
+        )
+    links = links.some(np.delete(np.arange(len(one)), at_wall))
     i, j = links.lookup("id1", ids), links.lookup("id2", ids)
-    force = np.column_stack([links.numbers(f"fn{k}") + links.numbers(f"fs{k}") for k in plane])
+    normal, shear = _yade_forces(links, plane)
     return _packing(
-        *(grains, plane, links, i, j, force, friction(mu), _cell(box, tilt), most_grains, "yade")
+        *(grains, plane, links, i, j, normal + shear, friction(mu), cell),
+        *(on_walls, walls, reverse, most_grains, "yade"),
     )
+
+
+def _yade_forces(links: Table, plane: str) -> tuple[Floats, Floats]:
+    """Normal and shear forces (k, 2) on the second body of each interaction."""
+    normal, shear = (
+        np.column_stack([links.numbers(f"f{kind}{axis}") for axis in plane]) for kind in "ns"
+    )
+    return normal, shear
 
 
 def read_mercury(
@@ -82,44 +144,134 @@ def read_mercury(
     fstat: Source,
     mu: Any,
     *,
-    step: int | None = None,
+    frame: int | None = None,
     box: npt.ArrayLike | None = None,
     tilt: float = 0.0,
+    walls: bool = False,
+    reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from MercuryDPM's .data and .fstat (paths or open files).
 
-    step: number of the time step in the files, from 0; by default the last. box, tilt: as
-    for `read_yade`. Raises InputError naming file and line.
+    frame: number of the time step in the files, from 0; by default the last that is whole in both.
+    Other options as for `read_yade`. Raises InputError naming file and line.
     """
-    cell = _cell(box, tilt)
-    grains, time = _mercury_particles(data, step)
-    links = _mercury_contacts(fstat, time)
+    found = open_mercury(
+        *(data, fstat, mu),
+        box=box,
+        tilt=tilt,
+        walls=walls,
+        reverse=reverse,
+        most_grains=most_grains,
+    )
+    return found.snapshot(frame).packing
+
+
+def open_mercury(
+    data: Source,
+    fstat: Source,
+    mu: Any,
+    *,
+    box: npt.ArrayLike | None = None,
+    tilt: float = 0.0,
+    walls: bool = False,
+    reverse: bool = False,
+    most_grains: int | None = None,
+) -> Snapshots:
+    """The Snapshots in both files, by number; options as for `read_mercury`."""
+    mu, cell = friction(mu), _cell(box, tilt)
+    steps, lost = _mercury_steps(data)
+    contacts, times, cut = _mercury_contacts(fstat)
+    there = np.unique(times)
+    nearest = np.array([there[np.argmin(np.abs(there - step.time))] for step in steps])
+    own = np.array([step.time for step in steps])
+    both = np.abs(nearest - own) <= 1e-4 * np.maximum(np.abs(nearest), np.abs(own))
+    numbers = np.flatnonzero(both).tolist()
+    if not numbers:
+        raise InputError(
+            f"{contacts.name}: no contacts at time {own[-1]:g}; "
+            f"they are of {times.min():g} … {times.max():g}"
+        )
+    if cut and len(numbers) > 1 and nearest[numbers[-1]] == times[-1]:
+        lost = lost or f"time step {numbers[-1]} is cut off in {contacts.name}"
+        numbers = numbers[:-1]
+
+    def read(number: int) -> Snapshot:
+        links = contacts.some(np.flatnonzero(times == nearest[number]))
+        arguments = mu, cell, walls, reverse, most_grains
+        packing = _mercury_packing(steps[number], links, *arguments)
+        info = packing.info | {"time": float(own[number])}
+        return Snapshot(packing._replace(info=info), list(range(len(packing.r))))
+
+    return Snapshots("time step", numbers, read, lost)
+
+
+class _Step(NamedTuple):
+    """The particles of one time step."""
+
+    name: str
+    time: float
+    domain: int  # fields of the line before
+    rows: list[tuple[int, list[str]]]  # line numbers and fields
+
+    def table(self) -> Table:
+        """A Table of the particles."""
+        header = _DATA.get((len(self.rows[0][1]), self.domain))
+        if header is None:
+            number, fields = self.rows[0]
+            raise InputError(
+                f"{self.name}, line {number}: {len(fields)} fields of a particle; 8 or 14 are read"
+            )
+        return make_table(self.name, header, [f for _, f in self.rows], [k for k, _ in self.rows])
+
+
+def _mercury_packing(
+    step: _Step,
+    links: Table,
+    mu: float,
+    cell: Cell,
+    walls: bool,
+    reverse: bool,
+    most_grains: int | None,
+) -> Packing:
+    grains = step.table()
     plane = _plane(grains, 3 if "z" in grains.header else 2)
-    first, second = links.numbers("i"), links.numbers("j")
-    inner = np.flatnonzero((first >= 0) & (second >= 0))
-    if not len(inner):
-        raise InputError(f"{links.name}: no contact between two particles at time {time:g}")
-    links = links.some(inner)
     ids = {row: row for row in range(len(grains.rows))}
-    i, j = links.lookup("i", ids), links.lookup("j", ids)
     x = np.column_stack([grains.numbers(axis) for axis in plane])
+    first, second = links.numbers("i"), links.numbers("j")
+    at_wall = np.flatnonzero((first >= 0) & (second < 0))
+    on_walls = None
+    if len(at_wall):
+        there = links.some(at_wall)
+        grain = there.lookup("i", ids)
+        point = np.column_stack([there.numbers(axis) for axis in plane])
+        out = cell.nearest(point - x[grain])
+        normal, force = _mercury_forces(there, plane)
+        names, number = np.unique(there.fields("j"), return_inverse=True)
+        # The force is on the grain where n points to it, away from the wall.
+        sign = np.where(np.sum(normal * out, axis=1) < 0, -1.0, 1.0)[:, None]
+        on_walls = _OnWalls(grain, number, sign * normal, sign * force, names.tolist())
+    links = links.some(np.flatnonzero((first >= 0) & (second >= 0)))
+    if not links.rows:
+        raise InputError(f"{links.name}: no contact between two particles at time {step.time:g}")
+    i, j = links.lookup("i", ids), links.lookup("j", ids)
+    normal, force = _mercury_forces(links, plane)
+    # That of the grain that n points to.
+    to_first = np.sum(normal * cell.nearest(x[j] - x[i]), axis=1) < 0
+    force[to_first] *= -1
+    return _packing(
+        *(grains, plane, links, i, j, force, mu, cell, on_walls, walls, reverse, most_grains),
+        "mercury",
+    )
+
+
+def _mercury_forces(links: Table, plane: str) -> tuple[Floats, Floats]:
+    """The unit vectors n (k, 2), and the forces along n and t."""
     normal, tangent = (
         np.column_stack([links.numbers(f"{kind}{axis}") for axis in plane]) for kind in "nt"
     )
     force = links.numbers("fn")[:, None] * normal + links.numbers("ft")[:, None] * tangent
-    # That of the grain that n points to.
-    to_first = np.sum(normal * cell.nearest(x[j] - x[i]), axis=1) < 0
-    force[to_first] *= -1
-    once, keep = set(), []
-    for k, pair in enumerate(zip(i.tolist(), j.tolist(), strict=True)):
-        if tuple(sorted(pair)) not in once:
-            once.add(tuple(sorted(pair)))
-            keep.append(k)
-    return _packing(
-        *(grains, plane, links.some(keep), i[keep], j[keep], force[keep]),
-        *(friction(mu), cell, most_grains, "mercury"),
-    )
+    return normal, force
 
 
 def _packing(
@@ -131,10 +283,13 @@ def _packing(
     force: Floats,
     mu: float,
     cell: Cell,
+    on_walls: _OnWalls | None,
+    walls: bool,
+    reverse: bool,
     most_grains: int | None,
     source: str,
 ) -> Packing:
-    """The packing of disks and of the forces (N_c, 2) on j."""
+    """The packing of disks and of the forces (k, 2) on j, and of walls or what they do."""
     check_grains(len(grains.rows), most_grains, grains.name)
     x = cell.wrapped(np.column_stack([grains.numbers(axis) for axis in plane]))
     r = grains.numbers("r")
@@ -142,12 +297,61 @@ def _packing(
     carrying = np.flatnonzero(force.any(axis=1))
     if not len(carrying):
         raise InputError(f"{links.name}: no contact carries force; is the packing compressed?")
+    skipped = len(force) - len(carrying)
+    on_j = force[carrying]
+    left = once(i[carrying], j[carrying], on_j, LOAD_MISFIT, lambda c: links.place(carrying[c]))
+    on_j, carrying = on_j[left], carrying[left]
     joined = listed(x, r, cell, i[carrying], j[carrying], lambda c: links.place(carrying[c]))
-    forces = components(force[carrying], joined.normal)
-    info = {"source": source, "contacts_skipped": len(force) - len(carrying)}
-    return adopt(
-        make_packing(x, r, cell.box, joined, forces, mu, info=info, tilt=cell.tilt), forces="given"
+    forces = components(on_j, joined.normal)
+    told: dict[str, Any] = {"forces": "given", "contacts_skipped": skipped}
+    if walls and on_walls is None:
+        raise InputError(f"{links.name}: no contact with a wall; leave out walls (--walls)")
+    if on_walls is not None:
+        told["notes"] = [_note_of(on_walls, walls, cell)]
+    if walls and on_walls is not None:
+        x, r, of_walls, forces_on_walls = _as_grains(on_walls, x, r)
+        joined, forces = joined.joined(of_walls), np.concatenate([forces, forces_on_walls])
+        told["walls"] = len(on_walls.names)
+    packing = make_packing(
+        x, r, cell.box, joined, forces, mu, info={"source": source}, tilt=cell.tilt
     )
+    return adopt(packing, reverse=reverse, **told)
+
+
+def _note_of(on_walls: _OnWalls, walls: bool, cell: Cell) -> str:
+    """What became of contacts with walls; InputError for walls in a periodic box."""
+    count, names = len(on_walls.grain), some_of(on_walls.names)
+    if not np.isinf(cell.box).any():
+        if walls:
+            raise InputError("a box that is periodic in both directions has no walls")
+        return f"{count} contacts with walls ({names}) are left out: the box is periodic"
+    if walls:
+        return f"{count} contacts with walls ({names}) are contacts of the packing"
+    return (
+        f"{count} contacts with walls ({names}) count as loads on the grains; --walls (walls=True) "
+        "makes them contacts"
+    )
+
+
+def _as_grains(on_walls: _OnWalls, x: Floats, r: Floats) -> tuple[Floats, Floats, Contacts, Floats]:
+    """Centres and radii of grains and walls, the contacts of walls, and their forces (w, 2).
+
+    A wall lies behind the places where it is touched; forces on it have no lever arm, so that its
+    torque does not count.
+    """
+    # Walls along the plane carry nothing in it.
+    pressed = np.flatnonzero(on_walls.normal.any(axis=1) & on_walls.force.any(axis=1))
+    grain, normal = on_walls.grain[pressed], on_walls.normal[pressed]
+    seen, wall = np.unique(on_walls.wall[pressed], return_inverse=True)
+    radius = r.mean()
+    behind = x[grain] + (r[grain] + 2 * radius)[:, None] * normal
+    places = np.zeros((len(seen), 2))
+    np.add.at(places, wall, behind / np.bincount(wall)[wall][:, None])
+    radii = np.concatenate([r, np.full(len(seen), radius)])
+    contacts = make_contacts(grain, len(r) + wall, normal, r[grain] + radius, radii)
+    contacts = contacts._replace(arm_i=r[grain], arm_j=np.zeros(len(grain)))
+    forces = components(on_walls.force[pressed], normal)
+    return np.concatenate([x, places]), radii, contacts, forces
 
 
 def _cell(box: npt.ArrayLike | None, tilt: float) -> Cell:
@@ -182,12 +386,19 @@ def _split(source: Source) -> tuple[str, list[tuple[int, list[str]]], list[str]]
     return name, rows, comments
 
 
-def _lines_of(source: Source, header: Sequence[str]) -> Table:
-    """A Table of lines with these columns, a first line with names left out."""
-    name, rows, _ = _split(source)
-    if not rows[0][1][0].lstrip("+-").replace(".", "").isdigit():
+def _yade_links(source: Source, named: bool) -> Table:
+    """A Table of interactions, under the names in the file if these are right, or to be."""
+    name, rows, comments = _split(source)
+    words = [word.lower() for word in rows[0][1]]
+    if words[0].lstrip("+-").replace(".", "").isdigit():
+        words = comments[-1].split() if comments else []
+    else:
         rows = rows[1:]
-    return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
+    if not rows:
+        raise InputError(f"{name}: no line with numbers")
+    if len(words) != len(rows[0][1]) or not (named or set(_INTERACTION) <= set(words)):
+        words = list(_INTERACTION)
+    return make_table(name, words, [fields for _, fields in rows], [k for k, _ in rows])
 
 
 def _yade_bodies(source: Source) -> Table:
@@ -203,45 +414,43 @@ def _yade_bodies(source: Source) -> Table:
     return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
 
 
-def _mercury_particles(source: Source, step: int | None) -> tuple[Table, float]:
-    """A Table of the particles of one step, and its time."""
+def _mercury_steps(source: Source) -> tuple[list[_Step], str]:
+    """The time steps that are whole, at least one, and which one is cut off, in words."""
     name, rows, _ = _split(source)
-    at, steps = 0, []
+    at = 0
+    steps: list[_Step] = []
     while at < len(rows):
         number, fields = rows[at]
+        lost = f"time step {len(steps)} is cut off in {name}"
+        if steps and at == len(rows) - 1:
+            return steps, lost
         if len(fields) not in (6, 8):
             raise InputError(
                 f"{name}, line {number}: N, time and the domain are wanted, and "
                 f"{len(fields)} fields are there; is it a .data of MercuryDPM?"
             )
         head = make_table(name, ("n", "time"), [fields[:2]], [number])
-        count = head.numbers("n")[0]
-        if not (count.is_integer() and 0 < count <= len(rows) - at - 1):
+        count, left = head.numbers("n")[0], rows[at + 1 :]
+        if not (count.is_integer() and 0 < count):
+            raise InputError(f"{name}, line {number}: {fields[0][:20]} particles are announced")
+        left = left[: int(count)]
+        ends = at + 1 + len(left) == len(rows)
+        if steps and ends and (len(left) < count or len(left[-1][1]) < len(left[0][1])):
+            return steps, lost
+        if len(left) < count:
             raise InputError(
                 f"{name}, line {number}: {fields[0][:20]} particles are announced, and "
-                f"{len(rows) - at - 1} lines follow; is the file cut off?"
+                f"{len(left)} lines follow; is the file cut off?"
             )
-        steps.append((head.numbers("time")[0], len(fields), rows[at + 1 : at + 1 + int(count)]))
+        steps.append(_Step(name, float(head.numbers("time")[0]), len(fields), left))
         at += 1 + int(count)
-    if step is not None and not 0 <= step < len(steps):
-        raise InputError(f"{name}: no step {step}; there are {len(steps)}, from 0")
-    time, domain, lines = steps[-1 if step is None else step]
-    header = _DATA.get((len(lines[0][1]), domain))
-    if header is None:
-        raise InputError(
-            f"{name}, line {lines[0][0]}: {len(lines[0][1])} fields of a particle; 8 or 14 are read"
-        )
-    return make_table(name, header, [f for _, f in lines], [k for k, _ in lines]), time
+    return steps, ""
 
 
-def _mercury_contacts(source: Source, time: float) -> Table:
-    """A Table of the contacts at a time, as nearly as files with few digits have it."""
+def _mercury_contacts(source: Source) -> tuple[Table, Floats, bool]:
+    """A Table of the contacts, their times, and whether the last line is cut off."""
     name, rows, _ = _split(source)
+    cut = len(rows) > 1 and len(rows[-1][1]) < len(_FSTAT)
+    rows = rows[:-1] if cut else rows
     table = make_table(name, _FSTAT, [fields for _, fields in rows], [k for k, _ in rows])
-    times = table.numbers("time")
-    nearest = times[np.argmin(np.abs(times - time))]
-    if abs(nearest - time) > 1e-4 * max(abs(time), abs(nearest)):
-        raise InputError(
-            f"{name}: no contacts at time {time:g}; they are of {times.min():g} … {times.max():g}"
-        )
-    return table.some(np.flatnonzero(times == nearest))
+    return table, table.numbers("time"), cut

@@ -12,6 +12,7 @@ from granforce.records import (
     Floats,
     InputError,
     Integers,
+    Mask,
     make_contacts,
     make_packing,
     positive,
@@ -31,6 +32,9 @@ EXTENT = 1e7
 # Pairs within one largest diameter that may be looked at for overlaps: above, grains lie on top
 # of each other (or sizes differ too much), and the list of pairs would not fit into memory.
 CLOSE_PAIRS = 20_000_000
+
+# Contacts a grain needs at least to be judged by its balance.
+_ENOUGH = 3
 
 # No direction is periodic.
 OPEN = Cell(np.full(2, np.inf), 0.0)
@@ -77,6 +81,28 @@ def listed(
     contacts = make_contacts(i, j, branch / length[:, None], length, r)
     check_contacts(contacts, r, place)
     return contacts
+
+
+def once(
+    i: Integers, j: Integers, force: Floats, allowed: float, place: Callable[[int], str]
+) -> Integers:
+    """Rows that are left where pairs that are listed twice, either way around, count once.
+
+    force (k, 2): on j. Raises InputError where both rows of a pair differ by more than `allowed`,
+    a part of the mean force.
+    """
+    low, high = np.minimum(i, j), np.maximum(i, j)
+    order = np.lexsort((high, low))
+    again = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
+    first, second = order[again], order[again + 1]
+    on_high = np.where((i > j)[:, None], -force, force)
+    off = np.hypot(*(on_high[first] - on_high[second]).T)
+    for c in np.flatnonzero(off > allowed * np.hypot(*force.T).mean())[:1]:
+        raise InputError(
+            f"{place(second[c])}: {_pair(i, j, second[c])} were given before "
+            f"({place(first[c])}) with another force; give each contact once, or twice alike"
+        )
+    return np.delete(np.arange(len(i)), second)
 
 
 def check_contacts(
@@ -161,3 +187,23 @@ def vectors(forces: Floats, normal: Floats) -> Floats:
     """The forces f_n n + f_t t (…, k, 2) of components (…, k, 2) along normals (k, 2)."""
     across = np.column_stack([-normal[:, 1], normal[:, 0]])
     return forces[..., :1] * normal + forces[..., 1:] * across
+
+
+def gain_by_reversing(
+    contacts: tuple[Integers, Integers, Floats], forces: Floats, load: Floats, inner: Mask
+) -> float:
+    """By what part the unbalance of inner grains falls if all f_t change sign; below 0: it grows.
+
+    Programs differ in the sign of f_t. contacts: i, j (k,) and the normals (k, 2); forces (k, 2),
+    load (N, 2); inner (N,): grains that count, of which those with _ENOUGH contacts do.
+    """
+    i, j, normal = contacts
+    inner = inner & (np.bincount(np.concatenate([i, j]), minlength=len(load)) >= _ENOUGH)
+    off = []
+    for sign in (1, -1):
+        force = vectors(forces * [1, sign], normal)
+        total = load.copy()
+        np.add.at(total, j, force)
+        np.add.at(total, i, -force)
+        off.append(np.hypot(*total[inner].T).sum())
+    return float(1 - off[1] / off[0]) if off[0] > 0 else 0.0

@@ -1,18 +1,21 @@
 """Packings from LAMMPS: ``dump custom`` of the particles, ``dump local`` of the contacts."""
 
-from collections.abc import Callable, Mapping, Sequence
+import itertools
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.packing.importers.geometry import MISFIT, check_disks, components, listed
-from granforce.packing.importers.network import adopt
+from granforce.packing.importers.geometry import MISFIT, check_disks, components, listed, once
+from granforce.packing.importers.network import LOAD_MISFIT, adopt
+from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.text import (
     Source,
     Table,
     check_grains,
     make_table,
     read_text,
+    renamed,
     some_of,
 )
 from granforce.records import (
@@ -28,6 +31,10 @@ from granforce.records import (
 
 # Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
 CONTACT_COLUMNS = ("atom1", "atom2", "distance", "fx", "fy", "px", "py")
+# Columns of positions, wrapped and unwrapped, and in parts of the box's sides (``dump atom``).
+SCALED = ("xs", "ys"), ("xsu", "ysu")
+AXES = ("x", "y"), ("xu", "yu"), *SCALED
+NAMES = ("id", *itertools.chain(*AXES), "radius", "diameter", *CONTACT_COLUMNS)
 
 # The normal force may point this far beside the line of centres, in the mean force of a contact:
 # more, and its columns are not what they are taken for.
@@ -42,69 +49,144 @@ class _Item(NamedTuple):
     body: list[list[str]]  # the lines below, as lists of words
 
 
+class _Box(NamedTuple):
+    low: Floats  # (2,) origin
+    vectors: Floats  # (2, 2) its sides, in rows, whether or not it is periodic along them
+    cell: Cell
+
+
+class Dump(NamedTuple):
+    """A dump, cut into its snapshots."""
+
+    name: str
+    lines: list[str]
+    at: dict[int, range]  # {timestep: its lines}, in the file's order; of equal ones, the last
+
+    def items(self, step: int) -> dict[str, _Item]:
+        """The parts of a snapshot by their titles."""
+        found: dict[str, _Item] = {}
+        item = None
+        for k in self.at[step]:
+            line = self.lines[k]
+            if line.startswith("ITEM:"):
+                title, rest = _title(line[5:].strip())
+                item = found[title] = _Item(k + 1, rest, [])
+            elif item is not None and line.strip():
+                item.body.append(line.split())
+        return found
+
+    def is_cut(self, step: int, title: str) -> bool:
+        """Whether a snapshot ends the file before all rows that it announces."""
+        if not self.at[step] or self.at[step].stop != len(self.lines):
+            return False
+        items = self.items(step)
+        number, item = items.get("NUMBER OF"), items.get(title)
+        if not (number and number.body and item):
+            return True
+        count = number.body[0][0]
+        rows = item.body
+        return count.isdecimal() and (
+            len(rows) < int(count) or (bool(rows) and len(rows[-1]) < len(item.words))
+        )
+
+
 def read_lammps(
     particles: Source,
     contacts: Source,
     mu: Any,
     *,
-    columns: Sequence[str] | None = None,
+    frame: int | None = None,
+    columns: Mapping[str, str] | None = None,
+    reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from a particle dump and a contact dump (paths or open files), in LAMMPS' units.
 
-    particles: ``dump custom`` with id, x y (or xu yu) and radius (or diameter), in any order.
-    contacts: ``dump local`` with the two grains, their distance, normal and tangential force on
-    the first: columns named atom1 atom2 distance fx fy px py, or seven in this order, or those
-    that ``columns`` names in this order. Pairs without force are neighbours, not contacts.
+    particles: ``dump custom`` with id, x y (or xu yu, xs ys, xsu ysu) and radius (or diameter), in
+    any order. contacts: ``dump local`` with the two grains, their distance, normal and tangential
+    force on the first: columns named atom1 atom2 distance fx fy px py, or seven in this order,
+    beside an index. columns: {name here: name in the dumps} of columns that are called otherwise.
+    Pairs without force are neighbours, not contacts; pairs that are listed from both sides (newton
+    off) count once.
 
-    The last timestep in both files is read; grains are sorted by id. The box may be tilted in the
-    plane (xy). Directions that are not periodic are open, what grains lack to balance is their load
-    there. packing.info holds timestep, residual and violation (in ⟨f_n⟩), rattlers and
-    contacts_skipped. most_grains: how many are taken.
+    frame: the timestep, by default the last that is whole in both files. reverse: take tangential
+    forces with the other sign. Grains are sorted by id. The box may be tilted in the plane (xy).
+    Directions that are not periodic are open, what grains lack to balance is their load there.
+    packing.info holds timestep, residual and violation (in ⟨f_n⟩), rattlers, contacts_skipped and
+    notes. most_grains: how many are taken.
 
     Raises InputError naming file and line.
     """
+    found = open_lammps(
+        particles, contacts, mu, columns=columns, reverse=reverse, most_grains=most_grains
+    )
+    return found.snapshot(frame).packing
+
+
+def open_lammps(
+    particles: Source,
+    contacts: Source,
+    mu: Any,
+    *,
+    columns: Mapping[str, str] | None = None,
+    reverse: bool = False,
+    most_grains: int | None = None,
+) -> Snapshots:
+    """The Snapshots in both dumps, by timestep; options as for `read_lammps`."""
     mu = friction(mu)
-    first, second = snapshots(particles), snapshots(contacts)
-    steps = [step for step in first[1] if step in second[1]]
+    first, second = read_dump(particles), read_dump(contacts)
+    steps = [step for step in first.at if step in second.at]
     if not steps:
         raise InputError(
-            f"{first[0]} and {second[0]} have no timestep in common; dump both at the same step"
+            f"{first.name} and {second.name} have no timestep in common; dump both at the same step"
         )
-    step = steps[-1]
-    atoms = _table(first[0], first[1][step], "ATOMS")
-    check_grains(len(atoms.rows), most_grains, first[0])
-    pairs = _table(second[0], second[1][step], "ENTRIES")
-    low, cell = cell_of(first[0], first[1][step])
-    x, r, index = _disks(atoms, low, cell)
-    joined, forces, skipped = _contacts(pairs, columns, x, r, cell, index)
-    info = {"source": "lammps"}
-    packing = make_packing(x, r, cell.box, joined, forces, mu, info=info, tilt=cell.tilt)
-    return adopt(packing, timestep=step, contacts_skipped=skipped)
+    cut = [
+        dump.name
+        for dump, title in ((first, "ATOMS"), (second, "ENTRIES"))
+        if len(steps) > 1 and dump.is_cut(steps[-1], title)
+    ]
+
+    def read(step: int) -> Snapshot:
+        items = first.items(step)
+        atoms = _table(first.name, items, "ATOMS")
+        pairs = _table(second.name, second.items(step), "ENTRIES")
+        atoms, pairs = renamed(columns or {}, NAMES, atoms, pairs)
+        check_grains(len(atoms.rows), most_grains, first.name)
+        box = box_of(first.name, items)
+        x, r, index = _disks(atoms, box)
+        pairs = _with_names(pairs, bool(set(columns or {}) & set(CONTACT_COLUMNS)))
+        joined, forces, skipped = _contacts(pairs, x, r, box.cell, index)
+        packing = make_packing(
+            *(x, r, box.cell.box, joined, forces, mu),
+            info={"source": "lammps"},
+            tilt=box.cell.tilt,
+        )
+        told = {"timestep": step, "contacts_skipped": skipped}
+        return Snapshot(adopt(packing, reverse=reverse, **told), list(index))
+
+    whole = steps[:-1] if cut else steps
+    lost = f"timestep {steps[-1]} is cut off in {' and '.join(cut)}" if cut else ""
+    return Snapshots("timestep", whole, read, lost)
 
 
-def snapshots(source: Source) -> tuple[str, dict[int, dict[str, _Item]]]:
-    """Name of the file and its snapshots: {timestep: {title: _Item}}, in the file's order."""
+def read_dump(source: Source) -> Dump:
+    """The Dump in a file; InputError for what is none."""
     name, text = read_text(source)
-    snapshots: dict[int, dict[str, _Item]] = {}
-    items: dict[str, _Item] = {}
-    item = None
-    for number, line in enumerate(text.splitlines(), start=1):
-        words = line.split()
-        if line.startswith("ITEM:"):
-            title, rest = _title(line[5:].strip())
-            if title == "TIMESTEP":
-                items = {}
-            item = items[title] = _Item(number, rest, [])
-        elif item is None:
-            raise InputError(f"{name}, line {number}: no 'ITEM: TIMESTEP'; is it a LAMMPS dump?")
-        elif words:
-            item.body.append(words)
-            if item is items.get("TIMESTEP"):
-                step = _whole(words[0], name, number)
-                snapshots.pop(step, None)
-                snapshots[step] = items
-    return name, snapshots
+    lines = text.splitlines()
+    first = next(k for k, line in enumerate(lines) if line.strip())
+    starts = [k for k, line in enumerate(lines) if line.startswith("ITEM: TIMESTEP")]
+    if not lines[first].startswith("ITEM:") or not starts:
+        raise InputError(f"{name}, line {first + 1}: no 'ITEM: TIMESTEP'; is it a LAMMPS dump?")
+    at: dict[int, range] = {}
+    for start, end in itertools.pairwise([*starts, len(lines)]):
+        number = next((k for k in range(start + 1, end) if lines[k].strip()), None)
+        if number is None and at and end == len(lines):
+            break  # cut off before its number
+        line = start if number is None else number
+        step = _whole("" if number is None else lines[line].split()[0], name, line + 1)
+        at.pop(step, None)
+        at[step] = range(start, end)
+    return Dump(name, lines, at)
 
 
 def _title(heading: str) -> tuple[str, list[str]]:
@@ -140,8 +222,8 @@ def _table(name: str, items: dict[str, _Item], title: str) -> Table:
     return make_table(name, item.words, item.body, lines)
 
 
-def cell_of(name: str, items: dict[str, _Item]) -> tuple[Floats, Cell]:
-    """Origin (2,) and Cell of the box, open along directions that are not periodic.
+def box_of(name: str, items: dict[str, _Item]) -> _Box:
+    """The box, whose cell is open along directions that are not periodic.
 
     Bounds of a tilted box (title ``xy xz yz``, tilts in a third column) are those of the rectangle
     around it: x_lo + min(0, xy), x_hi + max(0, xy) (docs.lammps.org, Howto triclinic).
@@ -171,68 +253,72 @@ def cell_of(name: str, items: dict[str, _Item]) -> tuple[Floats, Cell]:
         raise InputError(f"{bounds.place(k)}: the upper bound of the box is not above the lower")
     # Dumps of old versions have no flags, and were periodic by default.
     is_open = np.array([flag != "pp" for flag in [*flags, "pp", "pp"][:2]])
+    (width, height), lean = high - low, tilt[0]
     try:
-        return low, make_cell(np.where(is_open, np.inf, high - low), tilt[0])
+        cell = make_cell(np.where(is_open, np.inf, high - low), lean)
+        return _Box(low, np.array([[width, 0.0], [lean, height]]), cell)
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
 
 
-def _disks(table: Table, low: Floats, cell: Cell) -> tuple[Floats, Floats, dict[int | str, int]]:
+def _disks(table: Table, box: _Box) -> tuple[Floats, Floats, dict[int | str, int]]:
+    """Centres and radii in the order of ids, and the row {id: row} of each, in this order."""
     ids = table.numbers("id")
     order = np.argsort(ids, kind="stable")
-    rank = np.argsort(order)
-    index = {label: int(rank[row]) for label, row in table.index("id").items()}
-    axes = ("xu", "yu") if "x" not in table.header and "xu" in table.header else ("x", "y")
-    x = np.column_stack([table.numbers(axis) for axis in axes]) - low
+    labels = list(table.index("id"))
+    index = {labels[row]: k for k, row in enumerate(order.tolist())}
+    axes = next((pair for pair in AXES if set(pair) <= set(table.header)), AXES[0])
+    x = np.column_stack([table.numbers(axis) for axis in axes])
+    x = x @ box.vectors if axes in SCALED else x - box.low
     if "radius" not in table.header and "diameter" in table.header:
         r = table.numbers("diameter") / 2
     else:
         r = table.numbers("radius")
-    x, r = cell.wrapped(x[order]), r[order]
-    check_disks(x, r, cell, lambda g: table.place(order[g]))
+    x, r = box.cell.wrapped(x[order]), r[order]
+    check_disks(x, r, box.cell, lambda g: table.place(order[g]))
     return x, r, index
 
 
 def _contacts(
-    table: Table,
-    columns: Sequence[str] | None,
-    x: Floats,
-    r: Floats,
-    cell: Cell,
-    index: Mapping[Any, int],
+    table: Table, x: Floats, r: Floats, cell: Cell, index: Mapping[Any, int]
 ) -> tuple[Contacts, Floats, int]:
     """Contacts that carry force, their forces (N_c, 2), and how many pairs carry none."""
-    names = _force_columns(table, columns)
-    i, j = (table.lookup(names[k], index) for k in ("atom1", "atom2"))
-    distance = table.numbers(names["distance"])
+    i, j = (table.lookup(column, index) for column in ("atom1", "atom2"))
+    distance = table.numbers("distance")
     normal_force, tangential_force = (
-        np.column_stack([table.numbers(names[k]) for k in pair])
+        np.column_stack([table.numbers(column) for column in pair])
         for pair in (("fx", "fy"), ("px", "py"))
     )
     active = np.flatnonzero(normal_force.any(axis=1) | tangential_force.any(axis=1))
     if not len(active):
         raise InputError(f"{table.name}: no contact carries force; is the packing compressed?")
+    # Forces are on atom1 = i; ours are on j.
+    on_j = -(normal_force + tangential_force)[active]
+    left = once(i[active], j[active], on_j, LOAD_MISFIT, lambda c: table.place(active[c]))
+    skipped, active = len(i) - len(active), active[left]
 
     def place(c: int) -> str:
         return table.place(active[c])
 
     joined = listed(x, r, cell, i[active], j[active], place)
     _check_distances(joined.length, distance[active], r.max(), place)
-    # Forces are on atom1 = i; ours are on j.
     forces = _components(joined.normal, -normal_force[active], -tangential_force[active], place)
-    return joined, forces, len(i) - len(active)
+    return joined, forces, skipped
 
 
-def _force_columns(table: Table, columns: Sequence[str] | None) -> dict[str, str]:
-    if columns is None:
-        columns = CONTACT_COLUMNS if set(CONTACT_COLUMNS) <= set(table.header) else table.header
+def _with_names(table: Table, named: bool) -> Table:
+    """The table of contacts with CONTACT_COLUMNS in its header, if not by name then by order."""
+    if named or set(CONTACT_COLUMNS) <= set(table.header):
+        table.require(*CONTACT_COLUMNS)
+        return table
+    columns = [column for column in table.header if column != "index"]
     if len(columns) != len(CONTACT_COLUMNS):
         raise InputError(
             f"{table.name}: {len(columns)} columns ({some_of(columns)}); name, by columns=, "
             f"the seven that hold {', '.join(CONTACT_COLUMNS)}"
         )
-    table.require(*columns)
-    return dict(zip(CONTACT_COLUMNS, columns, strict=True))
+    ours = dict(zip(columns, CONTACT_COLUMNS, strict=True))
+    return table._replace(header=tuple(ours.get(column, column) for column in table.header))
 
 
 def _check_distances(

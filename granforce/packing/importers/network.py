@@ -8,25 +8,38 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
 from granforce.packing.closing import margin
-from granforce.packing.importers.geometry import overlapping
+from granforce.packing.importers.geometry import gain_by_reversing, overlapping
 from granforce.records import Floats, InputError, Integers, NotJammedError, Packing, UndecidedError
 from granforce.tolerances import CARRYING, RIGID_OVERLAP
 
 # The loads of an open set may miss balance by this part of ⟨f_n⟩ (digits lost in the file); the
 # difference is then taken off them, since S would be empty otherwise.
 LOAD_MISFIT = 1e-3
+# A note tells that f_t may have the other sign where that takes off this part of the unbalance.
+WORTH_REVERSING = 0.5
 
 
-def adopt(packing: Packing, **info: Any) -> Packing:
+def adopt(packing: Packing, *, reverse: bool = False, **info: Any) -> Packing:
     """The packing with the pressure (or, in an open box, the boundary loads) its forces carry.
 
     P = Σ f_n ℓ / (2V); a grain's load is what its contact forces leave over, unless loads were
-    given. Residual, violation and rattlers go to packing.info, beside the given entries.
+    given. reverse: the tangential forces change sign. Residual, violation and rattlers go to
+    packing.info, beside the given entries, and a note where the other sign balances better.
     Raises InputError where the forces do not press.
     """
+    if reverse:
+        packing = packing._replace(forces=packing.forces * [1, -1])
     normal = packing.forces[:, 0]
     if not np.any(normal > 0):
         raise InputError("no contact presses; check the sign of the normal forces")
+    c, load = packing.contacts, packing.load[:, :2]
+    inner = np.isfinite(load.sum(axis=1))
+    gain = gain_by_reversing((c.i, c.j, c.normal), packing.forces, np.nan_to_num(load), inner)
+    if gain > WORTH_REVERSING:
+        note = f"the unbalance of grains falls by {gain:.0%} if tangential forces change sign; " + (
+            "leave out reverse" if reverse else "--reverse (reverse=True) changes it"
+        )
+        info["notes"] = [*info.get("notes", []), note]
     if np.isfinite(packing.volume):
         virial = float(normal @ packing.contacts.length)
         if virial <= 0:

@@ -19,7 +19,7 @@ from granforce.forces.ensemble import ensemble
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
 from granforce.packing.importers import solved
-from granforce.packing.importers.geometry import OPEN, check_disks, vectors
+from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
 from granforce.packing.importers.listing import Frames, Listing, plain, read_frames
 from granforce.packing.importers.network import judged
 from granforce.packing.importers.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
@@ -44,8 +44,6 @@ _CHANGE = 0.2
 _BALANCED = 1e-6
 # Steps of interior points after which another method is tried: they take 10 to 40.
 _ITERATIONS = 500
-# Contacts a grain needs at least to be judged by its balance.
-_ENOUGH = 3
 # Findings of one kind that are listed in the report.
 _LISTED = 10
 
@@ -138,7 +136,11 @@ def read_pegs(
     with_wall = (rows == -1).any(axis=1)
     at_wall[rows[with_wall].max(axis=1)] = True
     listed = _listed(listing, rows)
-    saved = _gain_by_reversing(x, listed, at_wall)
+    branch = x[listed.pairs[:, 1]] - x[listed.pairs[:, 0]]
+    normal = branch / np.hypot(*branch.T)[:, None]
+    saved = gain_by_reversing(
+        (*listed.pairs.T, normal), np.nan_to_num(listed.forces), np.zeros_like(x), ~at_wall
+    )
     found = wall_contacts(listing, x, r, at_wall, walls, reach)
     if wall_forces and found is None:
         raise InputError("a force on a wall needs walls: give the outline, such as --walls box")
@@ -269,24 +271,6 @@ def _listed(listing: Listing, rows: Integers) -> _Listed:
         twice=int(np.sum(times > 1)),
         unequal=unequal,
     )
-
-
-def _gain_by_reversing(x: Floats, listed: _Listed, at_wall: Mask) -> float:
-    """By what part the unbalance of inner grains falls if all f_t change sign; below 0: it grows.
-
-    Programs that fit forces differ in the sign of f_t.
-    """
-    branch = x[listed.pairs[:, 1]] - x[listed.pairs[:, 0]]
-    normal = branch / np.hypot(*branch.T)[:, None]
-    inner = ~at_wall & (np.bincount(listed.pairs.ravel(), minlength=len(x)) >= _ENOUGH)
-    off = []
-    for sign in (1, -1):
-        force = vectors(np.nan_to_num(listed.forces) * [1, sign], normal)
-        total = np.zeros_like(x)
-        np.add.at(total, listed.pairs[:, 1], force)
-        np.add.at(total, listed.pairs[:, 0], -force)
-        off.append(np.hypot(*total[inner].T).sum())
-    return float(1 - off[1] / off[0]) if off[0] > 0 else 0.0
 
 
 def _candidates(x: Floats, r: Floats, listed: _Listed, left_open: Mask, reach: float) -> Integers:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from granforce.packing.importers.geometry import check_disks, listed, touching
 from granforce.packing.importers.network import adopt, find
-from granforce.packing.importers.text import Source, Table, check_grains, read_csv
+from granforce.packing.importers.text import Source, Table, check_grains, read_csv, renamed
 from granforce.records import (
     Cell,
     Contacts,
@@ -36,6 +36,7 @@ def read_table(
     tilt: float = 0.0,
     columns: Mapping[str, str] | None = None,
     forces: bool | None = None,
+    reverse: bool = False,
     pressure: float = 1.0,
     tolerance: float = TOUCHING,
     most_grains: int | None = None,
@@ -48,24 +49,25 @@ def read_table(
     tolerance (in largest radii) touch. box: (L_x, L_y), inf for an open direction; None: open.
     tilt: of the cell, whose upper side begins at (tilt, L_y). columns: {name here: name in the
     files} of columns that are called otherwise. forces: whether to take fn, ft, by default if they
-    are there; the pressure is then what they carry (in an open set: the loads). Otherwise the
-    network nearest to equal normal forces at the given pressure (or the given loads) is found;
-    pressure is not used with fn, ft. most_grains: how many are taken.
+    are there; the pressure is then what they carry (in an open set: the loads). reverse: ft has the
+    other sign. Otherwise the network nearest to equal normal forces at the given pressure (or the
+    given loads) is found; pressure is not used with fn, ft. most_grains: how many are taken.
 
     Raises InputError naming file and line, NotJammedError where no network exists.
     """
     mu, cell = friction(mu), make_cell((np.inf, np.inf) if box is None else box, tilt)
     pressure = positive(pressure, "pressure")
-    table = renamed(read_csv(grains), columns)
+    found = [read_csv(source) for source in (grains, contacts) if source is not None]
+    table, *pairs = renamed(columns or {}, NAMES, *found)
     check_grains(len(table.rows), most_grains, table.name)
     x, r = _disks(table, cell)
     load = _loads(table, cell)
-    if contacts is None:
+    if not pairs:
         if forces:
             raise InputError("forces need a table of contacts with columns i, j, fn, ft")
         joined, given = touching(x, r, cell, tolerance), None
     else:
-        joined, given = _joined(renamed(read_csv(contacts), columns), table, x, r, cell, forces, mu)
+        joined, given = _joined(pairs[0], table, x, r, cell, forces, mu)
     closed = bool(np.all(np.isfinite(cell.box)))
     zero = np.zeros((len(joined.i), 2))
     packing = make_packing(
@@ -81,29 +83,10 @@ def read_table(
         cell.tilt,
     )
     if given is None:
+        if reverse:
+            raise InputError("reverse is of tables with forces (fn, ft): leave it out")
         return find(packing, forces="found")
-    return adopt(packing, forces="given")
-
-
-def renamed(table: Table, columns: Mapping[str, str] | None) -> Table:
-    """The table with columns under the names that are used here; those that it lacks are none."""
-    for name, theirs in (columns or {}).items():
-        if name not in NAMES:
-            raise InputError(f"no column is called {name[:40]!r} here: {', '.join(NAMES)}")
-        if theirs.lower() in table.header and theirs.lower() != name:
-            # A column of that name that is not meant stands aside.
-            header = [f"other {one}" if one == name else one for one in table.header]
-            header[table.header.index(theirs.lower())] = name
-            table = table._replace(header=tuple(header))
-    return table
-
-
-def read_columns(text: str) -> dict[str, str]:
-    """{name here: name in the file} of 'x=…,y=…'; InputError for anything else."""
-    pairs = [part.split("=", 1) for part in text.split(",")]
-    if not all(len(pair) == 2 and pair[1].strip() for pair in pairs):
-        raise InputError(f"--columns {text[:40]!r}: give them as x=…,y=…,r=…")
-    return {name.strip(): theirs.strip() for name, theirs in pairs}
+    return adopt(packing, reverse=reverse, forces="given")
 
 
 def _disks(table: Table, cell: Cell) -> tuple[Floats, Floats]:

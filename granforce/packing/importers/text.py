@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import csv
+import gzip
+import io
 import math
 import os
+import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from importlib import import_module
 from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from granforce.records import Floats, InputError, Integers, are_whole
+from granforce.records import Floats, InputError, Integers, Mask, are_whole
 
 # Numbers beyond this size cannot be lengths or forces, and their squares would overflow.
 LARGEST = 1e100
+
+# Compressed text may unpack to this many times its size, and small files to so many bytes: dumps
+# have 3 to 20 times theirs, and what has far more is no dump.
+_RATIO, _SMALL = 100, 2**24
+# What compressed files begin with.
+_GZIP, _ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]  # a path, or an open file
 
@@ -90,6 +100,10 @@ class Table(NamedTuple):
                 )
         return rows
 
+    def among(self, column: str, index: Mapping[Any, int]) -> Mask:
+        """(rows,) whether the label in a column is one of the index."""
+        return np.array([_label(text) in index for text in self.fields(column)], dtype=bool)
+
     def lookup(self, column: str, index: Mapping[Any, int]) -> Integers:
         """Row numbers (rows,) int64 of the labels in a column; InputError for an unknown one."""
         found = np.empty(len(self.rows), dtype=np.int64)
@@ -130,6 +144,41 @@ def some_of(columns: Sequence[str]) -> str:
     return ", ".join([*names, *(["…"] if len(columns) > len(names) else [])])
 
 
+def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) -> list[Table]:
+    """The tables with columns under the names that are used here.
+
+    columns: {name here: name in the files}, in any case. Raises InputError for a name that is none
+    of `names`, or a column that no table has.
+    """
+    here = {theirs.lower(): name for name, theirs in columns.items()}
+    header = [one for table in tables for one in table.header]
+    for name, theirs in columns.items():
+        if name not in names:
+            raise InputError(f"no column is called {name[:40]!r} here: {', '.join(names)}")
+        if theirs.lower() not in map(str.lower, header):
+            raise InputError(f"no column {theirs[:40]!r}; the columns are {some_of(header)}")
+
+    def ours(column: str, header: Sequence[str]) -> str:
+        if column.lower() in here:
+            return here[column.lower()]
+        # A column of a name that is given to another stands aside.
+        taken = columns.get(column, "").lower() in map(str.lower, header)
+        return f"other {column}" if taken else column
+
+    return [
+        table._replace(header=tuple(ours(one, table.header) for one in table.header))
+        for table in tables
+    ]
+
+
+def read_columns(text: str) -> dict[str, str]:
+    """{name here: name in the file} of 'x=…,y=…'; InputError for anything else."""
+    pairs = [part.split("=", 1) for part in text.split(",")]
+    if not all(len(pair) == 2 and pair[1].strip() for pair in pairs):
+        raise InputError(f"--columns {text[:40]!r}: give them as x=…,y=…,r=…")
+    return {name.strip(): theirs.strip() for name, theirs in pairs}
+
+
 def check_grains(count: int, most: int | None, name: str) -> None:
     """InputError for a file of more grains than are taken (most; None: any number)."""
     if most is not None and count > most:
@@ -137,14 +186,19 @@ def check_grains(count: int, most: int | None, name: str) -> None:
 
 
 def read_text(source: Source) -> tuple[str, str]:
-    """Name and text (UTF-8) of a path or of an open text or bytes file; InputError otherwise."""
+    """Name and text (UTF-8) of a path or of an open text or bytes file; InputError otherwise.
+
+    Files compressed by gzip are unpacked, and those by Zstandard where Python has a module for it.
+    """
     if hasattr(source, "read"):
         name, content = str(getattr(source, "name", "the given file")), source.read()
     else:
         name, content = os.fspath(source), _bytes(source)
     name = os.path.basename(name) or name
     try:
-        text = content if isinstance(content, str) else bytes(content).decode("utf-8-sig")
+        if not isinstance(content, str):
+            content = _unpacked(name, bytes(content)).decode("utf-8-sig")
+        text = content
     except UnicodeDecodeError:
         raise InputError(f"{name}: not a text file; give plain text in UTF-8") from None
     if not text.strip():
@@ -183,6 +237,41 @@ def _bytes(path: str | os.PathLike[str]) -> bytes:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({reason}); check the path") from None
+
+
+def _unpacked(name: str, content: bytes) -> bytes:
+    """The content, decompressed; InputError for what is damaged or unpacks to far too much."""
+    if content.startswith(_GZIP):
+        module: Any = gzip
+    elif content.startswith(_ZSTD):
+        module = _zstd(name)
+    else:
+        return content
+    most = max(_SMALL, _RATIO * len(content))
+    try:
+        with module.open(io.BytesIO(content), "rb") as file:
+            unpacked = file.read(most + 1)
+    except (EOFError, OSError, zlib.error, getattr(module, "ZstdError", OSError)) as error:
+        raise InputError(
+            f"{name}: compressed, and cannot be unpacked ({error}); is it cut off?"
+        ) from None
+    if len(unpacked) > most:
+        raise InputError(
+            f"{name}: unpacks to more than {_RATIO} times its size; unpack it if that is right"
+        )
+    return unpacked
+
+
+def _zstd(name: str) -> Any:
+    """The module that unpacks Zstandard: Python's own from 3.14 on, or its backport."""
+    for module in ("compression.zstd", "backports.zstd"):
+        try:
+            return import_module(module)
+        except ImportError:
+            continue
+    raise InputError(
+        f"{name}: compressed by Zstandard; unpack it by zstd -d, or install backports.zstd"
+    )
 
 
 def _label(text: str) -> int | str:

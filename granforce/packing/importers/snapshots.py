@@ -1,0 +1,42 @@
+"""Snapshots of a simulation: which ones its files have, and the packing of one."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from granforce.records import InputError, Packing
+
+
+class Snapshot(NamedTuple):
+    """A packing, and the names of its grains in the files."""
+
+    packing: Packing
+    ids: list[int | str]  # (N,)
+
+
+class Snapshots(NamedTuple):
+    """The snapshots in the files of a simulation that are whole."""
+
+    word: str  # what their numbers are: timestep, …
+    numbers: Sequence[int]  # in the order of the files, at least one
+    read: Callable[[int], Snapshot]
+    lost: str = ""  # in words, what was cut off after the last of them
+
+    def snapshot(self, number: int | None = None) -> Snapshot:
+        """One Snapshot, by default the last; InputError for a number that is not there."""
+        if number is None:
+            last = self.numbers[-1]
+            note = f"{self.lost}; {self.word} {last} is read" if self.lost else None
+            found = self.read(last)
+            return found if note is None else noted(found, note)
+        if number not in self.numbers:
+            ends = sorted({self.numbers[0], self.numbers[-1]})
+            there = f"there is {' … '.join(map(str, ends))}" + (self.lost and f"; {self.lost}")
+            raise InputError(f"no {self.word} {number}: {there}")
+        return self.read(number)
+
+
+def noted(found: Snapshot, note: str) -> Snapshot:
+    """The snapshot with one more of its packing's notes."""
+    info = found.packing.info
+    notes = [*info.get("notes", []), note]
+    return found._replace(packing=found.packing._replace(info={**info, "notes": notes}))

@@ -1,0 +1,306 @@
+"""What simulations really write: many snapshots, files that are cut off, compressed, listed twice.
+
+The packing is a square lattice of three by three touching disks of radius ½ in a periodic box of
+side 3: with f_n = P on all 18 contacts its pressure is P.
+"""
+
+import gzip
+import io
+import itertools
+import sys
+
+import numpy as np
+import pytest
+from packing.test_importers import tables
+from packings import packed
+
+from granforce.cli.parser import main
+from granforce.forces.ensemble import ensemble
+from granforce.packing.importers import (
+    dem,
+    lammps,
+    load_packing,
+    read_lammps,
+    read_mercury,
+    read_table,
+    read_yade,
+    save_packing,
+    snapshots,
+)
+from granforce.records import InputError
+
+PLACES = [(x, y) for y in range(3) for x in range(3)]
+PAIRS = [
+    (3 * y + x, 3 * ((y + v) % 3) + (x + u) % 3, u, v)
+    for x, y in PLACES
+    for u, v in ((1, 0), (0, 1))
+]
+BOX = "ITEM: BOX BOUNDS pp pp pp\n0 3\n0 3\n-0.5 0.5\n"
+MU = 0.3
+
+
+def particles(step, columns="x y", scale=1.0, low=0.0):
+    rows = [f"{k + 1} 1 {low + (x + 0.5) * scale:.12g} {low + (y + 0.5) * scale:.12g} 0.5"
+            for k, (x, y) in enumerate(PLACES)]  # fmt: skip
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n9\n{BOX}"
+    return "\n".join([f"{head}ITEM: ATOMS id type {columns} radius", *rows, ""])
+
+
+def contacts(step, pressure, both=(), index=False, columns="atom1 atom2 distance fx fy px py"):
+    """Forces are on atom1; `both`: (pair, factor) of those listed from the other side, too."""
+    rows = [f"{i + 1} {j + 1} 1 {-u * pressure} {-v * pressure} 0 0" for i, j, u, v in PAIRS]
+    for k, factor in both:
+        i, j, u, v = PAIRS[k]
+        rows.append(f"{j + 1} {i + 1} 1 {u * pressure * factor} {v * pressure * factor} 0 0")
+    rows = [f"{k + 1} {row}" if index else row for k, row in enumerate(rows)]
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{BOX}"
+    columns = f"index {columns}" if index else columns
+    return "\n".join([f"{head}ITEM: ENTRIES {columns}", *rows, ""])
+
+
+def mercury_files(pressures):
+    data, fstat = [], []
+    for time, pressure in enumerate(pressures):
+        data.append(f"9 {time} 0 0 0 3 3 1")
+        data += [f"{x + 0.5} {y + 0.5} 0 0 0 0 0.5 0 0 0 0 0 0 0" for x, y in PLACES]
+        fstat += [
+            f"{time} {i} {j} 0 0 0 0 0 {pressure} 0 {-u} {-v} 0 {-v} {u} 0" for i, j, u, v in PAIRS
+        ]
+    return "\n".join(data) + "\n", "\n".join(fstat) + "\n"
+
+
+def given(*texts):
+    return [io.BytesIO(text if isinstance(text, bytes) else text.encode()) for text in texts]
+
+
+DUMPS = particles(100) + particles(200), contacts(100, 1.0) + contacts(200, 3.0)
+MERCURY = mercury_files([1.0, 3.0])
+READ = {
+    "lammps": (read_lammps, DUMPS, {}, (100, 200)),
+    "mercury": (read_mercury, MERCURY, {"box": (3, 3)}, (0, 1)),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_a_frame_is_chosen(name):
+    read, files, options, (first, last) = READ[name]
+    pressures = {first: 1.0, last: 3.0, None: 3.0}
+    for frame, pressure in pressures.items():
+        found = read(*given(*files), MU, frame=frame, **options)
+        assert found.pressure == pytest.approx(pressure) and found.info["residual"] < 1e-12
+        assert "notes" not in found.info
+    with pytest.raises(InputError, match=rf"no time ?step 7: there is {first} … {last}$"):
+        read(*given(*files), MU, frame=7, **options)
+
+
+# Of the last snapshot: its rows, its last row, all but its title, its number.
+CUTS = [
+    *(("lammps", 0, cut) for cut in ("\n9 1 2.5", " 2.5 0.5\n", "\nITEM: ATOMS", "\n200\n")),
+    *(("lammps", 1, cut) for cut in ("\n9 3 1", " 0 0\n", "\nITEM: NUMBER", "\n200\n")),
+    *(("mercury", 0, cut) for cut in ("\n2.5 2.5", " 0 0\n", "\n0.5 0.5", " 3 3 1\n")),
+    ("mercury", 1, " -1 0 0\n"),
+]
+
+
+@pytest.mark.parametrize("name, file, cut", CUTS)
+def test_the_last_whole_frame_is_read_where_a_file_is_cut_off(name, file, cut):
+    read, files, options, (first, last) = READ[name]
+    files = list(files)
+    files[file] = files[file][: files[file].rindex(cut)]
+    found = read(*given(*files), MU, **options)
+    assert found.pressure == pytest.approx(1.0)
+    lost = snapshots_of(name, files, options).lost
+    if "200" not in cut:  # else the dump ends without a word of it
+        assert "is cut off in the given file" in lost and found.info["notes"][0].startswith(lost)
+        with pytest.raises(
+            InputError, match=rf"no time ?step {last}: there is {first}; .* cut off"
+        ):
+            read(*given(*files), MU, frame=last, **options)
+
+
+def snapshots_of(name, files, options):
+    opened = {"lammps": lammps.open_lammps, "mercury": dem.open_mercury}[name]
+    found = opened(*given(*files), MU, **options)
+    assert isinstance(found, snapshots.Snapshots)
+    return found
+
+
+def test_a_single_frame_that_is_cut_off_is_refused():
+    text = particles(100)
+    with pytest.raises(InputError, match="8 rows where 9 are announced; is the file cut off"):
+        read_lammps(*given(text[: text.rindex("\n9 1")], contacts(100, 1.0)), MU)
+
+
+@pytest.mark.parametrize("columns", ["xs ys", "xsu ysu"])
+@pytest.mark.parametrize("low", [0.0, -2.0])
+def test_scaled_coordinates(columns, low):
+    bounds = BOX.replace("0 3\n0 3", f"{low} {low + 3}\n{low} {low + 3}")
+    dump = particles(1, columns, scale=1 / 3).replace(BOX, bounds)
+    found = read_lammps(*given(dump, contacts(1, 1.0)), MU)
+    np.testing.assert_allclose(found.x, np.array(PLACES) + 0.5, atol=1e-9)
+    assert found.pressure == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("index", [False, True])
+def test_pairs_that_are_listed_twice_count_once(index):
+    names = "c_1[1] c_1[2] c_2[1] c_2[2] c_2[3] c_2[4] c_2[5]"
+    once, twice = (
+        read_lammps(*given(particles(1), contacts(1, 1.0, both, index, names)), MU)
+        for both in ((), [(k, 1) for k in range(5)])
+    )
+    assert len(twice.contacts.i) == 18 and twice.pressure == once.pressure
+    np.testing.assert_array_equal(once.forces, twice.forces)
+    with pytest.raises(InputError, match=r"line 28: grains .* before .*line 13.* another force"):
+        read_lammps(*given(particles(1), contacts(1, 1.0, [(3, 2)])), MU)
+
+
+def test_columns_of_dumps_have_any_names():
+    text = contacts(1, 1.0, columns="a b c d e f g")
+    words = dict(
+        zip("abcdefg", ("atom1", "atom2", "distance", "fx", "fy", "px", "py"), strict=True)
+    )
+    columns = {name: theirs for theirs, name in words.items()} | {"radius": "c_r"}
+    grains = particles(1).replace("radius", "c_r")
+    assert read_lammps(*given(grains, text), MU, columns=columns).pressure == pytest.approx(1.0)
+    with pytest.raises(InputError, match="no column 'q'; the columns are"):
+        read_lammps(*given(grains, text), MU, columns=columns | {"fx": "q"})
+    with pytest.raises(InputError, match="no column is called 'speed' here"):
+        read_lammps(*given(grains, text), MU, columns=columns | {"speed": "a"})
+
+
+# Compressed
+
+
+def test_gzip_is_unpacked():
+    found = read_lammps(*given(*(gzip.compress(text.encode()) for text in DUMPS)), MU)
+    assert found.pressure == pytest.approx(3.0)
+
+
+def test_zstandard_is_unpacked_where_python_can(monkeypatch):
+    packed = [b"\x28\xb5\x2f\xfd" + b"0" * 50] * 2
+    for module in ("compression", "compression.zstd", "backports", "backports.zstd"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(InputError, match=r"zstd -d, or install backports\.zstd"):
+        read_lammps(*given(*packed), MU)
+    monkeypatch.undo()
+    zstd = pytest.importorskip("backports.zstd")
+    found = read_lammps(*given(*(zstd.compress(text.encode()) for text in DUMPS)), MU)
+    assert found.pressure == pytest.approx(3.0)
+    with pytest.raises(InputError, match="cannot be unpacked"):
+        read_lammps(*given(*packed), MU)
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[:-20], lambda b: b[:40] + b"#" * 9 + b[49:]])
+def test_damaged_gzip_is_refused(damage):
+    content = gzip.compress(DUMPS[0].encode())
+    with pytest.raises(InputError, match="cannot be unpacked"):
+        read_lammps(*given(damage(content), DUMPS[1]), MU)
+
+
+def test_what_unpacks_to_far_too_much_is_refused():
+    """No more is unpacked than the bound: 200 MB of blanks are 200 KB."""
+    bomb = gzip.compress(b" " * 200_000_000, 1)
+    with pytest.raises(InputError, match="unpacks to more than 100 times its size"):
+        read_lammps(*given(bomb, DUMPS[1]), MU)
+
+
+# Walls of YADE and MercuryDPM: four disks of diameter 1 in a box of side 2.
+
+BODIES = "#format x_y_z_r_attrs\n# x y z r id\n" + "".join(
+    f"{0.5 + x} {0.5 + y} 0 0.5 {4 + x + 2 * y}\n" for y, x in itertools.product((0, 1), (0, 1))
+)
+INNER = ["4 5 1 0 0 0 0 0", "6 7 1 0 0 0 0 0", "4 6 0 1 0 0 0 0", "5 7 0 1 0 0 0 0"]
+# Bodies 0 … 3 are the walls left, right, bottom and top, as the first or the second of a pair.
+OUTER = ["0 4 1 0 0 0 0 0", "0 6 1 0 0 0 0 0", "1 5 -1 0 0 0 0 0", "1 7 -1 0 0 0 0 0"]
+OUTER += ["4 2 0 -1 0 0 0 0", "5 2 0 -1 0 0 0 0", "3 6 0 -1 0 0 0 0", "7 3 0 1 0 0 0 0"]
+
+
+def boxed(lines, **options):
+    return read_yade(*given(BODIES, "\n".join(lines)), 0.5, **options)
+
+
+def test_contacts_with_walls_are_loads():
+    found, without = boxed(OUTER + INNER), boxed(INNER)
+    assert found.forces.tolist() == without.forces.tolist() == [[1, 0]] * 4
+    assert found.load.tolist() == [[1, 1, 0], [-1, 1, 0], [1, -1, 0], [-1, -1, 0]]
+    (note,) = found.info["notes"]
+    assert "8 contacts with walls (0, 1, 2, 3) count as loads" in note
+    assert "notes" not in without.info
+
+
+def test_walls_are_grains_where_asked(tmp_path):
+    """24 forces; 12 equations of disks and 8 of walls, two of which follow: h = 6."""
+    found = boxed(OUTER + INNER, walls=True)
+    assert len(found.r) == 8 and len(found.contacts.i) == 12 and found.info["walls"] == 4
+    assert np.allclose(found.forces, [[1, 0]] * 12)
+    # The force on each wall is its load, and disks have none.
+    assert np.allclose(found.load[:4], 0)
+    assert np.allclose(found.load[4:], [[2, 0, 0], [-2, 0, 0], [0, 2, 0], [0, -2, 0]])
+    assert found.info["residual"] < 1e-12 and ensemble(found).dimension == 6
+    assert found.x[4:].tolist() == [[-1, 1], [3, 1], [1, -1], [1, 3]]
+    save_packing(found, tmp_path / "p.npz")
+    assert ensemble(load_packing(tmp_path / "p.npz")).dimension == 6
+    with pytest.raises(InputError, match="no contact with a wall"):
+        boxed(INNER, walls=True)
+    with pytest.raises(InputError, match="periodic in both directions has no walls"):
+        boxed(OUTER + INNER, walls=True, box=(9, 9))
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_walls_of_mercury(turned):
+    """The same box, n and t of the force on the wall or on the grain."""
+    places = [(x, y) for y in (0, 1) for x in (0, 1)]
+    data = "4 0 0 0 0 2 2 1\n" + "".join(f"{x + 0.5} {y + 0.5} 0 0 0 0 0.5 0\n" for x, y in places)
+    rows = []
+    for k, (x, y) in enumerate(places):
+        for wall, (u, v) in ((-1 - x, (2 * x - 1, 0)), (-3 - y, (0, 2 * y - 1))):
+            point = f"{x + 0.5 + 0.5 * u} {y + 0.5 + 0.5 * v} 0"
+            n = f"{turned * u} {turned * v} 0"
+            rows.append(f"0 {k} {wall} {point} 0 0 1 0 {n} 0 0 0")
+    for i, j in ((0, 1), (2, 3), (0, 2), (1, 3)):
+        u, v = np.subtract(places[j], places[i])
+        rows.append(f"0 {i} {j} 0 0 0 0 0 1 0 {-u} {-v} 0 0 0 0")
+    found = read_mercury(*given(data, "\n".join(rows)), 0.5, walls=True)
+    assert np.allclose(found.forces, [[1, 0]] * 12) and ensemble(found).dimension == 6
+    assert np.allclose(found.load[4:], boxed(OUTER + INNER, walls=True).load[4:])
+
+
+def test_interactions_have_columns_of_any_name_and_order():
+    lines = ["# a b nx ny nz sx sy sz", *INNER]
+    names = ("id1", "id2", "fnx", "fny", "fnz", "fsx", "fsy", "fsz")
+    columns = dict(zip(names, "a b nx ny nz sx sy sz".split(), strict=True))
+    assert boxed(lines, columns=columns).forces.tolist() == [[1, 0]] * 4
+    swapped = ["fnx fny fnz fsx fsy fsz id1 id2"]
+    swapped += [" ".join(line.split()[2:] + line.split()[:2]) for line in INNER]
+    assert boxed(swapped).forces.tolist() == [[1, 0]] * 4
+
+
+# The sign of tangential forces
+
+
+def reversed_table():
+    """A packing whose tangential forces have the other sign, and its tables."""
+    packing = packed(30, MU)
+    packing = packing._replace(forces=packing.forces * [1, -1])
+    return packing, [file.getvalue() for file in tables(packing)]
+
+
+def test_the_other_sign_of_tangential_forces_is_noted_and_taken():
+    packing, files = reversed_table()
+    wrong = read_table(*given(*files), mu=MU, box=packing.box)
+    (note,) = wrong.info["notes"]
+    assert "falls by 100% if tangential forces change sign; --reverse" in note
+    right = read_table(*given(*files), mu=MU, box=packing.box, reverse=True)
+    assert "notes" not in right.info and right.info["residual"] < 1e-8 < wrong.info["residual"]
+    with pytest.raises(InputError, match="leave it out"):
+        read_table(*given(files[0]), mu=MU, box=packing.box, reverse=True)
+
+
+def test_notes_go_to_stderr(away, capsys):
+    (away / "b.txt").write_text(BODIES)
+    (away / "i.txt").write_text("\n".join(OUTER + INNER))
+    assert main(["import", "yade", "b.txt", "i.txt", "--mu", "0.5", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert err.startswith("granforce: 8 contacts with walls") and out.startswith("{")
+    assert main(["import", "yade", "b.txt", "i.txt", "--mu", "0.5", "--walls", "--json"]) == 0
+    assert '"walls": 4' in capsys.readouterr().out
