@@ -73,6 +73,12 @@ def required_mu(arguments: argparse.Namespace) -> float:
     return arguments.mu
 
 
+def store_of(arguments: argparse.Namespace) -> Store:
+    """The store of a command, by which it is known at the end whether all results were kept."""
+    arguments.store = open_store(arguments.cache)
+    return arguments.store
+
+
 def prepared(
     arguments: argparse.Namespace,
     kind: Kind,
@@ -92,7 +98,7 @@ def prepared(
         named = kinds.imported_parameters(packing)
     parameters = name(named)
     check_outputs(*outputs)
-    store = open_store(arguments.cache)
+    store = store_of(arguments)
     store.refuse_file(study.entry_name(store, kind, parameters))
     if packing is None:
         get_packing(store, named)

@@ -43,9 +43,9 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     for frame, message in failed:
         print(f"granforce: frame {frame.number:g}: {message}", file=sys.stderr)
     if dataset is not None:
+        print_list(_rows(dataset), tuple(_rows(dataset)[0]), arguments.json)
         if arguments.out is not None:
             series.save_series(dataset, arguments.out)
-        print_list(_rows(dataset), tuple(_rows(dataset)[0]), arguments.json)
     return 1 if failed else 0
 
 

@@ -12,13 +12,31 @@ from typing import NoReturn
 from granforce.cli import words
 from granforce.cli.options import EXAMPLE
 from granforce.cli.parsing import Input, Kept, Output, Parser, Workplace, refused
-from granforce.system import interrupts
+from granforce.system import interrupts, streams
 
 # Only the standard library in what this needs: --help must not wait for numba, xarray and HiGHS.
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; the exit code: 0, 1 (some cells failed), 2 (bad input) or 130 (Ctrl-C)."""
+    """Run one command; its exit code.
+
+    0; 1 where some cells failed, or a result could not be printed or kept; 2 for bad input; 130
+    after Ctrl-C.
+    """
+    with streams.guarded():
+        try:
+            try:
+                return _main(argv)
+            finally:
+                sys.stdout.flush()
+        except (streams.ReaderGone, BrokenPipeError):  # the latter of a file that is a pipe
+            return 0
+        except streams.OutputError as error:
+            print(f"granforce: cannot write to standard output: {error}", file=sys.stderr)
+            return 1
+
+
+def _main(argv: Sequence[str] | None) -> int:
     parser = make_parser()
     arguments = parser.parse_args(argv)
     usual = warnings.formatwarning
@@ -27,9 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _run(arguments, parser)
         except KeyboardInterrupt:
             return _told_interrupted()
-        except BrokenPipeError:
-            sys.stderr.close()  # the reader of our output (head, less) has gone; that is no error
-            return 0
+        except streams.OutputError:
+            raise
         except Exception:
             if interrupts.interrupted():  # what a library made of it
                 return _told_interrupted()
@@ -40,12 +57,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def command() -> NoReturn:
     """The process `granforce`: main, and at its end nobody waits for what was left behind."""
+    streams.prepare()
     code = main()
     cancelling = sys.modules.get("granforce.system.cancelling")
     if cancelling is not None and cancelling.left_behind():
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
+        os._exit(code)  # main has flushed what was printed
     sys.exit(code)
 
 
@@ -61,7 +77,9 @@ def _run(arguments: argparse.Namespace, parser: Parser) -> int:
         interrupts.check()  # an import may have swallowed it
         tell_when_compiling(_say_compiling)
         _check_paths(arguments, parser.chosen(arguments))
-        return getattr(commands, arguments.run)(arguments) or 0
+        code: int = getattr(commands, arguments.run)(arguments) or 0
+        store = getattr(arguments, "store", None)
+        return max(code, 1) if store is not None and store.incomplete else code
     except InputError as error:
         return refused(str(error))
     except MemoryError as error:

@@ -64,6 +64,8 @@ def get(
 ) -> tuple[xr.Dataset, bool]:
     """The dataset of a kind and parameters, and whether the store had it; if not, it is kept.
 
+    One that cannot be written, as the disk is full, is returned all the same, with a warning.
+
     workers: threads, which change nothing in the result. dtypes: as for Store.save, of states.
     options: as the kind's compute takes them beside; where they end it early, what is there is kept
     under the parameters that it has `reached`. Raises what compute raises.
@@ -91,8 +93,8 @@ def save(
     *,
     dtypes: Mapping[str, str] | None = None,
 ) -> str:
-    """Keep a dataset under its kind and parameters; returns the entry's name."""
-    return store.save(kind.name, parameters, dataset, version=kind.version, dtypes=dtypes)
+    """Keep a dataset under its kind and parameters, as Store.keep; returns the entry's name."""
+    return store.keep(kind.name, parameters, dataset, version=kind.version, dtypes=dtypes)
 
 
 def entry_name(store: Store, kind: Kind, parameters: Parameters) -> str:

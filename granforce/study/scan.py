@@ -253,8 +253,11 @@ def run_cell(path: str | Path, cell: Cell, dtypes: Mapping[str, str] | None = No
                 _counter.value += part - seen
             seen = part
 
-    _, cached = get(open_store(path), *cell, workers=1, dtypes=dtypes, progress=count)
+    store = open_store(path)
+    _, cached = get(store, *cell, workers=1, dtypes=dtypes, progress=count)
     count(1, 1)
+    if store.incomplete:
+        raise InputError("it was computed, but could not be written to the store")
     return cached
 
 

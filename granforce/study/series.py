@@ -39,7 +39,7 @@ from granforce.study.cells import Cell, Kind, get
 from granforce.study.keys import Parameters
 from granforce.study.scan import run
 from granforce.study.schema import labelled, packing_dataset, to_builtin
-from granforce.study.store import Store, open_store
+from granforce.study.store import Store, is_store, open_store
 from granforce.system.files import beside, expanded
 
 # Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
@@ -381,6 +381,8 @@ def check_folder(path: str | Path) -> Path:
     path = expanded(path)
     if path.exists() and not (path / "zarr.json").is_file():
         raise InputError(f"{path}: is there already and no Zarr folder; choose another")
+    if is_store(path):
+        raise InputError(f"{path}: is a store of results, which would be replaced; choose another")
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}")
     return path

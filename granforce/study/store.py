@@ -34,6 +34,10 @@ LOCATION_VARIABLE = "GRANFORCE_CACHE"  # environment variable naming the store's
 STALE_SECONDS = 3600.0  # a temporary untouched for this long has lost its writer
 
 
+class NotKeptError(InputError):
+    """A result could not be written to the store: its disk is full, say."""
+
+
 class Entry(NamedTuple):
     """What the store knows of one entry without reading its arrays."""
 
@@ -110,6 +114,11 @@ def _schema(path: Path) -> int | None:
     return version if isinstance(version, int) else None
 
 
+def is_store(path: Path) -> bool:
+    """Whether a folder is a store."""
+    return _schema(path) is not None
+
+
 def _refuse_newer(path: Path) -> None:
     """Raise InputError for a store of a newer schema: what it may hold is not known here."""
     schema = _schema(path)
@@ -160,6 +169,7 @@ class Store(Mapping[str, xr.Dataset]):
     def __init__(self, path: Path, *, readonly: bool = False) -> None:
         self.path = path
         self.readonly = readonly
+        self._unkept: dict[str, xr.Dataset] = {}  # by name, what could not be written
 
     def __repr__(self) -> str:
         return f"Store({str(self.path)!r}, readonly={self.readonly})"
@@ -205,7 +215,7 @@ class Store(Mapping[str, xr.Dataset]):
         dataset, reason = entries.checked(self.path / name)
         if reason:
             self._warn(name, reason)
-        return dataset
+        return self._unkept.get(name) if dataset is None else dataset
 
     def save(
         self,
@@ -234,6 +244,26 @@ class Store(Mapping[str, xr.Dataset]):
             if entries.checked(self.path / name)[0] is None:
                 self._publish(name, variables, attrs)
         return name
+
+    def keep(
+        self, kind: str, params: Mapping[str, Any], dataset: xr.Dataset, **options: Any
+    ) -> str:
+        """As `save`, but a dataset that cannot be written is held in memory, with a warning.
+
+        This object loads it as if it were stored; `incomplete` says that it is not.
+        """
+        try:
+            return self.save(kind, params, dataset, **options)
+        except NotKeptError as error:
+            warnings.warn(f"{error}; results are given, but not kept", stacklevel=3)
+            name = self.name(kind, params, version=options["version"])
+            self._unkept[name] = dataset
+            return name
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether a result could not be written."""
+        return bool(self._unkept)
 
     def refuse_unwritable(self) -> None:
         """Raise InputError where nothing can be saved, before anything is computed for it."""
@@ -395,7 +425,7 @@ class Store(Mapping[str, xr.Dataset]):
             yield
         except OSError as error:
             reason = error.strerror or error
-            raise InputError(
+            raise NotKeptError(
                 f"cannot write to the store {self.path}: {reason}; "
                 f"give another folder or set {LOCATION_VARIABLE}"
             ) from error

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from granforce.system.streams import tell
+
 
 def find_a_place() -> None:
     """Name a temporary folder to numba where it could write neither beside us nor at home.
@@ -25,10 +27,9 @@ def find_a_place() -> None:
     os.environ["NUMBA_CACHE_DIR"] = place  # workers get it from here
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = place
-    print(
+    tell(
         f"granforce: compiled kernels are kept in {place}, since neither the installation nor the "
-        "home folder can be written; set NUMBA_CACHE_DIR to keep them elsewhere",
-        file=sys.stderr,
+        "home folder can be written; set NUMBA_CACHE_DIR to keep them elsewhere"
     )
 
 

@@ -3,7 +3,7 @@
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from tqdm import tqdm
 
@@ -57,11 +57,18 @@ def one_line(
     line: str | None = None,
 ) -> str:
     """A warning as one line without the place in the code, for warnings.formatwarning."""
-    return f"granforce: {' '.join(str(message).split())}\n"
+    return f"{Bar.line_end()}granforce: {' '.join(str(message).split())}\n"
 
 
 class Bar:
     """A tqdm bar on stderr that a progress(done, total) callable drives; unseen when not used."""
+
+    _drawn: ClassVar[set[int]] = set()  # those whose line has not ended
+
+    @classmethod
+    def line_end(cls) -> str:
+        """What goes before another line: the end of the line of a bar, if there is one."""
+        return "\n" if cls._drawn else ""
 
     def __init__(self, label: str, unit: str) -> None:
         # Made at once, so that its rate counts from the beginning, and shown from the first call.
@@ -72,9 +79,11 @@ class Bar:
 
     def __exit__(self, *_: Any) -> None:
         self.bar.close()
+        self._drawn.discard(id(self))
 
     def __call__(self, done: float, total: float | None) -> None:
         """So much is done of a total, if that is known."""
+        self._drawn.add(id(self))
         self.bar.delay, self.bar.total = 0, total
         # Set, not added: quarters of cells would leave whole numbers as 2.0.
         self.bar.n = int(done) if done == int(done) else done

@@ -292,3 +292,11 @@ def test_outputs_keep_off_the_store_and_what_is_inside_a_folder(tmp_path, monkey
     words = "import table /dev/null --mu 0.3 --out /dev/null"
     assert parser.main(words.split()) == 2
     assert "overwrite" not in capsys.readouterr().err
+
+
+def test_frames_replace_no_store(here, capsys):
+    kept = sorted((here / "done").rglob("*"))
+    words = f"infer {FRAMES} --frames all --mu 0.3 --out done/cells.zarr"
+    assert parser.main(words.split()) == 2
+    assert "is a store of results" in capsys.readouterr().err
+    assert sorted((here / "done").rglob("*")) == kept

@@ -41,12 +41,12 @@ def perturb(arguments: argparse.Namespace) -> None:
         "largest_breach": float(dataset["motion_breach"].max()),
         **ends,
     }
+    print_report(lines, arguments.json)
     if arguments.csv is not None:
         names = ("limit_load", "critical_low", "critical_high", "pair_opening")
         names += ("opened", "slid", "kept", *COUNTS)
         columns = {"contact": dataset["backbone"].values}
         write_csv(arguments.csv, columns | {name: dataset[name].values for name in names})
-    print_report(lines, arguments.json)
 
 
 def _exact(arguments: argparse.Namespace, kind: Kind) -> tuple[xr.Dataset, dict[str, Any]]:
@@ -80,13 +80,13 @@ def intervals(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
+    print_report(lines, arguments.json)
     if arguments.csv is not None:
         columns = {"contact": dataset["backbone"].values}
         for name, side in (("min", "low"), ("max", "high")):
             columns |= {f"f_n_{name}": dataset[side].values[:, 0]}
             columns |= {f"f_t_{name}": dataset[side].values[:, 1]}
         write_csv(arguments.csv, columns | {"cluster": cluster})
-    print_report(lines, arguments.json)
 
 
 def limit_loads(arguments: argparse.Namespace) -> None:
@@ -102,10 +102,10 @@ def limit_loads(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": dataset["max_gap"].item(),
         **ends,
     }
+    print_report(lines, arguments.json)
     if arguments.csv is not None:
         names = {"contact": "backbone", "limit_load": "limit_load"}
         write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
-    print_report(lines, arguments.json)
 
 
 def stress(arguments: argparse.Namespace) -> None:
@@ -124,7 +124,7 @@ def stress(arguments: argparse.Namespace) -> None:
         "largest_duality_gap": float(dataset["stress_gap"].max()),
         **ends,
     }
+    print_report(lines, arguments.json)
     if arguments.csv is not None:
         names = {"angle": "stress_angle", "largest": "stress_support"}
         write_csv(arguments.csv, {k: dataset[v].values for k, v in names.items()})
-    print_report(lines, arguments.json)

@@ -74,7 +74,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
         for k, part in enumerate(("f_n", "f_t")):
             columns |= {f"mean_{part}": dataset["expected"].values[:, k]}
             columns |= {f"error_{part}": error[:, k]}
+    print_report(lines | ends, arguments.json)
     if arguments.csv is not None:
         write_csv(arguments.csv, columns)
-    print_report(lines | ends, arguments.json)
     return None

@@ -12,11 +12,11 @@ from granforce.cli.asked import (
     get_packing,
     packing_parameters,
     required_mu,
+    store_of,
     write_csv,
 )
 from granforce.packing import importers, scenes
 from granforce.records import InputError, Packing, whole
-from granforce.study.store import open_store
 from granforce.system.terminal import print_report
 
 
@@ -27,22 +27,26 @@ def pack(arguments: argparse.Namespace) -> None:
     parameters = packing_parameters(arguments, required_mu(arguments), arguments.seed)
     max_steps = whole(arguments.max_steps, "--max-steps", 1)
     check_outputs(arguments.out)
-    store = open_store(arguments.cache)
+    store = store_of(arguments)
     packing, cached = get_packing(store, parameters, max_steps=max_steps)
-    if arguments.out is not None:
-        importers.save_packing(packing, arguments.out)
     told = "steps", "sweeps_done", "unfinished_steps", "largest_contact_gap", "least_other_gap"
     work = {name: packing.info[name] for name in told}
     lines = {**importers.report(packing), **work, "cached": cached}
     print_report(lines, arguments.json)
+    _save(packing, arguments)
+
+
+def _save(packing: Packing, arguments: argparse.Namespace) -> None:
+    """Save a packing where it is wanted: behind the report, which is printed in any case."""
+    if arguments.out is not None:
+        importers.save_packing(packing, arguments.out)
 
 
 def _scene(arguments: argparse.Namespace) -> None:
     check_outputs(arguments.out)
     packing = scenes.scene(arguments.scene, arguments.mu)
-    if arguments.out is not None:
-        importers.save_packing(packing, arguments.out)
     print_report({"scene": arguments.scene, **importers.report(packing)}, arguments.json)
+    _save(packing, arguments)
 
 
 # What reads each format; pegs gives more than a packing.
@@ -73,9 +77,8 @@ def import_(arguments: argparse.Namespace) -> None:
     named = ("timestep", "time", "contacts_skipped", "walls")
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info
-    if arguments.out is not None:
-        importers.save_packing(packing, arguments.out)
     print_report(lines, arguments.json)
+    _save(packing, arguments)
 
 
 def _import_pegs(arguments: argparse.Namespace) -> None:
@@ -87,14 +90,13 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
         frame=arguments.frame,
         **flaws_and_walls(arguments),
     )
-    if arguments.out is not None:
-        importers.save_packing(found.packing, arguments.out)
+    print_report(found.report, arguments.json)
+    _save(found.packing, arguments)
     if arguments.measured is not None:
         values = np.concatenate([found.measured, found.sigma], axis=1).T
         columns = {"contact": np.arange(len(found.measured))}
         columns |= dict(zip(importers.measurements.COLUMNS, values, strict=True))
         write_csv(arguments.measured, columns)
-    print_report(found.report, arguments.json)
 
 
 def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:

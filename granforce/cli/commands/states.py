@@ -114,12 +114,12 @@ def measure(arguments: argparse.Namespace) -> None:
         "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
         "original_distance": dataset["original_distance"].item(),
     }
+    print_report(lines, arguments.json)
     if arguments.contacts is not None:
         columns = {"contact": dataset["backbone"].values}
         for name, source in (("f_n", "original"), ("f_n_min", "low"), ("f_n_max", "high")):
             columns[name] = dataset[source].values[:, 0]
         write_csv(arguments.contacts, columns)
-    print_report(lines, arguments.json)
 
 
 def scan(arguments: argparse.Namespace) -> int:
