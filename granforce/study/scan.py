@@ -4,13 +4,15 @@ Cells are independent and seeded, so a scan gives the same result for any number
 one that was cut short, or lost a worker, goes on where it was.
 """
 
+import logging
 import multiprocessing
 import os
 import signal
 import socket
 import threading
+import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -29,6 +31,10 @@ from granforce.study.cells import Cell, get, load, row
 from granforce.study.keys import Parameters
 from granforce.study.store import open_store
 from granforce.system.terminal import one_line
+
+# How often it is asked what dask has finished, and how long it may have no worker until that is
+# said, s.
+LOOK, WORKERLESS = 0.2, 5.0
 
 CELL_BYTES = 2000  # of memory, that a cell takes until it is computed
 
@@ -269,19 +275,65 @@ def _over_dask(
         from dask.distributed import Client, KilledWorker, as_completed
     except ImportError:
         raise InputError("a scheduler needs dask: pip install 'granforce[cluster]'") from None
-    try:
-        client = Client(scheduler, timeout=10)
-    except (OSError, ValueError) as error:
-        raise InputError(f"no dask scheduler at {scheduler}: {error}") from None
-    with client:
+    gone = InputError(f"the dask scheduler at {scheduler} is gone; finished entries are kept")
+    with _without_tracebacks(), _client_of(scheduler, Client) as client:
         waiting = {client.submit(run_cell, *task, pure=False): k for k, task in tasks.items()}
+        completed, workers = as_completed(list(waiting)), _Workers(scheduler)
         try:
-            for future in as_completed(list(waiting)):
-                dead = isinstance(future.exception(), KilledWorker)
-                finished(waiting[future], _lost if dead else future.result)
+            while waiting:
+                for future in completed.next_batch(block=False):
+                    if future.status == "cancelled":  # what became of it, nobody knows
+                        raise gone
+                    dead = isinstance(future.exception(), KilledWorker)
+                    finished(waiting.pop(future), _lost if dead else future.result)
+                try:
+                    workers.count(client.nthreads())
+                except OSError:
+                    raise gone from None
+                time.sleep(LOOK)
         except BaseException:
             client.cancel(list(waiting))
             raise
+
+
+def _client_of(scheduler: str, client: Callable[..., Any]) -> Any:
+    try:
+        return client(scheduler, timeout=10)
+    except Exception as error:  # whatever else may answer there
+        words = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"no dask scheduler at {scheduler}: {words}") from None
+
+
+@contextmanager
+def _without_tracebacks() -> Iterator[None]:
+    """Within, dask does not log what ends in an error here, too."""
+    logger = logging.getLogger("distributed.client")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+
+
+class _Workers:
+    """Says, each time once, that a scheduler has been without workers for some seconds."""
+
+    def __init__(self, scheduler: str) -> None:
+        self._scheduler = scheduler
+        self._since, self._told = time.monotonic(), False
+
+    def count(self, workers: Collection[Any]) -> None:
+        """These are its workers just now."""
+        if workers:
+            self._since, self._told = time.monotonic(), False
+        elif not self._told and time.monotonic() >= self._since + WORKERLESS:
+            self._told = True
+            warnings.warn(
+                f"no worker at the dask scheduler {self._scheduler}: waiting for one to come "
+                "(Ctrl-C ends)",
+                stacklevel=2,
+            )
 
 
 def warm_up(needed: Any = None, packing: Packing | None = None) -> None:

@@ -1,11 +1,15 @@
 """Scans over processes and over dask workers: the same results, and what a kill costs."""
 
+import contextlib
 import multiprocessing
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
+import warnings
 from pathlib import Path
 
 import pytest
@@ -276,3 +280,75 @@ def test_no_scheduler_is_one_line(tmp_path):
     pytest.importorskip("dask.distributed")
     with pytest.raises(InputError, match="no dask scheduler at"):
         scan.run(tmp_path / "s", small_cells()[:1], scheduler="tcp://127.0.0.1:9")
+
+
+@pytest.fixture
+def empty_cluster():
+    """A scheduler to which no worker has come yet."""
+    distributed = pytest.importorskip("dask.distributed")
+    with distributed.LocalCluster(
+        n_workers=0, processes=False, dashboard_address=":0", protocol="tcp://",
+        silence_logs="CRITICAL",
+    ) as cluster:  # fmt: skip
+        yield cluster
+
+
+def when_it_waits(monkeypatch, then):
+    """Call then() once it is said that no worker is there; what was said."""
+    said = []
+
+    def warn(message, **options):
+        said.append(message)
+        then()
+
+    monkeypatch.setattr(scan, "WORKERLESS", 0)
+    monkeypatch.setattr(scan.warnings, "warn", warn)
+    return said
+
+
+def test_a_scheduler_without_workers_says_so_and_goes_on_once_one_comes(
+    tmp_path, monkeypatch, empty_cluster
+):
+    said = when_it_waits(monkeypatch, lambda: empty_cluster.scale(1))
+    cells = [Cell(kinds.WALK, cell())]
+    assert not scan.run(tmp_path / "s", cells, scheduler=empty_cluster.scheduler_address)
+    assert len(said) == 1 and "no worker at the dask scheduler tcp://" in said[0]
+    assert load(open_store(tmp_path / "s"), *cells[0]) is not None
+
+
+def test_a_scheduler_that_goes_is_one_line(tmp_path, monkeypatch, empty_cluster):
+    when_it_waits(monkeypatch, empty_cluster.close)
+    with pytest.raises(InputError, match=r"scheduler at .* is gone"):
+        scan.run(tmp_path / "s", small_cells()[:1], scheduler=empty_cluster.scheduler_address)
+
+
+def test_each_time_without_workers_is_told_once(monkeypatch):
+    workers = scan._Workers("tcp://there")
+    monkeypatch.setattr(scan, "WORKERLESS", 0)
+    for count, told in ([(), 1], [(), 0], ["a", 0], [(), 1], [(), 0]):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            workers.count(count)
+        assert len(said) == told
+    monkeypatch.setattr(scan, "WORKERLESS", 60)
+    workers.count("a")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        workers.count(())
+
+
+def test_what_is_no_scheduler_is_one_line(tmp_path):
+    """What an HTTP server answers, dask takes for the size of a message that no memory holds."""
+    pytest.importorskip("dask.distributed")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+
+        def answer():
+            with contextlib.suppress(OSError):
+                while True:
+                    server.accept()[0].sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+        threading.Thread(target=answer, daemon=True).start()
+        with pytest.raises(InputError, match="no dask scheduler at") as told:
+            scan.run(tmp_path / "s", small_cells()[:1], scheduler=f"tcp://127.0.0.1:{port}")
+        assert "\n" not in str(told.value)
