@@ -160,8 +160,6 @@ COMMANDS = {
             "--packings": [*WHOLE, *MEMORY],
             "--states": [*WHOLE, "1", *MEMORY],
             "--gauss-seidel-packings": ["-1", "some"],
-            "--exact-packings": ["-1", "some"],
-            "--uniform-packings": ["-1", "some"],
             "--perturb-packings": ["-1", "some"],
             "--perturb-contacts": ["-1", "0", "some"],
             "--sizes": [",a", "2", "-5", "nan", "100,1.5", *MEMORY],

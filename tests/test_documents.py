@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import json
 import re
 import shlex
 import shutil
@@ -15,6 +16,7 @@ import pytest
 from packings import packed
 
 from granforce.cli.parser import main, make_parser
+from granforce.paper import claims, documents, tables
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = ["README.md", "granforce/README.md", "data/README.md", "app/README.md"]
@@ -156,6 +158,45 @@ def test_every_file_named_is_there(document):
 def test_every_module_to_run_is_there(document):
     for name in re.findall(r"python -m (granforce[\w.]*)", text(document)):
         assert importlib.util.find_spec(name) is not None, name
+
+
+@pytest.fixture(scope="module")
+def study():
+    """The table that is shipped, and what is told of it."""
+    told = json.loads(text("data/claims.json"))
+    for claim in (*told["claims"], *told["findings"]):
+        claim |= {name: np.nan for name in ("value", "low", "high") if claim[name] is None}
+    return tables.load(ROOT / "data/study.zarr"), told
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_what_the_study_tells_is_what_is_shipped(document, study, tmp_path):
+    """Everything between marks is what the shipped study gives: no number was typed."""
+    table, told = study
+    copied = tmp_path / "copy.md"
+    shutil.copy(ROOT / document, copied)
+    documents.renew([copied], table, told["claims"], told["findings"])
+    assert copied.read_text() == text(document)
+
+
+def test_the_claims_are_those_of_the_shipped_study(study):
+    table, told = study
+    known = {(claim["statement"], claim["sampler"]): claim for claim in told["claims"]}
+    families = {claims.agreement: "nearest", claims.maximum: "exact", claims.coordination: ""}
+    for family, sampler in families.items():
+        for claim in family(table, sampler):
+            shipped = known[claim.statement, sampler]
+            assert claim.verdict == shipped["verdict"]
+            assert claim.value == pytest.approx(shipped["value"], rel=1e-6)
+
+
+def test_sentences_about_results_have_no_typed_numbers():
+    """Outside of generated parts the READMEs' results tell no measured number: none with a ±."""
+    for document, first in (("README.md", "## Results"), ("data/README.md", "## Main results")):
+        told = documents.MARK.sub("", text(document).partition(first)[2])
+        told = told.partition("## Words" if document == "README.md" else "## Accuracy")[0]
+        assert told
+        assert not re.findall(r"\d\S* ±|\d+\.\d+ \(|\b(?!95)\d+ %|\d+\.\d+ …", told)
 
 
 def test_the_map_shows_every_room():

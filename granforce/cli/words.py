@@ -255,21 +255,16 @@ def add_study(commands: Commands) -> None:
         "--documents",
         type=Edited,
         metavar="FILES",
-        help="renew the tables in these files, between <!-- study: claims --> (or measures) and "
-        "<!-- end -->; names separated by commas",
+        help="renew what stands between <!-- study: NAME --> and <!-- end --> in these files, "
+        "names separated by commas",
     )
     others = set(command.options)
     group = command.add_argument_group("size")
     group.add_argument("-n", type=int, help="number of disks (default 400)")
     group.add_argument("--mu", type=str, help="friction coefficients, separated by commas")
-    group.add_argument("--packings", type=int, help="packings at each μ (default 10)")
+    group.add_argument("--packings", type=int, help="packings at each μ (default 30)")
     group.add_argument("--states", type=int, help="states of a walk (default 1000)")
-    group.add_argument(
-        "--many-packings", type=int, help="where η is largest, and at large μ (default 30)"
-    )
     group.add_argument("--gauss-seidel-packings", type=int, help="walks as in the paper (10)")
-    group.add_argument("--exact-packings", type=int, help="with exact intervals (default 3)")
-    group.add_argument("--uniform-packings", type=int, help="with uniform states (default 10)")
     group.add_argument("--response-packings", type=int, help="pushed at contacts (default 10)")
     group.add_argument("--response-contacts", type=int, help="contacts pushed in each (default 20)")
     group.add_argument("--perturb-packings", type=int, help="pushed in larger steps (default 3)")

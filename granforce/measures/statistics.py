@@ -31,6 +31,19 @@ def mean_interval(values: Iterable[float], level: float = LEVEL) -> tuple[float,
     return mean, float(mean - reach), float(mean + reach)
 
 
+def difference_interval(
+    values: Floats, others: Floats, level: float = LEVEL
+) -> tuple[float, float, float]:
+    """Mean of values less that of others, (difference, low, high), by Welch's t.
+
+    At least two values each.
+    """
+    test = stats.ttest_ind(values, others, equal_var=False)
+    ends = test.confidence_interval(level)
+    difference = float(values.mean() - others.mean())
+    return difference, float(ends.low), float(ends.high)
+
+
 def jackknife(
     statistic: Callable[[list[T]], float], items: Iterable[T], level: float = LEVEL
 ) -> tuple[float, float, float]:
@@ -131,8 +144,10 @@ def percentile_ends(drawn: Floats) -> tuple[tuple[float, float], tuple[float, fl
 
 
 def rank_correlation(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
-    """Spearman's rank correlation; ties share their rank."""
+    """Spearman's rank correlation; ties share their rank. NaN where one of them does not vary."""
     ranks = stats.rankdata(x), stats.rankdata(y)
+    if min(map(np.ptp, ranks)) == 0:
+        return float("nan")
     return float(np.corrcoef(*ranks)[0, 1])
 
 

@@ -1,4 +1,11 @@
-"""The study's tables in documents, renewed between two marks: no number is copied by hand."""
+"""The study's tables in documents, renewed between two marks: no number is copied by hand.
+
+A document has <!-- study: NAME -->, what was put there last, and <!-- end -->. Names: "measures"
+(η against μ), "beside" (what else there is at each μ), "results" (the main claims in a few lines),
+"claims" (all of them), "findings" (what there is beyond them), "sweeps" (where the paper's sweeps
+end, and how far outside of S), "preparation" (what packings depend on), "counts" (how many packings
+each part has).
+"""
 
 import re
 from collections.abc import Sequence
@@ -6,19 +13,37 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from granforce.measures import statistics
+from granforce.paper import plan as plans
 from granforce.paper.claims.figure1 import skipped
-from granforce.paper.claims.groups import drawn
+from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, outside
 from granforce.paper.tables import Table
-from granforce.records import InputError, Rows
+from granforce.records import Floats, InputError, Rows
 from granforce.system.files import written
 
 MARK = re.compile(r"(<!-- study: (\w+) -->\n).*?(<!-- end -->)", re.S)
 
+_NOTHING = 1e-9  # η below this is rounding
+_MOST_DIGITS = 6  # after the point; more are told as a power of ten
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+# Claims of the paper that a few lines tell, and by which samplers.
+MAIN = (
+    "η3(μ) is not monotonic",
+    "η3(μ) is largest near μ = 0.1",
+    "z → 3 at the largest μ",
+    "η1 ≈ η2 ≈ 0.15 η3 up to a constant factor: value of η1/η3",
+    "corr(f_n, ΔF_n) is significant at intermediate μ",
+    "F_crit rises with η",
+)
+_TOLD = ("gauss_seidel", "nearest", "exact", "")
+# Findings that are too many for a table: `claims.json` has them.
+_LONG = "departure of P("
 _HEADS = {
     "gauss_seidel": "paper's sweeps, to 10⁻³",
     "gauss_seidel_1e-4": "to 10⁻⁴",
+    "gauss_seidel_1e-6": "to 10⁻⁶",
     "nearest": "nearest",
     "uniform": "uniform",
     "exact": "exact",
@@ -35,43 +60,327 @@ def named(files: str | None) -> list[Path]:
     return paths
 
 
-def renew(paths: Sequence[Path], table: Table, claims: Rows) -> None:
-    """Write the tables of a `tables.Table` and its judged claims (dicts) into marked files."""
-    known = {"measures": lambda: measures(table), "claims": lambda: claim_table(claims)}
+def renew(paths: Sequence[Path], table: Table, claims: Rows, findings: Rows) -> None:
+    """Write the tables of a `tables.Table`, its judged claims and its findings into marked files.
+
+    claims, findings: dicts of `claims.Claim`.
+    """
+    known = {
+        "measures": lambda: measures(table),
+        "beside": lambda: beside(table),
+        "results": lambda: results(claims),
+        "claims": lambda: claim_table(claims),
+        "sweeps": lambda: sweeps(table),
+        "preparation": lambda: preparation(table),
+        "findings": lambda: finding_table(findings),
+        "counts": lambda: counts(table),
+    }
     for path in paths:
         text = path.read_text()
         for name in {name for _, name, _ in MARK.findall(text)} - set(known):
-            raise InputError(f"{path}: no table {name!r}: take {' or '.join(known)}")
+            raise InputError(f"{path}: no table {name!r}: take one of {', '.join(known)}")
         renewed = MARK.sub(lambda m: m[1] + known[m[2]]() + m[3], text)
         with written(path) as file:
             file.write(renewed.encode())
 
 
 def measures(table: Table) -> str:
-    """η1 to η3 against μ as a table: of the paper's sampler, and beside it of others."""
+    """φ, z, h and η against μ as a table, of the same packings in every column.
+
+    Those of the exact intervals; where another column has fewer of them, it says of how many. The
+    last column is the paper's sweeps over nearest networks, packing by packing.
+    """
+    exact = table.part(SAMPLERS["exact"])
+    every = {mu: {row["seed"] for row in group} for mu, group in _by_friction(exact).items()}
+    swept, nearest = (table.part(SAMPLERS[name]) for name in ("gauss_seidel", "nearest"))
+    ratios = _over(swept, nearest, "eta2")
+    sources = {name: _drawn_by(table, name) for name in ("gauss_seidel", "nearest", "uniform")}
     columns = (
-        ("z", "gauss_seidel", "coordination", 1.0, "{:.3f}"),
-        ("h", "gauss_seidel", "dimension", 1.0, "{:.0f}"),
-        ("η1", "gauss_seidel", "eta1", 1.0, None),
-        ("η2", "gauss_seidel", "eta2", 1.0, None),
-        ("0.15 η3", "gauss_seidel", "eta3", 0.15, None),
-        ("nearest η2", "nearest", "eta2", 1.0, None),
-        ("exact 0.15 η3", "exact", "eta3", 0.15, None),
-        ("uniform η2", "uniform", "eta2", 1.0, None),
+        ("φ", exact, "packing_fraction", 1.0, "{:.4f}"),
+        ("z", exact, "coordination", 1.0, "{:.3f}"),
+        ("h", exact, "dimension", 1.0, "{:.0f}"),
+        ("exact 0.15 η3", exact, "eta3", 0.15, None),
+        ("nearest η2", sources["nearest"], "eta2", 1.0, None),
+        ("uniform η2", sources["uniform"], "eta2", 1.0, None),
+        ("sweeps η1", sources["gauss_seidel"], "eta1", 1.0, None),
+        ("sweeps η2", sources["gauss_seidel"], "eta2", 1.0, None),
+        ("sweeps 0.15 η3", sources["gauss_seidel"], "eta3", 0.15, None),
+        ("sweeps/nearest η2", ratios, "ratio", 1.0, None),
     )
-    means = []
-    for _, sampler, name, factor, _ in columns:
-        rows = drawn(table, sampler)
-        if sampler != "exact" and name.startswith("eta"):
-            rows = [row for row in rows if not skipped(row)]  # were not measured
-        means.append({mu: (m, e) for mu, m, e in statistics.means(rows, name, factor=factor)})
-    lines = [[f"{mu:g}"] for mu in sorted(set().union(*means))]
-    for (head, *_, form), column in zip(columns, means, strict=True):
-        for line in lines:
-            mean, error = column.get(float(line[0]), (None, None))
-            text = "" if mean is None else form.format(mean) if form else _short(mean)
-            line.append(f"{text} ± {error:.3f}" if head == "η2" and text else text)
-    return _markdown(["μ", *(head for head, *_ in columns)], lines)
+    beyond = outside(table, SAMPLERS["gauss_seidel"])
+    lines = []
+    for mu, seeds in every.items():
+        line = [f"{mu:g}", str(len(seeds))]
+        for head, rows, name, factor, form in columns:
+            if mu in beyond and head.startswith("sweeps"):
+                line.append("outside S")
+                continue
+            chosen = [row for row in rows if row["mu"] == mu and row["seed"] in seeds]
+            line.append(_cell(chosen, name, factor, form, len(seeds)))
+        lines.append(line)
+    return _markdown(["μ", "packings", *(head for head, *_ in columns)], lines)
+
+
+def beside(table: Table) -> str:
+    """What walks see, how contacts give way, and how wide S is, against μ as a table.
+
+    Means ± standard errors over packings; ratios are of the same packing.
+    """
+    answers = [
+        row | {"part": row["critical_force"] / row["limit_load"]}
+        for row in table.responses()
+        if row.get("limit_load", 0) > 0
+    ]
+    walk, uniform, exact = (table.part(SAMPLERS[name]) for name in ("nearest", "uniform", "exact"))
+    columns = (
+        ("walk/uniform η2", _over(walk, uniform, "eta2"), "ratio", None),
+        ("walk/exact η3", _over(walk, exact, "eta3"), "ratio", None),
+        ("uniform/exact η3", _over(uniform, exact, "eta3"), "ratio", None),
+        ("F_crit, ⟨f_n⟩", answers, "critical_force", None),
+        ("F_crit/limit load", answers, "part", None),
+        ("α", answers, "decay_exponent", None),
+        ("width of S, ⟨f_n⟩", table.part("volume"), "extent", None),
+        ("ln V per grain", table.part("volume"), "log_volume_per_grain", None),
+        ("undetermined in frozen surroundings", table.part("frozen"), "undetermined_part", None),
+        ("largest shear over pressure", table.part("stress"), "friction", None),
+    )
+    frictions = sorted({row["mu"] for _, rows, *_ in columns for row in rows if row["mu"] > 0})
+    lines = []
+    for mu in frictions:
+        of_mu = [[row for row in rows if row["mu"] == mu] for _, rows, *_ in columns]
+        most = max(map(len, of_mu))
+        cells = [
+            _cell(rows, name, 1.0, form, most)
+            for rows, (_, _, name, form) in zip(of_mu, columns, strict=True)
+        ]
+        lines.append([f"{mu:g}", str(most), *cells])
+    return _markdown(["μ", "packings", *(head for head, *_ in columns)], lines)
+
+
+def _over(rows: Rows, others: Rows, name: str) -> list[dict[str, Any]]:
+    """Rows with the "ratio" of a number to that of another row of the same packing."""
+    return [
+        row | {"ratio": row[name] / other[name]}
+        for row, other in statistics.paired(rows, others)
+        if name in row and other.get(name, 0) > _NOTHING
+    ]
+
+
+def sweeps(table: Table) -> str:
+    """Walks by sweeps, by where these end: what they reach, and how far outside of S, as a table.
+
+    Excess: how far the intervals that states span reach beyond the exact ones, over the length of
+    those, means over packings.
+    """
+    lines = []
+    for part, residual in plans.SWEEPS.items():
+        pairs = statistics.paired(table.part(part), table.part(SAMPLERS["exact"]))
+        excess = {
+            mu: (
+                np.mean([row["excess"] for row, _ in of_mu]),
+                np.mean([exact["mean_length"] for _, exact in of_mu]),
+            )
+            for mu, of_mu in _pairs_by_friction(pairs).items()
+        }
+        ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2")
+        for mu, rows in _by_friction(table.part(part)).items():
+            reach, length = excess.get(mu, (np.nan, np.nan))
+            known = np.isfinite(reach)
+            far = "" if not known else "all" if length < _NOTHING else f"{reach / length:.2g}"
+            cells = [
+                f"10{str(round(np.log10(residual))).translate(_RAISED)}",
+                f"{mu:g}",
+                str(len(rows)),
+                _cell(rows, "reached_part", 1.0, "{:.2f}", len(rows)),
+                _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)),
+                far,
+            ]
+            compared = [row for row in ratios if row["mu"] == mu]
+            beyond = known and reach > length
+            eta = (
+                ["outside S"] * 2
+                if beyond
+                else [
+                    _cell(rows, "eta2", 1.0, None, len(rows)),
+                    _cell(compared, "ratio", 1.0, None, len(rows)),
+                ]
+            )
+            lines.append([*cells, *eta])
+    heads = ("end at", "μ", "packings", "states reached", "sweeps per state", "excess")
+    return _markdown([*heads, "η2", "over nearest η2"], lines)
+
+
+def _pairs_by_friction(pairs: Any) -> dict[float, list[Any]]:
+    found: dict[float, list[Any]] = {}
+    for row, exact in pairs:
+        if "excess" in row and "mean_length" in exact:
+            found.setdefault(row["mu"], []).append((row, exact))
+    return found
+
+
+def preparation(table: Table) -> str:
+    """What packings depend on: their class by how they are made, as a table, and what it says.
+
+    In brackets the difference from the default in the same seeds, in its own standard errors.
+    """
+    columns = (
+        ("h", "exact", "dimension"),
+        ("z", "exact", "coordination"),
+        ("φ", "exact", "packing_fraction"),
+        ("exact η3", "exact", "eta3"),
+        ("η2", "walk", "eta2"),
+    )
+    made = [part.removesuffix("_exact") for part in table.parts() if part.startswith("prepared_")]
+    made = list(dict.fromkeys(made))
+    lines, differences = [], []
+    for mu in sorted({row["mu"] for row in table.part(*made)}):
+        seeds = {row["seed"] for row in table.part(*made) if row["mu"] == mu}
+        for name in ("", *made):
+            parts = {"exact": f"{name}_exact" if name else "exact", "walk": name or "walk"}
+            cells, counted = [], set()
+            for _, source, measure in columns:
+                rows = [
+                    row
+                    for row in table.part(parts[source], n=table.plan["n"])
+                    if row["mu"] == mu and row["seed"] in seeds and measure in row
+                ]
+                counted.add(len(rows))
+                text = _with_error(np.array([row[measure] for row in rows])) if rows else ""
+                if name and rows:
+                    apart = _apart(rows, table.part(source, n=table.plan["n"]), measure)
+                    if np.isfinite(apart):
+                        differences.append(apart)
+                        text += f" ({apart:+.1f})"
+                cells.append(text)
+            if counted != {0}:
+                word = name.removeprefix("prepared_").replace("_", " ") or "default"
+                lines.append([f"{mu:g}", word, str(max(counted)), *cells])
+    heads = ["μ", "made with", "packings", *(head for head, *_ in columns)]
+    text = _markdown(heads, lines)
+    if not differences:
+        return text
+    size = np.abs(differences)
+    chance = len(size) * 2 * stats.norm.sf(2)
+    return text + (
+        f"\nOf {len(size)} differences {int((size > 2).sum())} exceed two standard errors, "
+        f"where chance makes {chance:.1f}; the largest is {size.max():.1f}.\n"
+    )
+
+
+def _apart(rows: Rows, others: Rows, name: str) -> float:
+    """Mean difference of a number in the same packings, in its standard errors; NaN if unknown."""
+    pairs = statistics.paired(rows, [other for other in others if name in other])
+    apart = np.array([row[name] - other[name] for row, other in pairs])
+    if len(apart) < 2 or not np.ptp(apart):
+        return 0.0 if len(apart) > 1 and not apart.any() else float("nan")
+    return float(apart.mean() / (apart.std(ddof=1) / np.sqrt(len(apart))))
+
+
+def results(claims: Rows) -> str:
+    """The main claims in a few lines: for each its number and its verdict, by each sampler."""
+    lines = []
+    for statement in MAIN:
+        told = [
+            f"{_HEADS[claim['sampler']]} {_verdict(claim)}"
+            for claim in claims
+            if claim["statement"] == statement
+            and claim["sampler"] in _TOLD
+            and np.isfinite(claim["value"])
+        ]
+        if told:
+            lines.append(f"- **{statement}**: {'; '.join(told)}.\n")
+    return "".join(lines)
+
+
+def finding_table(findings: Rows) -> str:
+    """Findings as a table: those of three ranges of μ in one line, all others below."""
+    ranged: dict[str, dict[str, str]] = {}
+    others = []
+    for finding in findings:
+        statement, number = finding["statement"], _number(finding)
+        if statement.startswith(_LONG):
+            continue
+        for word, _ in RANGES:
+            if statement.endswith(f", {word} μ"):
+                ranged.setdefault(statement.removesuffix(f", {word} μ"), {})[word] = number
+                break
+        else:
+            others.append([statement, number])
+    words = [word for word, _ in RANGES]
+    lines = [[name, *(found.get(word, "") for word in words)] for name, found in ranged.items()]
+    first = _markdown(["finding", *(f"{word} μ" for word in words)], lines) if lines else ""
+    second = _markdown(["finding", "number"], others) if others else ""
+    return "\n".join(part for part in (first, second) if part)
+
+
+def _number(finding: dict[str, Any]) -> str:
+    if not np.isfinite(finding["value"]):
+        return ""
+    known = np.isfinite(finding["low"])
+    ends = f" ({finding['low']:.3g} … {finding['high']:.3g})" if known else ""
+    return f"{finding['value']:.3g}{ends}"
+
+
+def counts(table: Table) -> str:
+    """How many packings each part has at each μ, and of which versions, as a table."""
+    lines = []
+    for part in table.parts():
+        rows = table.part(part)
+        for n in sorted({row["n"] for row in rows}):
+            some = [row for row in rows if row["n"] == n]
+            # Several packings may share the friction of their cones.
+            made: dict[Any, set[int]] = {}
+            for row in some:
+                made.setdefault(row.get("packing_mu", row["mu"]), set()).add(row["seed"])
+            each = sorted({len(seeds) for seeds in made.values()})
+            span = f"{each[0]}" if len(each) == 1 else f"{each[0]} to {each[-1]}"
+            versions = [_version(some, name) for name in ("version", "packing_version")]
+            lines.append([part, str(n), str(len(made)), span, *versions])
+    heads = ("part", "disks", "μ", "packings at each", "version", "version of packings")
+    return _markdown(heads, lines)
+
+
+def _version(rows: Rows, name: str) -> str:
+    return ", ".join(f"{v:g}" for v in sorted({row[name] for row in rows if name in row}))
+
+
+def _by_friction(rows: Rows) -> dict[float, list[dict[str, Any]]]:
+    found: dict[float, list[dict[str, Any]]] = {}
+    for row in rows:
+        found.setdefault(row["mu"], []).append(row)
+    return dict(sorted(found.items()))
+
+
+def _drawn_by(table: Table, sampler: str) -> list[dict[str, Any]]:
+    """Rows of a sampler whose states were drawn, and not known to be one point."""
+    return [row for row in drawn(table, sampler) if not skipped(row)]
+
+
+def _cell(rows: Rows, name: str, factor: float, form: str | None, wanted: int) -> str:
+    """Mean ± standard error over rows, and of how many they are if not of all that are wanted."""
+    values = factor * np.array([row[name] for row in rows if name in row])
+    if not len(values):
+        return ""
+    mean = values.mean()
+    text = form.format(mean) if form else _with_error(values)
+    return text if len(values) == wanted else f"{text} ({len(values)})"
+
+
+def _with_error(values: Floats) -> str:
+    """Mean ± standard error, to two digits of the error."""
+    mean = float(values.mean())
+    if len(values) < 2 or abs(mean) < _NOTHING:
+        return _short(mean)
+    error = float(values.std(ddof=1) / np.sqrt(len(values)))
+    if error < _NOTHING:
+        return _short(mean)
+    digits = 1 - int(f"{error:.1e}".partition("e")[2])  # of the rounded error
+    if digits <= _MOST_DIGITS:
+        return f"{mean:.{max(0, digits)}f} ± {error:.{max(0, digits)}f}"
+    power = int(np.floor(np.log10(abs(mean))))
+    digits = max(0, power + digits)
+    scaled = f"({mean / 10.0**power:.{digits}f} ± {error / 10.0**power:.{digits}f})"
+    return f"{scaled}·10{str(power).translate(_RAISED)}"
 
 
 def claim_table(claims: Rows) -> str:
@@ -98,7 +407,7 @@ def _verdict(claim: dict[str, Any]) -> str:
 
 def _short(value: float) -> str:
     """Three decimals, or two digits of what is smaller."""
-    if abs(value) < 1e-9:
+    if abs(value) < _NOTHING:
         return "< 10⁻⁹"
     return f"{value:.3f}" if abs(value) >= 0.01 else f"{value:.2g}"
 

@@ -55,23 +55,6 @@ def measure(table: Table) -> Iterator[Claim]:
         )
 
 
-def solver(table: Table) -> Iterator[Claim]:
-    """How the paper's relaxation walks, by where its sweeps end, and against nearest networks."""
-    for sampler in ("gauss_seidel", "gauss_seidel_1e-4"):
-        part = SAMPLERS[sampler]
-        for name, label in (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3")):
-            yield from _by_range(
-                _ratios(table, name, part, "walk"), f"{label} of {sampler} over {label} of nearest"
-            )
-    # Of fewer states than the others, η3 would be smaller for that alone.
-    for name, label in (("eta1", "η1"), ("eta2", "η2")):
-        found = _ratios(table, name, "sweeps_1e-6", "walk")
-        yield from _by_range(found, f"{label} of sweeps_1e-6 over {label} of nearest")
-    for part in ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6"):
-        for name, word in (("acceptance", "acceptance"), ("mean_sweeps", "sweeps per state")):
-            yield from _by_range(_values(table.part(part), name), f"{word} of {part}")
-
-
 def exact_shape(table: Table) -> Iterator[Claim]:
     """Maximum and small-μ slope of the exact and of the uniform indeterminacy."""
     for part, name, label in (("exact", "eta3", "exact η3"), ("uniform", "eta2", "uniform η2")):
@@ -122,19 +105,6 @@ def size(table: Table) -> Iterator[Claim]:
         groups = statistics.grouped([row for row in rows if row["mu"] == mu], "eta3", "n")
         if len(groups) > 1:
             yield _trend(f"slope of log exact η3 against log N, μ = {mu:g}", slope, groups)
-
-
-def preparation(table: Table) -> Iterator[Claim]:
-    """What other time steps and more sweeps of the compaction change, in the same seeds."""
-    parts = sorted({row["part"] for row in table.rows if row["part"].startswith("prepared")})
-    for part in parts:
-        for name, label in (("dimension", "h"), ("eta2", "η2"), ("eta3", "η3")):
-            for mu, ratios in _ratios(table, name, part, "walk").items():
-                yield _finding(
-                    f"{label} of packings {part.replace('_', ' ')} over the default, μ = {mu:g}",
-                    np.mean,
-                    [ratios],
-                )
 
 
 def strength(table: Table) -> Iterator[Claim]:
@@ -246,8 +216,8 @@ def _part(packings: Any, name: str) -> float:
 
 
 FAMILIES = (
-    *(sampled_part, measure, solver, exact_shape, distribution, opened, size, preparation),
-    *(strength, shear, volume, forces),
+    *(sampled_part, measure, exact_shape, distribution, opened, size, strength, shear, volume),
+    forces,
 )
 
 

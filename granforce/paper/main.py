@@ -21,9 +21,8 @@ from granforce.system.terminal import Bar, print_list, table
 
 _LEAST = {"n": 3, "packings": 1, "states": 2}
 _NUMBERS = (
-    *("n", "packings", "many_packings", "states", "gauss_seidel_packings", "exact_packings"),
-    *("uniform_packings", "response_packings", "response_contacts", "perturb_packings"),
-    *("perturb_contacts",),
+    *("n", "packings", "states", "gauss_seidel_packings", "response_packings"),
+    *("response_contacts", "perturb_packings", "perturb_contacts"),
 )
 
 
@@ -72,7 +71,7 @@ def main(arguments: argparse.Namespace) -> int:
     }
     with written(folder / "claims.json") as file:
         file.write(json_text(told, ascii_only=False).encode())
-    documents.renew(renewed, reduced, told["claims"])
+    documents.renew(renewed, reduced, told["claims"], told["findings"])
     print_claims(told, arguments.json)
     return 1 if failed else 0
 
@@ -114,8 +113,6 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
             continue
         given: dict[str, Any] = {name: whole(value, name.replace("_", " "), _LEAST.get(name, 0))}
         plan = plan._replace(**given)
-    if arguments.packings is not None and arguments.many_packings is None:
-        plan = plan._replace(many_packings=0)
     if arguments.n is not None:
         plan = plan._replace(frozen_large=4 * plan.n, tails_n=4 * plan.n)
     if arguments.mu is not None:
@@ -134,11 +131,11 @@ def _at(plan: Plan, frictions: tuple[float, ...]) -> Plan:
     some: dict[str, Any] = {
         name: tuple(mu for mu in getattr(plan, name) if mu in frictions)
         for name in (
-            *("large_frictions", "frozen_large_frictions", "prepared_frictions"),
+            *("frozen_large_frictions", "prepared_frictions", "repeat_frictions"),
             "tails_frictions",
         )
     }
-    return plan._replace(frictions=frictions, fine_frictions=(), **some)
+    return plan._replace(frictions=frictions, **some)
 
 
 def _numbers(option: str, text: str, cast: Callable[[str], Any]) -> tuple[Any, ...]:
@@ -154,30 +151,23 @@ def _numbers(option: str, text: str, cast: Callable[[str], Any]) -> tuple[Any, .
 def compute(
     path: str | Path, wanted: list[Task], arguments: argparse.Namespace
 ) -> list[tuple[Cell, str]]:
-    """Compute the tasks, with bars on stderr; returns what failed."""
-    bars, begin = [], time.monotonic()
+    """Compute the tasks, with a bar on stderr; returns what failed."""
+    begin = time.monotonic()
 
     def enough() -> bool:
         limit = arguments.minutes
         return limit is not None and time.monotonic() - begin > 60 * limit
 
-    def bar(what: str) -> Any:
-        bars.append(Bar(what, "cell"))
-        return bars[-1]
-
-    try:
+    with Bar("cells", "cell") as progress:
         failed = plans.compute(
             path,
             wanted,
             workers=arguments.workers,
             scheduler=arguments.scheduler,
             dtypes={"states": "float32"},
-            progress=bar,
+            progress=progress,
             enough=enough,
         )
-    finally:
-        for each in bars:
-            each.__exit__()
     for cell, message in failed:
         print(f"granforce: {cell.kind.name} of {cell.parameters}: {message}", file=sys.stderr)
     return failed

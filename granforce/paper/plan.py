@@ -1,95 +1,115 @@
-"""Plan of the study: which cells it is made of, and how they are computed.
+"""Plan of the study: which cells it is made of, and in which order they are computed.
 
-Parts: "sweeps_1e-3", "sweeps_1e-4" and "sweeps_1e-6" (walks by Gauss–Seidel sweeps alone, as in the
-paper, which end at that residual in ⟨f_n⟩), "walk" (by nearest networks), "exact" (intervals),
-"uniform" (uniform states of S), "response" (critical forces and first motions of random contacts,
-loads raised in tenths of the way), "response_long" (some of them with four times the implicit
-steps) and "perturb" (loads raised by 0.4 of the way), "frozen" and "frozen_large" (exact intervals
-of the inner part with all forces outside held), "prepared_…" (walks in packings made with another
-time step or accuracy), "opened" and "opened_exact" (packings made without friction, cones opened
-to μ), "size", "size_sweeps" and "size_exact" (other numbers of disks), "stress" (outlines of the
-stresses that the contacts can carry), "stress_uniform" (uniform states, for their stresses),
-"volume" (ln V of S), "volume_size" (that of other numbers of disks), "tails" and "tails_stress"
-(uniform states of large packings, with the pressure and with the whole stress prescribed, for the
-distribution of f_n).
+Parts, the most valuable first: "exact" (intervals, with z, h and φ), "walk" (by nearest networks)
+and "uniform" (uniform states of S), all three in the same packings; "response" (critical forces and
+first motions of random contacts, loads raised in tenths of the way), "response_long" (some of them
+with four times the implicit steps) and "perturb" (loads raised by 0.4 of the way); "sweeps_1e-3"
+(walks by Gauss–Seidel sweeps alone, as in the paper, which end at that residual in ⟨f_n⟩);
+"prepared_…" (walks and, with "…_exact", intervals of packings made otherwise); "opened" and
+"opened_exact" (packings made without friction, cones opened to μ) and "widest_exact" (packings made
+with μ, cones opened to the largest μ); "stress" (outlines of the stresses that the contacts can
+carry) and "stress_uniform" (uniform states, for their stresses); "frozen" and "frozen_large" (exact
+intervals of the inner part with all forces outside held); "volume" (ln V of S) and "volume_size"
+(that of other numbers of disks); "sweeps_1e-4" and "sweeps_1e-6" (sweeps that end later);
+"repeat_…" (walks once more, and longer ones); "size", "size_sweeps" and "size_exact" (other numbers
+of disks); "tails" and "tails_stress" (uniform states of large packings, with the pressure and with
+the whole stress prescribed, for the distribution of f_n).
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+import itertools
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import xarray as xr
 
 from granforce.numerics.lanes import LANES
+from granforce.packing.compaction import default_steps
 from granforce.perturb.critical_force import MOST_STEPS
-from granforce.records import InputError, Progress
+from granforce.records import InputError
 from granforce.study import kinds, scan
 from granforce.study.cells import Cell, Kind, load
 from granforce.study.store import open_store
 
 # The smallest two lie where soft modes do not yet amplify friction beyond its linear effect.
-FRICTIONS = (0, 0.00001, 0.0001, 0.001, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1, 2, 5, 10)
+FRICTIONS = (
+    *(0, 0.00001, 0.0001, 0.001, 0.003, 0.01, 0.02, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5),
+    *(1, 2, 3, 5, 10),
+)
 # Below this it takes minutes to follow a first motion, and bounds within frozen surroundings end
 # uncertified (in small packings also above): contacts are perturbed and forces frozen from here on.
 LEAST_FOLLOWED = 0.001
 SLICE = (0.2, 0.8, 0.2, 0.8)  # inner part whose surroundings are frozen, in parts of the box
 KEPT_STATES = 100  # of each walk, evenly spaced: measures come from all
+# The paper's walk. It does not say where its sweeps end: the residual is the option of these. Most
+# attempts end in no equilibrium at large μ: a walk is kept with the states that it has after so
+# many attempts for each.
+SWEEPS = {"sweeps_1e-3": 1e-3, "sweeps_1e-4": 1e-4, "sweeps_1e-6": 1e-6}
+PAPERS = "sweeps_1e-3"  # what is taken for the paper's, as these reach their end at every μ
+ATTEMPTS = 3
 # All states are kept of these, of the first packing: Figures 3 and 5 show them.
 SHOWN_FRICTIONS = (0.01, 0.1, 1.0, 10.0)
-SHOWN_PARTS = ("sweeps_1e-3", "walk")
-# The paper's walk. It does not say where its sweeps end. Most attempts end in no equilibrium at
-# large μ: a walk is kept with the states that it has after so many attempts for each.
-SWEEPS = {"sweeps_1e-3": 1e-3, "sweeps_1e-4": 1e-4}
-ATTEMPTS = 3
+SHOWN_PARTS = (PAPERS, "walk")
 # Walks that go side by side take a fifth of the time of one as long as all of them; a state has
 # forgotten where it came from after some ten others.
 CHAINS = LANES
 # The residual that most attempts do not reach at large μ: tried with fewer states.
-HARDEST, HARDEST_STATES = ("sweeps_1e-6", 1e-6), 200
+HARDEST, HARDEST_STATES = "sweeps_1e-6", 200
+LONGER_WALK = 4  # than the others, to see whether η hangs on the length
 # Part of the way to the limit load by which the next load lies above the last at rest.
 RISE, LONGER = 0.1, 4
-# What else packings are made with.
-PREPARED = {
-    "prepared_dt_0.1": {"dt": 0.1, "sweeps": 600},
-    "prepared_dt_0.01": {"dt": 0.01},
-    "prepared_accuracy_0.003": {"accuracy": 0.003, "sweeps": 600},
-}
+
+
+def variations(mu: float) -> dict[str, dict[str, Any]]:
+    """What else packings of this friction are made with, by name: options of `pack`."""
+    dt, sweeps = default_steps(mu, None, None)
+    return {
+        "half_steps": {"dt": dt / 2},
+        "double_steps": {"dt": 2 * dt},
+        "box_mass_30": {"box_mass": 30.0},
+        "box_mass_300": {"box_mass": 300.0},
+        "accuracy": {"accuracy": 0.001, "sweeps": 4 * sweeps},
+        "sweeps": {"sweeps": 4 * sweeps},
+    }
 
 
 class Plan(NamedTuple):
-    """Size of the study; packings are those of seeds 1, 2, …, so smaller numbers are subsets."""
+    """Size of the study; packings are those of seeds 1, 2, …, so smaller numbers are subsets.
+
+    Exact intervals, walks by nearest networks and uniform states are of all `packings`; all else of
+    the first of them.
+    """
 
     n: int = 400
     frictions: tuple[float, ...] = FRICTIONS
-    packings: int = 10
+    packings: int = 30
     states: int = 1000
     gauss_seidel_packings: int = 10
-    hardest_packings: int = 10  # with sweeps down to the smallest residual
-    # More packings where the maximum is, and where packings differ most.
-    fine_frictions: tuple[float, ...] = (0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
-    large_frictions: tuple[float, ...] = (0.5, 1, 2, 5, 10)
-    many_packings: int = 30
-    exact_packings: int = 3
-    uniform_packings: int = 10
+    residual_packings: int = 5  # of those, with sweeps that go on to smaller residuals
     response_packings: int = 10
     response_contacts: int = 20
     perturb_packings: int = 3
     perturb_contacts: int = 30
+    prepared_packings: int = 20
+    prepared_frictions: tuple[float, ...] = (0.1, 0.5, 1, 3, 10)
+    opened_packings: int = 10
+    repeat_packings: int = 5
+    repeats: int = 2  # beside the first walk
+    repeat_frictions: tuple[float, ...] = (0.01, 0.1, 1, 10)
     frozen_packings: int = 10
     frozen_from: float = LEAST_FOLLOWED  # smallest μ: bounds of thinner S end uncertified
     frozen_large: int = 1600  # disks
+    frozen_large_packings: int = 3
     frozen_large_frictions: tuple[float, ...] = (0.01, 0.1, 0.5, 1, 10)
-    prepared_packings: int = 10
-    prepared_frictions: tuple[float, ...] = (1, 10)
-    sizes: tuple[int, ...] = (100, 200, 800, 1600)
-    size_frictions: tuple[float, ...] = (0.1, 1.0)
-    largest_exact: int = 800  # exact intervals of other sizes up to here
     stress_packings: int = 10
-    stress_uniform_packings: int = 3
     stress_states: int = 300
     volume_packings: int = 10
     # Of ln V, which differs by far more from packing to packing; in proportion to N beyond n.
     volume_accuracy: float = 0.1
+    sizes: tuple[int, ...] = (100, 200, 800, 1600)
+    size_packings: int = 10
+    size_frictions: tuple[float, ...] = (0.1, 1.0)
+    largest_exact: int = 800  # exact intervals of other sizes up to here
     tails_n: int = 1600
     tails_frictions: tuple[float, ...] = (0.01, 0.1, 1)
     # 9 million forces of each kind, ten in the bin of 1/8 ⟨f_n⟩ where P(f_n) is 10⁻⁵. Where S is
@@ -104,29 +124,21 @@ QUICK = Plan(
     packings=3,
     states=60,
     gauss_seidel_packings=3,
-    hardest_packings=1,
-    fine_frictions=(),
-    large_frictions=(),
-    many_packings=0,
-    exact_packings=3,
-    uniform_packings=3,
-    response_packings=3,
     response_contacts=4,
     perturb_packings=1,
     perturb_contacts=4,
-    frozen_packings=3,
+    prepared_frictions=(1,),
+    repeat_packings=1,
     frozen_from=0.01,
     frozen_large=80,
+    frozen_large_packings=1,
     frozen_large_frictions=(0.1, 1),
-    prepared_packings=3,
-    prepared_frictions=(1,),
-    sizes=(20, 80),
-    size_frictions=(0.1,),
-    largest_exact=80,
-    stress_packings=3,
     stress_states=50,
     volume_packings=2,
     volume_accuracy=0.3,
+    sizes=(20, 80),
+    size_frictions=(0.1,),
+    largest_exact=80,
     tails_n=80,
     tails_frictions=(0.1, 1),
     tails_packings=1,
@@ -143,14 +155,20 @@ class Task(NamedTuple):
     mu: float  # of the cones
     seed: int  # of the packing
 
+    @property
+    def packing_mu(self) -> float:
+        """Friction with which its packing was made."""
+        return float(self.cell.parameters["packing"]["mu"])
+
 
 def tasks(plan: Plan) -> list[Task]:
-    """All cells but the packings, those of the first packings first."""
-    found = []
-    for seed in range(1, max(plan.packings, plan.many_packings) + 1):
-        for applies in _PARTS.values():
-            found += [task for task in applies(plan, seed)]
-    return found
+    """All cells but the packings: part after part, in each those of the first packings first."""
+    found: dict[str, list[Task]] = {}
+    for applies in _PARTS.values():
+        for seed in range(1, plan.packings + 1):
+            for task in applies(plan, seed):
+                found.setdefault(task.part, []).append(task)
+    return list(itertools.chain(*found.values()))
 
 
 def packings(wanted: Iterable[Task]) -> list[Cell]:
@@ -162,23 +180,21 @@ def packings(wanted: Iterable[Task]) -> list[Cell]:
     return list(unique.values())
 
 
-def compute(
-    path: str | Path,
-    wanted: Sequence[Task],
-    *,
-    progress: Callable[[str], Progress | None] | None = None,
-    **options: Any,
-) -> list[tuple[Cell, str]]:
-    """Compute tasks into the store at path, packings first; options as for `scan.run`.
+def compute(path: str | Path, wanted: Sequence[Task], **options: Any) -> list[tuple[Cell, str]]:
+    """Compute tasks into the store at path; options as for `scan.run`.
 
-    progress(what) gives the progress callable of the packings and of the cells. Returns what failed
-    as (cell, error message); cells of failed packings are not tried.
+    One family of parts after the other, the packings that it needs first: whenever it ends, what is
+    most wanted is there. Returns what failed as (cell, error message); cells of failed packings are
+    not tried.
     """
-    progress = progress or (lambda what: None)
-    failed = scan.run(path, packings(wanted), progress=progress("packings"), **options)
-    lost = [cell.parameters for cell, _ in failed]
-    cells = [task.cell for task in wanted if task.cell.parameters["packing"] not in lost]
-    return failed + scan.run(path, cells, progress=progress("cells"), **options)
+    cells: list[Cell] = []
+    known: list[Cell] = []
+    for _, some in itertools.groupby(wanted, lambda task: _family(task.part)):
+        family = list(some)
+        needed = [cell for cell in packings(family) if cell not in known]
+        known += needed
+        cells += [*needed, *(task.cell for task in family)]
+    return scan.run(path, cells, **options)
 
 
 def _task(
@@ -200,71 +216,89 @@ def _task(
 
 
 def _walk(
-    part: str, n: int, seed: int, mu: float, plan: Plan, *, states: int | None = None, **how: Any
+    part: str,
+    n: int,
+    seed: int,
+    mu: float,
+    plan: Plan,
+    *,
+    states: int | None = None,
+    walk_seed: int = 0,
+    **how: Any,
 ) -> Task:
     states = plan.states if states is None else states
     shown = part in SHOWN_PARTS and seed == 1 and mu in SHOWN_FRICTIONS
     keep = states if shown else min(KEPT_STATES, states)
-    return _task(part, kinds.WALK, n, seed, mu, states, keep=keep, **how)
+    return _task(part, kinds.WALK, n, seed, mu, states, walk_seed, keep=keep, **how)
 
 
 def _exact(part: str, n: int, seed: int, mu: float, **how: Any) -> Task:
     return _task(part, kinds.INTERVALS, n, seed, mu, **how)
 
 
-def _frictions(plan: Plan, seed: int, packings: int, more: Iterable[float] = ()) -> list[float]:
-    """Those of the plan for the first packings, and some more for many."""
-    wanted = set(plan.frictions) if seed <= min(packings, plan.packings) else set()
-    return sorted(wanted | (set(more) if seed <= plan.many_packings else set()))
+def _exacts(plan: Plan, seed: int) -> list[Task]:
+    return [_exact("exact", plan.n, seed, mu) for mu in plan.frictions]
+
+
+def _walks(plan: Plan, seed: int) -> list[Task]:
+    return [_nearest("walk", seed, mu, plan) for mu in plan.frictions]
+
+
+def _nearest(part: str, seed: int, mu: float, plan: Plan, **how: Any) -> Task:
+    return _walk(part, plan.n, seed, mu, plan, skip=mu > 0, **how)
+
+
+def _uniform(plan: Plan, seed: int) -> list[Task]:
+    # The mean of those kept is the centre that distances are measured from: off by a tenth of what
+    # states scatter, half a per cent of a distance as long.
+    return [
+        _task("uniform", kinds.UNIFORM, plan.n, seed, mu, plan.states, keep=KEPT_STATES)
+        for mu in plan.frictions
+    ]
 
 
 def _sweeps(plan: Plan, seed: int) -> list[Task]:
-    found = []
-    for mu in _frictions(plan, seed, plan.gauss_seidel_packings, plan.fine_frictions):
-        for part, residual in SWEEPS.items():
-            if seed <= plan.gauss_seidel_packings or residual == max(SWEEPS.values()):
-                found.append(_swept(part, residual, seed, mu, plan))
-    if seed <= min(plan.hardest_packings, plan.packings):
-        part, residual = HARDEST
-        states = min(HARDEST_STATES, plan.states)
-        found += [_swept(part, residual, seed, mu, plan, states) for mu in plan.frictions]
-    return found
+    frictions = plan.frictions if seed <= plan.gauss_seidel_packings else ()
+    return [_swept(PAPERS, seed, mu, plan) for mu in frictions]
+
+
+def _residuals(plan: Plan, seed: int) -> list[Task]:
+    few = min(plan.residual_packings, plan.gauss_seidel_packings)
+    frictions = plan.frictions if seed <= few else ()
+    parts = [part for part in SWEEPS if part != PAPERS]
+    return [_swept(part, seed, mu, plan, ends=part) for part in parts for mu in frictions]
 
 
 def _swept(
     part: str,
-    residual: float,
     seed: int,
     mu: float,
     plan: Plan,
-    states: int | None = None,
+    *,
+    ends: str = PAPERS,
     n: int | None = None,
+    **how: Any,
 ) -> Task:
-    how: dict[str, Any] = {"relax": "gauss_seidel_only", "residual": residual, "attempts": ATTEMPTS}
-    how["chains"] = min(CHAINS, states or plan.states)
+    """A walk by sweeps, which end where those of the part `ends` do."""
+    states = how.pop("states", plan.states)
+    states = min(HARDEST_STATES, states) if ends == HARDEST else states
+    options: dict[str, Any] = {"relax": "gauss_seidel_only", "residual": SWEEPS[ends]}
+    options |= {"attempts": ATTEMPTS, "chains": min(CHAINS, states)}
     # Where S is one point, sweeps end beside it: how far is measured, but not to where none ends.
-    how["skip"] = mu > 0 or part == HARDEST[0]
-    return _walk(part, n or plan.n, seed, mu, plan, states=states, **how)
+    options["skip"] = mu > 0 or ends == HARDEST
+    return _walk(part, n or plan.n, seed, mu, plan, states=states, **options, **how)
 
 
-def _walks(plan: Plan, seed: int) -> list[Task]:
-    many = plan.fine_frictions + plan.large_frictions
-    frictions = _frictions(plan, seed, plan.packings, many)
-    return [_walk("walk", plan.n, seed, mu, plan, skip=mu > 0) for mu in frictions]
-
-
-def _exacts(plan: Plan, seed: int) -> list[Task]:
-    many = plan.fine_frictions + plan.large_frictions
-    frictions = _frictions(plan, seed, plan.exact_packings, many)
-    return [_exact("exact", plan.n, seed, mu) for mu in frictions]
-
-
-def _uniform(plan: Plan, seed: int) -> list[Task]:
-    if seed > min(plan.uniform_packings, plan.packings):
-        return []
-    # All states are kept: their mean is the centre that distances are measured from.
-    frictions = sorted(set(plan.frictions) | set(plan.fine_frictions))
-    return [_task("uniform", kinds.UNIFORM, plan.n, seed, mu, plan.states) for mu in frictions]
+def _repeated(plan: Plan, seed: int) -> list[Task]:
+    """Walks with other seeds, numbered in their part's name, and longer ones."""
+    found = []
+    for mu in plan.repeat_frictions if seed <= plan.repeat_packings else ():
+        for part, walk in (("repeat_sweeps", _swept), ("repeat_walk", _nearest)):
+            for k in range(1, plan.repeats + 1):
+                found.append(walk(f"{part}_{k}", seed, mu, plan, walk_seed=k))
+            longer = LONGER_WALK * plan.states
+            found.append(walk(f"{part}_long", seed, mu, plan, states=longer))
+    return found
 
 
 def _responses(plan: Plan, seed: int) -> list[Task]:
@@ -275,7 +309,7 @@ def _responses(plan: Plan, seed: int) -> list[Task]:
         ("response_long", plan.perturb_packings, plan.response_contacts, {"rise": RISE, **longer}),
         ("perturb", plan.perturb_packings, plan.perturb_contacts, {}),
     ):
-        for mu in plan.frictions if seed <= min(packings, plan.packings) else ():
+        for mu in plan.frictions if seed <= packings else ():
             if 0 < mu < LEAST_FOLLOWED:
                 continue
             how: dict[str, Any] = {"random": contacts, **protocol}
@@ -284,70 +318,72 @@ def _responses(plan: Plan, seed: int) -> list[Task]:
 
 
 def _frozen(plan: Plan, seed: int) -> list[Task]:
-    if seed > min(plan.frozen_packings, plan.packings):
-        return []
-    frictions = [mu for mu in plan.frictions if mu >= plan.frozen_from]
-    found = [_exact("frozen", plan.n, seed, mu, slice_=SLICE) for mu in frictions]
-    if seed <= min(plan.exact_packings, plan.packings):
-        n, frictions = plan.frozen_large, plan.frozen_large_frictions
-        found += [_exact("frozen_large", n, seed, mu, slice_=SLICE) for mu in frictions]
+    found = []
+    if seed <= plan.frozen_packings:
+        frictions = [mu for mu in plan.frictions if mu >= plan.frozen_from]
+        found += [_exact("frozen", plan.n, seed, mu, slice_=SLICE) for mu in frictions]
+    if seed <= plan.frozen_large_packings:
+        n, large = plan.frozen_large, plan.frozen_large_frictions
+        found += [_exact("frozen_large", n, seed, mu, slice_=SLICE) for mu in large]
     return found
 
 
 def _prepared(plan: Plan, seed: int) -> list[Task]:
-    if seed > min(plan.prepared_packings, plan.packings):
+    if seed > plan.prepared_packings:
         return []
-    return [
-        _walk(part, plan.n, seed, mu, plan, made=made)
-        for part, made in PREPARED.items()
-        for mu in plan.prepared_frictions
-    ]
+    found = []
+    for mu in plan.prepared_frictions:
+        for name, made in variations(mu).items():
+            found.append(_nearest(f"prepared_{name}", seed, mu, plan, made=made))
+            found.append(_exact(f"prepared_{name}_exact", plan.n, seed, mu, made=made))
+    return found
 
 
 def _opened(plan: Plan, seed: int) -> list[Task]:
-    if seed > min(plan.exact_packings, plan.packings):
+    if seed > plan.opened_packings:
         return []
+    n, widest = plan.n, max(plan.frictions)
     frictions = [mu for mu in plan.frictions if mu > 0]
-    walks = [_walk("opened", plan.n, seed, mu, plan, packing_mu=0) for mu in frictions]
-    return walks + [_exact("opened_exact", plan.n, seed, mu, packing_mu=0) for mu in frictions]
+    found = [_walk("opened", n, seed, mu, plan, packing_mu=0) for mu in frictions]
+    found += [_exact("opened_exact", n, seed, mu, packing_mu=0) for mu in frictions]
+    # Those made without friction, and with the most, are there already.
+    between = [mu for mu in frictions if mu < widest]
+    return found + [_exact("widest_exact", n, seed, widest, packing_mu=mu) for mu in between]
 
 
 def _sizes(plan: Plan, seed: int) -> list[Task]:
     found = []
     for n in plan.sizes:
         # Large packings average over more contacts: fewer of them are needed.
-        if seed > max(1, min(plan.packings, plan.packings * plan.n // n)):
+        if seed > _of_size(plan.size_packings, n, plan):
             continue
-        found += [_walk("size", n, seed, mu, plan) for mu in plan.size_frictions]
-        (residual,) = (SWEEPS[part] for part in SHOWN_PARTS if part in SWEEPS)
-        found += [
-            _swept("size_sweeps", residual, seed, mu, plan, n=n) for mu in plan.size_frictions
-        ]
-        few = max(plan.exact_packings, plan.exact_packings * plan.n // n)
-        if n <= plan.largest_exact and seed <= few:
-            found += [_exact("size_exact", n, seed, mu) for mu in plan.size_frictions]
+        for mu in plan.size_frictions:
+            found.append(_walk("size", n, seed, mu, plan))
+            found.append(_swept("size_sweeps", seed, mu, plan, n=n))
+            if n <= plan.largest_exact:
+                found.append(_exact("size_exact", n, seed, mu))
     return found
+
+
+def _of_size(packings: int, n: int, plan: Plan) -> int:
+    """How many packings of n disks are made where there are so many of the usual size."""
+    return max(1, min(packings, packings * plan.n // n))
 
 
 def _stresses(plan: Plan, seed: int) -> list[Task]:
-    found = []
-    for mu in plan.frictions if seed <= min(plan.stress_packings, plan.packings) else ():
-        if mu == 0:
-            continue  # one network, one stress
-        at = plan.n, seed, mu
-        found.append(_task("stress", kinds.STRESS, *at))
-        if seed <= plan.stress_uniform_packings:
-            found.append(_task("stress_uniform", kinds.UNIFORM, *at, plan.stress_states))
-    return found
+    # Without friction there is one network, with one stress.
+    frictions = [mu for mu in plan.frictions if mu > 0] if seed <= plan.stress_packings else []
+    found = [_task("stress", kinds.STRESS, plan.n, seed, mu) for mu in frictions]
+    drawn = ("stress_uniform", kinds.UNIFORM, plan.n, seed)
+    return found + [_task(*drawn, mu, plan.stress_states) for mu in frictions]
 
 
 def _volumes(plan: Plan, seed: int) -> list[Task]:
-    if seed > min(plan.volume_packings, plan.packings):
+    if seed > plan.volume_packings:
         return []
     found = [_volume("volume", plan.n, seed, mu, plan) for mu in plan.frictions if mu > 0]
     for n in plan.sizes:
-        # Large packings average over more contacts: fewer of them are needed.
-        if seed <= max(1, min(plan.volume_packings, plan.volume_packings * plan.n // n)):
+        if seed <= _of_size(plan.volume_packings, n, plan):
             found += [_volume("volume_size", n, seed, mu, plan) for mu in plan.size_frictions]
     return found
 
@@ -358,7 +394,7 @@ def _volume(part: str, n: int, seed: int, mu: float, plan: Plan) -> Task:
 
 
 def _tails(plan: Plan, seed: int) -> list[Task]:
-    if seed > min(plan.tails_packings, max(plan.packings, plan.many_packings)):
+    if seed > plan.tails_packings:
         return []
     n, states = plan.tails_n, plan.tails_states
     parts: dict[str, Any] = {"tails": {}, "tails_stress": {"prescribed": "stress"}}
@@ -369,25 +405,27 @@ def _tails(plan: Plan, seed: int) -> list[Task]:
     ]
 
 
-# The parts by families, which are computed by name; those of the paper first.
+# The parts by families, which are computed by name, in this order.
 _PARTS = {
-    "sweeps": _sweeps,
-    "response": _responses,
-    "walk": _walks,
     "exact": _exacts,
+    "walk": _walks,
     "uniform": _uniform,
-    "frozen": _frozen,
+    "response": _responses,
+    "sweeps": _sweeps,
     "prepared": _prepared,
     "opened": _opened,
-    "size": _sizes,
     "stress": _stresses,
+    "frozen": _frozen,
     "volume": _volumes,
+    "residuals": _residuals,
+    "repeat": _repeated,
+    "size": _sizes,
     "tails": _tails,
 }
 
 PARTS = tuple(_PARTS)
 # What the paper did: its walks, and its response to local forces.
-PAPER = ("sweeps", "response")
+PAPER = ("response", "sweeps", "residuals")
 
 
 def chosen(plan: Plan, parts: Collection[str] | None = None) -> list[Task]:
@@ -400,7 +438,10 @@ def chosen(plan: Plan, parts: Collection[str] | None = None) -> list[Task]:
 
 
 def _family(part: str) -> str:
-    return "response" if part == "perturb" else part.split("_")[0]
+    if part in SWEEPS and part != PAPERS:
+        return "residuals"
+    word = part.split("_")[0]
+    return {"perturb": "response", "widest": "opened"}.get(word, word)
 
 
 def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:

@@ -20,13 +20,15 @@ from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import Floats, InputError, Integers, Packing, friction
 from granforce.study import cells, kinds
+from granforce.study.cells import packing_version
 from granforce.study.schema import ROW_SCALARS, dataset_packing, labelled
 from granforce.study.store import Entry, Store, open_store
 
 VERSION = 1
 
-# Parts whose contacts are kept one by one.
-SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "walk", "exact", "uniform")
+# Parts whose contacts are kept one by one, and walks that are held against exact intervals.
+SAMPLED = ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6", "walk", "exact", "uniform")
+WALKED = (*plans.SWEEPS, "walk")
 # Upper edges of the bins, in ⟨f_n⟩, in which normal forces of uniform states are counted.
 TAILED = ("tails", "tails_stress")
 FORCES = np.arange(1, 161) * 0.125
@@ -47,11 +49,16 @@ class Table(NamedTuple):
     skipped: dict[str, int]  # counts: cells of the plan that the store lacked
     # {row: counts of f_n of its states, in bins up to FORCES}
     tails: Mapping[int, Floats] = MappingProxyType({})
-    packing_version: int = kinds.PACKING.version  # of the algorithm that made its packings
+    # {row: (shells, 2) their middle in mean diameters, mean |u|, where α is fitted}
+    decays: Mapping[int, Floats] = MappingProxyType({})
 
     def part(self, *names: str, n: int | None = None) -> list[dict[str, Any]]:
         """Rows of some parts; n: only of this number of disks."""
         return [r for r in self.rows if r["part"] in names and n in (None, r["n"])]
+
+    def parts(self) -> list[str]:
+        """Names of the parts that it has, in order of their first rows."""
+        return list(dict.fromkeys(row["part"] for row in self.rows))
 
     def contacts(self, part: str) -> list[tuple[Any, ...]]:
         """[(row, contact numbers, f_n, least f_n, ΔF_n)] of a sampled part, forces in ⟨f_n⟩."""
@@ -93,11 +100,19 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     shown: list[tuple[int, Integers]] = []
     packings: dict[int, Packing] = {}
     centres: dict[tuple[float, int], tuple[Floats, dict[str, Any]]] = {}
+    exact: dict[tuple[float, int], xr.Dataset] = {}
     tails: dict[int, Floats] = {}
+    decays: dict[int, Floats] = {}
     every = plans.tasks(plan)
     for task, dataset in plans.finished(path, plan):
         k = len(rows)
         rows.append(row_of(task, dataset))
+        if task.part == "exact":
+            exact[task.mu, task.seed] = dataset
+        if task.part in WALKED and (task.mu, task.seed) in exact and _has_states(dataset):
+            rows[k]["excess"] = _excess(dataset, exact[task.mu, task.seed])
+        if "profile" in dataset:
+            decays[k] = _decay(store, task, dataset)
         if task.part == "stress_uniform":
             packing, _ = kinds.get_packing(store, task.cell.parameters["packing"])
             rows[k] |= _shears(packing, dataset)
@@ -121,7 +136,7 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
     }
     wanted = every if wanted is None else wanted
     known = {_name(row) for row in rows}
-    missing = sum((t.part, t.n, t.mu, t.seed) not in known for t in wanted)
+    missing = sum(_name(_named(task)) not in known for task in wanted)
     skipped = {"missing_cells": missing}
     return Table(
         plan=plan._asdict(),
@@ -131,7 +146,32 @@ def reduce(path: str | Path, plan: Plan, wanted: Sequence[Task] | None = None) -
         packings=packings,
         skipped=skipped,
         tails=tails,
+        decays=decays,
     )
+
+
+def _excess(walked: xr.Dataset, exact: xr.Dataset) -> float:
+    """How far the intervals that states span reach beyond the exact ones, mean, ⟨f_n⟩.
+
+    States in S reach beyond none. NaN where the two know other contacts.
+    """
+    if not np.array_equal(walked["backbone"], exact["backbone"]):
+        return np.nan
+    low, high = (np.maximum(s * (walked[e] - exact[e]), 0) for s, e in ((-1, "low"), (1, "high")))
+    return float((low + high).mean() / exact["force_scale"])
+
+
+def _decay(store: Store, task: Task, dataset: xr.Dataset) -> Floats:
+    """Middles of shells in mean diameters and mean |u| in them over contacts, (shells, 2).
+
+    Of the shells in which α is fitted and that hold grains of every contact.
+    """
+    packing, _ = kinds.get_packing(store, task.cell.parameters["packing"])
+    inner, outer = json.loads(dataset.attrs["fit_range"])
+    radius, profile = dataset["shell_radius"].values, dataset["profile"].values
+    kept = (radius >= inner) & (radius <= outer) & np.isfinite(profile).all(axis=0)
+    diameter = 2 * float(packing.r.mean())
+    return np.column_stack([radius[kept] / diameter, profile[:, kept].mean(axis=0)])
 
 
 def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:
@@ -153,7 +193,7 @@ def _compare_distances(store: Store, wanted: Any, centres: Any) -> None:
 
 def row_of(task: Task, dataset: xr.Dataset) -> dict[str, Any]:
     """The numbers of one cell: scalars of its dataset and what its contacts sum up to."""
-    row: dict[str, Any] = {"part": task.part, "n": task.n, "mu": task.mu, "seed": task.seed}
+    row = _named(task)
     for name in ROW_SCALARS:
         if name in dataset and dataset[name].size:
             row[name] = float(dataset[name].max())
@@ -179,6 +219,7 @@ def row_of(task: Task, dataset: xr.Dataset) -> dict[str, Any]:
         scale = dataset["force_scale"].item()
         row["contacts"] = len(low)
         row["mean_extent"] = float(measures.normal_extent(low, high).mean() / scale)
+        row["mean_length"] = float((high - low).mean() / scale)
     if "cluster" in dataset:
         counts = np.bincount(dataset["cluster"].values[dataset["cluster"].values >= 0])
         row["undetermined"] = int(counts.sum())
@@ -230,15 +271,19 @@ def merged(new: Table, old: Table) -> Table:
     """The Table `new` with the rows of its plan that it lacks and `old` has, after its own.
 
     Numbers of a row that hang on other cells (distances from the uniform centre) stay the old ones
-    where those cells are gone. Raises InputError where the packings are of different versions.
+    where those cells are gone. Raises InputError where rows are of other versions than those that
+    the plan has now.
     """
-    if new.packing_version != old.packing_version:
-        raise InputError(
-            f"the older table is of packings of version {old.packing_version}, which cannot stand "
-            f"beside those of version {new.packing_version}: leave --table out"
-        )
+    tasks = {_name(_named(task)): task for task in plans.tasks(plans.Plan(**new.plan))}
+    planned = tasks.keys()
+    for row in old.rows:
+        task = tasks.get(_name(row))
+        if task is not None and _versions(row) != _versions(_named(task)):
+            raise InputError(
+                f"the older table has {row['part']} {_version_words(row)}, which cannot stand "
+                f"beside {_version_words(_named(task))}: leave --table out"
+            )
     known, older = {_name(row) for row in new.rows}, {_name(row): row for row in old.rows}
-    planned = {(t.part, t.n, t.mu, t.seed) for t in plans.tasks(plans.Plan(**new.plan))}
     kept = [k for k, row in enumerate(old.rows) if _name(row) in planned - known]
     place = {k: len(new.rows) + at for at, k in enumerate(kept)}
     lacked = np.isin(old.samples["row"], kept)
@@ -255,11 +300,47 @@ def merged(new: Table, old: Table) -> Table:
         packings=new.packings | {place[k]: p for k, p in old.packings.items() if k in place},
         skipped={"missing_cells": new.skipped["missing_cells"] - len(kept)},
         tails=dict(new.tails) | {place[k]: t for k, t in old.tails.items() if k in place},
+        decays=dict(new.decays) | {place[k]: d for k, d in old.decays.items() if k in place},
     )
 
 
-def _name(row: dict[str, Any]) -> tuple[Any, ...]:
-    return row["part"], row["n"], row["mu"], row["seed"]
+def _named(task: Task) -> dict[str, Any]:
+    """What names the row of a task, and the versions of what it tells."""
+    row: dict[str, Any] = {"part": task.part, "n": task.n, "mu": task.mu, "seed": task.seed}
+    if task.packing_mu != task.mu:
+        row["packing_mu"] = task.packing_mu
+    packing = task.cell.parameters["packing"]["version"]
+    return row | {"version": task.cell.kind.version, "packing_version": packing}
+
+
+def _name(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    return row["part"], row["n"], row["mu"], row["seed"], row.get("packing_mu", row["mu"])
+
+
+def _versions(row: Mapping[str, Any]) -> tuple[Any, Any]:
+    return row.get("version"), row.get("packing_version")
+
+
+def _version_words(row: Mapping[str, Any]) -> str:
+    version, packing = ("unknown" if v is None else f"{v:g}" for v in _versions(row))
+    return f"of version {version} in packings of version {packing}"
+
+
+def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
+    """InputError where rows of one part, or packings that one algorithm makes, differ in version.
+
+    What an older table did not tell is one version by itself.
+    """
+    first: dict[Any, Any] = {}
+    for row in rows:
+        made = packing_version(row.get("packing_mu", row["mu"]))
+        for group, version in zip((row["part"], made), _versions(row), strict=True):
+            other = first.setdefault(group, (row, version))
+            if other[1] != version:
+                raise InputError(
+                    f"the study mixes {row['part']} {_version_words(row)} with {other[0]['part']} "
+                    f"{_version_words(other[0])}: reduce it anew from cells of one version"
+                )
 
 
 def save(table: Table, path: str | Path) -> None:
@@ -307,8 +388,12 @@ def _dataset(table: Table) -> xr.Dataset:
     if table.tails:
         arrays["tail_row"], arrays["tail_force"] = list(table.tails), FORCES
         arrays["tail_count"] = np.stack(list(table.tails.values()))
-    told = {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)}
-    return labelled(arrays, told | {"packing_version": table.packing_version})
+    if table.decays:
+        shells = [len(decay) for decay in table.decays.values()]
+        arrays["decay_row"] = np.repeat(list(table.decays), shells)
+        both = np.concatenate(list(table.decays.values())).T
+        arrays["decay_radius"], arrays["decay_size"] = both
+    return labelled(arrays, {"parts": json.dumps(parts), "skipped": json.dumps(table.skipped)})
 
 
 def _number(value: Any) -> Any:
@@ -327,6 +412,7 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> Table:
         row = {name: values[k].item() for name, values in columns.items()}
         row |= {"part": parts[row["part"]], "n": int(row["n"]), "seed": int(row["seed"])}
         rows.append({name: value for name, value in row.items() if value == value})
+    check_versions(rows)
     samples = {name: dataset[f"sample_{name}"].values for name in SAMPLES}
     shown, packings = [], {}
     if "shown_row" in dataset:
@@ -343,9 +429,13 @@ def _table(store: Store, entry: Entry, dataset: xr.Dataset) -> Table:
         counts = dataset["tail_count"].values
         tails = dict(zip(dataset["tail_row"].values.tolist(), counts, strict=True))
     plan = {name: value for name, value in entry.params.items() if name != "rows"}
+    decays = {}
+    if "decay_row" in dataset:
+        at = dataset["decay_row"].values
+        both = np.column_stack([dataset["decay_radius"], dataset["decay_size"]])
+        decays = {int(k): both[at == k] for k in np.unique(at)}
     skipped = json.loads(dataset.attrs["skipped"])
-    version = int(dataset.attrs.get("packing_version", 1))  # tables of version 1 did not tell
-    return Table(plan, rows, samples, shown, packings, skipped, tails, version)
+    return Table(plan, rows, samples, shown, packings, skipped, tails, decays)
 
 
 def _packing(store: Store, row: dict[str, Any]) -> Packing:

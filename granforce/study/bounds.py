@@ -41,6 +41,7 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
             "correlation": measures.correlation(original[:, 0], extent),
             "dimension": S.dimension,
             "coordination": S.coordination,
+            "packing_fraction": S.packing.packing_fraction,
             "force_scale": S.force_scale,
             **S.skipped,
             "seconds": seconds,

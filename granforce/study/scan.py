@@ -17,7 +17,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
@@ -28,7 +28,7 @@ from granforce.perturb.critical_force import critical_forces
 from granforce.records import InputError, Packing, Progress
 from granforce.study import kinds
 from granforce.study.cells import Cell, get, load, row
-from granforce.study.keys import Parameters
+from granforce.study.keys import Parameters, canonical
 from granforce.study.store import open_store
 from granforce.system.terminal import one_line
 
@@ -87,6 +87,8 @@ def run(
 
     workers: processes on this machine. scheduler: address of a dask scheduler whose workers see
     the same folder, in place of processes. dtypes: as for Store.save, for the states.
+    Cells are begun in their order; one whose packing is among them waits for it, and is left out,
+    without a word, where that fails.
     progress(cells done, cells in all) counts quarters of cells and never goes back;
     on_done(position in cells, whether it was found) after each. Once enough() is true no cell is
     begun; those under way are finished (not asked with a scheduler, whose cells are all handed
@@ -118,11 +120,41 @@ def run(
 
     if todo:
         tasks = {k: (str(store.path), cells[k], dtypes) for k in todo}
+        needs = _needs({k: cells[k] for k in todo})
         if scheduler is None:
-            _over_processes(tasks, workers, finished, tell, enough or (lambda: False))
+            waits = Waits(needs, failed)
+            _over_processes(tasks, waits, workers, finished, tell, enough or (lambda: False))
         else:
-            _over_dask(tasks, scheduler, finished)
+            first = set(needs.values())
+            for part in (first, tasks.keys() - first):
+                some = {k: tasks[k] for k in sorted(part) if needs.get(k) not in failed}
+                _over_dask(some, scheduler, finished)
     return [(cells[k], failed[k]) for k in sorted(failed)]
+
+
+class Waits(NamedTuple):
+    """What cells wait for: {cell: its packing, where that is to be made}, and what has failed."""
+
+    needs: Mapping[int, int]
+    failed: Mapping[int, str]
+
+    def ready(self, todo: Sequence[int], left: Collection[int]) -> int | None:
+        """The first cell to do whose packing is not among those left; None where all wait."""
+        return next((k for k in todo if self.needs.get(k) not in left), None)
+
+    def lost(self, k: int) -> bool:
+        """Whether the packing of a cell has failed."""
+        return self.needs.get(k) in self.failed
+
+
+def _needs(cells: Mapping[int, Cell]) -> dict[int, int]:
+    """{cell: the one among them that makes its packing}."""
+    made = {
+        canonical(cell.parameters): k for k, cell in cells.items() if cell.kind == kinds.PACKING
+    }
+    named = {k: cell.parameters.get("packing") for k, cell in cells.items()}
+    wanted = {k: canonical(packing) for k, packing in named.items() if packing is not None}
+    return {k: made[name] for k, name in wanted.items() if name in made}
 
 
 def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
@@ -144,6 +176,7 @@ def forwards(progress: Progress | None, total: int) -> Callable[[float], None]:
 
 def _over_processes(
     tasks: Tasks,
+    waits: Waits,
     workers: int,
     finished: Callable[[int, Callable[[], bool]], object],
     advanced: Callable[[float], object],
@@ -153,7 +186,7 @@ def _over_processes(
     count = len(tasks)
     for _ in range(TRIES):
         before = count - len(tasks)
-        tasks = _one_pool(tasks, workers, finished, advanced, before, enough)
+        tasks = _one_pool(tasks, waits, workers, finished, advanced, before, enough)
         if not tasks or enough():
             return
     for k in tasks:
@@ -166,6 +199,7 @@ def _lost() -> NoReturn:
 
 def _one_pool(
     tasks: Tasks,
+    waits: Waits,
     workers: int,
     finished: Callable[[int, Callable[[], bool]], object],
     advanced: Callable[[float], object],
@@ -182,8 +216,14 @@ def _one_pool(
     try:
         while True:
             # One for each worker: what the pool was given it would begin.
-            while todo and len(waiting) < workers and not broken and not enough():
-                k = todo.pop(0)
+            while len(waiting) < workers and not broken and not enough():
+                k = waits.ready(todo, left)
+                if k is None:
+                    break
+                todo.remove(k)
+                if waits.lost(k):
+                    del left[k]
+                    continue
                 with _single_threaded():
                     try:
                         waiting[pool.submit(run_cell, *tasks[k])] = k

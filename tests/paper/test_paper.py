@@ -1,5 +1,6 @@
 """The study: its plan, its reduced table, its verdicts, and the command that runs it."""
 
+import itertools
 import json
 import os
 import signal
@@ -14,8 +15,9 @@ from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
 from granforce.forces.ensemble import ensemble
-from granforce.paper import claims, documents, drawings, tables
+from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
+from granforce.paper.claims import groups, verdicts
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.cells import load
@@ -27,27 +29,25 @@ TINY = plans.Plan(
     packings=2,
     states=6,
     gauss_seidel_packings=1,
-    hardest_packings=1,
-    fine_frictions=(),
-    large_frictions=(),
-    many_packings=0,
-    exact_packings=1,
-    uniform_packings=1,
-    response_packings=0,
+    response_packings=1,
+    response_contacts=3,
     perturb_packings=0,
-    frozen_packings=1,
+    prepared_packings=2,
+    prepared_frictions=(0.1,),
+    opened_packings=2,
+    repeat_packings=2,
+    repeat_frictions=(0.1,),
+    frozen_packings=2,
     frozen_large=80,
     frozen_large_frictions=(),
-    prepared_packings=1,
-    prepared_frictions=(),
-    sizes=(12,),
-    size_frictions=(0.1,),
-    largest_exact=12,
-    stress_packings=1,
-    stress_uniform_packings=1,
+    stress_packings=2,
     stress_states=5,
     volume_packings=2,
     volume_accuracy=0.5,
+    sizes=(12,),
+    size_packings=2,
+    size_frictions=(0.1,),
+    largest_exact=12,
     tails_n=20,
     tails_frictions=(0.1, 0.3),
     tails_packings=1,
@@ -55,8 +55,8 @@ TINY = plans.Plan(
 )
 WORDS = [
     *("study", "-n", "20", "--mu", "0,0.1,0.3", "--packings", "2", "--states", "6"),
-    *("--gauss-seidel-packings", "1", "--exact-packings", "1", "--uniform-packings", "1"),
-    *("--response-packings", "0", "--perturb-packings", "0", "--sizes", "12"),
+    *("--gauss-seidel-packings", "1", "--response-packings", "0", "--perturb-packings", "0"),
+    *("--sizes", "12"),
 ]
 
 
@@ -69,6 +69,12 @@ def done(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def table(done):
+    """It reduced; not to be changed."""
+    return tables.reduce(done / "cells.zarr", TINY)
+
+
 def test_the_default_plan_is_the_papers():
     found = plans.tasks(plans.Plan())
     walks = [task for task in found if task.part == "walk"]
@@ -77,16 +83,6 @@ def test_the_default_plan_is_the_papers():
     assert len(frictions - {0}) >= 12
     assert {0.001, 10} <= frictions
     assert max(frictions) == 10
-    for mu in plans.FRICTIONS:
-        assert {task.seed for task in walks if task.mu == mu} >= set(range(1, 11))
-        least = {"exact": 3, "uniform": 3, "sweeps_1e-3": 10, "sweeps_1e-4": 10}
-        if mu == 0 or mu >= 0.001:
-            least["response"] = 10
-        for part, packings in least.items():
-            assert sum(task.part == part and task.mu == mu for task in found) >= packings
-    for mu in (0.05, 0.07, 0.1, 0.14, 0.2, 0.3):
-        for part in ("walk", "exact", "sweeps_1e-3"):
-            assert sum(task.part == part and task.mu == mu for task in found) == 30
     pushed = next(task.cell.parameters for task in found if task.part == "response")
     assert pushed["rise"] <= 0.1
     assert 10 * pushed["random"] >= 200
@@ -96,17 +92,71 @@ def test_the_default_plan_is_the_papers():
     assert len(set(names)) == len(names)  # no cell twice
 
 
+def test_columns_are_of_the_same_packings():
+    """Exact ones of thirty, all others of the first of those; each variation has a default."""
+    made = {}
+    for task in plans.tasks(plans.Plan()):
+        if task.n == plans.Plan().n:
+            packed = task.cell.parameters["packing"]
+            made.setdefault(task.part, {}).setdefault(task.mu, []).append(packed)
+    for mu in plans.FRICTIONS:
+        assert made["exact"][mu] == made["walk"][mu] == made["uniform"][mu]
+        assert [packed["seed"] for packed in made["exact"][mu]] == list(range(1, 31))
+        for part in ("sweeps_1e-3", "sweeps_1e-4", "sweeps_1e-6", "response", "volume", "stress"):
+            few = made[part].get(mu, [])
+            assert few == made["exact"][mu][: len(few)]
+    default = plans.variations(1)
+    for name in default:
+        for mu in (0.1, 0.5, 1, 3, 10):
+            some = made[f"prepared_{name}"][mu]
+            assert some == made[f"prepared_{name}_exact"][mu]
+            assert [packed["seed"] for packed in some] == list(range(1, 21))
+            (changed,) = {
+                tuple(key for key in packed if packed[key] != made["exact"][mu][k][key])
+                for k, packed in enumerate(some)
+            }
+            assert changed and set(changed) <= plans.variations(mu)[name].keys()
+
+
+def test_the_most_valuable_cells_come_first():
+    found = plans.tasks(plans.Plan())
+    parts = list(dict.fromkeys(task.part for task in found))
+    first = ["exact", "walk", "uniform", "response", "response_long", "perturb", "sweeps_1e-3"]
+    assert parts[:7] == first
+    for part in parts:
+        seeds = [task.seed for task in found if task.part == part]
+        assert seeds == sorted(seeds)  # any beginning has as many packings at each μ
+
+
+def test_a_study_that_ends_early_has_its_first_parts(monkeypatch):
+    """Parts come one after the other, and no packing before the first part that needs it."""
+    asked = []
+    monkeypatch.setattr(plans.scan, "run", lambda path, cells, **options: asked.extend(cells))
+    some = plans.chosen(TINY, ["exact", "walk", "prepared"])
+    plans.compute("", some)
+    runs = [
+        (kind.name, len(list(group))) for kind, group in itertools.groupby(c.kind for c in asked)
+    ]
+    variations = 2 * len(plans.variations(0.1))
+    assert runs[:4] == [("packing", 6), ("intervals", 6), ("walk", 6), ("packing", variations)]
+    assert [cell for cell in asked if cell.kind != kinds.PACKING] == [task.cell for task in some]
+
+
 def test_packings_are_named_once():
     found = plans.packings(plans.tasks(TINY))
-    assert sorted((c.parameters["n"], c.parameters["mu"], c.parameters["seed"]) for c in found) == [
-        *((12, 0.1, seed) for seed in (1, 2)),
-        *((20, mu, seed) for mu in (0, 0.1, 0.3) for seed in (1, 2)),
-    ]
+    named = [(c.parameters["n"], c.parameters["mu"], c.parameters["seed"]) for c in found]
+    assert sorted(named) == sorted(
+        [
+            *((12, 0.1, seed) for seed in (1, 2)),
+            *((20, mu, seed) for mu in (0, 0.1, 0.3) for seed in (1, 2)),
+            *((20, 0.1, seed) for seed in (1, 2) for _ in plans.variations(0.1)),
+        ]
+    )
 
 
 def test_parts_are_chosen_by_name():
     some = plans.chosen(TINY, ["exact", "opened"])
-    assert {task.part for task in some} == {"exact", "opened", "opened_exact"}
+    assert {t.part for t in some} == {"exact", "opened", "opened_exact", "widest_exact"}
     assert plans.chosen(TINY) == plans.tasks(TINY)
     with pytest.raises(InputError, match="unknown part 'exakt'"):
         plans.chosen(TINY, ["exakt"])
@@ -121,8 +171,7 @@ def test_the_papers_part_is_its_walks_and_its_responses():
     }
 
 
-def test_rows_are_the_numbers_of_their_cells(done):
-    table = tables.reduce(done / "cells.zarr", TINY)
+def test_rows_are_the_numbers_of_their_cells(done, table):
     assert table.skipped == {"missing_cells": 0}
     assert len(table.rows) == len(plans.tasks(TINY))
     store = open_store(done / "cells.zarr")
@@ -138,6 +187,9 @@ def test_rows_are_the_numbers_of_their_cells(done):
         if task.part == "stress":
             assert row["friction"] == dataset["friction"].item()
             assert row["own_shear"] == np.hypot(*dataset["stress_own"].values)
+            continue
+        if task.cell.kind == kinds.PERTURBATION:
+            assert row["critical_force"] == dataset["critical_force"].item()
             continue
         assert row["eta3"] == dataset["eta3"].item()
         extent = measures.normal_extent(dataset["low"].values, dataset["high"].values)
@@ -156,9 +208,8 @@ def test_rows_are_the_numbers_of_their_cells(done):
         assert (row["mu"], row["seed"]) == (beside["mu"], beside["seed"])
         assert 0 < beside["mean_shear"] < beside["largest_shear"] < row["friction"]
         assert row["own_shear"] < row["friction"]
-        task = next(
-            t for t in plans.tasks(TINY) if t.part == "stress_uniform" and t.mu == row["mu"]
-        )
+        named = "stress_uniform", row["mu"], row["seed"]
+        task = next(t for t in plans.tasks(TINY) if (t.part, t.mu, t.seed) == named)
         packing, _ = kinds.get_packing(store, task.cell.parameters["packing"])
         S, states = ensemble(packing), load(store, *task.cell)["states"].values
         shears = [np.hypot(*stress_plane(S, state)) for state in states]
@@ -177,8 +228,7 @@ def test_rows_are_the_numbers_of_their_cells(done):
     assert row["pair_spread"] == pytest.approx(np.std(apart) / np.mean(apart), rel=1e-4)
 
 
-def test_a_table_survives_its_store(done, tmp_path):
-    table = tables.reduce(done / "cells.zarr", TINY)
+def test_a_table_survives_its_store(done, table, tmp_path):
     tables.save(table, tmp_path / "study.zarr")
     store = open_store(tmp_path / "study.zarr")
     names = {tuple(table.rows[k][name] for name in ("n", "mu", "seed")) for k in table.packings}
@@ -246,12 +296,9 @@ def test_rows_that_a_store_lacks_come_from_the_older_table(done):
         assert joined.rows[k]["part"] in plans.SHOWN_PARTS
         assert k in joined.packings
         assert len(counts) == joined.rows[k]["contacts"]
-    with pytest.raises(InputError, match="packings of version 1"):
-        tables.merged(fewer, old._replace(packing_version=1))
 
 
-def test_every_figure_of_the_table_is_made(done):
-    table = tables.reduce(done / "cells.zarr", TINY)
+def test_every_figure_of_the_table_is_made(table):
     made = drawings.all_figures(table)
     assert {"figure1", "figure3", "figure4", "figure5", "figure6"} <= made.keys()
     assert {"figure1_uniform", "opened", "frozen", "sizes", "distances"} <= made.keys()
@@ -315,28 +362,112 @@ def test_a_study_tells_what_is_left_and_ends_in_time(done, tmp_path, capsys):
     assert not list((tmp_path / "late" / "cells.zarr").glob("walk-*"))
 
 
-def test_tables_in_documents_are_renewed(done, tmp_path):
-    table = tables.reduce(done / "cells.zarr", TINY)
+def test_tables_in_documents_are_renewed(table, tmp_path):
     told = [claim._asdict() for claim in claims.judged(table)]
+    found = [finding._asdict() for finding in findings.found(table)]
     page = tmp_path / "page.md"
     blocks = "<!-- study: {} -->\nold\n<!-- end -->\n"
-    page.write_text("before\n" + blocks.format("measures") + blocks.format("claims") + "after\n")
+    names = ("measures", "beside", "sweeps", "preparation", "counts", "claims", "findings")
+    page.write_text("before\n" + "".join(map(blocks.format, names)) + "after\n")
     (path,) = documents.named(str(page))
-    documents.renew([path], table, told)
+    documents.renew([path], table, told, found)
     text = page.read_text()
-    assert text.startswith("before\n<!-- study: measures -->\n| μ | z |")
+    assert text.startswith("before\n<!-- study: measures -->\n| μ | packings |")
     assert text.endswith("<!-- end -->\nafter\n")
     assert "\nold\n" not in text
-    walk = np.mean([row["eta2"] for row in table.part("walk") if row["mu"] == 0.3])
-    (line,) = [line for line in text.splitlines() if line.startswith("| 0.3 | ")]
-    assert f"{walk:.3f}" in line
     for claim in told:
         assert claim["statement"] in text
-    documents.renew([path], table, told)
+    documents.renew([path], table, told, found)
     assert page.read_text() == text
     page.write_text(blocks.format("everything"))
     with pytest.raises(InputError, match="no table 'everything'"):
-        documents.renew([path], table, told)
+        documents.renew([path], table, told, found)
+
+
+def cells_of(text, mu):
+    """{head: cell} of the line of a table that begins with this friction."""
+    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()]
+    (line,) = [line for line in lines if line[0] == f"{mu:g}"]
+    return dict(zip(lines[0], line, strict=True))
+
+
+def test_a_column_of_fewer_packings_says_of_how_many(table):
+    line = cells_of(documents.measures(table), 0.3)
+    walk = np.array([row["eta2"] for row in table.part("walk") if row["mu"] == 0.3])
+    assert line["packings"] == "2"
+    error = walk.std(ddof=1) / np.sqrt(2)
+    mean, _, told = line["nearest η2"].partition(" ± ")
+    assert (float(mean), float(told)) == pytest.approx((walk.mean(), error), rel=0.06)
+    phi = np.mean([row["packing_fraction"] for row in table.part("exact") if row["mu"] == 0.3])
+    assert line["φ"] == f"{phi:.4f}"
+    # The paper's sweeps are of the first one: that one over nearest networks in the same packing.
+    assert line["sweeps η2"].endswith(" (1)") and line["sweeps/nearest η2"].endswith(" (1)")
+    (swept,) = (row for row in table.part("sweeps_1e-3") if row["mu"] == 0.3)
+    assert float(line["sweeps/nearest η2"].split()[0]) == pytest.approx(
+        swept["eta2"] / walk[0], abs=2e-3
+    )
+
+
+def test_what_lies_outside_of_s_is_no_value_of_eta(table):
+    """At μ = 0 S is one point: sweeps end beside it, by more than its extent."""
+    assert groups.outside(table, "walk") == []
+    assert 0 in groups.outside(table, "sweeps_1e-3")
+    for row in table.part("sweeps_1e-3", "walk"):
+        assert row["excess"] >= 0
+    assert max(row["excess"] for row in table.part("walk") if row["mu"] > 0) < 1e-8
+    line = cells_of(documents.measures(table), 0)
+    assert line["sweeps η2"] == line["sweeps 0.15 η3"] == "outside S"
+    assert {row["mu"] for row in groups.drawn(table, "gauss_seidel")} <= {0.1, 0.3}
+    told = {(c.statement, c.sampler): c for c in claims.judged(table)}
+    vanishing = told["η vanishes at μ = 0 within 10⁻⁷", "gauss_seidel"]
+    assert vanishing.verdict == verdicts.UNMEASURED
+    assert "outside S, and not judged, at 0" in vanishing.why
+
+
+def test_what_packings_depend_on_is_told_in_standard_errors(table):
+    text = documents.preparation(table)
+    lines = {
+        line.split("|")[2].strip(): [cell.strip() for cell in line.split("|")[3:-1]]
+        for line in text.splitlines()
+        if line.startswith("| 0.1 |")
+    }
+    assert lines.keys() == {"default", *(n.replace("_", " ") for n in plans.variations(0.1))}
+    some, usual = (
+        np.array([row["dimension"] for row in table.part(part, n=20) if row["mu"] == 0.1])
+        for part in ("prepared_box_mass_30_exact", "exact")
+    )
+    apart = some - usual
+    told = lines["box mass 30"]
+    assert told[0] == "2"
+    assert told[1].startswith(f"{some.mean():.1f}"[:3])
+    if np.ptp(apart):
+        assert told[1].endswith(f"({apart.mean() / (apart.std(ddof=1) / 2**0.5):+.1f})")
+    assert "differences" in text.splitlines()[-1]
+
+
+def test_versions_are_not_mixed(done, table, tmp_path, capsys):
+    for row, task in zip(table.rows, plans.tasks(TINY), strict=True):
+        assert row["version"] == task.cell.kind.version
+        assert row["packing_version"] == task.cell.parameters["packing"]["version"]
+    old = table._replace(rows=[row | {"packing_version": 1} for row in table.rows])
+    with pytest.raises(InputError, match="packings of version 1, which cannot stand beside"):
+        tables.merged(table, old)
+    unknown = [{k: v for k, v in row.items() if "version" not in k} for row in table.rows]
+    with pytest.raises(InputError, match="version unknown"):
+        tables.merged(table, table._replace(rows=unknown))
+    kind = table._replace(rows=[row | {"version": 0} for row in table.rows])
+    with pytest.raises(InputError, match="exact of version 0"):
+        tables.merged(table, kind)
+    # A table that mixes them, however it came about, is not read.
+    tables.save(table._replace(rows=[*table.rows[:-1], old.rows[-1]]), tmp_path / "mixed.zarr")
+    assert main(["study", "--table", str(tmp_path / "mixed.zarr"), "--out", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert "the study mixes" in error and len(error.splitlines()) == 1
+    tables.save(old, tmp_path / "old.zarr")
+    words = [*WORDS, "--reduce", str(done / "cells.zarr"), "--out", str(tmp_path / "out")]
+    assert main([*words, "--table", str(tmp_path / "old.zarr")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,16 @@ of a range of μ is judged at each μ of it, so that no mean hides a change of s
 shape of P(ΔF_n) use no bins.
 
 Samplers: "gauss_seidel", the paper's relaxation, whose sweeps end at 10⁻³ of ⟨f_n⟩ here, which they
-reach at every μ; "gauss_seidel_1e-4", the same to 10⁻⁴; "nearest" networks; "uniform" states; and
-"exact" bounds. Claims about packings alone have none. Sources: "PRE", the paper; "PRL", the letter
+reach at every μ; "gauss_seidel_1e-4" and "gauss_seidel_1e-6", the same to 10⁻⁴ and 10⁻⁶; "nearest"
+networks; "uniform" states; and "exact" bounds. Where sweeps leave networks that reach beyond the
+exact intervals by more than those are long, they are not judged, and the claim says at which μ.
+Claims about packings alone have none. Sources: "PRE", the paper; "PRL", the letter
 before it; "ours".
 
 The modules are named for the paper's figures that the claims belong to.
 """
+
+from collections.abc import Sequence
 
 from granforce.paper.claims.figure1 import (
     agreement,
@@ -30,12 +34,13 @@ from granforce.paper.claims.figure3 import centre, pairs
 from granforce.paper.claims.figure4 import elongation, shape, tails, widths
 from granforce.paper.claims.figure5 import counts, enrichment, frozen, place
 from granforce.paper.claims.figure6 import correlation, error_bars
-from granforce.paper.claims.groups import SAMPLERS
+from granforce.paper.claims.groups import SAMPLERS, outside
 from granforce.paper.claims.verdicts import FEW, MISSING, Claim
 from granforce.paper.tables import Table
 
-BY_STATES = ("gauss_seidel", "gauss_seidel_1e-4", "nearest", "uniform")  # have η1 and η2
-BY_WALKS = ("gauss_seidel", "gauss_seidel_1e-4", "nearest")
+BY_SWEEPS = ("gauss_seidel", "gauss_seidel_1e-4", "gauss_seidel_1e-6")
+BY_WALKS = (*BY_SWEEPS, "nearest")
+BY_STATES = (*BY_WALKS, "uniform")  # have η1 and η2
 
 # The families, and the samplers that each takes: none for claims about packings alone.
 FAMILIES = {
@@ -70,6 +75,7 @@ def judged(table: Table) -> list[Claim]:
     """
     known = [name for name, part in SAMPLERS.items() if table.part(part)]
     samplers = ["gauss_seidel", *(name for name in known if name != "gauss_seidel")]
+    beyond = {name: outside(table, SAMPLERS[name]) for name in BY_SWEEPS}
     found = []
     for family, takes in FAMILIES.items():
         for sampler in samplers if takes else [""]:
@@ -78,5 +84,14 @@ def judged(table: Table) -> list[Claim]:
             for claim in family(table, sampler):
                 lacking = claim.verdict == MISSING and table.rows and sampler in ("", *known)
                 verdict = FEW if lacking else claim.verdict
-                found.append(claim._replace(sampler=sampler, verdict=verdict))
+                claim = claim._replace(sampler=sampler, verdict=verdict)
+                found.append(without(claim, beyond.get(sampler, [])))
     return found
+
+
+def without(claim: Claim, beyond: Sequence[float]) -> Claim:
+    """The claim with the μ that it is not judged at, where states lie outside of S."""
+    if not beyond:
+        return claim
+    where = f"outside S, and not judged, at {', '.join(f'{mu:g}' for mu in beyond)}"
+    return claim._replace(why=f"{claim.why}; {where}" if claim.why else where)

@@ -8,12 +8,15 @@ import numpy as np
 from granforce.measures import statistics
 from granforce.paper.claims.groups import (
     LEAST_DYNAMIC,
+    SAMPLERS,
     SMALL,
     Ends,
     Groups,
     drawn,
     dynamic,
+    enough,
     items,
+    outside,
     positive_friction,
 )
 from granforce.paper.claims.verdicts import (
@@ -25,10 +28,13 @@ from granforce.paper.claims.verdicts import (
     over_all,
     peak,
     slope,
+    turns,
 )
 from granforce.paper.tables import Table
 
 PEAK = f"μ of the maximum (parabola in log μ through what lies within a factor {NEAR_PEAK:g} of it)"
+# How near its limits z has to come: its whole fall is 1.
+NEAR, FAIR = 0.01, 0.03
 _MEASURES = (("eta1", "η1"), ("eta2", "η2"), ("eta3", "η3"))
 
 
@@ -76,8 +82,7 @@ def maximum(table: Table, sampler: str) -> Iterator[Claim]:
     names = (("eta3", "η3"),) if sampler == "exact" else _MEASURES
     for name, label in names:
         groups = positive_friction(items(rows, name, positive=(name,)))
-        rises_and_falls: dict[str, Any] = {"good": (0.02, 0.5), "fair": (0.005, 2)}
-        yield peaked(f"{label}(μ) is not monotonic", groups, **rises_and_falls)
+        yield turns(f"{label}(μ) is not monotonic", groups)
         yield peaked(f"{label}(μ) is largest near μ = 0.1", groups)
 
 
@@ -110,7 +115,7 @@ def small_friction(table: Table, sampler: str) -> Iterator[Claim]:
 def vanishing(table: Table, sampler: str) -> list[Claim]:
     """η vanishes at μ = 0, where S is one point: as measured, not as it must be."""
     name, label = _measure_of(sampler)
-    at_rest = [row for row in drawn(table, sampler) if row["mu"] == 0]
+    at_rest = [row for row in table.part(SAMPLERS[sampler]) if row["mu"] == 0 and enough(row)]
     measured = [row for row in at_rest if sampler == "exact" or not skipped(row)]
     claim = at_each(
         "η vanishes at μ = 0 within 10⁻⁷",
@@ -119,6 +124,9 @@ def vanishing(table: Table, sampler: str) -> list[Claim]:
         good=(-np.inf, 1e-7),
         source=PRL,
     )
+    if 0 in outside(table, SAMPLERS[sampler]):
+        why = "S is one point there, and sweeps end beside it"
+        return [claim._replace(verdict=UNMEASURED, why=why)]
     if at_rest and not measured:
         why = "S is one point there: no state was relaxed or drawn"
         return [claim._replace(verdict=UNMEASURED, why=why)]
@@ -148,14 +156,13 @@ def measure(table: Table, sampler: str) -> Iterator[Claim]:
 
 def coordination(table: Table, sampler: str) -> Iterator[Claim]:
     """z falls from 4 towards 3."""
-    rows = table.part("walk") or drawn(table, "gauss_seidel")
+    rows = table.part("exact") or table.part("walk") or drawn(table, "gauss_seidel")
     groups = items(rows, "coordination")
     ends = ({mu: groups[mu]} for mu in (min(groups), max(groups))) if groups else ({}, {})
-    for group, word, limit, good in zip(
-        ends, ("smallest", "largest"), (4, 3), ((3.9, 4.0), (3.0, 3.1)), strict=True
-    ):
+    for group, word, limit in zip(ends, ("smallest", "largest"), (4, 3), strict=True):
         told = f"z → {limit} at the {word} μ"
-        yield at_each(told, "mean z there", group, good=good)
+        good, fair = ((limit - near, limit + near) for near in (NEAR, FAIR))
+        yield at_each(told, "mean z there", group, good=good, fair=fair)
     yield over_all(
         "z falls with μ",
         "rank correlation of mean z with μ",

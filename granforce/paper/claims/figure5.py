@@ -10,8 +10,8 @@ from granforce.paper.claims.groups import (
     MIDDLE,
     SAMPLERS,
     Groups,
-    enough,
     items,
+    may_be_judged,
     told,
     within,
 )
@@ -22,8 +22,9 @@ from granforce.paper.tables import Table
 def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:
     """{μ: [(disks, measure(strong, loose))]}, masks (N_c,) of f_n > 2⟨f_n⟩, ΔF_n > ⟨ΔF_n⟩."""
     found: dict[Any, Any] = {}
+    judged = may_be_judged(table, sampler)
     for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
-        if enough(row) and row["mu"] > 0 and len(extent):
+        if judged(row) and row["mu"] > 0 and len(extent):
             value = measure(normal > 2 * normal.mean(), extent > extent.mean())
             if np.isfinite(value):
                 found.setdefault(row["mu"], []).append((row["n"], value))

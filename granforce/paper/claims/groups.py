@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from granforce.measures import statistics
 from granforce.paper.tables import Table
 from granforce.records import Rows
 
@@ -14,6 +15,7 @@ Groups = dict[float, list[tuple[int, Any]]]  # {μ: [(disks, value) of each pack
 SAMPLERS = {  # parts of the table
     "gauss_seidel": "sweeps_1e-3",
     "gauss_seidel_1e-4": "sweeps_1e-4",
+    "gauss_seidel_1e-6": "sweeps_1e-6",
     "nearest": "walk",
     "uniform": "uniform",
     "exact": "exact",
@@ -29,8 +31,30 @@ DETERMINED = 1e-9  # ⟨f_n⟩: mean extents below this are rounding
 
 
 def drawn(table: Table, sampler: str) -> list[dict[str, Any]]:
-    """Rows of a sampler; walks that reached too few of their states are left out."""
-    return [row for row in table.part(SAMPLERS[sampler]) if enough(row)]
+    """Rows of a sampler that may be judged: see `may_be_judged`."""
+    judged = may_be_judged(table, sampler)
+    return [row for row in table.part(SAMPLERS[sampler]) if judged(row)]
+
+
+def may_be_judged(table: Table, sampler: str) -> Callable[[dict[str, Any]], bool]:
+    """Whether a row's states are enough, and lie in S or near it."""
+    beyond = outside(table, SAMPLERS[sampler])
+    return lambda row: enough(row) and row["mu"] not in beyond
+
+
+def outside(table: Table, part: str) -> list[float]:
+    """The μ at which states reach beyond the exact intervals by more than those are long.
+
+    Sweeps that end early leave networks that are not balanced: what they differ by is then no
+    property of S. By the means over the packings that have both.
+    """
+    walked = [row for row in table.part(part) if "excess" in row]
+    beyond = [
+        {"mu": row["mu"], "part": row["excess"] - exact["mean_length"] - DETERMINED}
+        for row, exact in statistics.paired(walked, table.part("exact"))
+        if "mean_length" in exact
+    ]
+    return [mu for mu, parts in statistics.grouped(beyond, "part").items() if parts.mean() > 0]
 
 
 def enough(row: dict[str, Any]) -> bool:
@@ -63,8 +87,9 @@ def items(
 def sampled(table: Table, sampler: str) -> Groups:
     """{μ: [(disks, ΔF_n (N_c,) in ⟨f_n⟩)]} of packings with indeterminacy."""
     found: dict[Any, Any] = {}
+    judged = may_be_judged(table, sampler)
     for row, *_, extent in table.contacts(SAMPLERS[sampler]):
-        if enough(row) and len(extent) and extent.mean() > DETERMINED:
+        if judged(row) and len(extent) and extent.mean() > DETERMINED:
             found.setdefault(row["mu"], []).append((row["n"], extent))
     return {mu: found[mu] for mu in sorted(found)}
 

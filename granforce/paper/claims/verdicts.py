@@ -198,6 +198,36 @@ def at_each(
     return claim._replace(measured=where, value=value, low=low, high=high, verdict=verdict, why=why)
 
 
+def turns(statement: str, groups: Groups, *, source: str = PRE) -> Claim:
+    """The Claim that a number rises and falls again: significantly both, from end to end.
+
+    groups: {μ: [(disks, value)]}. Of every μ between the ends, the smaller of the rise from the
+    first and of the fall to the last, in parts of the mean there; told is the largest. Its interval
+    is that of Welch's t, so wide that it holds for all of them together (Bonferroni): no maximum
+    is picked for free.
+    """
+    ranges = Ranges((0, np.inf), (0, np.inf))
+    span = f"{min(groups):g} to {max(groups):g}" if groups else "the first to the last"
+    measured = f"the smaller of rise and fall, from μ = {span}, in parts of the largest"
+    claim = _missing(statement, source, measured, ranges)
+    if len(groups) < 3:
+        return claim
+    values = [np.array([value for _, value in group]) for group in groups.values()]
+    if min(map(len, values)) < 2:
+        return claim._replace(verdict=FEW)
+    first, *between, last = values
+    level = 1 - (1 - statistics.LEVEL) / (2 * len(between))
+    told = []
+    for middle in between:
+        ends = [statistics.difference_interval(middle, end, level) for end in (first, last)]
+        told.append(np.min(ends, axis=0) / middle.mean())
+    value, low, high = max(told, key=lambda one: one[0])
+    few = min(sum(n for n, _ in group) for group in groups.values()) < LEAST_DISKS
+    # From one end to the other only it does not turn: of exactly nothing nothing is certain.
+    verdict = FEW if few else UNDECIDED if low <= 0 <= high else ranges.verdict(low, high)
+    return claim._replace(value=value, low=low, high=high, verdict=verdict)
+
+
 def _beyond(value: float, ends: Ends) -> float:
     """How far a number lies outside of a range, or how near its ends it is inside: negative."""
     return max(ends[0] - value, value - ends[1])
