@@ -1,19 +1,23 @@
-"""`granforce infer --frames`: many photoelastic frames, over processes, in one dataset."""
+"""`infer --frames` and `import … --frames`: many frames, over processes, in one dataset."""
 
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
 
+from granforce.cli.asked import check_outputs, write_csv
 from granforce.packing.importers.repair import KINDS
+from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, whole
 from granforce.study import series
-from granforce.study.series import Frame
+from granforce.study.evolution import SCALARS, evolution
 from granforce.study.store import open_store
 from granforce.system.terminal import Bar, print_list
+
+Number = TypeVar("Number", int, float)
 
 
 def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
@@ -23,7 +27,9 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     if not arguments.files:
         raise InputError("--frames needs a folder, *_solved.mat files, or positions and adjacency")
     whole(arguments.workers, "--workers", 1)
-    frames = _chosen(series.frames_of(*arguments.files), arguments.frames)
+    frames = series.frames_of(*arguments.files)
+    numbers = _chosen([frame.number for frame in frames], arguments.frames)
+    frames = [frame for frame in frames if frame.number in numbers]
     if arguments.out is not None:
         series.check_folder(arguments.out)
     store = open_store(arguments.cache)
@@ -49,18 +55,53 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     return 1 if failed else 0
 
 
-def _chosen(frames: Sequence[Frame], text: str) -> Sequence[Frame]:
-    """The frames that were asked for, by number."""
+def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
+    """Compute what was asked for of snapshots; print a line of each. 1 if one failed."""
+    states = whole(arguments.states, "--states", 0)
+    whole(arguments.workers, "--workers", 1)
+    numbers = _chosen(snapshots.numbers, arguments.frames)
+    check_outputs(arguments.csv)
+    if arguments.out is not None:
+        series.check_folder(arguments.out)
+    store = open_store(arguments.cache)
+    if snapshots.lost:
+        print(f"granforce: {snapshots.lost}", file=sys.stderr)
+    with Bar("snapshots", "cell") as progress:
+        dataset, failed = evolution(
+            store.path,
+            snapshots,
+            numbers,
+            states=states,
+            seed=arguments.walk_seed,
+            workers=arguments.workers,
+            scheduler=arguments.scheduler,
+            progress=progress,
+        )
+    for number, message in failed:
+        print(f"granforce: {snapshots.word} {number}: {message}", file=sys.stderr)
+    if dataset is not None:
+        columns = {name: dataset[name].values for name in ("frame", *SCALARS)}
+        lists = {name: values.tolist() for name, values in columns.items()}
+        rows = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
+        print_list(rows, tuple(columns), arguments.json)
+        if arguments.out is not None:
+            series.save_series(dataset, arguments.out)
+        if arguments.csv is not None:
+            write_csv(arguments.csv, columns)
+    return 1 if failed else 0
+
+
+def _chosen(there: Sequence[Number], text: str) -> list[Number]:
+    """The numbers of the frames that were asked for."""
     if text == "all":
-        return frames
+        return list(there)
     try:
         numbers = {float(part) for part in text.split(",")}
     except ValueError:
         raise InputError(f"--frames {text[:40]!r}: all, or numbers separated by commas") from None
-    there = {frame.number for frame in frames}
-    for number in sorted(numbers - there):
+    for number in sorted(numbers - set(there)):
         raise InputError(f"no frame {number:g}: there are {min(there):g} … {max(there):g}")
-    return [frame for frame in frames if frame.number in numbers]
+    return [number for number in there if number in numbers]
 
 
 def _rows(dataset: xr.Dataset) -> list[dict[str, Any]]:

@@ -75,6 +75,31 @@ def add_frame(command: Parser, number: str) -> None:
     command.add_argument("--frame", type=int, help=f"{number} (default: the last that is whole)")
 
 
+def add_series(command: Parser) -> None:
+    """What makes one dataset of many snapshots, once `add_frame` is there."""
+    others = command.options.keys()
+    group = command.add_argument_group(
+        "many snapshots",
+        "with --frames: exact intervals of each, into one dataset (--out FOLDER.zarr), and a line "
+        "for each",
+    )
+    group.add_argument("--frames", type=str, help="all, or numbers separated by commas")
+    group.add_argument(
+        "--states", type=int, default=0, help="states of a random walk, for η1 and η2 (default 0)"
+    )
+    group.add_argument("--walk-seed", type=int, default=0, help="seed of the walk (default 0)")
+    group.add_argument("--csv", type=Output, metavar="FILE.csv", help="write the lines as a table")
+    group.add_argument("--workers", type=int, default=2, help="processors to use (default 2)")
+    add_scheduler(group)
+    add_store(group)
+    series = command.options.keys() - others - {"frames"}
+    command.leaves_out("without --frames", lambda asked: asked.frames is None, series)
+    command.leaves_out("with --frames", lambda asked: asked.frames is not None, {"frame"})
+    command.leaves_out(
+        "without --states", lambda asked: asked.frames and not asked.states, {"walk_seed"}
+    )
+
+
 def add_columns(command: Parser) -> None:
     command.add_argument(
         "--columns", type=str, metavar="x=…,y=…", help="names of the columns in the files"
@@ -96,7 +121,7 @@ def add_wall_contacts(command: Parser) -> None:
     )
 
 
-def add_store(command: Parser) -> None:
+def add_store(command: argparse._ActionsContainer) -> None:
     command.add_argument(
         "--cache",
         type=Kept,
@@ -210,7 +235,7 @@ def add_source(command: Parser) -> None:
     add_store(command)
 
 
-def add_scheduler(command: Parser) -> None:
+def add_scheduler(command: argparse._ActionsContainer) -> None:
     command.add_argument(
         "--scheduler",
         type=str,

@@ -16,6 +16,7 @@ from granforce.cli.options import (
     add_reading,
     add_reverse,
     add_scheduler,
+    add_series,
     add_source,
     add_store,
     add_walk_options,
@@ -404,6 +405,8 @@ def add_import(commands: Commands) -> None:
         "import",
         "read a packing from elsewhere, check it and keep it",
         "granforce import lammps particles.dump contacts.dump --mu 0.3 --out packing.npz\n"
+        "  granforce import lammps particles.dump contacts.dump --mu 0.3 --frames all "
+        "--out series.zarr\n"
         "  granforce import table grains.csv contacts.csv --box 30 30 --mu 0.3 --out packing.npz\n"
         "  granforce import pegs positions.txt adjacency.txt --mu 0.5 --out frame.npz "
         "--measured frame.csv",
@@ -418,6 +421,7 @@ def add_import(commands: Commands) -> None:
     add_frame(lammps, "timestep")
     add_columns(lammps)
     add_reverse(lammps)
+    add_series(lammps)
     yade = import_format(
         *(formats, "yade", "read the bodies and interactions of YADE"),
         *("bodies.txt interactions.txt", "bodies, by export.textExt", "interactions"),
@@ -434,6 +438,7 @@ def add_import(commands: Commands) -> None:
     add_cell(mercury)
     add_wall_contacts(mercury)
     add_reverse(mercury)
+    add_series(mercury)
     table = import_format(
         *(formats, "table", "read a table of grains and, if there is one, a table of contacts"),
         *("grains.csv contacts.csv", "columns x, y, r", "columns i, j, and fn, ft if known"),

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -316,17 +316,17 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     inferred force less that in the frame before, and change_error, by both errors. Without draws
     there are no errors.
     """
-    named = [_names(one) for _, one in done]
-    pairs = sorted({pair for names in named for pair in names if pair is not None})
-    row = {pair: k for k, pair in enumerate(pairs)}
+    named = [
+        pair_names(one["grain_id"].values, one["contact_i"].values, one["contact_j"].values)
+        for _, one in done
+    ]
+    pairs, places = over_frames(named)
     shape = (len(done), len(pairs), 2)
     told = ["measured", "sigma", "inferred"]
     told += ["standard_error"] if all("standard_error" in one for _, one in done) else []
     arrays = {name: np.full(shape, np.nan) for name in told}
     added = np.zeros(shape[:2], dtype=bool)
-    for k, ((_, one), names) in enumerate(zip(done, named, strict=True)):
-        here = [c for c, pair in enumerate(names) if pair is not None]
-        into = [row[pair] for pair in names if pair is not None]
+    for k, ((_, one), (here, into)) in enumerate(zip(done, places, strict=True)):
         for name, values in arrays.items():
             values[k, into] = one[name].values[here]
         added[k, into] = one["added"].values[here]
@@ -349,31 +349,56 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
         change_error, error = np.full(shape, np.nan), arrays["standard_error"]
         change_error[1:] = np.hypot(error[1:], error[:-1])
         variables["change_error"] = forces, change_error, {"units": "force"}
-    ends = np.array(pairs, dtype=float).reshape(-1, 2)
     return xr.Dataset(
         variables,
         {
             "frame": [number for number, _ in done],
             "component": ["f_n", "f_t"],
             "kind": list(_COUNTS),
-            "id1": ("contact", ends[:, 0], {"long_name": "name of the first grain"}),
-            "id2": ("contact", ends[:, 1], {"long_name": "of the second; below 0: a wall"}),
+            **ends_of(pairs),
         },
     )
 
 
-def _names(one: xr.Dataset) -> list[tuple[float, float] | None]:
+# Names of the two grains of a contact; below 0: a wall.
+Pair: TypeAlias = tuple[float, float]
+
+
+def pair_names(ids: Floats, i: Integers, j: Integers) -> list[Pair | None]:
     """Names of a frame's contacts: pairs of ids, None for a second contact of one pair."""
-    ids = one["grain_id"].values
-    i, j = ids[one["contact_i"].values], ids[one["contact_j"].values]
-    seen: set[tuple[float, float]] = set()
-    names: list[tuple[float, float] | None] = []
-    for a, b in zip(i.tolist(), j.tolist(), strict=True):
+    seen: set[Pair] = set()
+    names: list[Pair | None] = []
+    for a, b in zip(ids[i].tolist(), ids[j].tolist(), strict=True):
         # Grains before walls, whose names are below 0.
         pair = (a, b) if b < 0 or (a >= 0 and a <= b) else (b, a)
         names.append(None if pair in seen else pair)
         seen.add(pair)
     return names
+
+
+def over_frames(
+    named: Sequence[Sequence[Pair | None]],
+) -> tuple[list[Pair], list[tuple[list[int], list[int]]]]:
+    """All pairs of all frames in order, and for each frame its contacts and their places."""
+    pairs = sorted({pair for names in named for pair in names if pair is not None})
+    row = {pair: k for k, pair in enumerate(pairs)}
+    places = [
+        (
+            [c for c, pair in enumerate(names) if pair is not None],
+            [row[pair] for pair in names if pair is not None],
+        )
+        for names in named
+    ]
+    return pairs, places
+
+
+def ends_of(pairs: Sequence[Pair]) -> dict[str, Any]:
+    """The coordinates id1, id2 of pairs."""
+    ends = np.array(pairs, dtype=float).reshape(-1, 2)
+    return {
+        "id1": ("contact", ends[:, 0], {"long_name": "name of the first grain"}),
+        "id2": ("contact", ends[:, 1], {"long_name": "of the second; below 0: a wall"}),
+    }
 
 
 def check_folder(path: str | Path) -> Path:

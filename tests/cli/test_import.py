@@ -10,6 +10,8 @@ from granforce.cli.parser import main, make_parser
 from granforce.packing import importers
 
 FILES = {"help", "json", "out", "measured", "grains", "contacts"}
+# What is done with many snapshots.
+FILES |= {"frames", "states", "walk_seed", "csv", "workers", "scheduler", "cache"}
 # Options of pegs that stand for arguments of another name.
 WORDS = {"strict": "repair", "wall_force": "wall_forces"}
 

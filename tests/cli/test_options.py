@@ -8,11 +8,13 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import frames
+import numpy as np
 import pytest
 from packings import packed
 
 from granforce.cli import commands, parser, parsing
 from granforce.packing.importers import load_packing, save_packing
+from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.study.store import open_store
 
 MU = "-n 8 --mu 0.3"
@@ -49,9 +51,17 @@ LINES = {
     ],
     "app": [""],
     "docs": ["--out reference.html"],
-    "import lammps": ["particles.dump contacts.dump --mu 0.5"],
+    "import lammps": [
+        "particles.dump contacts.dump --mu 0.5",
+        "particles.dump contacts.dump --mu 0.5 --frames all",
+        "particles.dump contacts.dump --mu 0.5 --frames all --states 2",
+    ],
     "import yade": ["bodies.txt interactions.txt --mu 0.5"],
-    "import mercury": ["run.data run.fstat --mu 0.5"],
+    "import mercury": [
+        "run.data run.fstat --mu 0.5",
+        "run.data run.fstat --mu 0.5 --frames 0",
+        "run.data run.fstat --mu 0.5 --frames 0 --states 2",
+    ],
     "import table": ["grains.csv --mu 0.3"],
     "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
     "bench": ["--quick"],
@@ -125,6 +135,10 @@ def here(place, monkeypatch):
         monkeypatch.setitem(
             commands.packings.READERS, name, lambda *files, **options: load_packing("p.npz")
         )
+    one = Snapshot(load_packing("p.npz"), np.arange(8.0))
+    for name in commands.packings.OPENERS:
+        opened = Snapshots("step", [0], lambda number: one)
+        monkeypatch.setitem(commands.packings.OPENERS, name, lambda *f, o=opened, **_: o)
     return place
 
 
@@ -268,6 +282,8 @@ def _clash_line(command, given):
         elif action.required or action.dest in ("grains", "contacts"):
             words += [*action.option_strings[-1:], "0.3" if action.dest == "mu" else "nowhere"]
     if command == "infer" and ("files" in given or "out" in given):
+        words += ["--frames", "all"]
+    if command in ("import lammps", "import mercury") and {"csv", "cache"} & given.keys():
         words += ["--frames", "all"]
     return words
 

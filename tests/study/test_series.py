@@ -128,7 +128,7 @@ def test_by_the_command_line(away, capsys):
     assert main([*words.split()[:-1], "--frames", "2"]) == 0
     assert xr.open_zarr(away / "series.zarr").sizes["frame"] == 1
     capsys.readouterr()
-    for wrong in ("--frames 7", "--frames x", "--out lab", "--measured x.csv"):
+    for wrong in ("--frames 7", "--frames x", "--out lab"):
         assert main([*words.split(), *wrong.split()]) == 2, wrong
         assert capsys.readouterr().err.count("\n") == 1
     assert main(["infer", "--mu", "0.3"]) == 2

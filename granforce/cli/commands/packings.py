@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from granforce.cli import frames
 from granforce.cli.asked import (
     check_outputs,
     get_packing,
@@ -16,6 +17,7 @@ from granforce.cli.asked import (
     write_csv,
 )
 from granforce.packing import importers, scenes
+from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, Packing, whole
 from granforce.system.terminal import print_report
 
@@ -56,19 +58,29 @@ READERS: dict[str, Callable[..., Packing]] = {
     "mercury": importers.read_mercury,
     "table": importers.read_table,
 }
+# What opens formats of many snapshots.
+OPENERS: dict[str, Callable[..., Snapshots]] = {
+    "lammps": importers.open_lammps,
+    "mercury": importers.open_mercury,
+}
 # What of the arguments is not an option of a reader.
 _NO_OPTIONS = ("command", "format", "run", "json", "grains", "contacts", "out")
+_NO_OPTIONS += ("frames", "states", "walk_seed", "csv", "workers", "scheduler", "cache")
 
 
-def import_(arguments: argparse.Namespace) -> None:
-    """Read a packing from elsewhere; report and save it."""
-    check_outputs(arguments.out)
+def import_(arguments: argparse.Namespace) -> int | None:
+    """Read a packing from elsewhere, or many; report and save. Returns 1 if one of many failed."""
+    if getattr(arguments, "frames", None) is None:
+        check_outputs(arguments.out)
     if arguments.format == "pegs":
         _import_pegs(arguments)
-        return
+        return None
     options = {k: v for k, v in vars(arguments).items() if k not in _NO_OPTIONS and v is not None}
     if "columns" in options:
         options["columns"] = importers.read_columns(options["columns"])
+    if getattr(arguments, "frames", None) is not None:
+        opened = OPENERS[arguments.format](arguments.grains, arguments.contacts, **options)
+        return frames.import_frames(arguments, opened)
     packing = READERS[arguments.format](arguments.grains, arguments.contacts, **options)
     if "pressure" in options and (packing.info["forces"] == "given" or packing.load.any()):
         raise InputError("--pressure is of a table without forces or loads: leave it out")
@@ -79,6 +91,7 @@ def import_(arguments: argparse.Namespace) -> None:
     lines = importers.report(packing) | info
     print_report(lines, arguments.json)
     _save(packing, arguments)
+    return None
 
 
 def _import_pegs(arguments: argparse.Namespace) -> None:

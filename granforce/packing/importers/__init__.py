@@ -3,9 +3,9 @@
 Whatever a file holds, these functions return a validated Packing or raise InputError.
 """
 
-from granforce.packing.importers.dem import read_mercury, read_yade
+from granforce.packing.importers.dem import open_mercury, read_mercury, read_yade
 from granforce.packing.importers.known import read_known
-from granforce.packing.importers.lammps import read_lammps
+from granforce.packing.importers.lammps import open_lammps, read_lammps
 from granforce.packing.importers.measurements import Measurement, read_measurement
 from granforce.packing.importers.network import report
 from granforce.packing.importers.npz import load_packing, save_packing
@@ -20,6 +20,8 @@ __all__ = [
     "Photoelastic",
     "SyntheticFrame",
     "load_packing",
+    "open_lammps",
+    "open_mercury",
     "read_columns",
     "read_known",
     "read_lammps",

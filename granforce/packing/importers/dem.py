@@ -201,7 +201,9 @@ def open_mercury(
         arguments = mu, cell, walls, reverse, most_grains
         packing = _mercury_packing(steps[number], links, *arguments)
         info = packing.info | {"time": float(own[number])}
-        return Snapshot(packing._replace(info=info), list(range(len(packing.r))))
+        grains, walls_there = len(steps[number].rows), int(info.get("walls", 0))
+        ids = np.concatenate([np.arange(grains), -1.0 - np.arange(walls_there)])
+        return Snapshot(packing._replace(info=info), ids)
 
     return Snapshots("time step", numbers, read, lost)
 
@@ -311,7 +313,7 @@ def _packing(
     if walls and on_walls is not None:
         x, r, of_walls, forces_on_walls = _as_grains(on_walls, x, r)
         joined, forces = joined.joined(of_walls), np.concatenate([forces, forces_on_walls])
-        told["walls"] = len(on_walls.names)
+        told["walls"] = len(r) - len(grains.rows)
     packing = make_packing(
         x, r, cell.box, joined, forces, mu, info={"source": source}, tilt=cell.tilt
     )

@@ -162,7 +162,7 @@ def open_lammps(
             tilt=box.cell.tilt,
         )
         told = {"timestep": step, "contacts_skipped": skipped}
-        return Snapshot(adopt(packing, reverse=reverse, **told), list(index))
+        return Snapshot(adopt(packing, reverse=reverse, **told), np.sort(atoms.numbers("id")))
 
     whole = steps[:-1] if cut else steps
     lost = f"timestep {steps[-1]} is cut off in {' and '.join(cut)}" if cut else ""
@@ -262,11 +262,10 @@ def box_of(name: str, items: dict[str, _Item]) -> _Box:
 
 
 def _disks(table: Table, box: _Box) -> tuple[Floats, Floats, dict[int | str, int]]:
-    """Centres and radii in the order of ids, and the row {id: row} of each, in this order."""
-    ids = table.numbers("id")
-    order = np.argsort(ids, kind="stable")
-    labels = list(table.index("id"))
-    index = {labels[row]: k for k, row in enumerate(order.tolist())}
+    """Centres and radii in the order of ids, and the row {id: row} of each."""
+    order = np.argsort(table.numbers("id"), kind="stable")
+    rank = np.argsort(order)
+    index = {label: int(rank[row]) for label, row in table.index("id").items()}
     axes = next((pair for pair in AXES if set(pair) <= set(table.header)), AXES[0])
     x = np.column_stack([table.numbers(axis) for axis in axes])
     x = x @ box.vectors if axes in SCALED else x - box.low

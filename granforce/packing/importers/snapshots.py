@@ -3,14 +3,14 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from granforce.records import InputError, Packing
+from granforce.records import Floats, InputError, Packing
 
 
 class Snapshot(NamedTuple):
-    """A packing, and the names of its grains in the files."""
+    """A packing, and the names of its grains in the files; −1, −2, … for walls."""
 
     packing: Packing
-    ids: list[int | str]  # (N,)
+    ids: Floats  # (N,)
 
 
 class Snapshots(NamedTuple):

@@ -1,0 +1,129 @@
+"""The snapshots of a simulation: exact intervals, and walks, of each, in one dataset over time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granforce.packing.importers.network import judged
+from granforce.packing.importers.snapshots import Snapshot, Snapshots
+from granforce.records import InputError, Packing, Progress
+from granforce.study import kinds
+from granforce.study.cells import Cell, get
+from granforce.study.scan import run
+from granforce.study.series import ends_of, over_frames, pair_names
+from granforce.study.store import open_store
+
+# Numbers of a snapshot, with their units and meaning.
+SCALARS = {
+    "time": ("", "timestep, or time"),
+    "grains": ("1", "number of grains"),
+    "contacts": ("1", "number of contacts that carry force"),
+    "rattlers": ("1", "grains without load"),
+    "packing_fraction": ("1", "packing fraction φ; NaN in an open box"),
+    "pressure": ("force/length", "pressure; NaN in an open box"),
+    "mean_normal_force": ("force", "mean normal force of the backbone"),
+    "coordination": ("1", "contacts per grain of the backbone, z"),
+    "dimension": ("1", "dimension h of S"),
+    "eta1": ("1", "η1 of the states of a walk; NaN without"),
+    "eta2": ("1", "η2 of the states of a walk; NaN without"),
+    "eta3": ("1", "η3 of the exact intervals"),
+    "residual": ("mean normal force", "largest unbalance of the simulation's own forces"),
+}
+_FORCES = {"forces": "of the simulation", "low": "least in S", "high": "largest in S"}
+
+
+def evolution(
+    path: str | Path,
+    snapshots: Snapshots,
+    numbers: Sequence[int] | None = None,
+    *,
+    states: int = 0,
+    seed: int = 0,
+    workers: int = 2,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> tuple[xr.Dataset | None, list[tuple[int, str]]]:
+    """Exact intervals of all snapshots, computed into the store at path, or found there.
+
+    numbers: of the snapshots, by default all. states: of a random walk from each, with this seed,
+    for η1 and η2; 0: none. workers, scheduler, progress: as for `scan.run`. Returns a dataset
+    (frame, contact, component) with f_n and f_t of each contact (forces, low, high; a contact is a
+    pair of names, NaN where a snapshot does not have it) and SCALARS by frame, None where no
+    snapshot could be used; and (number, message) of those that could not.
+
+    Raises InputError where the store cannot be written.
+    """
+    store = open_store(path)
+    failed: list[tuple[int, str]] = []
+    read: list[tuple[int, Snapshot, list[Cell]]] = []
+    for number in snapshots.numbers if numbers is None else numbers:
+        try:
+            found = snapshots.snapshot(number)
+        except InputError as error:
+            failed.append((number, str(error)))
+            continue
+        named = kinds.imported_parameters(found.packing)
+        kinds.keep_packing(store, named, found.packing)
+        cells = [Cell(kinds.INTERVALS, kinds.INTERVALS.parameters(named))]
+        if states:
+            cells.append(Cell(kinds.WALK, kinds.WALK.parameters(named, states, seed)))
+        read.append((number, found, cells))
+    work = [cell for *_, cells in read for cell in cells]
+    refused = run(path, work, workers=workers, scheduler=scheduler, progress=progress)
+    lost = {id(cell): message for cell, message in refused}
+    done = []
+    for number, found, cells in read:
+        messages = [lost[id(cell)] for cell in cells if id(cell) in lost]
+        failed += [(number, message) for message in messages[:1]]
+        if not messages:
+            results = [get(store, *cell, workers=workers)[0] for cell in cells]
+            done.append((number, found, results))
+    return (_combined(done) if done else None), sorted(failed)
+
+
+def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Dataset:
+    """One dataset of [(number, its snapshot, intervals and perhaps a walk), …]."""
+    names = []
+    for _, found, _ in done:
+        contacts = found.packing.contacts
+        names.append(pair_names(found.ids, contacts.i, contacts.j))
+    pairs, places = over_frames(names)
+    arrays = {name: np.full((len(done), len(pairs), 2), np.nan) for name in _FORCES}
+    for k, ((_, found, (bounds, *_)), (here, into)) in enumerate(zip(done, places, strict=True)):
+        arrays["forces"][k, into] = found.packing.forces[here]
+        for name in ("low", "high"):
+            # Contacts that are not of the backbone carry nothing in any network.
+            own = np.zeros_like(found.packing.forces)
+            own[bounds["backbone"].values] = bounds[name].values
+            arrays[name][k, into] = own[here]
+    rows = [_scalars(number, found.packing, *results) for number, found, results in done]
+    variables: dict[str, Any] = {}
+    for name, meaning in _FORCES.items():
+        attributes = {"units": "force", "long_name": meaning}
+        variables[name] = (("frame", "contact", "component"), arrays[name], attributes)
+    for name, (units, meaning) in SCALARS.items():
+        numbers = [row[name] for row in rows]
+        variables[name] = (("frame",), numbers, {"units": units, "long_name": meaning})
+    coordinates = {"frame": [number for number, *_ in done], "component": ["f_n", "f_t"]}
+    return xr.Dataset(variables, coordinates | ends_of(pairs))
+
+
+def _scalars(
+    number: int, packing: Packing, bounds: xr.Dataset, walk: xr.Dataset | None = None
+) -> dict[str, float]:
+    """The SCALARS of one snapshot."""
+    closed, verdict = bool(np.isfinite(packing.volume)), judged(packing)
+    return {
+        "time": float(packing.info.get("time", number)),
+        "grains": len(packing.r),
+        "contacts": len(packing.contacts.i),
+        "packing_fraction": float(packing.packing_fraction) if closed else np.nan,
+        "pressure": float(packing.pressure),
+        "mean_normal_force": bounds["force_scale"].item(),
+        **{name: bounds[name].item() for name in ("coordination", "dimension", "eta3")},
+        **{name: np.nan if walk is None else walk[name].item() for name in ("eta1", "eta2")},
+        **{name: verdict[name] for name in ("residual", "rattlers")},
+    }
