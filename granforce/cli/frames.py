@@ -27,7 +27,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     if not arguments.files:
         raise InputError("--frames needs a folder, *_solved.mat files, or positions and adjacency")
     whole(arguments.workers, "--workers", 1)
-    frames = series.frames_of(*arguments.files)
+    frames = series.frames_of(*arguments.files, columns=options["columns"])
     numbers = _chosen([frame.number for frame in frames], arguments.frames)
     frames = [frame for frame in frames if frame.number in numbers]
     if arguments.out is not None:
@@ -49,6 +49,8 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     for frame, message in failed:
         print(f"granforce: frame {frame.number:g}: {message}", file=sys.stderr)
     if dataset is not None:
+        for note in dataset.attrs["notes"]:
+            print(f"granforce: {note}", file=sys.stderr)
         print_list(_rows(dataset), tuple(_rows(dataset)[0]), arguments.json)
         if arguments.out is not None:
             series.save_series(dataset, arguments.out)

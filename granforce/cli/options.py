@@ -100,10 +100,10 @@ def add_series(command: Parser) -> None:
     )
 
 
-def add_columns(command: Parser) -> None:
-    command.add_argument(
-        "--columns", type=str, metavar="x=…,y=…", help="names of the columns in the files"
-    )
+def add_columns(
+    command: argparse._ActionsContainer, what: str = "names of the columns in the files"
+) -> None:
+    command.add_argument("--columns", type=str, metavar="x=…,y=…", help=what)
 
 
 def add_reverse(command: argparse._ActionsContainer) -> None:
@@ -279,10 +279,19 @@ def add_reading(group: argparse._ActionsContainer) -> None:
         "--error", type=float, help="standard error of a force (default: as the data suggest)"
     )
     add_reverse(group)
+    add_columns(
+        group, "headers, or numbers from 1, of the columns frame, id, x, y, r, flag, i, j, ft, fn"
+    )
 
 
 def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> None:
     """The options of how a frame is mended and of its walls, in a group of a command."""
+    group.add_argument(
+        "--flag",
+        choices=["ignore"],
+        help="ignore the flags of the grains: those at the boundary of the frame are at walls "
+        "(default: flagged ones, unless nearly all are)",
+    )
     group.add_argument(
         "--repair",
         type=float,
@@ -294,8 +303,9 @@ def add_flaws_and_walls(command: Parser, group: argparse._ActionsContainer) -> N
         "--walls",
         type=str,
         metavar="SHAPE",
-        help="walls that count: box, annulus or circle, found from the grains at them or with "
-        "numbers (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); open: left open "
+        help="walls that count: box, annulus, circle or auto (which fits), found from the grains "
+        "at them or with numbers (box:x0,x1,y0,y1, annulus:x,y,inner,outer, circle:x,y,R); open: "
+        "left open "
         "(default: where a *_solved.mat has the directions of their contacts)",
     )
     group.add_argument(

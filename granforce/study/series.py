@@ -10,7 +10,7 @@ import json
 import re
 import shutil
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -48,7 +48,8 @@ STATES, UNMEASURED = 200, 1.0
 REGIONS = 3
 # What files are, by their names.
 _POSITIONS, _CONTACTS = re.compile("position|cent(er|re)s", re.I), re.compile("adjacency", re.I)
-_TEXT = {".txt", ".csv", ".dat"}
+_TEXT = (".txt", ".csv", ".dat")
+_PACKED = (".gz", ".zst")
 # Numbers of a frame's account that are kept by frame.
 _COUNTS = (*KINDS, "grains", "contacts_listed", "candidates", "candidates_that_carry", "unbalanced")
 
@@ -61,10 +62,11 @@ class Frame(NamedTuple):
     number: float
 
 
-def frames_of(*paths: str | Path) -> list[Frame]:
+def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> list[Frame]:
     """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
 
-    In order of their numbers. Raises InputError where there are none, or two of one number.
+    In order of their numbers. columns: of text files, as for `read_pegs`. Raises InputError where
+    there are none, or two of one number.
     """
     files = []
     for path in map(expanded, paths):
@@ -80,7 +82,7 @@ def frames_of(*paths: str | Path) -> list[Frame]:
     elif len(files) == 2 and not any(expanded(path).is_dir() for path in paths):
         pairs = [tuple(files)]
     else:
-        pairs = _paired([one for one in files if one.suffix.lower() in _TEXT])
+        pairs = _paired(list(filter(_is_text, files)))
     if not pairs:
         raise InputError(
             f"{', '.join(map(str, paths))}: no frames; wanted are *_solved.mat, or text files with "
@@ -89,7 +91,7 @@ def frames_of(*paths: str | Path) -> list[Frame]:
     found = [
         Frame(str(one), None if two is None else str(two), float(number))
         for one, two in pairs
-        for number in _numbers(one, two, len(pairs))
+        for number in _numbers(one, two, len(pairs), columns)
     ]
     found.sort(key=lambda frame: frame.number)
     for one, two in itertools.pairwise(found):
@@ -98,9 +100,16 @@ def frames_of(*paths: str | Path) -> list[Frame]:
     return found
 
 
-def _numbers(one: Path, two: Path | None, count: int) -> list[float]:
+def _is_text(path: Path) -> bool:
+    name = path.name.lower()
+    return any(name.removesuffix(end).endswith(_TEXT) for end in ("", *_PACKED))
+
+
+def _numbers(
+    one: Path, two: Path | None, count: int, columns: Mapping[str, str] | None
+) -> list[float]:
     """Numbers of the frames in one pair of files; by the name where each file has one frame."""
-    inside = open_frames(one, two).frames
+    inside = open_frames(one, two, columns=columns).frames
     by_name = _digits(one) if count > 1 and two is not None else []
     return [float(by_name[-1])] if by_name and len(inside) == 1 else inside.tolist()
 
@@ -164,9 +173,10 @@ def _inferred(
     store: Store, parameters: Parameters, *, workers: int, progress: Progress | None
 ) -> xr.Dataset:
     """Dataset of one frame: its packing, measured and inferred forces with errors, its account."""
-    frames = open_frames(parameters["positions"], parameters["adjacency"])
-    number = parameters["frame"] if len(frames.frames) > 1 else None
     chosen = {name: parameters[name] for name in ("mu", "wall_forces")} | parameters["options"]
+    columns = chosen.pop("columns", None)
+    frames = open_frames(parameters["positions"], parameters["adjacency"], columns=columns)
+    number = parameters["frame"] if len(frames.frames) > 1 else None
     found = read_pegs(frames, frame=number, **chosen)
     return infer_frame(
         found,
@@ -314,7 +324,7 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
 
     A contact is a pair of names, over all frames; NaN where a frame does not have it. change: its
     inferred force less that in the frame before, and change_error, by both errors. Without draws
-    there are no errors.
+    there are no errors. Its attribute notes has what is to be said of frames.
     """
     named = [
         pair_names(one["grain_id"].values, one["contact_i"].values, one["contact_j"].values)
@@ -333,6 +343,11 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
     change = np.full(shape, np.nan)
     change[1:] = np.diff(arrays["inferred"], axis=0)
     accounts = [json.loads(one.attrs["account"])["report"] for _, one in done]
+    notes = [
+        f"frame {number:g}: {note}"
+        for (number, _), one in zip(done, accounts, strict=True)
+        for note in one.get("notes", [])
+    ]
     forces, single = ("frame", "contact", "component"), ("frame",)
     variables: dict[str, Any] = {
         name: (forces, values, {"units": "force"}) for name, values in arrays.items()
@@ -357,6 +372,7 @@ def combined(done: Sequence[tuple[float, xr.Dataset]]) -> xr.Dataset:
             "kind": list(_COUNTS),
             **ends_of(pairs),
         },
+        {"notes": notes},
     )
 
 

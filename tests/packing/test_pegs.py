@@ -149,10 +149,12 @@ def test_what_is_wrong_is_told(change, words):
 @pytest.mark.parametrize("reach", [0, 0.5])
 def test_a_frame_whose_grains_are_all_at_walls_is_taken(reach):
     """No balance is left to be judged."""
-    grains, rows, _ = frame(30)
-    found = read([[*row[:-1], 1] for row in grains], rows, mu=0.3, reach=reach)
+    grains, rows, _ = frame(8, 0.5)
+    found = read([[*row[:-1], 1] for row in grains], rows, mu=0.5, reach=reach)
     assert found.report["unbalanced"] == 0 == found.report["unbalance"]
-    assert found.report["grains_at_walls"] == 30
+    assert found.report["grains_at_walls"] == 8 and "notes" not in found.report
+    S = ensemble(found.packing)
+    assert S.dimension == 2 * len(S.index)
 
 
 def test_a_frame_of_one_contact_is_taken():

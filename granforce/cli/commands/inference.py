@@ -6,7 +6,7 @@ import numpy as np
 
 from granforce.cli import frames
 from granforce.cli.asked import conditions, found, write_csv
-from granforce.cli.commands.packings import flaws_and_walls
+from granforce.cli.commands.packings import flaws_and_walls, named_columns
 from granforce.packing import importers
 from granforce.records import InputError
 from granforce.study import kinds
@@ -22,7 +22,8 @@ INFERENCE_LINES = (
 def infer(arguments: argparse.Namespace) -> int | None:
     """The likeliest network of measured forces, with error bars if wanted; report it."""
     if arguments.frames is not None:
-        return frames.infer_frames(arguments, flaws_and_walls(arguments))
+        options = flaws_and_walls(arguments) | {"columns": named_columns(arguments)}
+        return frames.infer_frames(arguments, options)
     if arguments.measured is None:
         raise InputError(
             "give --measured FILE.csv and a packing, or files of frames with --frames all"

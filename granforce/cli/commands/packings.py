@@ -77,7 +77,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
         return None
     options = {k: v for k, v in vars(arguments).items() if k not in _NO_OPTIONS and v is not None}
     if "columns" in options:
-        options["columns"] = importers.read_columns(options["columns"])
+        options["columns"] = named_columns(arguments)
     if getattr(arguments, "frames", None) is not None:
         opened = OPENERS[arguments.format](arguments.grains, arguments.contacts, **options)
         return frames.import_frames(arguments, opened)
@@ -101,8 +101,11 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
         *(arguments.grains, arguments.contacts),
         mu=arguments.mu,
         frame=arguments.frame,
+        columns=named_columns(arguments),
         **flaws_and_walls(arguments),
     )
+    for note in found.report.get("notes", []):
+        print(f"granforce: {note}", file=sys.stderr)
     print_report(found.report, arguments.json)
     _save(found.packing, arguments)
     if arguments.measured is not None:
@@ -112,6 +115,11 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
         write_csv(arguments.measured, columns)
 
 
+def named_columns(arguments: argparse.Namespace) -> dict[str, str] | None:
+    """What columns are called in the files, as the options say it."""
+    return None if arguments.columns is None else importers.read_columns(arguments.columns)
+
+
 def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:
     """What the options say of flaws and walls, as `importers.read_pegs` takes it."""
     repair = True if arguments.repair is None else arguments.repair
@@ -119,6 +127,7 @@ def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         **{name: getattr(arguments, name) for name in ("reach", "scale", "error", "reverse")},
         "repair": False if arguments.strict else repair,
+        "flag": arguments.flag,
         "walls": arguments.walls,
         "wall_forces": forces,
     }

@@ -7,6 +7,9 @@ told from the header or, without one, from their number and from what is in them
     frame, id, x, y, radius, flag     id, x, y, radius, flag     x, y, radius, flag
     frame, id, x, y, radius           id, x, y, radius           x, y, radius
     frame, id1, id2, f_t, f_n         id1, id2, f_t, f_n         (the contacts; ids < 0: a wall)
+    id1, id2, flag, f_t, f_n          (where the third is 0 throughout)
+
+Without a column for the frame, another frame begins where the ids of the grains begin anew.
 
 The formats of PeGS are those of its README (github.com/photoelasticity), modules particleTrack and
 adjacencyMatrix. Angles and signs are in the axes of the files: **t** is **n** turned from x to y.
@@ -15,8 +18,8 @@ adjacencyMatrix. Angles and signs are in the axes of the files: **t** is **n** t
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol, SupportsIndex
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol, SupportsIndex
 
 import numpy as np
 
@@ -38,6 +41,8 @@ _WORDS = {
     "tangential": ("tangential", "ft", "f_t", "tangentialforce", "tangential_force"),
     "normal": ("normal", "fn", "f_n", "normalforce", "normal_force"),
 }
+# Grains of a frame at least, on average, where frames are told apart by their ids.
+_LEAST = 3
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 
 
@@ -104,6 +109,11 @@ class Columns(NamedTuple):
         values = {name: column[here] for name, column in self.values.items()}
         return self._replace(values=values, lines=self.lines[here])
 
+    def with_frames(self, frame: Floats | Integers) -> Columns:
+        """The same with a column for the frame (rows,), as ids tell it."""
+        values = self.values | {"frame": np.asarray(frame, dtype=np.float64)}
+        return self._replace(values=values, said=f"{self.said}, frames told apart by the ids")
+
 
 class TextFrames(NamedTuple):
     """The two files of one frame or of many."""
@@ -160,9 +170,80 @@ class TextFrames(NamedTuple):
         )
 
 
-def read_frames(positions: Source, adjacency: Source) -> TextFrames:
-    """The TextFrames in two files, paths or open files; InputError for what is no such file."""
-    return TextFrames(_columns(positions, _GRAINS), _columns(adjacency, _CONTACTS))
+def read_frames(
+    positions: Source, adjacency: Source, columns: Mapping[str, str] | None = None
+) -> TextFrames:
+    """The TextFrames in two files, paths or open files; InputError for what is no such file.
+
+    columns: {frame, id, x, y, r, flag, i, j, ft or fn: its header in the files, or its number from
+    1}. Where one of a file is given, what its other columns are is told by headers only.
+    """
+    given = _by_name(columns or {})
+    grains, contacts = (
+        _columns(source, wanted, {name: given[name] for name in wanted if name in given})
+        for source, wanted in ((positions, _GRAINS), (adjacency, _CONTACTS))
+    )
+    return _told_apart(grains, contacts)
+
+
+def _by_name(columns: Mapping[str, str]) -> dict[str, str]:
+    """The columns under the names that are used here."""
+    given = {}
+    for word, theirs in columns.items():
+        name = next((name for name, words in _WORDS.items() if word.lower() in words), None)
+        if name is None:
+            raise InputError(
+                f"no column is called {word[:40]!r} here: frame, id, x, y, r, flag, i, j, ft, fn"
+            )
+        given[name] = theirs
+    return given
+
+
+def _told_apart(grains: Columns, contacts: Columns) -> TextFrames:
+    """Both files with a column for the frame where the ids of the grains begin anew without one."""
+    if "frame" in grains.values or "id" not in grains.values:
+        return TextFrames(grains, contacts)
+    parts = _begun_anew(grains.values["id"])
+    if parts is None:
+        return TextFrames(grains, contacts)
+    count, numbers = int(parts[-1]), contacts.frames
+    if not len(numbers):
+        ends = (contacts.values[name] for name in ("id1", "id2"))
+        found = next((some for some in map(_ascending, ends) if some[-1] == count), None)
+        if found is None:
+            raise InputError(
+                f"{grains.name}: ids begin anew {count} times, and where in {contacts.name} a "
+                "frame ends is not told; add a column for the frame to both files"
+            )
+        contacts = contacts.with_frames(found)
+    elif len(numbers) == count:
+        parts = numbers[parts - 1]
+    else:
+        raise InputError(
+            f"{grains.name}: ids begin anew {count} times, and {contacts.name} has "
+            f"{len(numbers)} frames; add a column for the frame"
+        )
+    return TextFrames(grains.with_frames(parts), contacts)
+
+
+def _begun_anew(ids: Floats) -> Integers | None:
+    """(rows,) numbers from 1 of the parts in each of which ids begin anew, None for a single one.
+
+    A part has at least half as many rows as the largest, and most of its ids are in the first.
+    """
+    for parts in (_ascending(ids), np.cumsum(ids == ids[0])):
+        sizes = np.bincount(parts)[1:]
+        if 1 < len(sizes) <= len(ids) / _LEAST and 2 * sizes.min() >= sizes.max():
+            known = np.isin(ids, ids[parts == 1])
+            if np.bincount(parts, known)[1:].min() * 2 > sizes.max():
+                return parts
+    return None
+
+
+def _ascending(values: Floats) -> Integers:
+    """(rows,) numbers from 1 of the parts in each of which values ascend."""
+    with np.errstate(invalid="ignore"):
+        return np.cumsum(np.concatenate([[True], np.diff(values) < 0]))
 
 
 def plain(number: float) -> int | float:
@@ -170,8 +251,8 @@ def plain(number: float) -> int | float:
     return int(number) if float(number).is_integer() else float(number)
 
 
-def _columns(source: Source, wanted: Sequence[str]) -> Columns:
-    """The Columns of a text file of grains or contacts."""
+def _columns(source: Source, wanted: Sequence[str], given: Mapping[str, str]) -> Columns:
+    """The Columns of a text file of grains or contacts; given: headers or numbers of some."""
     name, text = read_text(source)
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if "\0" in text:
@@ -189,7 +270,10 @@ def _columns(source: Source, wanted: Sequence[str]) -> Columns:
         # A line of another length is no line of this table: nothing in it is taken.
         if len(fields) == width:
             row[:] = [_number(field) for field in fields]
-    named = (header and _named(header, wanted, width)) or _by_content(name, numbers, wanted)
+    if given.keys() - {"frame"}:
+        named = _given(name, header, wanted, width, given)
+    else:
+        named = (header and _named(header, wanted, width)) or _by_content(name, numbers, wanted)
     values = {column: numbers[:, k] for k, column in enumerate(named) if column}
     told = f"{name}: {', '.join(filter(None, named))}, separated by {_SEPARATORS[separator]}"
     return Columns(name, values, np.array([k for k, _ in rows]), told)
@@ -208,11 +292,44 @@ def _named(header: Sequence[str], wanted: Sequence[str], width: int) -> list[str
     """Names of the columns by a header line, "" for others; None where it does not tell."""
     if header is None or len(header) != width:
         return None
-    words = [re.sub(r"[\[(].*|[\s\"'#]", "", word.lower()) for word in header]
-    named = [next((name for name in wanted if word in _WORDS[name]), "") for word in words]
-    needed = {"x", "y", "radius"} if "x" in wanted else set(wanted) - {"frame"}
+    named = _known(header, wanted)
     told = [name for name in named if name]
-    return named if needed <= set(told) and len(told) == len(set(told)) else None
+    return named if _needed(wanted) <= set(told) and len(told) == len(set(told)) else None
+
+
+def _known(header: Sequence[str], wanted: Sequence[str]) -> list[str]:
+    words = [re.sub(r"[\[(].*|[\s\"'#]", "", word.lower()) for word in header]
+    return [next((name for name in wanted if word in _WORDS[name]), "") for word in words]
+
+
+def _needed(wanted: Sequence[str]) -> set[str]:
+    return {"x", "y", "radius"} if "x" in wanted else set(wanted) - {"frame"}
+
+
+def _given(
+    file: str, header: Sequence[str] | None, wanted: Sequence[str], width: int, given: Any
+) -> list[str]:
+    """Names of the columns where some are given by header or number; "" for others."""
+    header = header if header is not None and len(header) == width else [""] * width
+    plain_words = [word.strip(" #\"'").lower() for word in header]
+    named = [name if name not in given else "" for name in _known(header, wanted)]
+    for name, theirs in given.items():
+        word = theirs.strip().lower()
+        if word in plain_words:
+            column = plain_words.index(word)
+        elif word.isdecimal() and 1 <= int(word[:9]) <= width:
+            column = int(word) - 1
+        else:
+            there = ", ".join(filter(None, header)) or "they have no names"
+            raise InputError(
+                f"{file}: no column {theirs[:40]!r} for {name} among {width} ({there}); give a "
+                "header, or a number from 1"
+            )
+        named[column] = name
+    missing = sorted(_needed(wanted) - set(named))
+    if missing:
+        raise InputError(f"{file}: columns for {', '.join(missing)} are to be given, too")
+    return named
 
 
 def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[str]:
@@ -232,6 +349,9 @@ def _as_contacts(numbers: Floats) -> Sequence[str] | None:
     columns = {4: _CONTACTS[1:], 5: _CONTACTS}.get(numbers.shape[1])
     if columns is None:
         return None
+    if len(columns) == 5 and not np.nan_to_num(numbers[:, 2]).any():
+        # No grain is in every contact: a flag, and the first two are the grains.
+        columns = ("id1", "id2", "", "tangential", "normal")
     whole = [_whole(numbers[:, columns.index(name)]) for name in ("id1", "id2")]
     return columns if all(whole) else None
 
@@ -243,15 +363,17 @@ def _as_grains(numbers: Floats) -> Sequence[str] | None:
     first, last = numbers[:, 0], numbers[:, min(width, 6) - 1]
     flagged, counted = _flags(last), _whole(first)
     alone = len(np.unique(first[np.isfinite(first)])) > 0.9 * np.isfinite(first).sum()
+    anew = not alone and _begun_anew(first) is not None
     if width >= 6:
         return (*_GRAINS, *[""] * (width - 6)) if counted else None
     if width == 5:
         # A number for the frame comes again and again, that of a grain once a frame.
         if not counted:
             return None
+        alone |= anew and not _whole(numbers[:, 1])
         return _GRAINS[1:] if flagged and alone else _GRAINS[:5]
     if width == 4:
-        if counted and alone and not flagged:
+        if counted and (alone or anew) and not flagged:
             return _GRAINS[1:5]
         return _GRAINS[2:] if flagged else None
     return _GRAINS[2:5]

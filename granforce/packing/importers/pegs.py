@@ -21,10 +21,16 @@ from granforce.numerics import highs
 from granforce.packing.importers import solved
 from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
 from granforce.packing.importers.listing import Frames, Listing, plain, read_frames
-from granforce.packing.importers.network import judged
+from granforce.packing.importers.network import WORTH_REVERSING, judged
 from granforce.packing.importers.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
 from granforce.packing.importers.text import Source, check_grains
-from granforce.packing.importers.walls import Bodies, bodies, read_outline, wall_contacts
+from granforce.packing.importers.walls import (
+    Bodies,
+    bodies,
+    flagged,
+    read_outline,
+    wall_contacts,
+)
 from granforce.records import (
     Floats,
     InputError,
@@ -68,17 +74,24 @@ class Photoelastic(NamedTuple):
         return notebook.table("Photoelastic frame", lines)
 
 
-def open_frames(positions: Source | Frames, adjacency: Source | None = None) -> Frames:
+def open_frames(
+    positions: Source | Frames,
+    adjacency: Source | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+) -> Frames:
     """Frames to read: `frames` (their numbers) and `listing(frame)`.
 
     From two text files, or, without adjacency, from a *_solved.mat of PeGS 2; a frame that is one
-    already (`synthetic_frame`) is taken as it is.
+    already (`synthetic_frame`) is taken as it is. columns: of text files, as for `read_frames`.
     """
+    if columns and (adjacency is None or hasattr(positions, "listing")):
+        raise InputError("columns are named in two text files, positions and adjacency, only")
     if hasattr(positions, "listing"):
         return cast("Frames", positions)
     if adjacency is None:
         return solved.read_solved(positions)
-    return read_frames(positions, adjacency)
+    return read_frames(positions, adjacency, columns)
 
 
 def read_pegs(
@@ -92,6 +105,8 @@ def read_pegs(
     error: float | None = None,
     reverse: bool = False,
     repair: bool = True,
+    columns: Mapping[str, str] | None = None,
+    flag: str | None = None,
     walls: str | None = None,
     wall_forces: Mapping[str, Sequence[float]] | None = None,
     most_grains: int | None = None,
@@ -105,10 +120,14 @@ def read_pegs(
     its degrees of freedom; half the difference of what was listed twice is added in quadrature.
     reverse: take f_t with the other sign (programs differ). repair: mend what is wrong by itself,
     up to a tenth of the data (or the part that is given); False: the first thing wrong raises.
-    most_grains: how many are taken.
+    most_grains: how many are taken. columns: {name here: header or number in the files}, such as
+    {"r": "diameter", "fn": "5"}, of columns that are not recognised.
 
-    walls: "open" (the balance of grains at walls is not asked for), "box", "annulus" or "circle",
-    found from the grains at walls or with numbers (`walls.read_outline`); by default contacts with
+    walls: "open" (the balance of grains at walls is not asked for), "box", "annulus", "circle" or
+    "auto" (which of them fits), found from the grains at walls or with numbers
+    (`walls.read_outline`). Grains at walls are flagged in the files. flag: "ignore" for those at
+    the boundary of the frame in their place, which are taken, too, where nearly all grains are
+    flagged; a note in the report says so. By default contacts with
     walls count where the solver lists their directions. wall_forces: {"right": (f_x, f_y, σ)},
     forces of the grains on straight walls, measured by load cells.
 
@@ -123,7 +142,7 @@ def read_pegs(
         raise InputError(f"reach is in mean radii and must lie between 0 and 2, got {reach}")
     if walls is not None and not hasattr(walls, "gaps"):
         walls = read_outline(walls)
-    listing = open_frames(positions, adjacency).listing(frame)
+    listing = open_frames(positions, adjacency, columns=columns).listing(frame)
     check_grains(len(listing.ids), most_grains, listing.names[0])
     listing = listing._replace(r=scale * listing.r)
     if reverse:
@@ -131,7 +150,9 @@ def read_pegs(
     listing, account, renamed = repaired(listing, mu, repair)
     x, r = listing.x, listing.r
     check_disks(x, r, OPEN, lambda g: listing.place(0, g), OVERLAP)
-    at_wall = listing.flag != 0
+    sides, note = flagged(listing, flag, walls)
+    listing = listing._replace(flag=sides)
+    at_wall = sides != 0
     rows = rows_of(listing)
     with_wall = (rows == -1).any(axis=1)
     at_wall[rows[with_wall].max(axis=1)] = True
@@ -141,6 +162,12 @@ def read_pegs(
     saved = gain_by_reversing(
         (*listed.pairs.T, normal), np.nan_to_num(listed.forces), np.zeros_like(x), ~at_wall
     )
+    notes = [] if note is None else [note]
+    if saved > WORTH_REVERSING:
+        notes.append(
+            f"the unbalance of grains falls by {saved:.0%} if tangential forces change sign: "
+            + ("leave out reverse" if reverse else "--reverse (reverse=True) changes it")
+        )
     found = wall_contacts(listing, x, r, at_wall, walls, reach)
     if wall_forces and found is None:
         raise InputError("a force on a wall needs walls: give the outline, such as --walls box")
@@ -197,6 +224,7 @@ def read_pegs(
         "freedom": best.freedom,
         "mean_change_of_f_n": float(change[0]),
         "mean_change_of_f_t": float(change[1]),
+        **({"notes": notes} if notes else {}),
         "findings": _told(account),
     }
     shorter = np.minimum(*packing.r[np.stack([packing.contacts.i, packing.contacts.j])])

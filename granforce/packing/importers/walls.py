@@ -7,7 +7,9 @@ direction: the sum of the forces on the wall lies in the same cone as each of th
 measured.
 
 Directions come from the angles that a solver lists, or from the nearest side of an outline: a box,
-or an annulus (a circle where no grain is flagged −1, for the inner wall).
+or an annulus (a circle where no grain is flagged −1, for the inner wall). Which grains are at walls
+is what their flags say. A flag of nearly all grains says something else: then, and without a flag,
+they are those at the boundary of the frame.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize
 
+from granforce.packing.importers.boundary import boundary
 from granforce.packing.importers.geometry import components
 from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.repair import rows_of
@@ -28,6 +31,10 @@ _SHAPES = {"box": 4, "annulus": 4, "circle": 3}
 _ANY = "wall"
 # Grains at a side lie within so many mean radii of the outermost.
 _AT_SIDE = 1.0
+# A flag of more than this part of the grains is none of walls, unless there are fewer grains.
+_NEARLY_ALL, _FEW = 0.9, 20
+# A shape is that of the outline where grains at walls are so near to it on average, in mean radii.
+_NEAR = 0.75
 
 
 class Outline(NamedTuple):
@@ -80,15 +87,16 @@ class WallContacts(NamedTuple):
 
 
 def read_outline(text: str) -> str | Outline:
-    """'open', 'box', 'annulus' or 'circle' (found from the grains), or an Outline with its numbers.
+    """'open', 'box', 'annulus', 'circle' or 'auto' (found from the grains), or an Outline.
 
-    Such as box:0,100,0,80 or annulus:500,500,200,450. Raises InputError.
+    With its numbers, such as box:0,100,0,80 or annulus:500,500,200,450. auto: the shape that fits
+    best. Raises InputError.
     """
     shape, _, numbers = str(text).strip().partition(":")
-    if shape == "open" and not numbers:
-        return "open"
+    if shape in ("open", "auto") and not numbers:
+        return shape
     if shape not in _SHAPES:
-        raise InputError(f"walls are open, {', '.join(_SHAPES)}, got {str(text)[:40]!r}")
+        raise InputError(f"walls are open, auto, {', '.join(_SHAPES)}, got {str(text)[:40]!r}")
     return _outline(shape, numbers) if numbers else shape
 
 
@@ -119,6 +127,44 @@ def read_wall_force(text: str) -> tuple[str, tuple[float, ...]]:
         raise InputError(f"--wall-force {str(text)[:40]!r}: give it as 'right: fx fy sigma'")
     positive(values[2], "the error of a wall's force")
     return name.strip(), values
+
+
+def flagged(
+    listing: Listing, flag: str | None, walls: str | Outline | None
+) -> tuple[Floats, str | None]:
+    """(N,) what tells grains at walls: not 0, below 0 at an inner wall; and a note, if it is due.
+
+    flag: "ignore" if those in the listing tell nothing. walls: as `read_outline` gives it, or None.
+    Raises InputError for another flag.
+    """
+    if flag not in (None, "ignore"):
+        raise InputError(f"flag: ignore is all that can be said of it, got {str(flag)[:40]!r}")
+    given = listing.flag
+    many, shaped = np.mean(given != 0), walls not in (None, "open")
+    told = given.any() or np.any(listing.ends < 0)
+    believed = many <= _NEARLY_ALL or len(given) < _FEW
+    if flag is None and believed and (told or not shaped):
+        return given, None
+    found: Floats = (
+        _nearest_side(listing, walls)
+        if isinstance(walls, Outline)
+        else (boundary(listing.x, listing.r).astype(np.float64))
+    )
+    if flag == "ignore" or not given.any():
+        return found, None
+    return found, (
+        f"{np.sum(given != 0)} of {len(given)} grains are flagged as touching a wall, which is no "
+        f"flag of walls: it is ignored, and the {np.sum(found != 0)} grains at the boundary of the "
+        "frame count as those at walls (as with --flag ignore); --walls annulus, box or auto makes "
+        "walls of the boundary"
+    )
+
+
+def _nearest_side(listing: Listing, outline: Outline) -> Floats:
+    gap = outline.gaps(listing.x, listing.r)[0]
+    at = gap.min(axis=1) <= _AT_SIDE * listing.r.mean()
+    inner = outline.names[0] == "inner"
+    return np.where(at, np.where(inner & (gap.argmin(axis=1) == 0), -1.0, 1.0), 0.0)
 
 
 def wall_contacts(
@@ -181,7 +227,9 @@ def _occurrence(grain: Integers) -> Integers:
 
 
 def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
-    """The Outline of a shape that the grains at walls touch."""
+    """The Outline of a shape that the grains at walls touch; "auto": of the one that fits best."""
+    if shape == "auto":
+        return _best_fitted(x, r, at_wall, flag)
     if at_wall.sum() < 4:
         raise InputError(
             f"walls {shape}: fewer than four grains are at walls (by a flag, or an id below 0); "
@@ -211,6 +259,22 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Out
     found = optimize.least_squares(misses, start, loss="soft_l1", f_scale=0.1 * r.mean()).x
     cut = found if shape == "annulus" else found[[0, 1, 3]]
     return _outline(shape, ",".join(repr(float(value)) for value in cut))
+
+
+def _best_fitted(x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
+    inner = np.any(flag[at_wall] < 0)
+    some = [fitted(one, x, r, at_wall, flag) for one in ("box", "annulus" if inner else "circle")]
+    off = [
+        np.abs(outline.gaps(x[at_wall], r[at_wall])[0]).min(axis=1).mean() / r.mean()
+        for outline in some
+    ]
+    best = int(np.argmin(off))
+    if not off[best] <= _NEAR:
+        raise InputError(
+            f"walls auto: neither {some[0].shape} nor {some[1].shape} fits the grains at walls; "
+            "give the outline with its numbers"
+        )
+    return some[best]
 
 
 class Bodies(NamedTuple):

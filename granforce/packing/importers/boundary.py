@@ -1,0 +1,47 @@
+"""Which grains lie at the outside of a frame, or at its hole, by their places alone."""
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import Delaunay, QhullError
+
+from granforce.records import Floats, Integers
+
+# Triangles of neighbours have circles up to so many mean radii about them: with those of a grain
+# that is missing among others, and without those that bridge a bay of the outside.
+_CIRCLE = 4.0
+# A hole so many mean radii across is that of an inner wall, and not that of missing grains.
+_HOLE = 12.0
+
+
+def boundary(x: Floats, r: Floats) -> Integers:
+    """(N,) 1 for grains at the outside, −1 at the largest hole, if it is large, and 0 elsewhere.
+
+    x (N, 2), r (N,). By the edges of the alpha shape of the centres (Edelsbrunner, Kirkpatrick,
+    Seidel, IEEE Trans. Inf. Theory 29, 551 (1983)).
+    """
+    found = np.ones(len(x), dtype=np.int64)
+    try:
+        triangles = Delaunay(x).simplices
+    except QhullError:  # fewer than three grains, or all on a line
+        return found
+    corner = x[triangles]
+    sides = np.stack([corner[:, k] - corner[:, k - 1] for k in range(3)], axis=1)
+    area = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) / 2
+    product = np.hypot(*sides.transpose(2, 0, 1)).prod(axis=1)
+    triangles = triangles[product <= 4 * area * _CIRCLE * r.mean()]
+    if not len(triangles):
+        return found
+    edges = np.sort(np.concatenate([triangles[:, [k, k - 1]] for k in range(3)]), axis=1)
+    edges, times = np.unique(edges, axis=0, return_counts=True)
+    i, j = edges[times == 1].T
+    graph = sparse.coo_matrix((np.ones(len(i)), (i, j)), shape=(len(x), len(x)))
+    _, ring = csgraph.connected_components(graph, directed=False)
+    at = np.unique(np.concatenate([i, j]))
+    found[np.unique(triangles)] = 0
+    width = {one: np.ptp(x[at[ring[at] == one]], axis=0).max() for one in np.unique(ring[at])}
+    widest = sorted(width, key=lambda one: -width[one])
+    found[at[ring[at] == widest[0]]] = 1
+    if len(widest) > 1 and width[widest[1]] > _HOLE * r.mean():
+        found[at[ring[at] == widest[1]]] = -1
+    return found

@@ -1,0 +1,219 @@
+"""What text files of photoelastic frames list, where columns and flags are not what they seem."""
+
+import gzip
+import io
+
+import numpy as np
+import pytest
+from frames import file, frame
+
+from granforce.cli.parser import main
+from granforce.packing.importers import read_pegs
+from granforce.packing.importers.boundary import boundary
+from granforce.packing.importers.walls import fitted
+from granforce.records import InputError
+from granforce.study import series
+
+N = 40
+CLEAN = {"mu": 0.3, "reach": 0.1, "error": 0.001}
+
+
+def read(grains, rows, **options):
+    return read_pegs(file(grains, "positions.txt"), file(rows, "adjacency.txt"), **CLEAN, **options)
+
+
+def flagged(grains, flag):
+    return [[*row[:-1], flag] for row in grains]
+
+
+def columns(rows, *chosen):
+    return [[row[k] for k in chosen] for row in rows]
+
+
+@pytest.fixture(scope="module")
+def made():
+    grains, rows, _ = frame(N)
+    return grains, rows
+
+
+@pytest.fixture(scope="module")
+def taken(made):
+    return read(*made)
+
+
+def same(found, taken):
+    assert np.array_equal(found.packing.contacts.i, taken.packing.contacts.i)
+    assert np.allclose(found.measured, taken.measured, equal_nan=True)
+    assert np.allclose(found.packing.forces, taken.packing.forces)
+
+
+@pytest.mark.parametrize("flag", [1, -1, 7])
+def test_a_flag_of_all_grains_is_no_flag_of_walls(made, flag):
+    """Those at the boundary are at walls: nearly the same as with the right flags."""
+    grains, rows = made
+    found = read(flagged(grains, flag), rows)
+    right = np.array([row[-1] for row in grains]) != 0
+    assert np.mean(found.at_wall == right) > 0.85
+    (note,) = found.report["notes"]
+    assert f"{N} of {N} grains are flagged" in note and "\n" not in note
+    same(found, read(flagged(grains, flag), rows, flag="ignore"))
+    assert "notes" not in read(grains, rows, flag="ignore").report
+    with pytest.raises(InputError, match="flag"):
+        read(grains, rows, flag="use")
+
+
+@pytest.mark.parametrize("flag", [0, 1])
+@pytest.mark.parametrize("walls", ["box", "auto"])
+def test_walls_are_found_without_flags(made, flag, walls):
+    grains, rows = made
+    found = read(flagged(grains, flag), rows, walls=walls)
+    assert found.walls == ("left", "right", "bottom", "top")
+    assert ("notes" in found.report) == (flag == 1)
+    numbers = "box:0,{0},0,{0}".format(max(row[2] for row in grains) + 20)
+    given = read(flagged(grains, flag), rows, walls=numbers)
+    assert given.walls == found.walls and 8 < given.report["grains_at_walls"] < 30
+
+
+def annulus(rng, inner):
+    """Disks of radius 5 in a ring of radii 60 and 130, without room for more."""
+    x = np.mgrid[-150:150:9.9, -150:150:9.9].reshape(2, -1).T + rng.normal(0, 0.3, (961, 2))
+    away = np.hypot(*x.T)
+    return x[(away < 125) & (away > inner + 5)] + [500, 300], np.hypot
+
+
+@pytest.mark.parametrize("inner", [0, 60])
+def test_an_annulus_is_told_from_a_circle(rng, inner):
+    x, _ = annulus(rng, inner)
+    r = np.full(len(x), 5.0)
+    sides = boundary(x, r)
+    away = np.hypot(*(x - [500, 300]).T)
+    assert np.all(away[sides == 1] > 110) and np.all(away[sides == -1] < 80)
+    assert np.any(sides == -1) == (inner > 0)
+    found = fitted("auto", x, r, sides != 0, sides.astype(float))
+    assert found.shape == ("annulus" if inner else "circle")
+    assert np.allclose(found.numbers[:2], [500, 300], atol=3)
+    assert np.allclose(found.numbers[-1], 128, atol=5)
+
+
+def test_an_outline_without_a_shape_is_refused(rng):
+    x = np.concatenate([annulus(rng, 0)[0], annulus(rng, 0)[0] + [230, 0]])
+    sides = boundary(x, r := np.full(len(x), 5.0))
+    with pytest.raises(InputError, match="auto: neither box nor circle fits"):
+        fitted("auto", x, r, sides != 0, sides.astype(float))
+
+
+@pytest.mark.parametrize("x", [[[0, 0]], [[0, 0], [1, 1], [2, 2]], [[0, 0], [9, 0], [0, 9]]])
+def test_few_grains_are_all_at_the_boundary(x):
+    assert np.all(boundary(np.array(x, float), np.full(len(x), 0.5)) == 1)
+
+
+@pytest.mark.parametrize("numbered", [False, True])
+@pytest.mark.parametrize("flags", [False, True])
+def test_ids_that_begin_anew_begin_another_frame(made, taken, numbered, flags):
+    """By the ids of both files, or with a column for the frame in that of the contacts."""
+    grains, rows = made
+    moved = [[row[0], row[1], row[2] + 1000, *row[3:]] for row in grains]
+    ordered = sorted(rows, key=lambda row: row[1])
+    # Forces of the first frame are twice as large.
+    contacts = [[4, *row[1:3], 2 * row[3], 2 * row[4]] for row in ordered]
+    contacts += [[9, *row[1:]] for row in ordered]
+    if not numbered:
+        contacts = columns(contacts, 1, 2, 3, 4)
+    listed = columns(grains + moved, 1, 2, 3, 4, 5)
+    listed = listed if flags else columns(listed, 0, 1, 2, 3)
+    texts = [one.getvalue() for one in (file(listed), file(contacts))]
+    taken = taken if flags else read(flagged(grains, 0), rows)
+    found = read_pegs(*map(io.StringIO, texts), **CLEAN)
+    same(found, taken)
+    assert found.packing.x[:, 0].min() > 900 and "told apart by the ids" in found.report["columns"]
+    first, last = (4, 9) if numbered else (1, 2)
+    assert found.report["frame"] == last
+    found = read_pegs(*map(io.StringIO, texts), frame=first, **CLEAN)
+    assert np.allclose(found.measured, 2 * taken.measured, equal_nan=True)
+    with pytest.raises(InputError, match="frame 7 is not in both"):
+        read_pegs(*map(io.StringIO, texts), frame=7, **CLEAN)
+
+
+def test_frames_of_contacts_that_nothing_tells_apart_are_refused(made, rng):
+    grains, rows = made
+    mixed = [rows[k] for k in rng.permutation(len(rows))]
+    with pytest.raises(InputError, match=r"ids begin anew 2 times.*add a column for the frame"):
+        read(columns(grains + grains, 1, 2, 3, 4, 5), columns(mixed + mixed, 1, 2, 3, 4))
+    three = [[k, *row[1:]] for k in (1, 2, 3) for row in rows]
+    with pytest.raises(InputError, match=r"begin anew 2 times, and adjacency.txt has 3 frames"):
+        read(columns(grains + grains, 1, 2, 3, 4, 5), three)
+
+
+def test_a_line_that_is_there_twice_begins_no_frame(made, taken):
+    grains, rows = made
+    listed = columns(grains, 1, 2, 3, 4, 5)
+    found = read([*listed, listed[0]], columns(rows, 1, 2, 3, 4))
+    same(found, taken)
+    assert found.report["doubled_grains"] == 1
+
+
+def test_a_third_column_of_zeros_is_a_flag(made, taken):
+    """No grain is in every contact."""
+    grains, rows = made
+    same(read(grains, [[row[1], row[2], 0, row[3], row[4]] for row in rows]), taken)
+
+
+def test_columns_are_named_by_header_or_number(made, taken):
+    grains, rows = made
+    head = "size;where_x;where_y;name;edge\n"
+    text = head + "\n".join(";".join(f"{row[k]:.12g}" for k in (4, 2, 3, 1, 5)) for row in grains)
+    mixed = [[row[4], row[3], 3.5, row[1], row[2]] for row in rows]
+    names = {"r": "size", "x": "where_x", "y": "WHERE_Y", "id": "name", "fn": "1", "ft": "2"}
+    names |= {"i": "4", "j": "5"}
+    found = read_pegs(io.StringIO(text), file(mixed), columns=names, **CLEAN)
+    same(found, taken)
+    assert np.array_equal(found.at_wall, taken.at_wall)
+    for wrong, words in (
+        ({"q": "1"}, "no column is called 'q' here: frame, id, x"),
+        ({"r": "radius", "x": "2", "y": "3"}, "no column 'radius' for radius among 5 .size"),
+        ({"x": "2"}, "columns for radius, y are to be given"),
+        (names | {"fn": "9"}, "no column '9' for normal among 5 .they have no names"),
+        ({name: names[name] for name in ("r", "x", "y", "fn")}, "columns for id1, id2, tangential"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_pegs(io.StringIO(text), file(mixed), columns={**wrong}, **CLEAN)
+
+
+def test_columns_are_of_text_files(made):
+    for given in ((io.BytesIO(b"MATLAB"), None), (made, None)):
+        with pytest.raises(InputError, match="two text files"):
+            read_pegs(*given, columns={"x": "1"}, **CLEAN)
+
+
+def test_tangential_forces_of_the_other_sign_are_noticed(made, taken):
+    grains, rows = made
+    other = [[*row[:3], -row[3], row[4]] for row in rows]
+    (note,) = read(grains, other).report["notes"]
+    assert "change sign" in note and "--reverse" in note
+    found = read(grains, other, reverse=True)
+    assert "notes" not in found.report
+    same(found, taken)
+
+
+def test_by_the_command_line_with_compressed_files(away, made, capsys):
+    """Notes go to stderr; series read the same files with the same options."""
+    grains, rows = made
+    for name, lines in (
+        ("positions", flagged(grains, 1)),
+        ("adjacency", columns(rows, 1, 2, 4, 3)),
+    ):
+        text = "\n".join(" ".join(f"{value:.12g}" for value in row) for row in lines)
+        (away / f"{name}.txt.gz").write_bytes(gzip.compress(text.encode()))
+    files = "positions.txt.gz adjacency.txt.gz"
+    options = "--mu 0.3 --reach 0.1 --columns i=1,j=2,fn=3,ft=4"
+    assert main(f"import pegs {files} {options} --out p.npz --json".split()) == 0
+    out, err = capsys.readouterr()
+    assert f"granforce: {N} of {N} grains are flagged" in err and err.count("\n") == 1
+    assert '"walls": "open"' in out
+    assert main(f"import pegs {files} {options} --flag ignore --walls auto".split()) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and "left, right, bottom, top" in out
+    (one,) = series.frames_of(away, columns={"i": "1", "j": "2", "fn": "3", "ft": "4"})
+    assert one.positions.endswith("positions.txt.gz")
+    assert main(f"infer {files} --frames all --states 0 {options}".split()) == 0
+    assert f"granforce: frame 1: {N} of {N} grains are flagged" in capsys.readouterr().err
