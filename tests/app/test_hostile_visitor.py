@@ -3,11 +3,15 @@
 Whatever they do, the next visitor's computation begins and ends, and no thread of the server dies.
 """
 
+import json
 import re
+import subprocess
+import sys
 import urllib.request
 
 import pytest
-from serving import CLOSED, free_port, painted, serve
+from serving import CLOSED, free_port, painted, serve, wait_until_served
+from small_store import ROOT
 
 LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, unless it is ended
 LIMITS = "n=60,states=20000"
@@ -143,10 +147,34 @@ def test_a_killed_server_comes_back_and_a_reloaded_page_works(page, shipped, tmp
             computes(page, url, 16)
 
 
-def test_a_server_with_threads_of_panel_is_refused_at_its_start(tmp_path):
-    with serve(tmp_path, PANEL_NUM_THREADS="2", wait=False) as (_, server):
+@pytest.mark.parametrize(
+    "option, words",
+    [
+        ("--num-threads=2", "cannot run with --num-threads"),
+        ("--num-procs=2", "cannot run with --num-procs"),
+        ("--autoreload", "cannot run with --autoreload"),
+    ],
+)
+def test_a_server_that_could_not_serve_is_refused_at_its_start(tmp_path, option, words):
+    with serve(tmp_path, option, wait=False) as (_, server):
         assert server.wait(300) == 2
-    assert "cannot run with --num-threads" in (tmp_path / "log").read_text().splitlines()[-1]
+    lines = (tmp_path / "log").read_text().splitlines()
+    assert words in lines[-1] and "Traceback" not in "".join(lines)
+
+
+def test_a_server_says_that_it_is_alive(tmp_path):
+    """As `granforce app` serves it."""
+    port = free_port()
+    words = [sys.executable, "-m", "granforce.cli", "app", "--no-show", "--port", str(port)]
+    with open(tmp_path / "log", "w") as log:
+        server = subprocess.Popen(words, cwd=ROOT, stdout=log, stderr=log)
+    try:
+        wait_until_served(f"http://localhost:{port}/health", server, tmp_path / "log")
+        with urllib.request.urlopen(f"http://localhost:{port}/health") as answer:
+            assert answer.status == 200 and json.load(answer) == {"alive": True}
+    finally:
+        server.terminate()
+        server.wait(20)
 
 
 @pytest.mark.parametrize("options", [(), ("--warm",)])
