@@ -49,10 +49,16 @@ from granforce.packing.closing import Margin as Margin
 from granforce.packing.closing import margin as margin
 from granforce.packing.compaction import Glimpse as Glimpse
 from granforce.packing.compaction import pack as pack
+from granforce.packing.exporters import save_lammps as save_lammps
+from granforce.packing.exporters import save_vtk as save_vtk
 from granforce.packing.importers import Measurement as Measurement
 from granforce.packing.importers import Photoelastic as Photoelastic
+from granforce.packing.importers import Snapshot as Snapshot
+from granforce.packing.importers import Snapshots as Snapshots
 from granforce.packing.importers import SyntheticFrame as SyntheticFrame
 from granforce.packing.importers import load_packing as load_packing
+from granforce.packing.importers import open_lammps as open_lammps
+from granforce.packing.importers import open_mercury as open_mercury
 from granforce.packing.importers import read_known as read_known
 from granforce.packing.importers import read_lammps as read_lammps
 from granforce.packing.importers import read_measurement as read_measurement
@@ -82,6 +88,7 @@ from granforce.records import Relaxation as Relaxation
 from granforce.records import UndecidedError as UndecidedError
 from granforce.records import make_contacts as make_contacts
 from granforce.records import make_packing as make_packing
+from granforce.study.evolution import evolution as evolution
 from granforce.study.series import Frame as Frame
 from granforce.study.series import frames_of as frames_of
 from granforce.study.series import infer_series as infer_series

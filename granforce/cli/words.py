@@ -467,6 +467,20 @@ def add_import(commands: Commands) -> None:
     )
 
 
+def add_export(commands: Commands) -> None:
+    command = subcommand(
+        commands,
+        "export",
+        "write a packing and its force network for ParaView or LAMMPS",
+        "granforce export packing.npz grains.vtp contacts.vtp\n"
+        "  granforce export packing.npz particles.dump contacts.dump",
+        reports=False,
+    )
+    command.add_argument("packing", type=Input, help="a packing: FILE.npz")
+    command.add_argument("grains", type=Output, help="FILE.vtp for ParaView, FILE.dump for LAMMPS")
+    command.add_argument("contacts", type=Output, help="the same, for the contacts and forces")
+
+
 def add_bench(commands: Commands) -> None:
     command = subcommand(
         commands,
@@ -503,6 +517,7 @@ COMMANDS = (
         add_app,
         add_docs,
         add_import,
+        add_export,
         add_bench,
     ),
     add_cache,

@@ -64,6 +64,7 @@ LINES = {
     ],
     "import table": ["grains.csv --mu 0.3"],
     "import pegs": [f"{FRAMES} --mu 0.3", f"{FRAMES} --mu 0.3 --strict"],
+    "export": ["p.npz g.vtp c.vtp"],
     "bench": ["--quick"],
     "cache": ["list", "size", "verify", "clear"],
 }

@@ -2,7 +2,7 @@
 
 from granforce.cli.commands.exact import intervals, limit_loads, perturb, stress
 from granforce.cli.commands.inference import infer
-from granforce.cli.commands.packings import import_, pack
+from granforce.cli.commands.packings import export, import_, pack
 from granforce.cli.commands.service import app, bench, cache, docs, study_
 from granforce.cli.commands.states import measure, scan, uniform, volume, walk
 
@@ -11,6 +11,7 @@ __all__ = [
     "bench",
     "cache",
     "docs",
+    "export",
     "import_",
     "infer",
     "intervals",

@@ -16,7 +16,7 @@ from granforce.cli.asked import (
     store_of,
     write_csv,
 )
-from granforce.packing import importers, scenes
+from granforce.packing import exporters, importers, scenes
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, Packing, whole
 from granforce.system.terminal import print_report
@@ -118,6 +118,13 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
 def named_columns(arguments: argparse.Namespace) -> dict[str, str] | None:
     """What columns are called in the files, as the options say it."""
     return None if arguments.columns is None else importers.read_columns(arguments.columns)
+
+
+def export(arguments: argparse.Namespace) -> None:
+    """Write a packing as files of other programs."""
+    check_outputs(arguments.grains, arguments.contacts)
+    packing = importers.load_packing(arguments.packing)
+    exporters.export(packing, arguments.grains, arguments.contacts)
 
 
 def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:

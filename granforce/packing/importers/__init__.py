@@ -10,6 +10,7 @@ from granforce.packing.importers.measurements import Measurement, read_measureme
 from granforce.packing.importers.network import report
 from granforce.packing.importers.npz import load_packing, save_packing
 from granforce.packing.importers.pegs import Photoelastic, read_pegs
+from granforce.packing.importers.snapshots import Snapshot, Snapshots
 from granforce.packing.importers.synthetic import SyntheticFrame, synthetic_frame
 from granforce.packing.importers.tables import read_table
 from granforce.packing.importers.text import read_columns
@@ -18,6 +19,8 @@ from granforce.packing.importers.walls import read_wall_force
 __all__ = [
     "Measurement",
     "Photoelastic",
+    "Snapshot",
+    "Snapshots",
     "SyntheticFrame",
     "load_packing",
     "open_lammps",

@@ -1,0 +1,186 @@
+"""Force networks as files of other programs: VTK XML for ParaView, dumps of LAMMPS."""
+
+import base64
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from granforce.records import Floats, InputError, Packing, float_array
+from granforce.system.files import written
+
+_VTK_TYPES = {"f": "Float64", "i": "Int64"}
+
+
+def save_vtk(
+    packing: Packing, grains: str | Path, contacts: str | Path, forces: npt.ArrayLike | None = None
+) -> None:
+    """Write a packing as two .vtp files (VTK XML PolyData), which ParaView opens.
+
+    grains: points with radius, number of contacts, load (F_x, F_y, 0) and torque. contacts: lines
+    from grain i along the branch to j, across periodic sides too, to the wall where j is one; with
+    i, j, f_n, f_t, the force on j (a vector) and the gap, as data of the lines, and f_n of their
+    ends as well, for tubes. forces (N_c, 2): f_n, f_t, by default the packing's own. Lengths and
+    forces are in the packing's units. Raises InputError where a file cannot be written.
+    """
+    forces, c = _forces(packing, forces), packing.contacts
+    count, links = len(packing.r), len(c.i)
+    ends = np.concatenate([c.i, c.j])
+    points = {
+        "radius": packing.r,
+        "contacts": np.bincount(ends, minlength=count),
+        "load": _spatial(packing.load[:, :2]),
+        "torque": packing.load[:, 2],
+    }
+    # A wall has no lever arm: the line ends at it.
+    reach = np.where(c.arm_j == 0, c.arm_i, c.length)
+    start = packing.x[c.i]
+    both = np.stack([start, start + reach[:, None] * c.normal], axis=1).reshape(-1, 2)
+    tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])
+    lines = {
+        "f_n": forces[:, 0],
+        "f_t": forces[:, 1],
+        "force": _spatial(forces[:, :1] * c.normal + forces[:, 1:] * tangent),
+        "gap": c.gap,
+        "i": c.i,
+        "j": c.j,
+    }
+    one, two = np.arange(count), np.arange(2 * links)
+    of_ends = {"f_n": np.repeat(forces[:, 0], 2)}
+    _write(
+        (grains, _poly_data(packing.x, "Verts", one, one + 1, points, {})),
+        (contacts, _poly_data(both, "Lines", two, two[1::2] + 1, of_ends, lines)),
+    )
+
+
+def save_lammps(
+    packing: Packing,
+    particles: str | Path,
+    contacts: str | Path,
+    forces: npt.ArrayLike | None = None,
+) -> None:
+    """Write a packing as two dumps of LAMMPS, which `read_lammps` reads back.
+
+    particles: ``dump custom`` with id, type, x, y and radius. contacts: ``dump local`` with atom1,
+    atom2, distance and, on atom1, the normal force fx, fy and the tangential force px, py. forces
+    (N_c, 2): f_n, f_t, by default the packing's own. A dump holds no friction coefficient, no loads
+    (those that are read back balance the forces) and no gaps. Raises InputError where a file cannot
+    be written.
+    """
+    forces, c = _forces(packing, forces), packing.contacts
+    ids = np.arange(1, len(packing.r) + 1)
+    tangent = np.column_stack([-c.normal[:, 1], c.normal[:, 0]])
+    on_i = np.column_stack([-forces[:, :1] * c.normal, -forces[:, 1:] * tangent])
+    box = _bounds(packing)
+    atoms = np.column_stack([ids, np.ones_like(ids), packing.x, packing.r])
+    pairs = np.column_stack([c.i + 1, c.j + 1, c.length, on_i])
+    _write(
+        (particles, _dump("ATOMS", "id type x y radius", box, atoms)),
+        (contacts, _dump("ENTRIES", "atom1 atom2 distance fx fy px py", box, pairs)),
+    )
+
+
+def _forces(packing: Packing, forces: npt.ArrayLike | None) -> Floats:
+    if forces is None:
+        return packing.forces
+    return float_array(forces, packing.forces.shape, "forces")
+
+
+def _write(*files: tuple[str | Path, bytes]) -> None:
+    """Write both files, or none of them."""
+    (first, one), (second, two) = files
+    with written(first) as file, written(second) as other:
+        file.write(one)
+        other.write(two)
+
+
+def _spatial(vectors: Floats) -> Floats:
+    return np.column_stack([vectors, np.zeros(len(vectors))])
+
+
+def _poly_data(
+    x: Floats,
+    kind: str,
+    connectivity: Any,
+    offsets: Any,
+    of_points: Mapping[str, Any],
+    of_cells: Mapping[str, Any],
+) -> bytes:
+    """A VTK XML file of points x (n, 2) and of cells of one kind, Verts or Lines."""
+    numbers = {part: 0 for part in ("Verts", "Lines", "Strips", "Polys")} | {kind: len(offsets)}
+    counts = "".join(f' NumberOf{part}="{number}"' for part, number in numbers.items())
+    parts = {
+        "PointData": of_points,
+        "CellData": of_cells,
+        "Points": {"points": _spatial(x)},
+        kind: {"connectivity": connectivity, "offsets": offsets},
+    }
+    inner = ""
+    for part, arrays in parts.items():
+        text = "".join(_data_array(name, array) for name, array in arrays.items())
+        inner += f"<{part}>\n{text}</{part}>\n"
+    return (
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+        f'<PolyData>\n<Piece NumberOfPoints="{len(x)}"{counts}>\n{inner}</Piece>\n</PolyData>\n'
+        "</VTKFile>\n"
+    ).encode()
+
+
+def _data_array(name: str, array: Any) -> str:
+    """A DataArray in base64: its number of bytes, and its numbers."""
+    array = np.asarray(array)
+    kind, wide = array.dtype.kind, array.shape[1] if array.ndim == 2 else 1
+    data = array.astype(f"<{kind}8").tobytes()
+    text = base64.b64encode(struct.pack("<Q", len(data)) + data).decode()
+    return (
+        f'<DataArray type="{_VTK_TYPES[kind]}" Name="{name}" NumberOfComponents="{wide}" '
+        f'format="binary">{text}</DataArray>\n'
+    )
+
+
+def _bounds(packing: Packing) -> str:
+    """The box as a dump tells it: bounds of a tilted one are those of the rectangle around it."""
+    cell, tilt = packing.cell, packing.tilt
+    is_open, reach = np.isinf(cell.box), packing.r[:, None]
+    low = np.where(is_open, (packing.x - reach).min(axis=0), 0.0)
+    high = np.where(is_open, (packing.x + reach).max(axis=0), cell.box)
+    low[0], high[0] = low[0] + min(0.0, tilt), high[0] + max(0.0, tilt)
+    sides = [[*pair, tilt * (k == 0)] for k, pair in enumerate(zip(low, high, strict=True))]
+    thick = packing.r.max()
+    rows = [*sides, [-thick, thick, 0.0]]
+    flags = " ".join(["ff" if side else "pp" for side in is_open] + ["pp"])
+    words = f"xy xz yz {flags}" if tilt else flags
+    text = "\n".join(" ".join(f"{v:.17g}" for v in row[: 3 if tilt else 2]) for row in rows)
+    return f"ITEM: BOX BOUNDS {words}\n{text}\n"
+
+
+def _dump(title: str, columns: str, box: str, table: Floats) -> bytes:
+    """A dump of one snapshot, the first two columns whole numbers."""
+    rows = "".join(
+        f"{row[0]:.0f} {row[1]:.0f} {' '.join(f'{v:.17g}' for v in row[2:])}\n"
+        for row in table.tolist()
+    )
+    head = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF {title}\n{len(table)}\n{box}"
+    return f"{head}ITEM: {title} {columns}\n{rows}".encode()
+
+
+# Formats by the end of the names of both files.
+FORMATS = {".vtp": save_vtk, ".dump": save_lammps}
+
+
+def export(packing: Packing, grains: str | Path, contacts: str | Path) -> None:
+    """Write a packing as two files in the format that the ends of their names tell.
+
+    Raises InputError for ends that are none of FORMATS, or two.
+    """
+    ends = {Path(path).suffix.lower() for path in (grains, contacts)}
+    save = FORMATS.get(ends.pop()) if len(ends) == 1 else None
+    if save is None:
+        raise InputError(
+            f"{grains}, {contacts}: give two files ending in .vtp (ParaView) or in .dump (LAMMPS)"
+        )
+    save(packing, grains, contacts)
