@@ -99,6 +99,23 @@ def test_packings_whose_steps_settle_are_another_version():
     assert (older["version"], newer["version"]) == (3, 4)
 
 
+@pytest.mark.parametrize("name", KINDS)
+def test_a_new_version_of_packings_renames_what_rests_on_them_alone(name, tmp_path, monkeypatch):
+    store, (given, options, _) = open_store(tmp_path / "s"), NAMES[name]
+
+    def called(packing):
+        known = given if name == "packing" else (packing, *given[1:])
+        named = KINDS[name].parameters(*known, **options)
+        return study.entry_name(store, KINDS[name], named)
+
+    imported = {"imported": "0" * 64, "mu": 0.1}
+    before = called(MADE), name != "packing" and called(imported)
+    monkeypatch.setattr("granforce.study.kinds.packings.packing_version", lambda mu: 99)
+    after = called(PACKING.parameters(20, 0.1, 1)), name != "packing" and called(imported)
+    assert before[0] != after[0]
+    assert before[1] == after[1]
+
+
 def test_a_kind_is_called_by_its_name():
     assert all(kind.name == name for name, kind in KINDS.items())
 

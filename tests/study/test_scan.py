@@ -47,6 +47,19 @@ def test_a_failed_cell_leaves_the_others(tmp_path):
     assert "radii" in failed[0][1]
 
 
+def test_cells_wait_for_their_packing_and_are_left_out_where_it_fails(tmp_path):
+    good, hopeless = cell(0.3), cell(0.3, 2)
+    hopeless["packing"] = {**hopeless["packing"], "radii": [1.0] * 3}
+    walks = [Cell(kinds.WALK, walk) for walk in (hopeless, good)]
+    made = [Cell(kinds.PACKING, walk.parameters["packing"]) for walk in walks]
+    done = []
+    # Walks come first: each waits for its packing all the same, which is made once.
+    cells, told = [*walks, *made], lambda k, cached: done.append((k, cached))
+    (failed,) = scan.run(tmp_path / "s", cells, workers=2, on_done=told)
+    assert failed[0] == made[0]
+    assert done == [(3, False), (1, False)]
+
+
 def test_a_cell_that_others_removed_is_computed_anew(tmp_path, monkeypatch):
     wanted = scan.scan(tmp_path / "one", [cell()], workers=1)[0]
 
