@@ -17,8 +17,6 @@ from granforce.bench.packings import (
     compaction,
     compaction_frictions,
     compaction_growth,
-    compaction_limit,
-    compaction_time_steps,
 )
 from granforce.bench.report import environment, note, table
 from granforce.bench.skips import skips
@@ -34,8 +32,6 @@ __all__ = [
     "compaction",
     "compaction_frictions",
     "compaction_growth",
-    "compaction_limit",
-    "compaction_time_steps",
     "contact_updates",
     "environment",
     "frames",
@@ -72,14 +68,6 @@ PARTS: Parts = {
     "compaction": (compaction, "Compaction: run time and overlap by time step and sweeps"),
     "compaction_frictions": (compaction_frictions, "Compaction at each μ"),
     "compaction_growth": (compaction_growth, "Compaction against the number of disks"),
-    "compaction_limit": (
-        compaction_limit,
-        "Packings by how they are made: whether they have a limit",
-    ),
-    "compaction_time_steps": (
-        compaction_time_steps,
-        "Packings by time step and sweeps: whether they hang on either",
-    ),
     "skips": (skips, "What skipping is worth"),
     "intervals": (intervals, "Intervals seen by walks against exact ones"),
     "interval_methods": (interval_methods, "Exact intervals against other tools"),

@@ -38,10 +38,14 @@ def difference_interval(
 
     At least two values each.
     """
-    test = stats.ttest_ind(values, others, equal_var=False)
-    ends = test.confidence_interval(level)
     difference = float(values.mean() - others.mean())
-    return difference, float(ends.low), float(ends.high)
+    counts = np.array([len(values), len(others)])
+    squares = np.array([values.var(ddof=1), others.var(ddof=1)]) / counts
+    if not squares.any():
+        return difference, difference, difference
+    freedom = squares.sum() ** 2 / (squares**2 / (counts - 1)).sum()
+    reach = float(stats.t.ppf((1 + level) / 2, freedom) * np.sqrt(squares.sum()))
+    return difference, difference - reach, difference + reach
 
 
 def jackknife(

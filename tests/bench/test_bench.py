@@ -7,7 +7,7 @@ import pytest
 from packings import packed
 
 from granforce import bench
-from granforce.bench import packings, report, siconos, solvers, states
+from granforce.bench import report, siconos, solvers, states
 from granforce.forces.ensemble import ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
@@ -230,16 +230,3 @@ def test_uniform_states_against_size_reach_what_was_asked_for():
         *sizes, fit = [row for row in rows if row["rows"] == place]
         cost = [row["seconds_per_state"] for row in sizes]
         assert min(cost) > 0 and np.isclose(fit["exponent"], np.log(cost[1] / cost[0]) / np.log(4))
-
-
-def test_the_limit_of_packings_tells_means_with_errors_by_settings():
-    rows = bench.compaction_limit(True, n=20, frictions=(0.1,), seeds=2)
-    assert [row["settings"] for row in rows] == list(packings.SETTINGS)
-    steps = bench.compaction_time_steps(True, n=20, frictions=(0.1,), seeds=2)
-    assert [row["settings"] for row in steps] == ["Δt to 0.1, 600 sweeps", "Δt to 0.1, 150 sweeps"]
-    assert all(steps[0][key] == rows[0][key] for key in ("h", "exact_eta3", "eta2"))
-    for row in rows + steps:
-        assert row["failed"] == 0
-        for key in ("phi", "z", "h", "exact_eta3", "eta2", "unfinished", "cpu_seconds"):
-            mean, error = map(float, row[key].split(" ± "))
-            assert mean >= 0 and error >= 0

@@ -119,3 +119,12 @@ def test_ranks_are_spearmans(rng):
     x, y = rng.normal(size=(2, 12))
     y[3] = y[4]
     assert statistics.rank_correlation(x, y) == pytest.approx(stats.spearmanr(x, y).statistic)
+
+
+def test_the_interval_of_a_difference_is_welchs(rng):
+    one, other = rng.normal(2, 1, 12), rng.normal(1, 3, 30)
+    difference, low, high = statistics.difference_interval(one, other, 0.9)
+    ends = stats.ttest_ind(one, other, equal_var=False).confidence_interval(0.9)
+    np.testing.assert_allclose((low, high), ends, rtol=1e-12)
+    assert difference == pytest.approx(one.mean() - other.mean())
+    assert statistics.difference_interval(np.ones(3), np.zeros(3)) == (1, 1, 1)

@@ -22,18 +22,20 @@ from collections.abc import Sequence
 
 from granforce.paper.claims.figure1 import (
     agreement,
+    causes,
     coordination,
     maximum,
     measure,
+    reproducible,
     size,
     small_friction,
     vanishing,
 )
-from granforce.paper.claims.figure2 import perturbation, response
-from granforce.paper.claims.figure3 import centre, pairs
+from granforce.paper.claims.figure2 import law, perturbation, response
+from granforce.paper.claims.figure3 import centre, pairs, relative
 from granforce.paper.claims.figure4 import elongation, shape, tails, widths
-from granforce.paper.claims.figure5 import counts, enrichment, frozen, place
-from granforce.paper.claims.figure6 import correlation, error_bars
+from granforce.paper.claims.figure5 import counts, enrichment, frozen, patterns, place
+from granforce.paper.claims.figure6 import correlation, error_bars, origin
 from granforce.paper.claims.groups import SAMPLERS, outside
 from granforce.paper.claims.verdicts import FEW, MISSING, Claim
 from granforce.paper.tables import Table
@@ -49,6 +51,8 @@ FAMILIES = {
     small_friction: tuple(SAMPLERS),
     vanishing: tuple(SAMPLERS),
     measure: BY_STATES,
+    reproducible: ("gauss_seidel", "nearest"),
+    causes: ("exact",),
     coordination: (),
     shape: tuple(SAMPLERS),
     tails: tuple(SAMPLERS),
@@ -56,14 +60,18 @@ FAMILIES = {
     elongation: tuple(SAMPLERS),
     correlation: tuple(SAMPLERS),
     error_bars: BY_WALKS,
+    origin: tuple(SAMPLERS),
     counts: tuple(SAMPLERS),
     enrichment: tuple(SAMPLERS),
+    patterns: tuple(SAMPLERS),
+    relative: tuple(SAMPLERS),
     pairs: BY_STATES,
     centre: BY_STATES,
     place: ("exact",),
     frozen: ("exact",),
     size: ("gauss_seidel", "nearest", "exact"),
     perturbation: (),
+    law: (),
     response: tuple(SAMPLERS),
 }
 

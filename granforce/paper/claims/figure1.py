@@ -154,6 +154,80 @@ def measure(table: Table, sampler: str) -> Iterator[Claim]:
     )
 
 
+# Parts with the same walks again, and with longer ones.
+_AGAIN = {"gauss_seidel": "repeat_sweeps", "nearest": "repeat_walk"}
+
+
+def reproducible(table: Table, sampler: str) -> Iterator[Claim]:
+    """η of another walk, and of a longer one, in the same packing is the same."""
+    part, first = _AGAIN[sampler], drawn(table, sampler)
+    known = {(row["mu"], row["seed"]): row for row in first}
+    again: dict[Any, list[dict[str, Any]]] = {}
+    for row in table.part(*(p for p in table.parts() if p.startswith(f"{part}_"))):
+        key = row["mu"], row["seed"]
+        if key in known and row["part"] != f"{part}_long" and enough(row):
+            again.setdefault(key, [known[key]]).append(row)
+    scatter = [
+        {"mu": mu, "n": rows[0]["n"], "part": np.std(values, ddof=1) / np.mean(values)}
+        for (mu, _), rows in again.items()
+        for values in [[row["eta2"] for row in rows]]
+    ]
+    yield at_each(
+        "η is well reproducible: other walks in the same packing give the same",
+        "standard deviation of η2 over walks, relative to its mean",
+        items(scatter, "part"),
+        good=(-np.inf, 0.05),
+        fair=(-np.inf, 0.1),
+    )
+    longer = statistics.paired([r for r in table.part(f"{part}_long") if enough(r)], first)
+    for name, label in (("eta2", "η2"), ("eta3", "η3")):
+        ratios = [row | {"ratio": row[name] / other[name]} for row, other in longer]
+        yield at_each(
+            f"{label} does not hang on the length of the walk",
+            f"{label} of a walk that is several times as long over that of the usual one",
+            items(ratios, "ratio"),
+            good=(0.95, 1.05),
+            fair=(0.9, 1.1),
+        )
+
+
+def causes(table: Table, sampler: str) -> Iterator[Claim]:
+    """Cones that open make η rise, contacts that vanish make it fall: each by itself."""
+    opened = [row for row in table.part("opened_exact")]
+    widest = max((row["mu"] for row in opened), default=np.nan)
+    ends = [row for row in [*opened, *table.part("exact")] if row["mu"] == widest]
+    wide = [row | {"made": row.get("packing_mu", row["mu"])} for row in table.part("widest_exact")]
+    wide += [row | {"made": row.get("packing_mu", row["mu"])} for row in ends] if wide else []
+    for told, what, rows, by, good, fair in (
+        (
+            "η rises as cones open around the same contacts",
+            "μ of the cones, packings made without friction",
+            opened,
+            "mu",
+            (0.95, 1),
+            (0.8, 1),
+        ),
+        (
+            "η falls as contacts vanish within the same cones",
+            f"μ with which packings were made, cones of μ = {widest:g}",
+            wide,
+            "made",
+            (-1, -0.95),
+            (-1, -0.8),
+        ),
+    ):
+        yield over_all(
+            told,
+            f"rank correlation of mean exact η3 with {what}",
+            statistics.rank_correlation,
+            items(rows, "eta3", by=by),
+            good=good,
+            fair=fair,
+            source=PRL,
+            least=3,
+        )
+
+
 def coordination(table: Table, sampler: str) -> Iterator[Claim]:
     """z falls from 4 towards 3."""
     rows = table.part("exact") or table.part("walk") or drawn(table, "gauss_seidel")

@@ -1,6 +1,6 @@
 """Claims about the response to a local force, against η (Figure 2)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,9 +8,11 @@ import numpy as np
 from granforce.measures import statistics
 from granforce.paper.claims.figure1 import peaked
 from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
-from granforce.paper.claims.verdicts import Claim, over_all
+from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import Table
+from granforce.records import Floats
 
+FEWEST_SHELLS = 4  # fewer tell no law from another
 _ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))
 
 
@@ -47,6 +49,46 @@ def response(table: Table, sampler: str) -> Iterator[Claim]:
             fair=(1 / 1.5, 1.5),
             least=3,
         )
+
+
+def law(table: Table, sampler: str) -> Iterator[Claim]:
+    """The first motion falls with distance as a power law, and not exponentially."""
+    found: dict[float, list[tuple[int, Any]]] = {}
+    part = {row["part"] for row in table.responses()}
+    for k, decay in table.decays.items():
+        row = table.rows[k]
+        if row["part"] in part and len(decay) >= FEWEST_SHELLS:
+            found.setdefault(row["mu"], []).append((row["n"], decay))
+    yield at_each(
+        "the first motion |u|(r) decays as a power law, not exponentially",
+        "misfit of the best power law over that of the best exponential, rms of ln |u|",
+        {mu: found[mu] for mu in sorted(found)},
+        good=(-np.inf, 1),
+        interval=_misfits,
+    )
+
+
+def _misfits(decays: Sequence[Floats], level: float) -> tuple[float, float, float]:
+    """`misfit_ratio` with its jackknife interval, that of its logarithm."""
+    log = statistics.jackknife(lambda some: np.log(misfit_ratio(some)), decays, level)
+    return tuple(np.exp(log).tolist())
+
+
+def misfit_ratio(decays: Sequence[Floats]) -> float:
+    """How far mean ln |u| lies from the best power law in r, over how far from an exponential.
+
+    decays: (shells, 2) of each packing, r in mean diameters and |u|; over shells that all have.
+    """
+    known = [dict(np.round(decay, 9)) for decay in decays]
+    r = np.array(sorted(set.intersection(*(set(decay) for decay in known))))
+    if len(r) < FEWEST_SHELLS:
+        return np.nan
+    u = np.mean([[np.log(decay[x]) for x in r] for decay in known], axis=0)
+
+    def off(x: Floats) -> float:
+        return float(np.std(u - np.polyval(np.polyfit(x, u, 1), x)))
+
+    return off(np.log(r)) / off(r)
 
 
 def branches(means: Any) -> float:

@@ -4,8 +4,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from granforce.paper.claims.groups import LEAST_DYNAMIC, drawn, dynamic, items, positive_friction
-from granforce.paper.claims.verdicts import PRL, Claim, at_each
+from granforce.measures import statistics
+from granforce.paper.claims.groups import (
+    DETERMINED,
+    LEAST_DYNAMIC,
+    SAMPLERS,
+    drawn,
+    dynamic,
+    items,
+    may_be_judged,
+    positive_friction,
+    within,
+)
+from granforce.paper.claims.verdicts import PRL, Claim, at_each, turns
 from granforce.paper.tables import Table
 
 
@@ -17,6 +28,31 @@ def pairs(table: Table, sampler: str) -> Iterator[Claim]:
         items(dynamic(drawn(table, sampler)), "pair_spread"),
         good=(-np.inf, 0.2),
         fair=(-np.inf, 0.35),
+    )
+
+
+def relative(table: Table, sampler: str) -> Iterator[Claim]:
+    """Weak contacts can change most for what they carry, and most at intermediate μ."""
+    judged = may_be_judged(table, sampler)
+    ratios: dict[float, list[tuple[int, float]]] = {}
+    ranks: dict[float, list[tuple[int, float]]] = {}
+    for row, _, normal, _, extent in table.contacts(SAMPLERS[sampler]):
+        carries = normal > DETERMINED
+        if judged(row) and row["mu"] > 0 and carries.sum() > 2 and extent.mean() > DETERMINED:
+            ratio = extent[carries] / normal[carries]
+            ratios.setdefault(row["mu"], []).append((row["n"], float(np.median(ratio))))
+            rank = statistics.rank_correlation(normal[carries], ratio)
+            ranks.setdefault(row["mu"], []).append((row["n"], rank))
+    yield turns(
+        "ΔF_n/F_orig, the relative extent of a contact, is not monotonic in μ",
+        {mu: ratios[mu] for mu in sorted(ratios)},
+    )
+    yield at_each(
+        "weak contacts have the largest relative extents ΔF_n/F_orig",
+        f"rank correlation of ΔF_n/F_orig with F_orig over contacts, μ ≥ {LEAST_DYNAMIC:g}",
+        within({mu: ranks[mu] for mu in sorted(ranks)}, (LEAST_DYNAMIC, np.inf)),
+        good=(-np.inf, -0.3),
+        fair=(-np.inf, 0),
     )
 
 

@@ -17,6 +17,7 @@ from granforce.paper.claims.groups import (
 )
 from granforce.paper.claims.verdicts import PRL, Claim, at_each
 from granforce.paper.tables import Table
+from granforce.records import Mask
 
 
 def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:
@@ -47,13 +48,7 @@ def counts(table: Table, sampler: str) -> Iterator[Claim]:
 
 def enrichment(table: Table, sampler: str) -> Iterator[Claim]:
     """Strong contacts are less determined than others at intermediate μ."""
-    groups = _marked(
-        table,
-        sampler,
-        lambda strong, loose: (
-            loose[strong].mean() / loose.mean() if strong.any() and loose.any() else np.nan
-        ),
-    )
+    groups = _marked(table, sampler, _enriched)
     yield at_each(
         "strong contacts are less determined at intermediate μ",
         "part with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all, "
@@ -61,6 +56,23 @@ def enrichment(table: Table, sampler: str) -> Iterator[Claim]:
         within(groups, MIDDLE),
         good=(1, np.inf),
     )
+
+
+def patterns(table: Table, sampler: str) -> Iterator[Claim]:
+    """Strong and undetermined contacts form different patterns at large μ."""
+    groups = _marked(table, sampler, _enriched)
+    yield at_each(
+        "strong contacts and undetermined ones form unrelated patterns at μ = 10",
+        "part with ΔF_n > ⟨ΔF_n⟩ of the contacts with f_n > 2⟨f_n⟩ over that of all",
+        within(groups, (10, 10)),
+        good=(0.8, 1.25),
+        fair=(0.5, 2),
+    )
+
+
+def _enriched(strong: Mask, loose: Mask) -> float:
+    """Part of the strong contacts that are loose over that of all; NaN where there are none."""
+    return loose[strong].mean() / loose.mean() if strong.any() and loose.any() else np.nan
 
 
 def place(table: Table, sampler: str) -> Iterator[Claim]:

@@ -4,10 +4,25 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from granforce.paper.claims.groups import LARGE, MIDDLE, SMALL, Ends, drawn, items, told, within
+from granforce import measures
+from granforce.paper.claims.groups import (
+    DETERMINED,
+    LARGE,
+    MIDDLE,
+    SAMPLERS,
+    SMALL,
+    Ends,
+    drawn,
+    items,
+    may_be_judged,
+    told,
+    within,
+)
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import Table
 from granforce.records import Floats
+
+PERMUTATIONS = 40
 
 
 def correlation(table: Table, sampler: str) -> Iterator[Claim]:
@@ -46,6 +61,41 @@ def correlation(table: Table, sampler: str) -> Iterator[Claim]:
             dict(sorted((within(everywhere, MIDDLE) | within(everywhere, span)).items())),
             good=(-np.inf, 0),
         )
+
+
+def origin(table: Table, sampler: str) -> Iterator[Claim]:
+    """The correlation comes from intervals alone: it is the same wherever f_n lies in them."""
+    judged = may_be_judged(table, sampler)
+    found: dict[float, list[tuple[int, float]]] = {}
+    for row, _, normal, least, extent in table.contacts(SAMPLERS[sampler]):
+        if judged(row) and len(extent) > 1 and extent.mean() > DETERMINED:
+            apart = beyond_place(normal, least, extent)
+            if np.isfinite(apart):
+                found.setdefault(row["mu"], []).append((row["n"], apart))
+    yield at_each(
+        "corr(f_n, ΔF_n) at intermediate μ is of statistical origin",
+        "what is left of it when contacts exchange the places of f_n within their intervals: the "
+        "correlation less that of places drawn anew",
+        within({mu: found[mu] for mu in sorted(found)}, MIDDLE),
+        good=(-0.1, 0.1),
+        fair=(-0.2, 0.2),
+    )
+
+
+def beyond_place(normal: Floats, least: Floats, extent: Floats) -> float:
+    """corr(f_n, ΔF_n) less its mean over permutations of the places of f_n in their intervals.
+
+    normal, least, extent (N_c,): f_n, its least value, ΔF_n. A contact without an interval keeps
+    its force. The permutations are a function of nothing.
+    """
+    free = extent > DETERMINED
+    place = (normal[free] - least[free]) / extent[free]
+    rng = np.random.default_rng(0)
+    drawn, others = normal.astype(float), []
+    for _ in range(PERMUTATIONS):
+        drawn[free] = least[free] + rng.permutation(place) * extent[free]
+        others.append(measures.correlation(drawn, extent))
+    return measures.correlation(normal, extent) - float(np.mean(others))
 
 
 def _mean_difference(keys: Floats, means: Floats, span: Ends) -> float:
