@@ -1,6 +1,7 @@
 """`infer --frames` and `import … --frames`: many frames, over processes, in one dataset."""
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from typing import Any, TypeVar
@@ -82,6 +83,9 @@ def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
     for number, message in failed:
         print(f"granforce: {snapshots.word} {number}: {message}", file=sys.stderr)
     if dataset is not None:
+        last, notes = list(json.loads(dataset.attrs["notes"]).items())[-1]
+        for note in notes:
+            print(f"granforce: {snapshots.word} {last}: {note}", file=sys.stderr)
         columns = {name: dataset[name].values for name in ("frame", *SCALARS)}
         lists = {name: values.tolist() for name, values in columns.items()}
         rows = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]

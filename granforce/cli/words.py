@@ -416,7 +416,11 @@ def add_import(commands: Commands) -> None:
     formats = command.add_subparsers(dest="format", metavar="FORMAT", required=True)
     lammps = import_format(
         *(formats, "lammps", "read a particle dump and a contact dump of LAMMPS"),
-        *("particles.dump contacts.dump", "dump custom of the particles", "dump local of contacts"),
+        "particles.dump contacts.dump",
+        "dump custom of the particles: id, x y (or xu yu, xs ys, xsu ysu), radius or diameter; "
+        "dumps may be compressed (.gz, .zst)",
+        "dump local of the contacts: two ids, distance, normal force x y, tangential force x y, in "
+        "this order or named atom1 atom2 distance fx fy px py",
     )
     add_frame(lammps, "timestep")
     add_columns(lammps)
@@ -424,7 +428,9 @@ def add_import(commands: Commands) -> None:
     add_series(lammps)
     yade = import_format(
         *(formats, "yade", "read the bodies and interactions of YADE"),
-        *("bodies.txt interactions.txt", "bodies, by export.textExt", "interactions"),
+        "bodies.txt interactions.txt",
+        "bodies by export.textExt: x y z r, and id (format x_y_z_r_attrs) if there are walls",
+        "a line for each interaction: id1 id2, phys.normalForce x y z, phys.shearForce x y z",
     )
     add_cell(yade)
     add_columns(yade)

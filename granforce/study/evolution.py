@@ -1,5 +1,6 @@
 """The snapshots of a simulation: exact intervals, and walks, of each, in one dataset over time."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -51,8 +52,9 @@ def evolution(
     numbers: of the snapshots, by default all. states: of a random walk from each, with this seed,
     for η1 and η2; 0: none. workers, scheduler, progress: as for `scan.run`. Returns a dataset
     (frame, contact, component) with f_n and f_t of each contact (forces, low, high; a contact is a
-    pair of names, NaN where a snapshot does not have it) and SCALARS by frame, None where no
-    snapshot could be used; and (number, message) of those that could not.
+    pair of names, NaN where a snapshot does not have it) and SCALARS by frame, its attribute notes
+    what was noted of each; None where no snapshot could be used; and (number, message) of those
+    that could not.
 
     Raises InputError where the store cannot be written.
     """
@@ -108,7 +110,8 @@ def _combined(done: Sequence[tuple[int, Snapshot, list[xr.Dataset]]]) -> xr.Data
         numbers = [row[name] for row in rows]
         variables[name] = (("frame",), numbers, {"units": units, "long_name": meaning})
     coordinates = {"frame": [number for number, *_ in done], "component": ["f_n", "f_t"]}
-    return xr.Dataset(variables, coordinates | ends_of(pairs))
+    notes = {str(number): found.packing.info.get("notes", []) for number, found, _ in done}
+    return xr.Dataset(variables, coordinates | ends_of(pairs), {"notes": json.dumps(notes)})
 
 
 def _scalars(

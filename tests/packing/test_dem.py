@@ -132,7 +132,11 @@ def test_a_step_is_chosen():
     "read, files, words",
     [
         (read_yade, (b"1 2 3 1\n4 5 9 1", b"0 1 1 0 0 0 0 0"), "plane"),
-        (read_yade, (b"0 0 0 1\n2 0 0 1", b"0 5 1 0 0 0 0 0"), "id2 names grain '5'"),
+        (
+            read_yade,
+            (b"0 0 0 1\n2 0 0 1", b"0 5 1 0 0 0 0 0"),
+            "line 1: a body is not among the 2 bodies",
+        ),
         (read_yade, (b"0 0 0 1\n2 0 0 1", b"0 1 1 0 0"), "fields"),
         (read_mercury, (b"0 0 0 1\n", b"0 1 1"), "is it a .data"),
         (read_mercury, (b"9 0 0 0 1 1\n0 0 0 0 1 0 0 0\n", b"0 1 1"), "cut off"),

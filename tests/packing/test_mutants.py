@@ -1,5 +1,6 @@
 """Files with a few bytes changed: refused in one line, or taken for something whole."""
 
+import gzip
 import io
 import warnings
 from functools import partial
@@ -10,6 +11,15 @@ from frames import file, frame, solved
 from mutants import refusals
 from packing.test_dem import MU, N, mercury, yade
 from packing.test_importers import SMALL, cluster, tables
+from packing.test_simulations import (
+    BODIES,
+    INNER,
+    MERCURY,
+    OUTER,
+    contacts,
+    mercury_in_a_box,
+    particles,
+)
 from packing.test_solved import mat, mat73
 from packings import packed
 
@@ -112,6 +122,27 @@ def simulated(kind):
     }[kind]
 
 
+def many_snapshots(kind):
+    """Two snapshots of nine disks, as simulators write them, or four disks in a box of walls."""
+    scaled = particles(1, "xs ys", scale=1 / 3) + particles(2, "xs ys", scale=1 / 3)
+    twice = [(k, 1) for k in range(5)]
+    pairs = contacts(1, 1.0, twice, index=True) + contacts(2, 2.0, twice, index=True)
+    in_box = BODIES, "id1 id2 fnx fny fnz fsx fsy fsz\n" + "\n".join(OUTER + INNER)
+    texts, read = {
+        "dumps": ((scaled, pairs), partial(read_lammps, mu=0.3, reverse=True)),
+        "dumps, chosen": ((scaled, pairs), partial(read_lammps, mu=0.3, frame=1)),
+        "dumps, gzip": ((scaled, pairs), partial(read_lammps, mu=0.3)),
+        "mercury, many": (MERCURY, partial(read_mercury, mu=0.3, box=(3, 3))),
+        "mercury, walls": (mercury_in_a_box(1), partial(read_mercury, mu=0.5, walls=True)),
+        "yade, walls": (in_box, partial(read_yade, mu=0.5, walls=True)),
+        "yade, loads": (in_box, partial(read_yade, mu=0.5)),
+    }[kind]
+    contents = [text.encode() for text in texts]
+    if kind.endswith("gzip"):
+        contents = [gzip.compress(content, mtime=0) for content in contents]
+    return contents, read
+
+
 def photoelastic(kind):
     """A frame of an experiment."""
     read = partial(read_pegs, mu=0.3, reach=0.2)
@@ -141,6 +172,11 @@ KINDS = [
     (few_grains, "lammps", whole, 0.1, 200, 2500, 100),
     *((simulated, kind, whole, 0.1, 100, 1000, 10) for kind in ("yade", "mercury")),
     (simulated, "mercury, flat", whole, 0.1, 100, 1000, 10),
+    *((many_snapshots, kind, whole, 0.1, 100, 1000, 10) for kind in ("dumps", "mercury, many")),
+    *((many_snapshots, kind, whole, 0.1, 100, 1000, 10) for kind in ("yade, walls", "yade, loads")),
+    (many_snapshots, "mercury, walls", whole, 0.1, 100, 1000, 10),
+    (many_snapshots, "dumps, chosen", whole, 0.1, 100, 1000, 10),
+    (many_snapshots, "dumps, gzip", whole, 0.5, 100, 1000, 10),
     (photoelastic, "few", whole_frame, 0.05, 60, 3334, 100),
     *((photoelastic, kind, whole_frame, 0.1, 60, 1000, 10) for kind in ("text", "solved")),
     (photoelastic, "blanks, walls", whole_frame, 0.1, 60, 1000, 10),

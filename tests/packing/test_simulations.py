@@ -246,23 +246,27 @@ def test_walls_are_grains_where_asked(tmp_path):
         boxed(OUTER + INNER, walls=True, box=(9, 9))
 
 
-@pytest.mark.parametrize("turned", [1, -1])
-def test_walls_of_mercury(turned):
-    """The same box, n and t of the force on the wall or on the grain."""
+def mercury_in_a_box(turned):
+    """The same box; n and t of the force on the wall (turned = 1) or on the grain (−1)."""
     places = [(x, y) for y in (0, 1) for x in (0, 1)]
-    data = "4 0 0 0 0 2 2 1\n" + "".join(f"{x + 0.5} {y + 0.5} 0 0 0 0 0.5 0\n" for x, y in places)
+    data = ["4 0 0 0 0 2 2 1", *(f"{x + 0.5} {y + 0.5} 0 0 0 0 0.5 0" for x, y in places)]
     rows = []
     for k, (x, y) in enumerate(places):
         for wall, (u, v) in ((-1 - x, (2 * x - 1, 0)), (-3 - y, (0, 2 * y - 1))):
             point = f"{x + 0.5 + 0.5 * u} {y + 0.5 + 0.5 * v} 0"
-            n = f"{turned * u} {turned * v} 0"
-            rows.append(f"0 {k} {wall} {point} 0 0 1 0 {n} 0 0 0")
+            rows.append(f"0 {k} {wall} {point} 0 0 1 0 {turned * u} {turned * v} 0 0 0 0")
     for i, j in ((0, 1), (2, 3), (0, 2), (1, 3)):
         u, v = np.subtract(places[j], places[i])
         rows.append(f"0 {i} {j} 0 0 0 0 0 1 0 {-u} {-v} 0 0 0 0")
-    found = read_mercury(*given(data, "\n".join(rows)), 0.5, walls=True)
+    return "\n".join(data), "\n".join(rows)
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_walls_of_mercury(turned):
+    found = read_mercury(*given(*mercury_in_a_box(turned)), 0.5, walls=True)
     assert np.allclose(found.forces, [[1, 0]] * 12) and ensemble(found).dimension == 6
     assert np.allclose(found.load[4:], boxed(OUTER + INNER, walls=True).load[4:])
+    assert found.info["walls"] == 4
 
 
 def test_interactions_have_columns_of_any_name_and_order():
@@ -294,6 +298,14 @@ def test_the_other_sign_of_tangential_forces_is_noted_and_taken():
     assert "notes" not in right.info and right.info["residual"] < 1e-8 < wrong.info["residual"]
     with pytest.raises(InputError, match="leave it out"):
         read_table(*given(files[0]), mu=MU, box=packing.box, reverse=True)
+
+
+def test_rounding_is_no_reason_to_reverse():
+    """A row of three disks between loads: f_n balances but for 1e-14, and f_t is smaller."""
+    grains = "x,y,r\n" + "\n".join(f"{x},{y},0.5" for x, y in PLACES)
+    rows = [f"{i},{j},{1 + 1e-15 * i},{1e-15 * i}" for i, j, *_ in PAIRS]
+    found = read_table(*given(grains, "\n".join(["i,j,fn,ft", *rows])), mu=MU, box=(3, 3))
+    assert "notes" not in found.info
 
 
 def test_notes_go_to_stderr(away, capsys):

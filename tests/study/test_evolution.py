@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from packing.test_simulations import MU, contacts, given, particles
+from packing.test_simulations import MU, contacts, given, mercury_in_a_box, particles
 
 from granforce.cli.parser import main
 from granforce.explore.intervals import intervals
@@ -88,6 +88,18 @@ def test_by_the_command_line(away, capsys):
     for frames, said in (("7", "no frame 7: there are 100"), ("x", "all, or numbers")):
         assert main([*words, "--frames", frames]) == 2
         assert said in capsys.readouterr().err
+
+
+def test_notes_are_kept_and_told(away, capsys):
+    for name, text in zip(("m.data", "m.fstat"), mercury_in_a_box(1), strict=True):
+        (away / name).write_text(text)
+    words = "import mercury m.data m.fstat --mu 0.5 --walls --frames 0 --out s.zarr --workers 1"
+    assert main(words.split()) == 0
+    err = capsys.readouterr().err
+    assert "time step 0: 8 contacts with walls (-1, -2, -3, -4) are contacts" in err
+    with xr.open_zarr("s.zarr", consolidated=False) as dataset:
+        assert "8 contacts with walls" in json.loads(dataset.attrs["notes"])["0"][0]
+        assert dataset["dimension"].values.tolist() == [6] and dataset["id2"].values.min() == -4
 
 
 def test_numbers_that_are_not_there_are_refused():

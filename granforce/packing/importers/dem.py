@@ -105,6 +105,12 @@ def read_yade(
     named = "id" in grains.header
     ids = grains.index("id") if named else {row: row for row in range(len(grains.rows))}
     one, two = (links.among(end, ids) for end in ("id1", "id2"))
+    if not named and not np.all(one & two):
+        k = int(np.flatnonzero(~(one & two))[0])
+        raise InputError(
+            f"{links.place(k)}: a body is not among the {len(grains.rows)} bodies, whose ids count "
+            "lines from 0; if walls are bodies, too, export the ids (format x_y_z_r_attrs)"
+        )
     at_wall = np.flatnonzero((one != two) & named)
     on_walls = None
     if len(at_wall):

@@ -33,8 +33,8 @@ EXTENT = 1e7
 # of each other (or sizes differ too much), and the list of pairs would not fit into memory.
 CLOSE_PAIRS = 20_000_000
 
-# Contacts a grain needs at least to be judged by its balance.
-_ENOUGH = 3
+# Contacts a grain needs at least to be judged by its balance, and what is rounding of it, in Σ |f|.
+_ENOUGH, _ROUNDING = 3, 1e-12
 
 # No direction is periodic.
 OPEN = Cell(np.full(2, np.inf), 0.0)
@@ -195,7 +195,8 @@ def gain_by_reversing(
     """By what part the unbalance of inner grains falls if all f_t change sign; below 0: it grows.
 
     Programs differ in the sign of f_t. contacts: i, j (k,) and the normals (k, 2); forces (k, 2),
-    load (N, 2); inner (N,): grains that count, of which those with _ENOUGH contacts do.
+    load (N, 2); inner (N,): grains that count, of which those with _ENOUGH contacts do. Unbalance
+    that is rounding counts as none.
     """
     i, j, normal = contacts
     inner = inner & (np.bincount(np.concatenate([i, j]), minlength=len(load)) >= _ENOUGH)
@@ -206,4 +207,4 @@ def gain_by_reversing(
         np.add.at(total, j, force)
         np.add.at(total, i, -force)
         off.append(np.hypot(*total[inner].T).sum())
-    return float(1 - off[1] / off[0]) if off[0] > 0 else 0.0
+    return float(1 - off[1] / off[0]) if off[0] > _ROUNDING * np.abs(forces).sum() else 0.0
