@@ -12,10 +12,12 @@ direction, so that
 
     e_x ← e_x + (σ_xx − P0) Δt/M_λ,   e_y likewise,   g ← g + 2 σ_xy Δt/M_λ,
 
-and (e_x + e_y)/2 is the λ of a square box. Each function has two bodies, and the compiler takes one
+and (e_x + e_y)/2 is the λ of a square box. Each function has two bodies, of which one is taken
 by the type of the rate: a number λ (or lanes of it), or a tuple (e_x, e_y, g). So the square box
 pays nothing for the other.
 """
+
+import functools
 
 from numba import types
 from numba.extending import overload
@@ -23,27 +25,36 @@ from numba.extending import overload
 _OPTIONS = {"forceinline": True, "error_model": "numpy"}
 
 
+def by_type(choose):
+    """The function whose body `choose` gives, by the types of the arguments.
+
+    The compiler asks for it once for each types; where it is off (NUMBA_DISABLE_JIT), values stand
+    for their types, at every call.
+    """
+
+    @functools.wraps(choose)
+    def function(*arguments):
+        return choose(*arguments)(*arguments)
+
+    overload(function, jit_options=_OPTIONS)(choose)
+    return function
+
+
 def _several(rate):
-    return isinstance(rate, types.BaseTuple)
+    return isinstance(rate, types.BaseTuple | tuple)
 
 
+@by_type
 def rate_in(kept):
     """The rate that an array keeps: λ in (1,), or e_x, e_y, g in (1, 3)."""
-
-
-@overload(rate_in, jit_options=_OPTIONS)
-def _rate_in(kept):
     if kept.ndim == 2:
         return lambda kept: (kept[0, 0], kept[0, 1], kept[0, 2])
     return lambda kept: kept[0]
 
 
+@by_type
 def keep_rate(rate, kept):
     """Keep a rate in an array."""
-
-
-@overload(keep_rate, jit_options=_OPTIONS)
-def _keep_rate(rate, kept):
     if not _several(rate):
 
         def keep(rate, kept):
@@ -57,23 +68,17 @@ def _keep_rate(rate, kept):
     return keep
 
 
+@by_type
 def stretched(rate, n_x, n_y):
     """Relative rate n·D n at which a branch along n grows."""
-
-
-@overload(stretched, jit_options=_OPTIONS)
-def _stretched(rate, n_x, n_y):
     if _several(rate):
         return lambda rate, n_x, n_y: rate[0] * n_x * n_x + (rate[1] * n_y + rate[2] * n_x) * n_y
     return lambda rate, n_x, n_y: rate
 
 
+@by_type
 def sheared(rate, v_t, length, n_x, n_y):
     """Tangential velocity v_t of a contact with what the box adds, ℓ t·D n; λ adds nothing."""
-
-
-@overload(sheared, jit_options=_OPTIONS)
-def _sheared(rate, v_t, length, n_x, n_y):
     if _several(rate):
         return lambda rate, v_t, length, n_x, n_y: (
             v_t + length * ((rate[1] - rate[0]) * n_x - rate[2] * n_y) * n_y
@@ -81,12 +86,9 @@ def _sheared(rate, v_t, length, n_x, n_y):
     return lambda rate, v_t, length, n_x, n_y: v_t
 
 
+@by_type
 def pushed(rate, compliance, f_n, f_t, n_x, n_y):
     """The rate after a contact pushed; compliance: change of λ per unit f_n."""
-
-
-@overload(pushed, jit_options=_OPTIONS)
-def _pushed(rate, compliance, f_n, f_t, n_x, n_y):
     if not _several(rate):
         return lambda rate, compliance, f_n, f_t, n_x, n_y: rate + compliance * f_n
 
@@ -102,12 +104,9 @@ def _pushed(rate, compliance, f_n, f_t, n_x, n_y):
     return push
 
 
+@by_type
 def driven(rate, velocity, mass, pressure, volume, dt, box_mass):
     """The rate after one step under the pressure outside and the moving grains inside."""
-
-
-@overload(driven, jit_options=_OPTIONS)
-def _driven(rate, velocity, mass, pressure, volume, dt, box_mass):
     if not _several(rate):
 
         def drive(rate, velocity, mass, pressure, volume, dt, box_mass):
@@ -135,12 +134,9 @@ def _driven(rate, velocity, mass, pressure, volume, dt, box_mass):
     return drive
 
 
+@by_type
 def soften(rate, problem):
     """Add to the inverse stiffness of each contact how it moves the shape of the box itself."""
-
-
-@overload(soften, jit_options=_OPTIONS)
-def _soften(rate, problem):
     if not _several(rate):
         return lambda rate, problem: None
 
@@ -155,23 +151,17 @@ def _soften(rate, problem):
     return add
 
 
+@by_type
 def fastest(rate):
     """Largest relative rate at which a length may change, from above."""
-
-
-@overload(fastest, jit_options=_OPTIONS)
-def _fastest(rate):
     if _several(rate):
         return lambda rate: abs(rate[0]) + abs(rate[1]) + abs(rate[2])
     return lambda rate: abs(rate)
 
 
+@by_type
 def carried(rate, x, y, dt):
     """Where the box carries a point in one step."""
-
-
-@overload(carried, jit_options=_OPTIONS)
-def _carried(rate, x, y, dt):
     if _several(rate):
         return lambda rate, x, y, dt: (
             x * (1.0 + rate[0] * dt) + y * (rate[2] * dt),

@@ -13,13 +13,16 @@ a factorisation of 400 disks took 0.11 ms a matrix, with explicit lanes it takes
 are slower: eight factors fit into the cache and sixteen do not).
 """
 
+import ctypes.util
+import math
 import operator
+import os
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
-from numba import njit, types
+from numba import config, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
@@ -28,7 +31,13 @@ from granforce.records import Floats
 LANES = 8
 # Kernels that are called from Python, and those that are called by kernels only: without what the
 # former need to be called, a third of the time to compile is saved.
-compiled = njit(cache=True, nogil=True, error_model="numpy")
+# Where the compiler is off (NUMBA_DISABLE_JIT) they run as they are written, slowly, with the same
+# results; that numpy warns of what compiled code leaves at NaN or infinity is then switched off.
+compiled = (
+    np.errstate(all="ignore")
+    if config.DISABLE_JIT
+    else njit(cache=True, nogil=True, error_model="numpy")
+)
 within = njit(
     cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
@@ -129,6 +138,55 @@ def _place(context, builder, signature, args):
     return builder.bitcast(builder.gep(array.data, [first]), kind.as_pointer())
 
 
+def instruction(plain):
+    """An intrinsic; `plain`, which does the same to numpy's numbers, where the compiler is off."""
+    return (lambda typed: plain) if config.DISABLE_JIT else intrinsic
+
+
+def _plain_load(array, index, lanes):
+    if array.ndim == _SHARED:
+        return _plain_same(lanes, array.reshape(-1)[index])
+    found = array.reshape(-1, len(lanes))[index]
+    return found[0] if len(lanes) == 1 else found.copy()
+
+
+def _plain_store(array, index, lanes, value):
+    array.reshape(-1, len(lanes))[index] = value
+
+
+def _plain_same(lanes, value):
+    return np.float64(value) if len(lanes) == 1 else np.full(len(lanes), float(value))
+
+
+def _plain_pick(a, b, yes, no):
+    found = np.where(a > b, yes, no)
+    return found if found.ndim else found[()]
+
+
+def _plain_larger(a, b):
+    return _plain_pick(a, b, a, b)
+
+
+def _rounded_once():
+    """a b + c of doubles, rounded once: of Python (from 3.13 on), or of the C library."""
+    if hasattr(math, "fma"):
+        return math.fma
+    library = ctypes.CDLL(ctypes.util.find_library("m" if os.name == "posix" else "ucrtbase"))
+    library.fma.restype, library.fma.argtypes = ctypes.c_double, [ctypes.c_double] * 3
+    return library.fma
+
+
+def _plain_fma(a, b, c):
+    width = max(map(np.size, (a, b, c)))
+    if width == 1:
+        return np.float64(_FMA(a, b, c))
+    rows = np.broadcast_arrays(a, b, c)
+    return np.array([_FMA(*row) for row in zip(*rows, strict=True)])
+
+
+_FMA = _rounded_once() if config.DISABLE_JIT else None
+
+
 # Axes of arrays whose numbers are the same in all lanes.
 _SHARED = 4
 
@@ -138,7 +196,7 @@ def shared(values: Floats) -> Floats:
     return values.reshape(-1, *(1,) * (_SHARED - 1))
 
 
-@intrinsic
+@instruction(_plain_load)
 def load(typing, array, index, lanes):
     """Number `index` of a contiguous array, of one that is `shared` the same in all lanes."""
 
@@ -151,7 +209,7 @@ def load(typing, array, index, lanes):
     return _number(lanes)(array, types.int64, lanes), emit
 
 
-@intrinsic
+@instruction(_plain_store)
 def store(typing, array, index, lanes, value):
     """Set number `index` of a contiguous array."""
     _, (given,) = _kinds(value)
@@ -164,7 +222,7 @@ def store(typing, array, index, lanes, value):
     return types.void(array, types.int64, lanes, given), emit
 
 
-@intrinsic
+@instruction(_plain_same)
 def same(typing, lanes, value):
     """One double in all lanes."""
     kind = _number(lanes)
@@ -194,7 +252,7 @@ def _named(builder, name, args):
     return builder.call(function, args)
 
 
-@intrinsic
+@instruction(_plain_fma)
 def fma(typing, a, b, c):
     """a b + c, rounded once."""
     kind, given = _kinds(a, b, c)
@@ -205,7 +263,7 @@ def fma(typing, a, b, c):
     return kind(*given), emit
 
 
-@intrinsic
+@instruction(np.sqrt)
 def root(typing, a):
     """√a."""
 
@@ -215,7 +273,7 @@ def root(typing, a):
     return a(a), emit
 
 
-@intrinsic
+@instruction(abs)
 def size(typing, a):
     """|a|."""
 
@@ -225,7 +283,7 @@ def size(typing, a):
     return a(a), emit
 
 
-@intrinsic
+@instruction(lambda a: bool(np.all(a == 0.0)))
 def vanishes(typing, a):
     """Whether a is 0 in every lane."""
 
@@ -240,7 +298,7 @@ def vanishes(typing, a):
     return types.boolean(a), emit
 
 
-@intrinsic
+@instruction(_plain_pick)
 def pick(typing, a, b, yes, no):
     """`yes` in the lanes where a > b, `no` in the others."""
     kind, given = _kinds(a, b, yes, no)
@@ -252,7 +310,7 @@ def pick(typing, a, b, yes, no):
     return kind(*given), emit
 
 
-@intrinsic
+@instruction(_plain_larger)
 def larger(typing, a, b):
     """The larger of both, b where a is not a number."""
     kind, given = _kinds(a, b)
