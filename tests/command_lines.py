@@ -181,6 +181,17 @@ COMMANDS = {
     "bench": ([], {"--out": ["file", "file/x", "loop", "x" * 300, "a\0b", "/proc/none"]}),
     "cache": (["list"], {"--cache": CACHES}),
 }
+SIMULATIONS = {
+    "lammps": ["lammps", "p.dump", "c.dump", "--mu", "0.3"],
+    "yade": ["yade", "b.txt", "i.txt", "--mu", "0.3"],
+    "mercury": ["mercury", "m.data", "m.fstat", "--mu", "0.3"],
+}
+EXPORTS = [
+    *([name, "g.vtp", "c.vtp"] for name in FILES),
+    *(["p.npz", out, "c.dump"] for out in OUTPUTS),
+    *(["p.npz", *words] for words in (["g.vtp"], ["g.vtp", "c.dump"], ["g", "c"], ["g.vtp"] * 2)),
+    ["p.npz", "p.npz", "c.npz"],
+]
 IMPORTS = [
     *(["table", name, "--mu", "0.3"] for name in FILES),
     *(["lammps", name, name, "--mu", "0.3"] for name in FILES),
@@ -203,6 +214,40 @@ IMPORTS = [
     *(["table", "grains.csv", "--mu", "0.3", "--box", side, "9"] for side in POSITIVE),
     *(["table", "grains.csv", "--mu", "0.3", "--pressure", p] for p in POSITIVE),
     *(["table", "grains.csv", "--mu", "0.3", "--out", out] for out in OUTPUTS),
+    *(
+        [*SIMULATIONS[name], f"{option}={word}"]
+        for name in SIMULATIONS
+        for option, words in {
+            "--out": OUTPUTS,
+            "--columns": ["", "x", "x=", "=x", "speed=x", "x=absent"],
+            "--tilt": ["nan", "inf", "", "wide", "1"],
+            "--frame": ["7", "-7", "1.5", "nan", "", "last", LONG],
+            "--frames": ["", ",", "7", "1,7", "nan", "inf", "1e999", "some"],
+            "--states": ["3"],
+            "--csv": ["s.csv"],
+        }.items()
+        for word in words
+    ),
+    *(
+        [*SIMULATIONS["lammps"], "--frames", "all", "--states", "2", f"{option}={word}"]
+        for option, words in {
+            "--frame": ["1"],
+            "--states": [*WHOLE[1:], *MEMORY],
+            "--walk-seed": SEEDS,
+            "--workers": WHOLE,
+            "--csv": OUTPUTS,
+            "--out": ["none/x", "folder", "file/x", "file", "loop", "a\0b"],
+            "--cache": CACHES,
+        }.items()
+        for word in words
+    ),
+    *(
+        [*SIMULATIONS["lammps"], "--frames", "all", "--states", "9", f"--scheduler={word}"]
+        for word in SCHEDULERS
+    ),
+    *(["lammps", name, "c.dump", "--mu", "0.3", "--frames", "all"] for name in FILES),
+    *(["yade", name, "i.txt", "--mu", "0.3"] for name in FILES),
+    *(["mercury", "m.data", name, "--mu", "0.3"] for name in FILES),
     *(["lammps", "one.dump", "--mu", "0.3"], ["ovito", "a", "--mu", "1"], ["table"], []),
     ["table", "grains.csv", "--mu", "0.3", "--forces"],
 ]
@@ -211,6 +256,7 @@ IMPORTS = [
 def lines():
     """All bad command lines, lists of words: one wrong word in each."""
     found = [["import", *words] for words in IMPORTS]
+    found += [["export", *words] for words in EXPORTS]
     cell = ["scan", "-n", "8", "--mu", "0.3", "--states", "4"]
     found += [[*cell, f"--scheduler={word}"] for word in SCHEDULERS]
     for command, (right, options) in COMMANDS.items():
@@ -238,6 +284,16 @@ def prepare(folder, packing):
     (folder / "newer" / "zarr.json").write_text(json.dumps(root))
     os.symlink("loop", folder / "loop")
     (folder / "cut.npz").write_bytes(packing.read_bytes()[:2000])
+    (folder / "p.npz").write_bytes(packing.read_bytes())
+    (folder / "b.txt").write_text("0 0 0 1\n2 0 0 1\n")
+    (folder / "i.txt").write_text("0 1 1 0 0 0 0 0\n")
+    (folder / "m.data").write_text("2 1 0 0 2 2\n0 0 0 0 1 0 0 0\n2 0 0 0 1 0 0 0\n")
+    (folder / "m.fstat").write_text("1 0 1 0 0 0 0 0 1 0 -1 0 0 0 0 0\n")
+    head = "ITEM: TIMESTEP\n1\nITEM: NUMBER OF {}\n{}\nITEM: BOX BOUNDS ff ff pp\n0 9\n0 9\n-1 1\n"
+    atoms = "ITEM: ATOMS id x y radius\n1 1 1 1\n2 3 1 1\n"
+    (folder / "p.dump").write_text(head.format("ATOMS", 2) + atoms)
+    pairs = "ITEM: ENTRIES atom1 atom2 distance fx fy px py\n1 2 2 -1 0 0 0\n"
+    (folder / "c.dump").write_text(head.format("ENTRIES", 1) + pairs)
     (folder / "grains.csv").write_text("x,y,r\n0,0,1\n2,0,1\n")
     (folder / "nothing.csv").write_text("contact,comment\n1,strong\n")
     (folder / "letters.csv").write_text("contact,f_n\n1,strong\n")

@@ -420,6 +420,8 @@ def ends_of(pairs: Sequence[Pair]) -> dict[str, Any]:
 def check_folder(path: str | Path) -> Path:
     """The path, if a Zarr folder can be put there; InputError otherwise."""
     path = expanded(path)
+    if path.is_symlink() and not path.exists():
+        raise InputError(f"{path}: is a link to nothing; choose another")
     if path.exists() and not (path / "zarr.json").is_file():
         raise InputError(f"{path}: is there already and no Zarr folder; choose another")
     if is_store(path):

@@ -61,7 +61,8 @@ def faults(folder, words):
     found = []
     if code != 2:
         found.append(f"exit code {code}")
-    if out:
+    # What only turns out not to be writable is printed all the same.
+    if out and not any("/proc/none" in word for word in words):
         found.append("something on stdout")
     if len(said) != 1 or not said[0].startswith("granforce: ") or len(said[0]) > LONGEST + 20:
         found.append(f"told {said}")

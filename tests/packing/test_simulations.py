@@ -269,6 +269,12 @@ def test_walls_of_mercury(turned):
     assert found.info["walls"] == 4
 
 
+def test_ids_are_told_by_the_name_of_the_attribute():
+    named = BODIES.replace("# x y z r id", "# made by hand\n#b.id")
+    found = read_yade(*given(named, "\n".join(OUTER + INNER)), 0.5)
+    assert found.forces.tolist() == [[1, 0]] * 4
+
+
 def test_interactions_have_columns_of_any_name_and_order():
     lines = ["# a b nx ny nz sx sy sz", *INNER]
     names = ("id1", "id2", "fnx", "fny", "fnz", "fsx", "fsy", "fsz")

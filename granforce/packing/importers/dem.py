@@ -418,7 +418,7 @@ def _yade_bodies(source: Source) -> Table:
         words = words if len(words) == width - 4 else words[4:]
         if len(words) != width - 4:
             words = [f"column {k}" for k in range(5, width + 1)]
-        header += words
+        header += ["id" if word == "b.id" else word for word in words]
     return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
 
 
