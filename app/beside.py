@@ -59,11 +59,14 @@ class Beside(param.Parameterized):
     def _find(self, wanted: Selection) -> None:
         state, library = self.state, self.state.library
         cell = cell_of(state.catalogue, wanted)
-        if cell is None:
+        if cell is None and LIMITS.shared and wanted.dear:
+            state.looks.beside = None
+            state.work.message = (
+                f"the packing at μ = {wanted.mu:g} takes long to compute: open it by itself first"
+            )
+        elif cell is None:
             self.task.start(compute.states(library, wanted), self._found)
-            return
-        shown = library.shown_in_memory(cell)
-        if shown is None:
+        elif (shown := library.shown_in_memory(cell)) is None:
             self.task.start(lambda job: library.shown(cell), self._found)
         else:
             self.task.cancel()

@@ -6,14 +6,14 @@ The kernels release the interpreter lock, so a thread keeps neither the page nor
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
-from queue import SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 
 import param
 
@@ -26,35 +26,100 @@ from .turns import Later, Turn, turn_of
 
 ESTIMATED = 2.0  # s of a stage from which on its end can be told
 LONGEST_LINE = 500  # characters of what a page tells about an error
+LONG = 3.0  # s after which a job is a long one
+_ASK = 0.2  # s between two looks at what nobody tells
 WAITING = "waiting for a free processor"  # stage of a job that has not begun
 
 _log = logging.getLogger(__name__)
 
 
-class Pool:
-    """Threads that run jobs in turn; they end with the server, whatever the jobs are doing."""
+class Visitor(NamedTuple):
+    """For whom a job works; the pages of one address have their share together."""
 
-    def __init__(self, workers: int, name: str) -> None:
-        self._jobs: SimpleQueue[Job] = SimpleQueue()
-        for k in range(workers):
+    address: str
+    page: str
+
+
+class Pool:
+    """Threads that run jobs; they end with the server, whatever the jobs are doing.
+
+    Of jobs that wait, those come first whose visitor has the fewest under way. While all threads
+    are held by long jobs, who has none under way does not wait for them: `extra` more threads are
+    for their jobs, which all together slow each other down instead.
+    """
+
+    def __init__(
+        self, workers: int, name: str, *, extra: int = 0, seconds: float | None = None
+    ) -> None:
+        """seconds: after which a job is ended, None: never."""
+        self.seconds = seconds
+        self._workers, self._extra = workers, extra
+        self._waiting: list[Job] = []
+        self._running: list[tuple[Job, float]] = []  # and since when
+        self._changed = threading.Condition()
+        for k in range(workers + extra):
             # Not concurrent.futures: its threads would keep a server that is to end waiting.
             threading.Thread(target=self._serve, name=f"{name}-{k}", daemon=True).start()
 
     def submit(self, job: Job) -> None:
         """Have job.run() called when a thread is free."""
-        self._jobs.put(job)
+        with self._changed:
+            if not job.ended:
+                self._waiting.append(job)
+                self._changed.notify_all()
 
     def _serve(self) -> None:
         while True:
+            with self._changed:
+                while (job := self._next()) is None:
+                    # What is long by then, or may be tried again, nobody tells.
+                    self._changed.wait(_ASK if self._waiting else None)
+                running = job, time.monotonic()
+                self._running.append(running)
             try:
-                self._jobs.get().run()
+                job.run()
                 settle()
             except BaseException:  # a thread that ends is missing to all visitors from then on
                 _log.exception("a job failed outside its work")
+            finally:
+                with self._changed:
+                    self._running.remove(running)
+                    self._changed.notify_all()
+                del job, running  # or the thread would keep it until the next
+
+    def _next(self) -> Job | None:
+        """The job to be run now, taken from those that wait; None: none of them yet."""
+        now = time.monotonic()
+        self._waiting = [job for job in self._waiting if not job.ended]
+        ready = [job for job in self._waiting if job.not_before <= now]
+        if not ready or len(self._running) >= self._workers + self._extra:
+            return None
+        job = min(ready, key=self._under_way)  # of several the one that came first
+        if len(self._running) >= self._workers:
+            of_address, of_page = self._under_way(job)
+            long = sum(now - since > LONG for _, since in self._running)
+            # One place is left to those of another address, however many pages one has.
+            if long < self._workers or of_page or of_address > self._workers:
+                return None
+        self._waiting.remove(job)
+        return job
+
+    def _under_way(self, job: Job) -> tuple[int, int]:
+        """How many jobs of its visitor's address, and of its page, are run just now."""
+        if job.visitor is None:
+            return 0, 0
+        others = [other.visitor for other, _ in self._running if other.visitor is not None]
+        of_address = sum(other.address == job.visitor.address for other in others)
+        return of_address, sum(other == job.visitor for other in others)
 
 
 # All users together: more would only slow each other down.
-computing = Pool(LIMITS.computations, "granforce-compute")
+computing = Pool(
+    LIMITS.computations,
+    "granforce-compute",
+    extra=LIMITS.computations if LIMITS.shared else 0,
+    seconds=LIMITS.seconds,
+)
 # What only reads stores must not wait for a computation to end.
 reading = Pool(2, "granforce-read")
 
@@ -85,9 +150,16 @@ class Job:
         work: Callable[[Job], Any],
         pool: Pool = computing,
         on_end: Callable[[], object] | None = None,
+        visitor: Visitor | None = None,
     ) -> None:
-        """on_end(): called from another thread when the job has ended."""
+        """on_end(): called from another thread when the job has ended.
+
+        visitor: for whom it works; None: for itself.
+        """
         self.stage = WAITING
+        self.visitor = visitor
+        self.not_before = 0.0  # when it may be run (again), as time.monotonic
+        self._until = math.inf  # when it is ended
         self.fraction: float | None = None  # done, 0 … 1; None where unknown
         self.seconds_left: float | None = None  # of this stage
         self.error = ""
@@ -146,6 +218,10 @@ class Job:
         """Whether it was asked to end, and no other job needs what it is making just now."""
         return self.cancelled() and not any(turn.wanted(self) for turn in list(self.turns))
 
+    def _ends(self) -> bool:
+        """Whether its work is to end: nobody wants it, or it takes too long."""
+        return self.unwanted() or time.monotonic() > self._until
+
     @property
     def ended(self) -> bool:
         """Whether it has ended, one way or another."""
@@ -164,16 +240,23 @@ class Job:
         try:
             work = self._work
             if work is not None and not self.cancelled():
-                with cancelling.watched(self.unwanted):
+                self._until = time.monotonic() + (self._pool.seconds or math.inf)
+                with cancelling.watched(self._ends):
                     self.result = work(self)
         except Later:
+            self.not_before = time.monotonic() + _ASK  # meanwhile others have the thread
             self._taken.release()
             self._pool.submit(self)
             if self.cancelled():  # meanwhile: it need not come to its turn
                 self.cancel()
             return
         except Cancelled:
-            pass
+            if not self.cancelled():
+                self.error = (
+                    f"this took longer than the {self._pool.seconds:g} s that a computation may "
+                    "take on this server: ask for less, or compute it on a machine of your own "
+                    "(Copy CLI command)"
+                )
         except BaseException as error:  # told on the page, or nobody would see it
             self.error = told(error)
         self._end()
@@ -224,11 +307,12 @@ class Task(param.Parameterized):
         self,
         pool: Pool = computing,
         wake: Callable[[Callable[[], object]], object] | None = None,
+        visitor: Visitor | None = None,
         **params: Any,
     ) -> None:
         """wake(function): call a function soon on the page's thread; without it, poll yourself."""
         super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
-        self._pool, self._wake = pool, wake
+        self._pool, self._wake, self._visitor = pool, wake, visitor
         self.job: Job | None = None  # the one that is under way
         self._done: Callable[[Any], object] | None = None
         self._closed = False
@@ -244,7 +328,7 @@ class Task(param.Parameterized):
         if self._closed:
             return
         on_end = None if self._wake is None else partial(self._wake, self.poll)
-        self.job, self._done = Job(work, self._pool, on_end), done
+        self.job, self._done = Job(work, self._pool, on_end, self._visitor), done
         self.param.update(
             running=True, stage=self.job.stage, fraction=None, seconds_left=None, keeps=False,
             message="",

@@ -11,16 +11,26 @@ LIMITS_VARIABLE = "GRANFORCE_LIMITS"
 
 MOST = 10**9  # of any limit,
 MOST_COMPUTATIONS = 64  # and of threads
+LONGEST = 600  # s that a computation may take on a shared server, if nothing else is said
 MOST_SEED = 2**53 - 1  # whole numbers that browsers know, too
 
 
 class Limits(NamedTuple):
-    """Largest sizes that are computed or taken; the defaults suit a machine of one's own."""
+    """Largest sizes that are computed or taken; the defaults suit a machine of one's own.
+
+    On one for others, `shared`, what only makes a computation longer has narrower bounds.
+    """
 
     n: int = 20_000  # disks of a packing
     states: int = 20_000  # states of a walk or sample
     upload: int = 64  # size of an uploaded file, MB
     computations: int = 2  # at the same time, all visitors together
+    seconds: int | None = None  # that one may take; None on a machine of one's own
+
+    @property
+    def shared(self) -> bool:
+        """Whether the server is for others than its owner."""
+        return self.seconds is not None
 
     def check(self, **asked: Any) -> None:
         """InputError if a number lies outside its limits, or radii differ by more than SIZE_RATIO.
@@ -33,7 +43,7 @@ class Limits(NamedTuple):
                 continue
             if name in ("box", "version"):
                 continue  # a name that was checked when it was given; of the algorithm
-            words, least, most = NAMES[name]
+            words, least, most = (SHARED_NAMES if self.shared else NAMES)[name]
             most = getattr(self, name) if most is None else most
             if not least <= value <= most:  # nor if it is NaN
                 raise InputError(
@@ -56,6 +66,14 @@ NAMES: dict[str, tuple[str, float, float | None]] = {
     "box_mass": ("the box mass", 10, 10_000),
     "sweeps": ("the number of sweeps", 1, 10_000),
     "accuracy": ("the accuracy of a step", 1e-6, 1),
+}
+# Each of these bounds makes a packing take up to some ten times as long as usual; the others' do a
+# thousand times and more.
+SHARED_NAMES = NAMES | {
+    "dt": ("the time step dt", 0.02, 1),
+    "box_mass": ("the box mass", 10, 300),
+    "sweeps": ("the number of sweeps", 1, 1000),
+    "accuracy": ("the accuracy of a step", 1e-3, 1),
 }
 
 
@@ -88,12 +106,15 @@ def _short(value: Any) -> str:
 
 
 def read_limits(text: str | None = None) -> Limits:
-    """Limits from "n=1000,states=2000,upload=10,computations=2", each optional.
+    """Limits from "n=1000,states=2000,upload=10,computations=2,seconds=600", each optional.
 
-    text: by default what GRANFORCE_LIMITS holds. InputError for other names or values.
+    text: by default what GRANFORCE_LIMITS holds; without it, those of a machine of one's own.
+    InputError for other names or values.
     """
-    text = os.environ.get(LIMITS_VARIABLE, "") if text is None else text
-    given = {}
+    text = os.environ.get(LIMITS_VARIABLE) if text is None else text
+    if text is None:
+        return Limits()
+    given = {"seconds": LONGEST}
     for part in filter(None, text.replace(" ", "").split(",")):
         name, _, value = part.partition("=")
         most = MOST_COMPUTATIONS if name == "computations" else MOST
@@ -109,4 +130,3 @@ def read_limits(text: str | None = None) -> Limits:
 
 
 LIMITS = read_limits()
-SHARED = LIMITS_VARIABLE in os.environ  # whether the server is for others than its owner

@@ -14,7 +14,7 @@ from tornado.ioloop import IOLoop
 
 from . import garbage, scenes
 from .data import Library
-from .jobs import Task, computing
+from .jobs import Task, Visitor, computing
 from .state import AppState
 from .views import explanation, export, figure, intervals, perturb, plane, statistics, upload
 from .views.address import Address
@@ -127,7 +127,7 @@ def page() -> Any:
 
 def _small(document: Document, asked: scenes.Asked) -> Any:
     """The page of a small scene, which asks no store."""
-    task = Task(computing, _turns(document))
+    task = Task(computing, _turns(document), _visitor(document))
     plain = asked == scenes.asked("")
     steps = len(FIRST_STEPS + STEPS)
     view = Small(asked, task, steps, step=asked.step, first=plain, dark=asked.dark)
@@ -146,7 +146,8 @@ def _small(document: Document, asked: scenes.Asked) -> Any:
 
 def _large(document: Document, query: str) -> Any:
     """The page of a large packing."""
-    state = AppState(pn.state.as_cached("library", _open_library), _turns(document), query)
+    library = pn.state.as_cached("library", _open_library)
+    state = AppState(library, _turns(document), query, _visitor(document))
     looks, work = state.looks, state.work
     work.message = work.message or " ".join(state.library.notes)
     wide = {"sizing_mode": "stretch_width"}
@@ -253,6 +254,15 @@ def _turns(document: Document) -> Callable[[Callable[[], object]], None]:
 
     pn.state.onload(arrived)
     return wake
+
+
+def _visitor(document: Document) -> Visitor | None:
+    """Who opened a page: from where, and which page it is."""
+    context: Any = document.session_context
+    if context is None:
+        return None
+    # Behind a proxy it is the proxy's, unless panel serve is told --use-xheaders.
+    return Visitor(getattr(context.request, "remote_ip", None) or "", context.id)
 
 
 def _in_transit(document: Document) -> bool:

@@ -25,6 +25,11 @@ OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "box")
 WORDS = {"accuracy": "step-accuracy"}  # those that are called otherwise on the command line
 # Stored states take at most about this much; measures are those of all states anyway.
 KEPT_BYTES = 64e6
+# Disks times (disks, for the packing, and states), up to which states are soon there, and what a
+# state costs beside one of the first kind.
+EASY = 500_000
+_WEIGHTS = {"accelerated": 1, "uniform": 2, "nearest": 3, "gauss_seidel": 10}
+_WEIGHTS["gauss_seidel_only"] = 10
 LONGEST_REASON = 200  # characters of a message about a link, which may hold anything
 
 
@@ -79,6 +84,14 @@ class Selection(NamedTuple):
         if not self.imported:
             # The version of the algorithm names a packing, too, but nobody asks for it.
             limits.check(**{name: self.packing[name] for name in self.packing if name != "version"})
+
+    @property
+    def dear(self) -> bool:
+        """Whether it takes more than some ten seconds, or how long is hard to tell."""
+        n = self.packing.get("n", 400)
+        weight = _WEIGHTS[self.relax if self.kind == "walk" else self.kind]
+        odd = set() if self.imported else set(unusual(self.packing)) - {"radii", "box"}
+        return bool(odd) or n * (n + weight * self.states) > EASY
 
     def names(self, other: Selection) -> bool:
         """Whether other is the same but for details that this kind of states does not have."""

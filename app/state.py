@@ -14,7 +14,7 @@ from . import known, perturbations
 from .beside import Beside
 from .data import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
 from .grabs import Hand
-from .jobs import Job, as_one
+from .jobs import Job, Visitor, as_one
 from .known import Knowledge
 from .limits import LIMITS
 from .links import OF_A_REPLAY, UNSEEN, VIEW, View, fitting, read_view, spelled
@@ -57,14 +57,18 @@ class AppState(param.Parameterized):
         library: Library,
         wake: Callable[[Callable[[], object]], object] | None = None,
         query: str | None = "",
+        visitor: Visitor | None = None,
     ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task.
 
         query: of the address that opened the page; None: nothing is to be shown yet.
         """
         super().__init__()  # type: ignore[no-untyped-call]  # param says no types
-        self.library, self.work = library, Work(wake)
+        self.library, self.work = library, Work(wake, visitor)
         self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
+        # What was refused is told until something else is done; before those that may refuse it.
+        chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
+        self.looks.param.watch(self._forget, chosen)
         self.knowledge, self.besides = Knowledge(self), Beside(self)
         self.hand = Hand(self)  # which keeps what is known
         self.parts = self.looks, self.knowledge, self.hand  # which a link names
@@ -74,12 +78,9 @@ class AppState(param.Parameterized):
         self.param.watch(self._need_loads, "replay")
         self.looks.param.watch(self._need_loads, ["colour", "thickness"])
         self.work.computation.param.watch(self._bring_back, "dismissed")
-        # What was refused is told until something else is done.
         self.param.watch(self._forget, "cell")
         self.knowledge.param.watch(self._forget, "known")
         self.hand.param.watch(self._forget, "pulls")
-        chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
-        self.looks.param.watch(self._forget, chosen)
         if query is not None:
             self.open(query)
 
@@ -224,7 +225,13 @@ class AppState(param.Parameterized):
             if shown is not None:
                 self._show(shown, view)
             if asked is not None and (shown is None or not shown.cell.selection.names(asked)):
-                self._ask(asked, at_once=True)
+                dear = LIMITS.shared and asked.dear
+                self._ask(asked, at_once=not dear)
+                if dear and self.missing:
+                    self.work.message = (
+                        "this link asks for what takes long to compute, and a link alone does not "
+                        "start that on this server: press Compute"
+                    )
             self.work.message = self.work.message or message
 
         wished = meant(library.catalogue)

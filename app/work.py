@@ -8,7 +8,7 @@ import param
 
 from . import compute
 from .data import Library, Shown
-from .jobs import Job, Pool, Task, computing, reading
+from .jobs import Job, Pool, Task, Visitor, computing, reading
 from .live import Arriving, Following
 from .selection import Selection
 
@@ -23,10 +23,14 @@ class Work(param.Parameterized):
     moving = param.Boolean(doc="whether a packing is on screen that is being compressed")
     fourfold = param.Integer(doc="how often the walk under way has grown fourfold: new axes")
 
-    def __init__(self, wake: Callable[[Callable[[], object]], object] | None = None) -> None:
+    def __init__(
+        self,
+        wake: Callable[[Callable[[], object]], object] | None = None,
+        visitor: Visitor | None = None,
+    ) -> None:
         """wake(function): call a function soon on the page's thread; see jobs.Task."""
         super().__init__()  # type: ignore[no-untyped-call]  # param says no types
-        self._wake = wake
+        self._wake, self._visitor = wake, visitor
         self.tasks: list[Task] = []
         self._ahead: list[Job] = []
         self._closed = False
@@ -49,7 +53,7 @@ class Work(param.Parameterized):
 
         told: whether the page tells what goes wrong in it; else whoever asks for it does.
         """
-        task = Task(pool, self._wake)
+        task = Task(pool, self._wake, self._visitor)
         if told:
             task.param.watch(self._tell, "message")
         task.param.watch(self._count, "running")

@@ -9,7 +9,7 @@ import panel_material_ui as pmui
 from granforce.records import InputError, friction, make_cell, positive
 
 from .. import photoelastic, uploads
-from ..limits import LIMITS, SHARED
+from ..limits import LIMITS
 from ..selection import Selection
 from ..state import AppState
 from . import photoelastic as measured
@@ -88,7 +88,8 @@ class View:
             self.report,
             self.frame,
             note(HELP),
-            *([] if SHARED else [Mine(self.state)]),  # on a server for all it would show all theirs
+            # On a server for all it would show all theirs.
+            *([] if LIMITS.shared else [Mine(self.state)]),
             sizing_mode="stretch_width",
         )
 

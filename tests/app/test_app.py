@@ -16,11 +16,13 @@ from small_store import DISKS, KEPT, STATES, cell_parameters
 from visitor import wait_for
 
 import granforce as gf
-from app import compute, distributions, limits, replays, work
+from app import beside, compute, distributions, limits, replays, work
+from app import jobs as app_jobs
+from app import state as app_state
 from app.data import Library
 from app.garbage import settle
 from app.geometry import MARGIN
-from app.jobs import Job, Pool, Task
+from app.jobs import Job, Pool, Task, Visitor
 from app.limits import LIMITS, NAMES, Limits, read_limits
 from app.links import read_view
 from app.looks import Looks
@@ -51,6 +53,7 @@ from granforce.records import Cancelled, InputError
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store
+from granforce.system import cancelling
 
 
 def cell_at(library, mu):
@@ -673,8 +676,9 @@ def test_all_that_a_link_may_name_is_limited():
 
 
 def test_limits_are_read_and_wrong_ones_refused():
-    assert read_limits("") == Limits()
-    assert read_limits("n=500, states=20,upload=3,computations=1") == Limits(500, 20, 3, 1)
+    assert read_limits("") == Limits(seconds=limits.LONGEST) and not Limits().shared
+    own = read_limits("n=500, states=20,upload=3,computations=1,seconds=7")
+    assert own == Limits(500, 20, 3, 1, 7) and own.shared
     wrong = "n=0", "disks=4", "n=", "n=1e3", "n=²", f"n={'9' * 5000}", "computations=65", "9" * 5000
     for text in wrong:
         with pytest.raises(InputError, match="GRANFORCE_LIMITS"):
@@ -683,6 +687,64 @@ def test_limits_are_read_and_wrong_ones_refused():
         Limits().check(mu=1e9)
     with pytest.raises(InputError, match="N must lie between 1 and 500"):
         Limits(n=500).check(n=501)
+
+
+# What makes a computation longer, and nothing else, further than a shared server has it.
+COSTS = {"sweeps": 10_000, "accuracy": 1e-6, "dt": 0.01, "box_mass": 10_000}
+
+
+@pytest.mark.parametrize("name", COSTS)
+def test_on_a_shared_server_costs_have_narrower_bounds(name):
+    asked = select(500, 0.3, 777, states=500)
+    asked = asked._replace(packing=asked.packing | {name: COSTS[name]})
+    asked.check(Limits())
+    with pytest.raises(InputError, match="must lie between"):
+        asked.check(Limits(seconds=60))
+    select(500, 0.3, 777, states=500).check(Limits(seconds=60))
+
+
+@pytest.mark.parametrize(
+    "query, dear",
+    [
+        ("n=20&states=5", False),
+        ("n=400&states=200", False),
+        ("n=400&states=5000", True),
+        ("n=60&states=20000&relax=gauss_seidel_only", True),
+        ("n=1000&states=5", True),
+        ("n=30&states=5&box_mass=200", True),
+        ("n=30&states=5&radii=uniform:0.9,1&box=isotropic", False),
+    ],
+)
+def test_a_link_alone_starts_nothing_dear_on_a_shared_server(
+    library, monkeypatch, shared, query, dear
+):
+    begun = []
+    monkeypatch.setattr(work.Work, "compute", lambda *asked: begun.append(asked[2]))
+    state = AppState(library, query=f"mu=0.2&seed=9&{query}")
+    wait_for(state, lambda: state.missing)
+    assert [one.dear for one in begun] == ([] if dear else [False])
+    assert ("press Compute" in state.work.message) == dear
+    if dear:
+        controls = Controls(state)
+        assert controls.go.visible and controls.n.value == state.selection.packing["n"]
+        state.compute()  # as the button does
+        assert begun == [state.selection]
+
+
+@pytest.fixture
+def shared(monkeypatch):
+    """A server for others than its owner."""
+    for module in (app_state, beside):
+        monkeypatch.setattr(module, "LIMITS", Limits(seconds=60))
+
+
+def test_a_link_starts_nothing_dear_beside_another(library, shared, visited):
+    state = visited("mu=0.1&n=30&states=30&relax=nearest")
+    state.cell = state.cell._replace(selection=state.cell.selection._replace(states=19_999))
+    state.looks.split = True
+    state.looks.beside = 0.2
+    assert not state.besides.task.running and state.looks.beside is None
+    assert "takes long to compute" in state.work.message
 
 
 # Tasks
@@ -731,6 +793,91 @@ def test_a_job_that_waits_is_cancelled_at_once():
     assert second.ended and not first.ended
     release.set()
     assert first.wait(60) and Job(lambda job: None, pool).wait(60) and begun == []
+
+
+class Gate:
+    """Works that say when they have begun, and end when they are let go."""
+
+    def __init__(self, pool):
+        self.pool, self.begun, self.doors = pool, [], {}
+
+    def job(self, name, visitor):
+        """A job of this name for a visitor."""
+        door = self.doors[name] = threading.Event()
+
+        def work(job):
+            self.begun.append(name)
+            door.wait(30)
+
+        return Job(work, self.pool, visitor=visitor)
+
+    def until(self, *names):
+        """Wait until exactly these have begun."""
+        end = time.monotonic() + 30
+        while len(self.begun) < len(names) and time.monotonic() < end:
+            time.sleep(0.005)
+        assert self.begun == list(names)
+
+
+HOSTILE = [Visitor("there", page) for page in "abcd"]
+OTHER = Visitor("elsewhere", "x")
+
+
+def test_a_second_computation_waits_behind_the_first_of_others():
+    gate = Gate(Pool(1, "test"))
+    jobs = [gate.job(name, HOSTILE[0]) for name in ("first", "second", "third")]
+    gate.until("first")
+    jobs += [gate.job("of another page", HOSTILE[1]), gate.job("of another", OTHER)]
+    gate.doors["first"].set()
+    gate.until("first", "second")  # nobody has one under way: in the order they came
+    jobs.append(gate.job("of one more", OTHER))
+    two = Gate(Pool(2, "test"))
+    jobs += [two.job(name, HOSTILE[0]) for name in ("one", "two", "three")]
+    two.until("one", "two")
+    jobs += [two.job("of another page", HOSTILE[1]), two.job("of another", OTHER)]
+    two.doors["one"].set()
+    two.until("one", "two", "of another")
+    two.doors["of another"].set()
+    two.until("one", "two", "of another", "of another page")
+    for door in (*gate.doors.values(), *two.doors.values()):
+        door.set()
+    assert all(job.wait(30) for job in jobs)
+
+
+def test_who_has_nothing_under_way_does_not_wait_for_long_jobs_of_others(monkeypatch):
+    """However many pages of one address hold the threads; but no visitor has two more."""
+    monkeypatch.setattr(app_jobs, "LONG", 0.0)
+    gate = Gate(Pool(2, "test", extra=2))
+    jobs = [gate.job(f"hostile {k}", HOSTILE[k % 2]) for k in range(4)]
+    gate.until("hostile 0", "hostile 1")
+    jobs += [gate.job(f"hostile {k}", HOSTILE[k % 4]) for k in range(4, 8)]
+    gate.until("hostile 0", "hostile 1", "hostile 6")  # of a third page
+    jobs.append(gate.job("of another", OTHER))
+    gate.until("hostile 0", "hostile 1", "hostile 6", "of another")
+    for door in gate.doors.values():
+        door.set()
+    assert all(job.wait(30) for job in jobs)
+
+
+def test_short_jobs_are_waited_for(monkeypatch):
+    monkeypatch.setattr(app_jobs, "LONG", 1e9)
+    gate = Gate(Pool(1, "test", extra=1))
+    jobs = [gate.job("one", HOSTILE[0]), gate.job("two", OTHER)]
+    gate.until("one")
+    gate.doors["one"].set()
+    gate.until("one", "two")
+    gate.doors["two"].set()
+    assert all(job.wait(30) for job in jobs)
+
+
+def test_what_takes_too_long_is_ended_with_a_line():
+    def work(job):
+        while True:
+            cancelling.check("work")
+
+    job = Job(work, Pool(1, "test", seconds=0.01))
+    assert job.wait(60) and not job.cancelled()
+    assert "longer than the 0.01 s that a computation may take on this server" in job.error
 
 
 def test_work_that_was_told_nothing_of_cancelling_is_cancelled():
@@ -934,7 +1081,8 @@ def test_a_pool_survives_jobs_whose_end_fails():
 
 def test_a_pool_survives_what_is_no_job():
     pool = Pool(1, "test")
-    pool.submit(None)
+    with pytest.raises(AttributeError):
+        pool.submit(None)
     assert next_on(pool)
 
 

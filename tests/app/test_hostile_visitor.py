@@ -14,7 +14,6 @@ from serving import CLOSED, free_port, painted, serve, wait_until_served
 from small_store import ROOT
 
 LONG = "?mu=0.2&n=60&states=20000&seed={}&relax=gauss_seidel_only"  # minutes, unless it is ended
-LIMITS = "n=60,states=20000"
 LARGEST = "9" * 300
 
 
@@ -25,8 +24,7 @@ def address(shipped, tmp_path_factory):
     Warmed up: there, too, a page is made and ended before its work.
     """
     folder = tmp_path_factory.mktemp("served")
-    variables = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_LIMITS": LIMITS}
-    with serve(folder, "--warm", *CLOSED, **variables) as (url, _):
+    with serve(folder, "--warm", *CLOSED, GRANFORCE_DATA=str(shipped)) as (url, _):
         yield url
     log = (folder / "log").read_text()
     for word in ("Exception in thread", "NameError", "failed with following error", "could not be"):

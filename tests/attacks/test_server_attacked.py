@@ -44,11 +44,19 @@ TROUBLE = "Exception in thread", "a job failed outside", "could not be", f"{ROOT
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """Address and process of the app, and its folder; at the end all its threads are there."""
-    folder = tmp_path_factory.mktemp("served")
+    yield from serving(tmp_path_factory.mktemp("served"))
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    """The same with limits, for others than its owner."""
+    yield from serving(tmp_path_factory.mktemp("shared"), GRANFORCE_LIMITS=LIMITS)
+
+
+def serving(folder, **variables):
     shipped = folder / "start.zarr"
     study.get(open_store(shipped), kinds.WALK, cell_parameters(0.1), dtypes={"states": "float32"})
-    variables = {"GRANFORCE_DATA": str(shipped), "GRANFORCE_LIMITS": LIMITS}
-    with serve(folder, *CLOSED, **variables) as (url, server):
+    with serve(folder, *CLOSED, GRANFORCE_DATA=str(shipped), **variables) as (url, server):
         yield url, server, folder
     log = (folder / "log").read_text()
     for word in TROUBLE:
@@ -243,9 +251,9 @@ SAID = [
 ]  # fmt: skip
 
 
-def test_limits_hold_whatever_is_said(served):
+def test_limits_hold_whatever_is_said(shared):
     """By links, by statements of what is known, by pulls and by uploads."""
-    url, _, folder = served
+    url, _, folder = shared
     before = {entry.name for entry in kept(folder)}
     statements = "~".join(f"{c}:1" for c in range(33))
     many = f"{HELD}&known={statements}", f"{HELD}&known=0:{'9' * 400}", f"{HELD}&pulls={statements}"
@@ -270,9 +278,45 @@ def test_limits_hold_whatever_is_said(served):
         return json.dumps(document)
 
     visits(visit())
-    computes(served, 300)
+    computes(shared, 300)
     new = [entry for entry in kept(folder) if entry.name not in before]
     assert [_seed(entry) for entry in new] == [300]
+
+
+# Hours of work, by bounds that a shared server does not have; and minutes within them.
+HOSTILE = (
+    "?scene=many&n=60&mu=0.3&seed=777&states=500&sweeps=10000&accuracy=1e-6&dt=0.01&box_mass=10000",
+    "?scene=many&n=60&mu=0.3&seed=778&states=500&sweeps=1000&accuracy=1e-3&dt=0.02&box_mass=300",
+    LONG.format(779),
+)
+
+
+def test_links_that_ask_for_hours_start_nothing_on_a_shared_server(shared):
+    """Visitors who open them say nothing more; another has his states meanwhile."""
+    url, _, folder = shared
+    before = {entry.name for entry in kept(folder)}
+
+    async def hostile():
+        clients = [await Client.opened(url, query) for query in HOSTILE]
+        for client in clients:
+            await client.ready()
+        return clients
+
+    async def all_of_them():
+        clients = await hostile()
+        await asyncio.to_thread(computes, shared, 301)
+        said = []
+        for client in clients:
+            await Protocol().create("PULL-DOC-REQ").send(client.socket)
+            document = (await client.answer("PULL-DOC-REPLY")).content["doc"]
+            said.append(json.dumps(document, ensure_ascii=False))
+            client.close()
+        return said
+
+    said = visits(all_of_them())
+    assert [_seed(entry) for entry in kept(folder) if entry.name not in before] == [301]
+    assert "must lie between" in said[0]
+    assert all("press Compute" in document for document in said[1:])
 
 
 def memory(server):
@@ -304,7 +348,7 @@ def test_a_hundred_sessions_leave_nothing(served):
 @pytest.mark.parametrize("times", [1, pytest.param(5, marks=pytest.mark.stress)])
 def test_a_server_told_to_end_while_it_computes_leaves_no_process(tmp_path, times):
     for _ in range(times):
-        with serve(tmp_path, GRANFORCE_LIMITS=LIMITS) as (url, server):
+        with serve(tmp_path) as (url, server):
             visits(_computing(url, server))
             children = Path(f"/proc/{server.pid}/task/{server.pid}/children").read_text().split()
             os.kill(server.pid, signal.SIGTERM)
