@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from granforce.paper import tables
+from granforce.paper.claims.groups import outside
 from granforce.records import InputError
 
 DATA = Path(__file__).resolve().parent.parent / "data"
@@ -58,6 +59,16 @@ def rows(*parts: str) -> list[dict[str, Any]]:
     """Rows of parts of the study at its usual number of disks; empty without a study."""
     table = study()
     return [] if table is None else table.part(*parts, n=table.plan["n"])
+
+
+def in_force_space(part: str) -> list[dict[str, Any]]:
+    """Rows of a part, but for the μ at which its states lie outside of S by more than its extent.
+
+    Sweeps that end early leave such networks: what they span is no indeterminacy.
+    """
+    table = study()
+    beyond = [] if table is None else outside(table, part)
+    return [row for row in rows(part) if row["mu"] not in beyond]
 
 
 def hill() -> list[tuple[float, float]]:

@@ -60,6 +60,7 @@ VERDICTS = {"reproduced": "✓", "differs": "≈", "not reproduced": "✗"}
 JUDGED = {
     "gauss_seidel": f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, to 10⁻³",
     "gauss_seidel_1e-4": f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, to 10⁻⁴",
+    "gauss_seidel_1e-6": f"{term('gauss_seidel_only', 'walk by Gauss–Seidel')}, to 10⁻⁶",
     "nearest": "walk to nearest networks",
     "uniform": "uniform networks",
     "exact": "exact",
@@ -122,7 +123,7 @@ def indeterminacy(own: list[Row], exact: list[Row], here: Row, log: bool) -> Dra
         legend_above(fig)
     seen = _over_mu("samplers", "0.15 × range η3", 270, title=FOLDED[2], **kind)
     for k, (part, label) in enumerate(SAMPLERS.items()):
-        points = statistics.means(studied.rows(part), "eta3", factor=0.15)
+        points = statistics.means(studied.in_force_space(part), "eta3", factor=0.15)
         _line(seen, points, label, log, k)
     _own(seen, statistics.means(own, "eta3", factor=0.15), log)
     _own(seen, statistics.means(exact, "eta3", factor=0.15), log, 3)

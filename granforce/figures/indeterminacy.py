@@ -17,13 +17,18 @@ _MEASURES = (
 
 
 def indeterminacy(
-    rows: Rows, *, beside: Mapping[str, Rows] | None = None, backend: str = "bokeh"
+    rows: Rows,
+    *,
+    beside: Mapping[str, Rows] | None = None,
+    outside: Rows = (),
+    backend: str = "bokeh",
 ) -> hv.Layout:
     """Figure 1: η1, η2 and 0.15 η3 against μ, linear and log–log, and z against μ.
 
     rows: dicts with mu, eta1, eta2, eta3, extent (the width of S per free dimension, in ⟨f_n⟩), of
     which what is there is drawn, and coordination (z). beside: {name: rows} of other
-    sources of the same measures, such as exact η3; what a row lacks is not drawn.
+    sources of the same measures, such as exact η3; what a row lacks is not drawn. outside: rows
+    whose states lie outside of S, so that what they span is no value of η: grey crosses.
     """
     style.ready(backend)
     curves = []
@@ -46,8 +51,10 @@ def indeterminacy(
         y="η",
         ylim=(0, 2.4 * top) if backend == "matplotlib" else (0, 1.1 * top),
         legend=style.beside("top_right", backend),
+        marks=_crosses(outside, backend),
     )
-    words = {"title": "the same, log–log", "x": "μ", "y": "η"}
+    words: dict[str, Any] = {"title": "the same, log–log", "x": "μ", "y": "η"}
+    words["marks"] = _crosses(outside, backend, logarithmic=True)
     log = style.graph(curves, backend, **words, logx=True, logy=True)
     z = [(statistics.means(rows, "coordination"), "z", style.COLOURS[0], "solid", 0)]
     contacts = style.graph(z, backend, title="Coordination", x="μ", y="z", logx=True)
@@ -55,6 +62,17 @@ def indeterminacy(
     # In pictures the legend stands beside the last frame.
     frames = [*both, contacts] if backend == "bokeh" else [contacts, *both]
     return style.page(frames, backend)
+
+
+def _crosses(rows: Rows, backend: str, *, logarithmic: bool = False) -> list[Any]:
+    """Means of the measures of states outside of S."""
+    points = [
+        (mu, mean)
+        for name, _, factor in _MEASURES
+        for mu, mean, _ in statistics.means(rows, name, factor=factor)
+        if min(mu, mean) > 0 or not logarithmic
+    ]
+    return [style.dots(points, "outside S", style.GREY, backend, "x")] if points else []
 
 
 # Up to which μ a distribution is drawn among those of small and of intermediate friction.

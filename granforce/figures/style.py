@@ -169,10 +169,16 @@ def frame(
 
 
 def graph(
-    series: Iterable[Any], backend: str, *, logx: bool = False, logy: bool = False, **options: Any
+    series: Iterable[Any],
+    backend: str,
+    *,
+    logx: bool = False,
+    logy: bool = False,
+    marks: Iterable[Any] = (),
+    **options: Any,
 ) -> hv.Overlay:
-    """The frame of some `curves`; options as for `frame`."""
-    drawn = curves(series, backend, logx, logy)
+    """The frame of some `curves`, and of marks; options as for `frame`."""
+    drawn = [*curves(series, backend, logx, logy), *marks]
     return frame(drawn, backend, logx=logx, logy=logy, **options)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from granforce import figures
 from granforce.paper import tails
-from granforce.paper.claims.groups import SAMPLERS, drawn
+from granforce.paper.claims.groups import SAMPLERS, drawn, outside
 from granforce.paper.tables import Table
 from granforce.records import Floats, Progress, Rows
 from granforce.system.files import make_folder
@@ -99,6 +99,10 @@ def captions(table: Table) -> dict[str, str]:
     """{file name: caption} of the figures of a table."""
     walk = _RELAXED[paper_sampler(table)]
     told = tails.told(table) or "–"
+    beyond = outside(table, SAMPLERS[paper_sampler(table)])
+    if beyond:
+        walk += f"; crosses or left out at μ = {', '.join(f'{mu:g}' for mu in beyond)}, where the "
+        walk += "networks lie outside of S by more than its extent"
     return {name: caption.format(walk=walk, tails=told) for name, caption in CAPTIONS.items()}
 
 
@@ -137,9 +141,9 @@ def _of_the_paper(table: Table) -> dict[str, Callable[..., Any]]:
     part = SAMPLERS[sampler]
     walk = drawn(table, sampler)
     if walk:
-        made["figure1"] = _later(figures.indeterminacy, walk)
+        made["figure1"] = _later(figures.indeterminacy, walk, outside=_beyond_S(table, part))
         made["figure6"] = _later(figures.correlations, walk, chance=_chance(walk))
-    groups = _some(_loose(table.extents(part)))
+    groups = _some(_loose(_in_S(table, part)))
     if groups:
         options = {"unit": "⟨f_n⟩", "largest": LARGEST, "bins": round(LARGEST / BIN)}
         made["figure4"] = _later(figures.extents, groups, **options)
@@ -153,6 +157,18 @@ def _of_the_paper(table: Table) -> dict[str, Callable[..., Any]]:
     if places:
         made["figure5"] = _later(figures.overlaid, places)
     return made
+
+
+def _in_S(table: Table, part: str) -> dict[float, list[Floats]]:
+    """{μ: extents} of a part where its states lie in S, or near it."""
+    beyond = outside(table, part)
+    return {mu: group for mu, group in table.extents(part).items() if mu not in beyond}
+
+
+def _beyond_S(table: Table, part: str) -> list[dict[str, Any]]:
+    """Rows of a part whose states lie outside of S by more than its extent."""
+    beyond = outside(table, part)
+    return [row for row in table.part(part) if row["mu"] in beyond]
 
 
 def _beyond(table: Table) -> dict[str, Callable[..., Any]]:
@@ -173,7 +189,7 @@ def _beyond(table: Table) -> dict[str, Callable[..., Any]]:
         made["figure6_exact"] = _later(figures.correlations, walk, beside=both)
     if walk and uniform:
         made["figure1_uniform"] = _later(figures.indeterminacy, walk, beside={"uniform": uniform})
-    groups = _some(_loose(table.extents(part)))
+    groups = _some(_loose(_in_S(table, part)))
     if groups:
         made["figure4_mean"] = _later(figures.extents, groups)
     groups = _some(_loose(table.extents("exact")))
