@@ -444,11 +444,16 @@ def _family(part: str) -> str:
     return {"perturb": "response", "widest": "opened"}.get(word, word)
 
 
+def _like(task: Task) -> tuple[str, int, str, str]:
+    """What tasks have in common that take about as long."""
+    return task.cell.kind.name, task.n, str(task.cell.parameters.get("relax")), "alike"
+
+
 def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:
     """A row for each part of some tasks: cells, how many are done, and the minutes they took.
 
     To these, minutes that the others will take: as the mean of those done of the same part and
-    size, at the same μ where there are any; NaN where nothing is known.
+    size, at the same μ where there are any, else of the same kind; NaN where nothing is known.
     """
     store = open_store(path)
     took: dict[Any, list[float]] = {}
@@ -457,13 +462,15 @@ def remaining(path: str | Path, wanted: Sequence[Task]) -> list[dict[str, Any]]:
         dataset = load(store, *task.cell)
         counts.setdefault(task.part, []).append((task, dataset is not None))
         if dataset is not None:
-            for key in ((task.part, task.n, task.mu), (task.part, task.n)):
+            for key in ((task.part, task.n, task.mu), (task.part, task.n), _like(task)):
                 took.setdefault(key, []).append(float(dataset["seconds"]) / 60)
     rows = []
     for part, tasks_of in counts.items():
         done = [task for task, there in tasks_of if there]
         left = [task for task, there in tasks_of if not there]
-        known = [took.get((part, t.n, t.mu)) or took.get((part, t.n)) for t in left]
+        known = [
+            took.get((part, t.n, t.mu)) or took.get((part, t.n)) or took.get(_like(t)) for t in left
+        ]
         spent = sum(sum(v) for key, v in took.items() if key[0] == part and len(key) == 3)
         ahead = sum(sum(v) / len(v) if v else float("nan") for v in known)
         rows.append(
