@@ -53,6 +53,8 @@ def role(name: str, content: bytes) -> str:
     """What a file is, one of WORDS, told by its content; InputError for anything else."""
     if content[:4] == b"PK\x03\x04":
         return "npz"
+    if content[:2] == b"\x1f\x8b" or content[:4] == b"\x28\xb5\x2f\xfd":
+        raise InputError(f"{name}: compressed; unpack it first")
     if content[:6] == b"MATLAB" or content[:4] == b"\x89HDF":
         return "solved"
     if content.lstrip()[:5] == b"ITEM:":
@@ -188,7 +190,7 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
 
     def work(job: Job) -> Brought:
         job.begin("looking for its backbone")
-        report = importers.report(packing)
+        report = importers.report(packing) | {"notes": packing.info.get("notes", [])}
         if library.cache is None:
             raise InputError("no cache folder can be written, so nothing can be taken in")
         params = kinds.imported_parameters(packing)
@@ -202,7 +204,8 @@ def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Bro
 def told(report: dict[str, Any]) -> list[tuple[str, str]]:
     """The report as rows (name, value) of texts for the page."""
     known = ((label, report[name], form, unit) for label, name, form, unit in _ROWS)
-    return [(label, f"{v:{form}}{unit}") for label, v, form, unit in known if v is not None]
+    rows = [(label, f"{v:{form}}{unit}") for label, v, form, unit in known if v is not None]
+    return rows + [("note", note) for note in report.get("notes", [])]
 
 
 _ROWS = (

@@ -1,5 +1,6 @@
 """What the tabs beside the packing show, without a browser."""
 
+import gzip
 import io
 import json
 from types import SimpleNamespace
@@ -207,11 +208,20 @@ def test_a_file_of_another_family_replaces_what_was_there():
         (b"\x89PNG\r\n\x1a\n" + bytes(200), "neither an NPZ"),
         (b"a,b,c\n1,2,3\n", "columns x, y, r"),
         (b"ITEM: TIMESTEP\n0\n", "without ATOMS or ENTRIES"),
+        (gzip.compress(b"ITEM: TIMESTEP\n0\n"), "compressed; unpack it first"),
     ],
 )
 def test_what_is_no_packing_is_refused(content, line):
     with pytest.raises(InputError, match=line):
         uploads.added({}, [("file", content)])
+
+
+def test_notes_of_a_packing_are_told(state):
+    packing = packed(30, 0.3)
+    noted = packing._replace(info=packing.info | {"notes": ["what was seen"]})
+    job = SimpleNamespace(begin=lambda stage: None)
+    brought = uploads.keep(state.library, noted, "a file")(job)
+    assert uploads.told(brought.report)[-1] == ("note", "what was seen")
 
 
 def test_damaged_and_hostile_files_are_one_clear_line(state):

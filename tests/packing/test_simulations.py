@@ -89,6 +89,7 @@ def test_a_frame_is_chosen(name):
         found = read(*given(*files), MU, frame=frame, **options)
         assert found.pressure == pytest.approx(pressure) and found.info["residual"] < 1e-12
         assert "notes" not in found.info
+    assert read(*given(*files), MU, frame=float(first), **options).pressure == pytest.approx(1.0)
     with pytest.raises(InputError, match=rf"no time ?step 7: there is {first} … {last}$"):
         read(*given(*files), MU, frame=7, **options)
 
@@ -166,6 +167,24 @@ def test_columns_of_dumps_have_any_names():
         read_lammps(*given(grains, text), MU, columns=columns | {"fx": "q"})
     with pytest.raises(InputError, match="no column is called 'speed' here"):
         read_lammps(*given(grains, text), MU, columns=columns | {"speed": "a"})
+    for wrong in (["a", "b"], {"fx": 3}):
+        with pytest.raises(InputError, match="columns must be"):
+            read_lammps(*given(grains, text), MU, columns=wrong)
+
+
+def test_named_contacts_need_no_distance():
+    text = contacts(1, 1.0).replace("distance", "c_3")
+    assert read_lammps(*given(particles(1), text), MU).pressure == pytest.approx(1.0)
+
+
+def test_titles_of_units_and_times_are_passed_over():
+    """As `dump_modify units yes time yes` writes them, before each timestep."""
+    grains, pairs = (
+        "ITEM: UNITS\nlj\n" + text.replace("ITEM: TIMESTEP", "ITEM: TIME\n0.5\nITEM: TIMESTEP")
+        for text in DUMPS
+    )
+    assert read_lammps(*given(grains, pairs), MU).pressure == pytest.approx(3.0)
+    assert read_lammps(*given(grains, pairs), MU, frame=100).pressure == pytest.approx(1.0)
 
 
 # Compressed

@@ -105,9 +105,10 @@ def read_lammps(
     particles: ``dump custom`` with id, x y (or xu yu, xs ys, xsu ysu) and radius (or diameter), in
     any order. contacts: ``dump local`` with the two grains, their distance, normal and tangential
     force on the first: columns named atom1 atom2 distance fx fy px py, or seven in this order,
-    beside an index. columns: {name here: name in the dumps} of columns that are called otherwise.
-    Pairs without force are neighbours, not contacts; pairs that are listed from both sides (newton
-    off) count once.
+    beside an index; where they are named, the distance, which is only checked, may be missing.
+    columns: {name here: name in the dumps} of columns that are called otherwise. Pairs without
+    force are neighbours, not contacts; pairs that are listed from both sides (newton off) count
+    once.
 
     frame: the timestep, by default the last that is whole in both files. reverse: take tangential
     forces with the other sign. Grains are sorted by id. The box may be tilted in the plane (xy).
@@ -283,7 +284,6 @@ def _contacts(
 ) -> tuple[Contacts, Floats, int]:
     """Contacts that carry force, their forces (N_c, 2), and how many pairs carry none."""
     i, j = (table.lookup(column, index) for column in ("atom1", "atom2"))
-    distance = table.numbers("distance")
     normal_force, tangential_force = (
         np.column_stack([table.numbers(column) for column in pair])
         for pair in (("fx", "fy"), ("px", "py"))
@@ -300,15 +300,20 @@ def _contacts(
         return table.place(active[c])
 
     joined = listed(x, r, cell, i[active], j[active], place)
-    _check_distances(joined.length, distance[active], r.max(), place)
+    if "distance" in table.header:
+        _check_distances(joined.length, table.numbers("distance")[active], r.max(), place)
     forces = _components(joined.normal, -normal_force[active], -tangential_force[active], place)
     return joined, forces, skipped
 
 
 def _with_names(table: Table, named: bool) -> Table:
-    """The table of contacts with CONTACT_COLUMNS in its header, if not by name then by order."""
-    if named or set(CONTACT_COLUMNS) <= set(table.header):
-        table.require(*CONTACT_COLUMNS)
+    """The table of contacts with CONTACT_COLUMNS in its header, if not by name then by order.
+
+    By name it may lack the distance, which is a check only.
+    """
+    needed = set(CONTACT_COLUMNS) - {"distance"}
+    if named or needed <= set(table.header):
+        table.require(*(column for column in CONTACT_COLUMNS if column in needed))
         return table
     columns = [column for column in table.header if column != "index"]
     if len(columns) != len(CONTACT_COLUMNS):

@@ -32,7 +32,7 @@ class Snapshots(NamedTuple):
             ends = sorted({self.numbers[0], self.numbers[-1]})
             there = f"there is {' … '.join(map(str, ends))}" + (self.lost and f"; {self.lost}")
             raise InputError(f"no {self.word} {number}: {there}")
-        return self.read(number)
+        return self.read(self.numbers[self.numbers.index(number)])  # 100.0 is 100
 
 
 def noted(found: Snapshot, note: str) -> Snapshot:

@@ -150,6 +150,8 @@ def renamed(columns: Mapping[str, str], names: Sequence[str], *tables: Table) ->
     columns: {name here: name in the files}, in any case. Raises InputError for a name that is none
     of `names`, or a column that no table has.
     """
+    if not isinstance(columns, Mapping) or not all(isinstance(v, str) for v in columns.values()):
+        raise InputError(f"columns must be {{name here: name in the files}}, got {columns!r:.60}")
     here = {theirs.lower(): name for name, theirs in columns.items()}
     header = [one for table in tables for one in table.header]
     for name, theirs in columns.items():
