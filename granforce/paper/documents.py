@@ -18,13 +18,15 @@ from scipy import stats
 from granforce.measures import statistics
 from granforce.paper import plan as plans
 from granforce.paper.claims.figure1 import skipped
-from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, outside
+from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, excesses, outside
 from granforce.paper.tables import Table
 from granforce.records import Floats, InputError, Rows
 from granforce.system.files import written
 
 MARK = re.compile(r"(<!-- study: (\w+) -->\n).*?(<!-- end -->)", re.S)
 
+_SWEPT_EXTENT = "sweeps 0.15 η3"
+_NEAR, _FAR = 0.001, 0.1  # in extents of S: from the second on the main table says how far outside
 _NOTHING = 1e-9  # η below this is rounding
 _MOST_DIGITS = 6  # after the point; more are told as a power of ten
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -104,10 +106,11 @@ def measures(table: Table) -> str:
         ("uniform η2", sources["uniform"], "eta2", 1.0, None),
         ("sweeps η1", sources["gauss_seidel"], "eta1", 1.0, None),
         ("sweeps η2", sources["gauss_seidel"], "eta2", 1.0, None),
-        ("sweeps 0.15 η3", sources["gauss_seidel"], "eta3", 0.15, None),
+        (_SWEPT_EXTENT, sources["gauss_seidel"], "eta3", 0.15, None),
         ("sweeps/nearest η2", ratios, "ratio", 1.0, None),
     )
-    beyond = outside(table, SAMPLERS["gauss_seidel"])
+    swept_part = SAMPLERS["gauss_seidel"]
+    beyond, known = outside(table, swept_part), excesses(table, swept_part)
     lines = []
     for mu, seeds in every.items():
         line = [f"{mu:g}", str(len(seeds))]
@@ -117,6 +120,8 @@ def measures(table: Table) -> str:
                 continue
             chosen = [row for row in rows if row["mu"] == mu and row["seed"] in seeds]
             line.append(_cell(chosen, name, factor, form, len(seeds)))
+            if head == _SWEPT_EXTENT and mu in known and known[mu][0] > _FAR * known[mu][1]:
+                line[-1] += f", excess {_excess(*known[mu])}"
         lines.append(line)
     return _markdown(["μ", "packings", *(head for head, *_ in columns)], lines)
 
@@ -174,32 +179,21 @@ def sweeps(table: Table) -> str:
     """
     lines = []
     for part, residual in plans.SWEEPS.items():
-        pairs = statistics.paired(table.part(part), table.part(SAMPLERS["exact"]))
-        excess = {
-            mu: (
-                np.mean([row["excess"] for row, _ in of_mu]),
-                np.mean([exact["mean_length"] for _, exact in of_mu]),
-            )
-            for mu, of_mu in _pairs_by_friction(pairs).items()
-        }
+        known, beyond = excesses(table, part), outside(table, part)
         ratios = _over(table.part(part), table.part(SAMPLERS["nearest"]), "eta2")
         for mu, rows in _by_friction(table.part(part)).items():
-            reach, length = excess.get(mu, (np.nan, np.nan))
-            known = np.isfinite(reach)
-            far = "" if not known else "all" if length < _NOTHING else f"{reach / length:.2g}"
             cells = [
                 f"10{str(round(np.log10(residual))).translate(_RAISED)}",
                 f"{mu:g}",
                 str(len(rows)),
                 _cell(rows, "reached_part", 1.0, "{:.2f}", len(rows)),
                 _cell(rows, "mean_sweeps", 1.0, "{:.0f}", len(rows)),
-                far,
+                _excess(*known[mu]) if mu in known else "",
             ]
             compared = [row for row in ratios if row["mu"] == mu]
-            beyond = known and reach > length
             eta = (
                 ["outside S"] * 2
-                if beyond
+                if mu in beyond
                 else [
                     _cell(rows, "eta2", 1.0, None, len(rows)),
                     _cell(compared, "ratio", 1.0, None, len(rows)),
@@ -210,12 +204,12 @@ def sweeps(table: Table) -> str:
     return _markdown([*heads, "η2", "over nearest η2"], lines)
 
 
-def _pairs_by_friction(pairs: Any) -> dict[float, list[Any]]:
-    found: dict[float, list[Any]] = {}
-    for row, exact in pairs:
-        if "excess" in row and "mean_length" in exact:
-            found.setdefault(row["mu"], []).append((row, exact))
-    return found
+def _excess(excess: float, length: float) -> str:
+    """How far states reach beyond S, over its extent; all of it where S is one point."""
+    if length < _NOTHING:
+        return "all" if excess > _NOTHING else "0"
+    part = excess / length
+    return f"{part:.2g}" if part >= _NEAR else f"< {_NEAR:g}"
 
 
 def preparation(table: Table) -> str:
@@ -358,7 +352,8 @@ def _drawn_by(table: Table, sampler: str) -> list[dict[str, Any]]:
 
 def _cell(rows: Rows, name: str, factor: float, form: str | None, wanted: int) -> str:
     """Mean ± standard error over rows, and of how many they are if not of all that are wanted."""
-    values = factor * np.array([row[name] for row in rows if name in row])
+    found = np.array([row[name] for row in rows if name in row], dtype=float)
+    values = factor * found[np.isfinite(found)]
     if not len(values):
         return ""
     mean = values.mean()

@@ -429,6 +429,21 @@ def test_what_lies_outside_of_s_is_no_value_of_eta(table):
     assert "outside S, and not judged, at 0" in vanishing.why
 
 
+def test_sweeps_tell_how_far_outside_of_s_they_end(table):
+    text = documents.sweeps(table)
+    first, *others = [line for line in text.splitlines() if line.startswith("| 10⁻³ |")]
+    assert "| all | outside S | outside S |" in first  # μ = 0
+    assert all("outside" not in line for line in others)
+    for row, exact in zip(table.part("sweeps_1e-3"), table.part("exact"), strict=False):
+        row, exact = row | {"part": "sweeps_1e-4"}, exact | {"mean_length": 2.0}
+        for excess, told in ((0.1, "0.05"), (0.5, "0.25"), (2.1, "outside S"), (1e-9, "< 0.001")):
+            rows = [row | {"excess": excess, "mu": 0.1, "seed": 1}, exact | {"mu": 0.1, "seed": 1}]
+            (line,) = documents.sweeps(table._replace(rows=rows)).splitlines()[2:]
+            assert told in line
+        rows[0] |= {"part": "sweeps_1e-3", "excess": 0.5, "skipped_part": 0.0}
+        assert ", excess 0.25 |" in documents.measures(table._replace(rows=rows))
+
+
 def test_what_packings_depend_on_is_told_in_standard_errors(table):
     text = documents.preparation(table)
     lines = {

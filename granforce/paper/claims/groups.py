@@ -46,15 +46,25 @@ def outside(table: Table, part: str) -> list[float]:
     """The μ at which states reach beyond the exact intervals by more than those are long.
 
     Sweeps that end early leave networks that are not balanced: what they differ by is then no
-    property of S. By the means over the packings that have both.
+    property of S.
     """
-    walked = [row for row in table.part(part) if "excess" in row]
-    beyond = [
-        {"mu": row["mu"], "part": row["excess"] - exact["mean_length"] - DETERMINED}
-        for row, exact in statistics.paired(walked, table.part("exact"))
-        if "mean_length" in exact
+    return [
+        mu for mu, (excess, length) in excesses(table, part).items() if excess > length + DETERMINED
     ]
-    return [mu for mu, parts in statistics.grouped(beyond, "part").items() if parts.mean() > 0]
+
+
+def excesses(table: Table, part: str) -> dict[float, tuple[float, float]]:
+    """{μ: how far the intervals of states reach beyond the exact ones, how long those are}.
+
+    Means over components and over the packings that have both, in ⟨f_n⟩.
+    """
+    both = [
+        {"mu": row["mu"], "excess": row["excess"], "length": exact["mean_length"]}
+        for row, exact in statistics.paired(table.part(part), table.part(SAMPLERS["exact"]))
+        if "excess" in row and "mean_length" in exact
+    ]
+    excess, length = (statistics.grouped(both, name) for name in ("excess", "length"))
+    return {mu: (float(excess[mu].mean()), float(length[mu].mean())) for mu in excess}
 
 
 def enough(row: dict[str, Any]) -> bool:
