@@ -14,23 +14,23 @@ from granforce.records import InputError, Packing, Progress
 from granforce.study import kinds
 from granforce.study.cells import Cell, get
 from granforce.study.scan import run
+from granforce.study.schema import VARIABLES
 from granforce.study.series import ends_of, over_frames, pair_names
 from granforce.study.store import open_store
 
-# Numbers of a snapshot, with their units and meaning.
+
+def _of_schema(*names: str) -> dict[str, tuple[str, str]]:
+    return {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in names}
+
+
+# Numbers of a snapshot with their units and meaning, by the schema where it has them.
 SCALARS = {
     "time": ("", "timestep, or time"),
     "grains": ("1", "number of grains"),
     "contacts": ("1", "number of contacts that carry force"),
-    "rattlers": ("1", "grains without load"),
-    "packing_fraction": ("1", "packing fraction φ; NaN in an open box"),
-    "pressure": ("force/length", "pressure; NaN in an open box"),
+    **_of_schema("rattlers", "packing_fraction", "pressure"),
     "mean_normal_force": ("force", "mean normal force of the backbone"),
-    "coordination": ("1", "contacts per grain of the backbone, z"),
-    "dimension": ("1", "dimension h of S"),
-    "eta1": ("1", "η1 of the states of a walk; NaN without"),
-    "eta2": ("1", "η2 of the states of a walk; NaN without"),
-    "eta3": ("1", "η3 of the exact intervals"),
+    **_of_schema("coordination", "dimension", "eta1", "eta2", "eta3"),
     "residual": ("mean normal force", "largest unbalance of the simulation's own forces"),
 }
 _FORCES = {"forces": "of the simulation", "low": "least in S", "high": "largest in S"}
@@ -52,8 +52,9 @@ def evolution(
     numbers: of the snapshots, by default all. states: of a random walk from each, with this seed,
     for η1 and η2; 0: none. workers, scheduler, progress: as for `scan.run`. Returns a dataset
     (frame, contact, component) with f_n and f_t of each contact (forces, low, high; a contact is a
-    pair of names, NaN where a snapshot does not have it) and SCALARS by frame, its attribute notes
-    what was noted of each; None where no snapshot could be used; and (number, message) of those
+    pair of names, NaN where a snapshot does not have it) and SCALARS by frame (NaN where they are
+    not defined: η1 and η2 without a walk, φ and P in an open box), its attribute notes what was
+    noted of each; None where no snapshot could be used; and (number, message) of those
     that could not.
 
     Raises InputError where the store cannot be written.
