@@ -115,9 +115,9 @@ def add_reverse(command: argparse._ActionsContainer) -> None:
 def add_wall_contacts(command: Parser) -> None:
     command.add_argument(
         "--walls",
-        action="store_true",
-        help="walls are grains, with the force on each as its load (default: what walls do to "
-        "grains is the grains' load)",
+        choices=("held", "pressing"),
+        help="make walls grains: held (they take any force), or pressing (with the force that each "
+        "has in the simulation); default: what walls do to grains is the grains' load",
     )
 
 

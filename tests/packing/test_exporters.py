@@ -97,7 +97,7 @@ def test_vtk_holds_disks_and_forces(tmp_path, name):
 
 def test_lines_end_at_walls(tmp_path):
     """Four disks of radius ½ in a box: lines from disk to disk are 1 long, those to walls ½."""
-    save_vtk(boxed(OUTER + INNER, walls=True), tmp_path / "g.vtp", tmp_path / "c.vtp")
+    save_vtk(boxed(OUTER + INNER, walls="pressing"), tmp_path / "g.vtp", tmp_path / "c.vtp")
     ends = arrays(tmp_path / "c.vtp")["Points"]["points"].reshape(-1, 2, 3)
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     assert sorted(length.tolist()) == [0.5] * 8 + [1.0] * 4

@@ -133,8 +133,8 @@ def many_snapshots(kind):
         "dumps, chosen": ((scaled, pairs), partial(read_lammps, mu=0.3, frame=1)),
         "dumps, gzip": ((scaled, pairs), partial(read_lammps, mu=0.3)),
         "mercury, many": (MERCURY, partial(read_mercury, mu=0.3, box=(3, 3))),
-        "mercury, walls": (mercury_in_a_box(1), partial(read_mercury, mu=0.5, walls=True)),
-        "yade, walls": (in_box, partial(read_yade, mu=0.5, walls=True)),
+        "mercury, walls": (mercury_in_a_box(1), partial(read_mercury, mu=0.5, walls="pressing")),
+        "yade, walls": (in_box, partial(read_yade, mu=0.5, walls="pressing")),
         "yade, loads": (in_box, partial(read_yade, mu=0.5)),
     }[kind]
     contents = [text.encode() for text in texts]

@@ -15,6 +15,7 @@ from packing.test_importers import tables
 from packings import packed
 
 from granforce.cli.parser import main
+from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import ensemble
 from granforce.packing.importers import (
     dem,
@@ -249,7 +250,7 @@ def test_contacts_with_walls_are_loads():
 
 def test_walls_are_grains_where_asked(tmp_path):
     """24 forces; 12 equations of disks and 8 of walls, two of which follow: h = 6."""
-    found = boxed(OUTER + INNER, walls=True)
+    found = boxed(OUTER + INNER, walls="pressing")
     assert len(found.r) == 8 and len(found.contacts.i) == 12 and found.info["walls"] == 4
     assert np.allclose(found.forces, [[1, 0]] * 12)
     # The force on each wall is its load, and disks have none.
@@ -260,9 +261,28 @@ def test_walls_are_grains_where_asked(tmp_path):
     save_packing(found, tmp_path / "p.npz")
     assert ensemble(load_packing(tmp_path / "p.npz")).dimension == 6
     with pytest.raises(InputError, match="no contact with a wall"):
-        boxed(INNER, walls=True)
+        boxed(INNER, walls="pressing")
     with pytest.raises(InputError, match="periodic in both directions has no walls"):
-        boxed(OUTER + INNER, walls=True, box=(9, 9))
+        boxed(OUTER + INNER, walls="pressing", box=(9, 9))
+
+
+def test_a_disk_in_a_groove_is_that_of_the_scene():
+    """Weight 1 between two walls at ±45°: if held, f_n goes from 0.71/(1 + μ) to 0.71/(1 − μ).
+
+    Where they press, the force on each is given, and nothing is left to choose.
+    """
+    f = 0.5**0.5
+    lines = [f"0 2 {f * f} {f * f} 0 0 0 0", f"1 2 {-f * f} {f * f} 0 0 0 0"]
+    files = "#format x_y_z_r_attrs\n# id\n0 0 0 1 2\n", "\n".join(lines)
+    S = ensemble(read_yade(*given(*files), 0.5, walls="held"))
+    bounds = intervals(S)
+    assert S.dimension == 1
+    np.testing.assert_allclose(bounds.lower[:, 0], f / 1.5, atol=1e-8)
+    np.testing.assert_allclose(bounds.upper[:, 0], f / 0.5, atol=1e-8)
+    assert ensemble(read_yade(*given(*files), 0.5, walls="pressing")).dimension == 0
+    for wrong, said in ((None, "no contact of two grains"), ("box", "walls are held or pressing")):
+        with pytest.raises(InputError, match=said):
+            read_yade(*given(*files), 0.5, walls=wrong)
 
 
 def mercury_in_a_box(turned):
@@ -282,9 +302,9 @@ def mercury_in_a_box(turned):
 
 @pytest.mark.parametrize("turned", [1, -1])
 def test_walls_of_mercury(turned):
-    found = read_mercury(*given(*mercury_in_a_box(turned)), 0.5, walls=True)
+    found = read_mercury(*given(*mercury_in_a_box(turned)), 0.5, walls="pressing")
     assert np.allclose(found.forces, [[1, 0]] * 12) and ensemble(found).dimension == 6
-    assert np.allclose(found.load[4:], boxed(OUTER + INNER, walls=True).load[4:])
+    assert np.allclose(found.load[4:], boxed(OUTER + INNER, walls="pressing").load[4:])
     assert found.info["walls"] == 4
 
 
@@ -339,5 +359,7 @@ def test_notes_go_to_stderr(away, capsys):
     assert main(["import", "yade", "b.txt", "i.txt", "--mu", "0.5", "--json"]) == 0
     out, err = capsys.readouterr()
     assert err.startswith("granforce: 8 contacts with walls") and out.startswith("{")
-    assert main(["import", "yade", "b.txt", "i.txt", "--mu", "0.5", "--walls", "--json"]) == 0
+    assert (
+        main(["import", "yade", "b.txt", "i.txt", "--mu", "0.5", "--walls", "held", "--json"]) == 0
+    )
     assert '"walls": 4' in capsys.readouterr().out

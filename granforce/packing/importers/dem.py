@@ -51,6 +51,8 @@ from granforce.records import (
 _FLAT = 1e-3
 # Of a force that is nothing, so that its direction is none.
 _TINY = 1e-300
+# What walls may be, as grains.
+WALLS = "held", "pressing"
 _BODY = ("x", "y", "z", "r", "id")
 _INTERACTION = ("id1", "id2", "fnx", "fny", "fnz", "fsx", "fsy", "fsz")
 _FSTAT = ("time", "i", "j", "x", "y", "z", "delta", "deltat", "fn", "ft")
@@ -81,7 +83,7 @@ def read_yade(
     box: npt.ArrayLike | None = None,
     tilt: float = 0.0,
     columns: Mapping[str, str] | None = None,
-    walls: bool = False,
+    walls: str | None = None,
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
@@ -94,7 +96,8 @@ def read_yade(
 
     Bodies that interact and are not listed are walls, where the list has ids. What they do to
     grains becomes the grains' load or, with `walls`, forces of contacts: each wall is then one more
-    grain, whose load is the force that the grains exert on it. packing.info has notes of this.
+    grain, "held" (its balance is left open, so that it takes any force) or "pressing" (with the
+    force that it has in the simulation as its load). packing.info has notes of this.
     Raises InputError naming file and line.
     """
     cell = _cell(box, tilt)
@@ -153,7 +156,7 @@ def read_mercury(
     frame: int | None = None,
     box: npt.ArrayLike | None = None,
     tilt: float = 0.0,
-    walls: bool = False,
+    walls: str | None = None,
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Packing:
@@ -180,7 +183,7 @@ def open_mercury(
     *,
     box: npt.ArrayLike | None = None,
     tilt: float = 0.0,
-    walls: bool = False,
+    walls: str | None = None,
     reverse: bool = False,
     most_grains: int | None = None,
 ) -> Snapshots:
@@ -238,7 +241,7 @@ def _mercury_packing(
     links: Table,
     mu: float,
     cell: Cell,
-    walls: bool,
+    walls: str | None,
     reverse: bool,
     most_grains: int | None,
 ) -> Packing:
@@ -260,8 +263,6 @@ def _mercury_packing(
         sign = np.where(np.sum(normal * out, axis=1) < 0, -1.0, 1.0)[:, None]
         on_walls = _OnWalls(grain, number, sign * normal, sign * force, names.tolist())
     links = links.some(np.flatnonzero((first >= 0) & (second >= 0)))
-    if not links.rows:
-        raise InputError(f"{links.name}: no contact between two particles at time {step.time:g}")
     i, j = links.lookup("i", ids), links.lookup("j", ids)
     normal, force = _mercury_forces(links, plane)
     # That of the grain that n points to.
@@ -292,7 +293,7 @@ def _packing(
     mu: float,
     cell: Cell,
     on_walls: _OnWalls | None,
-    walls: bool,
+    walls: str | None,
     reverse: bool,
     most_grains: int | None,
     source: str,
@@ -302,9 +303,15 @@ def _packing(
     x = cell.wrapped(np.column_stack([grains.numbers(axis) for axis in plane]))
     r = grains.numbers("r")
     check_disks(x, r, cell, grains.place)
+    if walls not in (None, *WALLS):
+        raise InputError(f"walls are {' or '.join(WALLS)}, got {walls!r:.40}")
+    if walls and on_walls is None:
+        raise InputError(f"{links.name}: no contact with a wall; leave out walls (--walls)")
     carrying = np.flatnonzero(force.any(axis=1))
-    if not len(carrying):
-        raise InputError(f"{links.name}: no contact carries force; is the packing compressed?")
+    if not len(carrying) and not walls:
+        raise InputError(
+            f"{links.name}: no contact of two grains carries force; is the packing compressed?"
+        )
     skipped = len(force) - len(carrying)
     on_j = force[carrying]
     left = once(i[carrying], j[carrying], on_j, LOAD_MISFIT, lambda c: links.place(carrying[c]))
@@ -312,8 +319,6 @@ def _packing(
     joined = listed(x, r, cell, i[carrying], j[carrying], lambda c: links.place(carrying[c]))
     forces = components(on_j, joined.normal)
     told: dict[str, Any] = {"forces": "given", "contacts_skipped": skipped}
-    if walls and on_walls is None:
-        raise InputError(f"{links.name}: no contact with a wall; leave out walls (--walls)")
     if on_walls is not None:
         told["notes"] = [_note_of(on_walls, walls, cell)]
     if walls and on_walls is not None:
@@ -323,10 +328,15 @@ def _packing(
     packing = make_packing(
         x, r, cell.box, joined, forces, mu, info={"source": source}, tilt=cell.tilt
     )
-    return adopt(packing, reverse=reverse, **told)
+    packing = adopt(packing, reverse=reverse, **told)
+    if walls == "held":
+        load = packing.load.copy()
+        load[len(grains.rows) :] = np.nan
+        packing = packing._replace(load=load)
+    return packing
 
 
-def _note_of(on_walls: _OnWalls, walls: bool, cell: Cell) -> str:
+def _note_of(on_walls: _OnWalls, walls: str | None, cell: Cell) -> str:
     """What became of contacts with walls; InputError for walls in a periodic box."""
     count, names = len(on_walls.grain), some_of(on_walls.names)
     if not np.isinf(cell.box).any():
@@ -336,8 +346,8 @@ def _note_of(on_walls: _OnWalls, walls: bool, cell: Cell) -> str:
     if walls:
         return f"{count} contacts with walls ({names}) are contacts of the packing"
     return (
-        f"{count} contacts with walls ({names}) count as loads on the grains; --walls (walls=True) "
-        "makes them contacts"
+        f"{count} contacts with walls ({names}) count as loads on the grains; --walls {WALLS[0]} "
+        f"or {WALLS[1]} makes them contacts"
     )
 
 

@@ -91,6 +91,8 @@ def once(
     force (k, 2): on j. Raises InputError where both rows of a pair differ by more than `allowed`,
     a part of the mean force.
     """
+    if len(i) < 2:
+        return np.arange(len(i))
     low, high = np.minimum(i, j), np.maximum(i, j)
     order = np.lexsort((high, low))
     again = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
