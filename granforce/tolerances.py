@@ -63,5 +63,9 @@ LARGEST_FRICTION = 1e4
 # Pressures and radii lie within this factor of 1: squares and products of forces stay finite.
 LARGEST_UNIT = 1e60
 
+# Measured forces up to so many ⟨f_n⟩, with errors up to so many and down to the inverse of that,
+# are resolved together: beyond, a unit is wrong.
+MEASURED, ERRORS = 1e6, 1e9
+
 # Friction coefficients are compared and stored on this relative grid (0.1 + 0.2 is 0.3).
 MU_DIGITS = 9

@@ -77,6 +77,8 @@ class Walls(NamedTuple):
         return y
 
 
+# What steps of a centre that is none lead to is seen by its sign.
+@np.errstate(divide="ignore", over="ignore", invalid="ignore")
 def walls(
     ensemble: Ensemble, weight: Floats | float = 0.0, measured: Floats | float = 0.0
 ) -> Walls:
@@ -101,6 +103,11 @@ def walls(
     thin = _is_thin(frame, y if centre is None else centre)
     if thin:
         centre = _centred(frame, y, _thin_matrix)
+    if centre is None and np.any(weight):
+        raise UndecidedError(
+            "no centre of what is measured was found: its errors are too small, for the forces or "
+            "beside each other; take larger ones"
+        )
     if centre is None:
         raise InputError(certificates.UNBOUNDED)
     if not np.all(centre >= 0):

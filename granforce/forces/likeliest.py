@@ -22,7 +22,7 @@ from granforce.numerics.interior_point import OPTIMUM
 from granforce.numerics.lanes import LANES, MANY, ONE
 from granforce.records import Floats, InputError, positive
 from granforce.system import cancelling
-from granforce.tolerances import BALANCED
+from granforce.tolerances import BALANCED, ERRORS, MEASURED
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble
@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # it needs this file to run
 # What was not measured counts as 0 with a standard error of so many ⟨f_n⟩, if not told otherwise:
 # among networks that the measurement cannot tell apart, the one with the least forces is taken.
 UNMEASURED = 1e3
+_PARTS = "f_n", "f_t"
 # Steps of the contact program; it ends balanced, with a mean product of forces and multipliers
 # (in ⟨f_n⟩², the largest weight 1) by which forces are known to the root of it. Bounds on single
 # forces leave fewer digits: beyond, rounding drives the multipliers away.
@@ -65,7 +66,9 @@ def likeliest(
     Raises InputError as `checked` does, NotJammedError where S is empty.
     """
     m, s = checked(ensemble, measured, sigma)
-    forces = fitted(ensemble, m, s, positive(unmeasured, "unmeasured"))
+    if not 1 / ERRORS <= positive(unmeasured, "unmeasured") <= ERRORS:
+        raise InputError(f"unmeasured must be from {1 / ERRORS:g} to {ERRORS:g}, got {unmeasured}")
+    forces = fitted(ensemble, m, s, unmeasured)
     deviation = (forces - m) / s
     freedom = int(np.isfinite(deviation).sum()) - _adapted(ensemble, m, forces)
     return Likeliest(forces, float(np.nansum(deviation**2)), freedom, deviation)
@@ -77,7 +80,8 @@ def checked(
     """m and σ (N_c, 2), NaN in both where nothing was measured.
 
     measured (N_c, 2), force; sigma likewise, or one number, or two for f_n and f_t. Raises
-    InputError for shapes that do not fit, infinite numbers, and σ ≤ 0.
+    InputError for shapes that do not fit, infinite numbers, σ ≤ 0, and sizes beyond MEASURED or
+    ERRORS.
     """
     shape = (len(ensemble.index), 2)
     try:
@@ -93,8 +97,19 @@ def checked(
         raise InputError("measured forces and errors must be finite, or NaN where not measured")
     for c, part in np.argwhere(s <= 0)[:1]:
         raise InputError(
-            f"the error of {'f_t' if part else 'f_n'} on contact {ensemble.index[c]} is "
-            f"{s[c, part]:g}; errors must be above 0"
+            f"the error of {_PARTS[part]} on contact {ensemble.index[c]} is {s[c, part]:g}; errors "
+            "must be above 0"
+        )
+    unit = ensemble.force_scale
+    for c, part in np.argwhere(np.abs(m) > MEASURED * unit)[:1]:
+        raise InputError(
+            f"{_PARTS[part]} measured on contact {ensemble.index[c]} is {m[c, part]:g}, more than "
+            f"{MEASURED:g} times the mean normal force {unit:.3g}; check the unit"
+        )
+    for c, part in np.argwhere((s < unit / ERRORS) | (s > unit * ERRORS))[:1]:
+        raise InputError(
+            f"the error of {_PARTS[part]} on contact {ensemble.index[c]} is {s[c, part]:g}, a "
+            f"factor of more than {ERRORS:g} from the mean normal force {unit:.3g}; check the unit"
         )
     return m, s
 

@@ -114,6 +114,8 @@ def margin(packing: Packing) -> Margin:
     Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs 10⁻⁶ apart or more;
     soft or measured disks overlap, and their contacts have no such margin.
     """
+    if not len(packing.r):
+        return Margin(0.0, SKIN / 2)
     unit = packing.r.max()
     i, j, shift = find_pairs(packing.x, packing.r, packing.cell, SKIN / 2 * unit)
     normal, _, gap = separations(packing.x, packing.r, packing.cell, i, j, shift)

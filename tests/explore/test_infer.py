@@ -297,3 +297,20 @@ def test_what_is_prescribed_or_known_holds_in_every_draw(conditions):
     assert body.admits(found.forces, violation=1e-6)
     assert found.draws.residual.max() < 1e-10 and found.draws.violation.max() < 1e-9
     assert np.abs(found.forces - by_piqp(body, m, sigma)).max() < 1e-4 * body.force_scale
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "factor, sigma, unmeasured, words",
+    [
+        (1e300, 0.1, 1e3, "f_n measured on contact .* check the unit"),
+        (1, 1e300, 1e3, "the error of f_n on contact .* check the unit"),
+        (1, 1e-300, 1e3, "the error of f_n on contact .* check the unit"),
+        (1, 0.1, 1e300, "unmeasured must be from 1e-09 to 1e.09"),
+        (0, 1e-6, 1e3, "its errors are too small"),
+    ],
+)
+def test_what_cannot_be_resolved_is_refused_in_a_line(factor, sigma, unmeasured, words):
+    S = ensemble(reference("n100_mu0.1_s11"))
+    with pytest.raises(InputError, match=words):
+        infer(S, factor * S.original, sigma * S.force_scale, states=4, unmeasured=unmeasured)

@@ -18,7 +18,14 @@ from granforce.packing.compaction import (
     pack,
 )
 from granforce.packing.neighbours import find_pairs, separations
-from granforce.records import Cancelled, Cell, InputError, NotJammedError
+from granforce.records import (
+    Cancelled,
+    Cell,
+    InputError,
+    NotJammedError,
+    make_contacts,
+    make_packing,
+)
 from granforce.tolerances import APART, CLOSED, LARGEST_FRICTION
 
 
@@ -203,6 +210,12 @@ def test_contacts_are_told_from_other_pairs_by_a_gap_in_the_gaps(mu):
     c = packing.contacts
     less = packing._replace(contacts=type(c)(*(values[1:] for values in c)))
     assert margin(less).other < CLOSED and not margin(less).certain
+
+
+def test_no_grains_have_a_margin():
+    none = np.zeros((0, 2))
+    empty = make_packing(none, [], [3, 3], make_contacts([], [], none, [], np.zeros(0)), none, 0.3)
+    assert margin(empty).contact == 0 < margin(empty).other
 
 
 def test_a_margin_does_not_depend_on_units():

@@ -74,7 +74,13 @@ def test_what_does_not_fit_is_said():
     assert 0.7 < ratio[0.3] < 1.4 < ratio[0.1]
 
 
+@pytest.mark.filterwarnings("error")
 def test_what_is_wrong_is_told():
-    for options in ({"noise": -1}, {"missed": 1.0}, {"blur": np.nan}, {"pixels": 0}, {"seed": -1}):
+    packing = packed(20, 0.3)
+    wrong = [{"noise": -1}, {"missed": 1.0}, {"blur": np.nan}, {"pixels": 0}, {"seed": -1}]
+    wrong += [{name: size} for name in ("pixels", "newton") for size in (1e308, 1e-308)]
+    for options in (*wrong, {"noise": 1e200}):
         with pytest.raises(InputError):
-            synthetic_frame(packed(20, 0.3), **options)
+            synthetic_frame(packing, **options)
+    with pytest.raises(InputError, match="no forces of its own"):
+        synthetic_frame(packing._replace(forces=0 * packing.forces))

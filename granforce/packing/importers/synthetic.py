@@ -20,6 +20,7 @@ from granforce.records import (
     whole,
 )
 from granforce.system.files import written
+from granforce.tolerances import LARGEST_UNIT
 
 
 class SyntheticFrame(NamedTuple):
@@ -86,14 +87,23 @@ def synthetic_frame(
     their direction and force; False: grains there are flagged only. pixels: of the unit of length;
     newton: mean normal force. number: of the frame.
 
-    Raises InputError for sizes below 0.
+    Raises InputError for sizes below 0, or beyond LARGEST_UNIT, and for a packing without forces.
     """
     for value, name in ((noise, "noise"), (missed, "missed"), (false, "false"), (blur, "blur")):
-        if not 0 <= value < np.inf or (name == "missed" and value >= 1):
-            raise InputError(f"{name} must be finite and at least 0 (missed: below 1), got {value}")
+        if not 0 <= value <= LARGEST_UNIT or (name == "missed" and value >= 1):
+            raise InputError(
+                f"{name} must be from 0 to {LARGEST_UNIT:g} (missed: below 1), got {value}"
+            )
+    for value, name in ((pixels, "pixels"), (newton, "newton")):
+        if not 1 / LARGEST_UNIT <= positive(value, name) <= LARGEST_UNIT:
+            raise InputError(
+                f"{name} must be from {1 / LARGEST_UNIT:g} to {LARGEST_UNIT:g}, got {value}"
+            )
+    if not np.any(packing.forces[:, 0] > 0):
+        raise InputError("the packing has no forces of its own that could be measured")
     rng = np.random.default_rng(random_seed(seed))
     S = ensemble(packing)
-    c, unit = S.contacts, positive(newton, "newton")
+    c, unit = S.contacts, float(newton)
     branch = packing.x[c.j] - packing.x[c.i]
     inside = np.abs(branch - c.length[:, None] * c.normal).max(axis=1) < 1e-6 * packing.r.max()
     forces = unit * S.original / S.original[:, 0].mean()
@@ -122,7 +132,7 @@ def synthetic_frame(
     mean = packing.r.mean()
     x = packing.x + blur * mean * rng.standard_normal(packing.x.shape)
     r = packing.r * (1 + blur * rng.standard_normal(count)).clip(0.5, 1.5)
-    size = positive(pixels, "pixels")
+    size = float(pixels)
     listing = Listing(
         ids=np.arange(1.0, count + 1),
         x=size * x,
