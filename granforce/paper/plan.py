@@ -29,6 +29,7 @@ from granforce.perturb.critical_force import MOST_STEPS
 from granforce.records import InputError
 from granforce.study import kinds, scan
 from granforce.study.cells import Cell, Kind, load
+from granforce.study.keys import canonical
 from granforce.study.store import open_store
 
 # The smallest two lie where soft modes do not yet amplify friction beyond its linear effect.
@@ -176,25 +177,21 @@ def packings(wanted: Iterable[Task]) -> list[Cell]:
     unique: dict[Any, Any] = {}
     for task in wanted:
         named = task.cell.parameters["packing"]
-        unique.setdefault(str(sorted(named.items())), Cell(kinds.PACKING, named))
+        unique.setdefault(canonical(named), Cell(kinds.PACKING, named))
     return list(unique.values())
 
 
 def compute(path: str | Path, wanted: Sequence[Task], **options: Any) -> list[tuple[Cell, str]]:
-    """Compute tasks into the store at path; options as for `scan.run`.
+    """Compute tasks into the store at path, in their order; options as for `scan.run`.
 
-    One family of parts after the other, the packings that it needs first: whenever it ends, what is
-    most wanted is there. Returns what failed as (cell, error message); cells of failed packings are
-    not tried.
+    A packing is made when the first task needs it: whenever it ends, what is most wanted is there.
+    Returns what failed as (cell, error message); cells of failed packings are not tried.
     """
-    cells: list[Cell] = []
-    known: list[Cell] = []
-    for _, some in itertools.groupby(wanted, lambda task: _family(task.part)):
-        family = list(some)
-        needed = [cell for cell in packings(family) if cell not in known]
-        known += needed
-        cells += [*needed, *(task.cell for task in family)]
-    return scan.run(path, cells, **options)
+    cells: dict[str, Cell] = {}
+    for task in wanted:
+        for cell in (*packings([task]), task.cell):
+            cells.setdefault(f"{cell.kind.name} {canonical(cell.parameters)}", cell)
+    return scan.run(path, list(cells.values()), **options)
 
 
 def _task(
