@@ -286,37 +286,61 @@ def test_limits_hold_whatever_is_said(shared):
 # Hours of work, by bounds that a shared server does not have; and minutes within them.
 HOSTILE = (
     "?scene=many&n=60&mu=0.3&seed=777&states=500&sweeps=10000&accuracy=1e-6&dt=0.01&box_mass=10000",
-    "?scene=many&n=60&mu=0.3&seed=778&states=500&sweeps=1000&accuracy=1e-3&dt=0.02&box_mass=300",
+    LONG.format(778),
     LONG.format(779),
 )
 
 
-def test_links_that_ask_for_hours_start_nothing_on_a_shared_server(shared):
-    """Visitors who open them say nothing more; another has his states meanwhile."""
-    url, _, folder = shared
+async def _pulled(client):
+    """The document of a page as the server has it now."""
+    await Protocol().create("PULL-DOC-REQ").send(client.socket)
+    return (await client.answer("PULL-DOC-REPLY")).content["doc"]
+
+
+def _button(part, label):
+    """The id of the button whose label begins so, in a document; None without one."""
+    if isinstance(part, dict):
+        data = part.get("attributes", {}).get("data")
+        told = data.get("attributes", {}) if isinstance(data, dict) else {}
+        if str(told.get("label", "")).startswith(label) and told.get("visible", True):
+            return part["id"]
+        part = list(part.values())
+    found = (_button(inner, label) for inner in part) if isinstance(part, list) else ()
+    return next((one for one in found if one), None)
+
+
+def test_links_start_nothing_dear_and_who_starts_it_keeps_nobody_waiting(shared):
+    """Two open links that ask for hours, press Compute all the same; a third has his states."""
+    url, server, folder = shared
     before = {entry.name for entry in kept(folder)}
 
-    async def hostile():
+    def new():
+        return [_seed(entry) for entry in kept(folder) if entry.name not in before]
+
+    async def attack():
         clients = [await Client.opened(url, query) for query in HOSTILE]
         for client in clients:
             await client.ready()
-        return clients
-
-    async def all_of_them():
-        clients = await hostile()
         await asyncio.to_thread(computes, shared, 301)
-        said = []
+        said = [json.dumps(await _pulled(client), ensure_ascii=False) for client in clients]
+        assert "must lie between" in said[0]
+        assert all("press Compute" in document for document in said[1:])
+        assert new() == [301]
+        for client in clients[1:]:
+            pressed = ["model", {"id": _button(await _pulled(client), "Compute μ")}]
+            data = {"type": "map", "entries": []}
+            await client.patch([_event("dom_event", [pressed, ["node", "click"], ["data", data]])])
+        begun = computed(server)
+        while computed(server) < begun + 2.0:
+            await asyncio.sleep(0.05)
+        await asyncio.to_thread(computes, shared, 302)
+        under_way = [json.dumps(await _pulled(client)) for client in clients[1:]]
+        assert all("Cancel" in document for document in under_way)
         for client in clients:
-            await Protocol().create("PULL-DOC-REQ").send(client.socket)
-            document = (await client.answer("PULL-DOC-REPLY")).content["doc"]
-            said.append(json.dumps(document, ensure_ascii=False))
             client.close()
-        return said
 
-    said = visits(all_of_them())
-    assert [_seed(entry) for entry in kept(folder) if entry.name not in before] == [301]
-    assert "must lie between" in said[0]
-    assert all("press Compute" in document for document in said[1:])
+    visits(attack())
+    assert sorted(new()) == [301, 302]
 
 
 def memory(server):
