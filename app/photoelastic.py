@@ -176,6 +176,12 @@ def account(report: dict[str, Any]) -> Iterator[str]:
     count = report.get
     if "names" in report:
         yield f"Beware: {report['names']}."
+    if "flags_ignored" in report:
+        yield (
+            f"Beware: {report['flags_ignored']} disks are flagged as touching a wall, too many to "
+            "be true. The flags are ignored; disks at the boundary of the frame count as those at "
+            "walls."
+        )
     yield (
         f"Listed are {count('contacts_listed')} contacts of {count('grains')} disks. "
         f"{_walls(report)}"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from frames import file, frame
 
+from app.photoelastic import account
 from granforce.cli.parser import main
 from granforce.packing.importers import read_pegs
 from granforce.packing.importers.boundary import boundary
@@ -56,6 +57,8 @@ def test_a_flag_of_all_grains_is_no_flag_of_walls(made, flag):
     assert np.mean(found.at_wall == right) > 0.85
     (note,) = found.report["notes"]
     assert f"{N} of {N} grains are flagged" in note and "\n" not in note
+    assert found.report["flags_ignored"] == N
+    assert f"Beware: {N} disks are flagged" in " ".join(account(found.report))
     same(found, read(flagged(grains, flag), rows, flag="ignore"))
     assert "notes" not in read(grains, rows, flag="ignore").report
     with pytest.raises(InputError, match="flag"):

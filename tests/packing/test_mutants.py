@@ -164,6 +164,24 @@ def photoelastic(kind):
     }[kind]
 
 
+def strange(kind):
+    """A frame of an experiment whose columns or flags are not what they seem."""
+    grains, rows, _ = frame(24 if kind == "all flagged" else 8, 0.5)
+    rows.sort(key=lambda row: row[1])
+    read = partial(read_pegs, mu=0.5, reach=0.2)
+    if kind == "all flagged":
+        grains, read = [[*row[:-1], 1] for row in grains], partial(read, walls="auto")
+    elif kind == "begun anew":
+        grains, rows = 2 * [row[1:] for row in grains], 2 * [row[1:] for row in rows]
+    elif kind == "third of zeros":
+        rows = [[row[1], row[2], 0, row[3], row[4]] for row in rows]
+    else:
+        named = dict(zip(("i", "j", "ft", "fn", "id", "x", "y", "r"), "23452345", strict=True))
+        read = partial(read, columns=named, flag="ignore")
+    contents = [file(lines).getvalue().encode() for lines in (grains, rows)]
+    return list(map(gzip.compress, contents)) if kind == "gzip" else contents, read
+
+
 # Who makes which, and judges what is taken; the least share that is refused; how many are tried
 # always, and with each of ten seeds from there on under stress. Forces are judged as they are read.
 KINDS = [
@@ -182,6 +200,9 @@ KINDS = [
     (photoelastic, "blanks, walls", whole_frame, 0.1, 60, 1000, 10),
     (photoelastic, "solved, packed", whole_frame, 0.1, 60, 1000, 10),
     (photoelastic, "solved, 7.3", whole_frame, 0.1, 60, 1000, 10),
+    *((strange, kind, whole_frame, 0.05, 60, 1000, 10) for kind in ("all flagged", "begun anew")),
+    *((strange, kind, whole_frame, 0.05, 60, 1000, 10) for kind in ("third of zeros", "columns")),
+    (strange, "gzip", whole_frame, 0.5, 60, 1000, 10),
 ]
 
 

@@ -151,6 +151,7 @@ def read_pegs(
     x, r = listing.x, listing.r
     check_disks(x, r, OPEN, lambda g: listing.place(0, g), OVERLAP)
     sides, note = flagged(listing, flag, walls)
+    ignored = {} if note is None else {"flags_ignored": int(np.sum(listing.flag != 0))}
     listing = listing._replace(flag=sides)
     at_wall = sides != 0
     rows = rows_of(listing)
@@ -201,6 +202,7 @@ def read_pegs(
         "columns": listing.said,
         **({"names": renamed} if renamed else {}),
         "grains": len(r),
+        **ignored,
         "grains_at_walls": int(at_wall.sum()),
         "contacts_listed": first,
         "listed_twice": listed.twice,
