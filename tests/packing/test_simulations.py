@@ -178,6 +178,14 @@ def test_named_contacts_need_no_distance():
     assert read_lammps(*given(particles(1), text), MU).pressure == pytest.approx(1.0)
 
 
+def test_rows_of_contacts_have_any_label():
+    """As `dump_modify label CONTACTS` writes it."""
+    pairs = DUMPS[1].replace("ENTRIES", "CONTACTS")
+    assert read_lammps(*given(DUMPS[0], pairs), MU).pressure == pytest.approx(3.0)
+    cut = pairs[: pairs.rindex("\n9 3 1")]
+    assert read_lammps(*given(DUMPS[0], cut), MU).pressure == pytest.approx(1.0)
+
+
 def test_titles_of_units_and_times_are_passed_over():
     """As `dump_modify units yes time yes` writes them, before each timestep."""
     grains, pairs = (
@@ -312,6 +320,19 @@ def test_ids_are_told_by_the_name_of_the_attribute():
     named = BODIES.replace("# x y z r id", "# made by hand\n#b.id")
     found = read_yade(*given(named, "\n".join(OUTER + INNER)), 0.5)
     assert found.forces.tolist() == [[1, 0]] * 4
+
+
+def test_the_format_tells_the_columns_of_bodies():
+    """Of `export.textExt`: with the id in front, or with the material behind."""
+    rows = [line.split() for line in BODIES.splitlines()[2:]]
+    first = "#format id_x_y_z_r_matId\n" + "\n".join(" ".join([r[4], *r[:4], "0"]) for r in rows)
+    found = read_yade(*given(first, "\n".join(OUTER + INNER)), 0.5)
+    assert found.forces.tolist() == [[1, 0]] * 4
+    last = "#format x_y_z_r_matId\n" + "\n".join(" ".join([*r[:4], "4"]) for r in rows)
+    with pytest.raises(InputError, match="whose ids count lines from 0"):
+        read_yade(*given(last, "\n".join(INNER)), 0.5)
+    with pytest.raises(InputError, match="no column x, y, z, r"):
+        read_yade(*given("#format jointedPM\n1 2 3 4 5", "\n".join(INNER)), 0.5)
 
 
 def test_interactions_have_columns_of_any_name_and_order():

@@ -1,9 +1,9 @@
 """Packings of simulations by YADE and MercuryDPM, from the text files that they write.
 
-YADE: bodies by `export.textExt` (format x_y_z_r, or x_y_z_r_attrs with a column id in its comment;
-without, ids count the lines from 0), and a line for each interaction with id1, id2 and the vectors
-phys.normalForce and phys.shearForce, which its documentation (NormShearPhys) gives in global
-coordinates, as sustained by particle #2 from particle #1.
+YADE: bodies by `export.textExt` (format x_y_z_r, id_x_y_z_r_matId, or x_y_z_r_attrs with a column
+id in its comment; without ids, these count the lines from 0), and a line for each interaction with
+id1, id2 and the vectors phys.normalForce and phys.shearForce, which its documentation
+(NormShearPhys) gives in global coordinates, as sustained by particle #2 from particle #1.
 
 MercuryDPM: $name.data and $name.fstat as its documentation ("Output files", docs.mercurydpm.org)
 has them: for each time step a line N, time and the domain, then the particles (x, y, z, velocity,
@@ -103,6 +103,7 @@ def read_yade(
     cell = _cell(box, tilt)
     tables = _yade_bodies(bodies), _yade_links(interactions, bool(columns))
     grains, links = renamed(columns or {}, _BODY + _INTERACTION, *tables)
+    grains.require("x", "y", "z", "r")
     links.require(*_INTERACTION)
     plane = _plane(grains, 3)
     named = "id" in grains.header
@@ -420,14 +421,17 @@ def _yade_links(source: Source, named: bool) -> Table:
 
 
 def _yade_bodies(source: Source) -> Table:
+    """A Table of bodies, whose columns the format and the last comment tell."""
     name, rows, comments = _split(source)
-    header = ["x", "y", "z", "r"]
-    width = len(rows[0][1])
-    if width > 4:
-        words = comments[-1].split() if comments else []
-        words = words if len(words) == width - 4 else words[4:]
-        if len(words) != width - 4:
-            words = [f"column {k}" for k in range(5, width + 1)]
+    formats = [words[-1] for words in map(str.split, comments) if words[:1] == ["format"]]
+    header = (formats[0] if formats else "x_y_z_r").removesuffix("_attrs").split("_")
+    more = len(rows[0][1]) - len(header)
+    if more > 0:
+        others = [line.split() for line in comments if not line.startswith("format")]
+        words = others[-1] if others else []
+        words = words if len(words) == more else words[len(header) :]
+        if len(words) != more:
+            words = [f"column {len(header) + k + 1}" for k in range(more)]
         header += ["id" if word == "b.id" else word for word in words]
     return make_table(name, header, [fields for _, fields in rows], [k for k, _ in rows])
 

@@ -40,7 +40,8 @@ NAMES = ("id", *itertools.chain(*AXES), "radius", "diameter", *CONTACT_COLUMNS)
 # more, and its columns are not what they are taken for.
 SKEW = 1e-2
 
-_TITLES = ("TIMESTEP", "NUMBER OF", "BOX BOUNDS", "ATOMS", "ENTRIES", "UNITS", "TIME")
+# Titles of items that are more than one word.
+_TITLES = ("NUMBER OF", "BOX BOUNDS")
 
 
 class _Item(NamedTuple):
@@ -75,12 +76,13 @@ class Dump(NamedTuple):
                 item.body.append(line.split())
         return found
 
-    def is_cut(self, step: int, title: str) -> bool:
+    def is_cut(self, step: int) -> bool:
         """Whether a snapshot ends the file before all rows that it announces."""
-        if not self.at[step] or self.at[step].stop != len(self.lines):
+        if self.at[step].stop != len(self.lines):
             return False
         items = self.items(step)
-        number, item = items.get("NUMBER OF"), items.get(title)
+        number = items.get("NUMBER OF")
+        item = items.get(" ".join(number.words)) if number else None
         if not (number and number.body and item):
             return True
         count = number.body[0][0]
@@ -141,16 +143,13 @@ def open_lammps(
         raise InputError(
             f"{first.name} and {second.name} have no timestep in common; dump both at the same step"
         )
-    cut = [
-        dump.name
-        for dump, title in ((first, "ATOMS"), (second, "ENTRIES"))
-        if len(steps) > 1 and dump.is_cut(steps[-1], title)
-    ]
+    cut = [dump.name for dump in (first, second) if len(steps) > 1 and dump.is_cut(steps[-1])]
 
     def read(step: int) -> Snapshot:
         items = first.items(step)
         atoms = _table(first.name, items, "ATOMS")
-        pairs = _table(second.name, second.items(step), "ENTRIES")
+        entries = second.items(step)
+        pairs = _table(second.name, entries, _label(entries))
         atoms, pairs = renamed(columns or {}, NAMES, atoms, pairs)
         check_grains(len(atoms.rows), most_grains, first.name)
         box = box_of(first.name, items)
@@ -191,10 +190,17 @@ def read_dump(source: Source) -> Dump:
 
 
 def _title(heading: str) -> tuple[str, list[str]]:
-    for title in _TITLES:
+    """The title of an item, one word but for _TITLES, and the words behind it."""
+    for title in (*_TITLES, heading.split(" ")[0]):
         if heading == title or heading.startswith(title + " "):
             return title, heading[len(title) :].split()
     return heading, []
+
+
+def _label(items: dict[str, _Item]) -> str:
+    """What a dump of contacts calls its rows: ENTRIES, or what `dump_modify label` makes of it."""
+    label = " ".join(items["NUMBER OF"].words) if "NUMBER OF" in items else ""
+    return label if label not in ("", "ATOMS") else "ENTRIES"
 
 
 def _whole(word: str, name: str, line: int) -> int:

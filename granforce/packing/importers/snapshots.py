@@ -27,7 +27,7 @@ class Snapshots(NamedTuple):
             last = self.numbers[-1]
             note = f"{self.lost}; {self.word} {last} is read" if self.lost else None
             found = self.read(last)
-            return found if note is None else noted(found, note)
+            return found if note is None else _noted(found, note)
         if number not in self.numbers:
             ends = sorted({self.numbers[0], self.numbers[-1]})
             there = f"there is {' … '.join(map(str, ends))}" + (self.lost and f"; {self.lost}")
@@ -35,7 +35,7 @@ class Snapshots(NamedTuple):
         return self.read(self.numbers[self.numbers.index(number)])  # 100.0 is 100
 
 
-def noted(found: Snapshot, note: str) -> Snapshot:
+def _noted(found: Snapshot, note: str) -> Snapshot:
     """The snapshot with one more of its packing's notes."""
     info = found.packing.info
     notes = [*info.get("notes", []), note]
