@@ -72,7 +72,7 @@ def add_cell(command: Parser) -> None:
 
 
 def add_frame(command: Parser, number: str) -> None:
-    command.add_argument("--frame", type=int, help=f"{number} (default: the last that is whole)")
+    command.add_argument("--frame", type=int, help=f"{number} (default: the last complete one)")
 
 
 def add_series(command: Parser) -> None:
@@ -80,8 +80,8 @@ def add_series(command: Parser) -> None:
     others = command.options.keys()
     group = command.add_argument_group(
         "many snapshots",
-        "with --frames: exact intervals of each, into one dataset (--out FOLDER.zarr), and a line "
-        "for each",
+        "with --frames: exact intervals of each snapshot in one dataset (--out FOLDER.zarr), and a "
+        "line for each",
     )
     group.add_argument("--frames", type=str, help="all, or numbers separated by commas")
     group.add_argument(
@@ -116,8 +116,8 @@ def add_wall_contacts(command: Parser) -> None:
     command.add_argument(
         "--walls",
         choices=("held", "pressing"),
-        help="make walls grains: held (they take any force), or pressing (with the force that each "
-        "has in the simulation); default: what walls do to grains is the grains' load",
+        help="treat walls as grains: held (they take any force) or pressing (each carries "
+        "the force that it has in the simulation); default: forces of walls are loads on grains",
     )
 
 
