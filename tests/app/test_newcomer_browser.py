@@ -1,18 +1,14 @@
 """What somebody stumbled over who saw the page for the first time, one test each."""
 
-import re
-
 import pytest
 from serving import (
     MODEL,
     ask,
-    column,
     how_it_is_made,
     more,
     painted,
     picture,
     scene,
-    searched,
     shows,
     until,
 )
@@ -129,40 +125,6 @@ def ring(page):
     return box["x"], box["y"], box["x"] + box["width"], box["y"] + box["height"]
 
 
-@pytest.mark.parametrize(
-    "width, height",
-    [
-        (1280, 900),
-        pytest.param(1920, 1080, marks=pytest.mark.slow),
-        pytest.param(390, 844, marks=pytest.mark.slow),
-    ],
-)
-def test_the_ring_stays_on_force_space_and_on_the_friction(visit, width, height):
-    page = visit(AT + "&tour=4", width, height)
-    page.wait_for_function(f"() => {MODEL}('path_figure')")
-    left, top, right, bottom = ring(page)
-    picture(page, f"newcomer/tour-4-{width}")
-    assert right - left > 0.25 * width and bottom - top > 100
-    page.get_by_role("dialog").get_by_role("button", name="Next").click()
-    page.get_by_role("dialog").get_by_text("9 of 10").wait_for()
-    slider = page.locator(".friction")
-    slider.wait_for()
-    page.wait_for_function(
-        """([ring, slider]) => {
-            const a = ring.getBoundingClientRect(), b = slider.getBoundingClientRect()
-            return b.height > 0 && Math.abs(a.top - b.top) < 2 && Math.abs(a.bottom - b.bottom) < 2
-        }""",
-        arg=[page.locator(".ring").element_handle(), slider.element_handle()],
-    )
-    card = page.get_by_role("dialog").bounding_box()
-    assert ring(page)[3] <= card["y"] or ring(page)[0] >= card["x"] + card["width"]
-    picture(page, f"newcomer/tour-5-{width}")
-    ask(page, 1)  # what the step asks for can be done at once
-    shows(page, 1)
-    page.get_by_role("dialog").get_by_role("button", name="Close").click()
-    page.locator(".ring").wait_for(state="hidden")
-
-
 # 8: words are explained where they stand
 
 
@@ -265,28 +227,6 @@ def test_the_difference_of_two_networks_is_spotted(visit):
     assert told.inner_text() == ""
 
 
-def test_questions_are_asked_before_the_page_shows_the_answers(visit):
-    page = visit(AT + "&predict=2")
-    told = page.locator(".quiz")
-    told.get_by_text("Question 2 of 3").wait_for()
-    extent = scene(page, "Array.from(scene.hand.player.look.extent)")
-    order = sorted(range(len(extent)), key=lambda c: -extent[c])
-    scene(page, f"scene.onSelect({order[4]})")
-    told.get_by_text(f"place 5 of {len(order)}").wait_for()
-    assert scene(page, "scene.selected") == order[0]
-    searched(page, "colour=extent")  # told to the page, too
-    told.get_by_role("button", name="Next question").click()
-    told.get_by_role("button", name="More at first, then less").click()
-    told.get_by_text("Well predicted").wait_for()
-    searched(page, "tab=statistics")
-    told.get_by_role("button", name="Done").click()
-    told.wait_for(state="hidden")
-    more(page).get_by_role("button", name="Predict, then look").click()
-    told.get_by_role("button", name="No, others balance as well").click()
-    told.get_by_text("numbers are left free").wait_for()
-    until(page, "scene.hand.player.replay.position > 0")  # it plays, or has played to the end
-
-
 # 12: at first there is the picture, and little around it
 
 
@@ -307,52 +247,6 @@ def test_the_volume_is_measured_among_the_numbers(visit):
     measure.wait_for()
     page.get_by_text("In numbers").click()
     measure.wait_for(state="hidden")
-
-
-OFFERED = ".scrub, .extras, [aria-expanded]"  # some of what is offered after the first gesture
-
-
-def test_one_thing_comes_first_and_the_rest_once_a_force_was_dragged(visit):
-    """The page moves for a while, rests, and points out what can be dragged; then all is there."""
-    page = visit(AT, first=True)
-    offered = page.locator(OFFERED).filter(visible=True)
-    assert not offered.count()
-    page.locator("button.all").wait_for()
-    page.locator(".turn").get_by_text("how strong can you make this force?").wait_for()
-    until(page, "!scene.hand.player.playing")
-    watched = "(p => { p.opens = true; const { what } = p.invite; p.opens = false; return what })"
-    assert scene(page, f"{watched}(scene.hand.player)") == "watch"  # as long as it moves by itself
-    bins = "new Set(scene.style.bin).size"
-    assert scene(page, bins) == 1  # colours come with what they show
-    x, y = inviting(page)
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x, y - 20, steps=4)
-    until(page, "scene.hand.moved")
-    until(page, f"{bins} > 1")
-    assert not offered.count()  # nothing moves while the hand holds
-    page.mouse.up()
-    page.locator(".scrub").filter(visible=True).wait_for()
-    assert page.evaluate("localStorage.getItem('granforce.network')") == "seen"
-    page.reload()
-    page.locator(".scrub").filter(visible=True).wait_for()
-    assert not page.locator("button.all").is_visible()
-
-
-def test_who_is_new_finds_out_how_far_networks_go(visit):
-    """Force space without its outline, and one bar without its ends, until a force was dragged."""
-    page = visit(AT + "&tab=plane", first=True)
-    page.locator(".turn").get_by_text("a law, or luck?").wait_for()
-    page.wait_for_function(f"() => {MODEL}('outer')?.get_length() > 0")
-    page.get_by_text("less than halfway").first.wait_for(
-        state="hidden"
-    )  # once it is known who is here
-    page.get_by_role("tab", name="How far?").click()
-    page.wait_for_function(f"() => {MODEL}('bars')?.get_length() === 1")
-    page.locator("button.all").click()
-    page.wait_for_function(f"() => {MODEL}('bars').get_length() > 8")
-    page.get_by_role("tab", name="Force space").click()
-    page.get_by_text("halfway").filter(visible=True).first.wait_for()
 
 
 def test_all_controls_are_there_at_once_for_who_asks(visit):
@@ -392,42 +286,3 @@ def test_who_never_saw_the_curve_over_friction_guesses_first(visit):
     )  # points can be clicked again
     page.locator(".turn").get_by_text("at which friction do forces vary most?").wait_for()
     assert page.evaluate("localStorage.getItem('granforce.guess')") == "seen"
-
-
-def inviting(page):
-    """Where on the page the line is that says that it can be dragged."""
-    contact = scene(page, "scene.hand.player.replay.walk.inviting")
-    middle = "(([a, b, c, d]) => scene.toPixel((a + c) / 2, (b + d) / 2))"
-    x, y = scene(page, f"{middle}(scene.ends({contact}))")
-    box = page.locator(".scene").bounding_box()
-    return box["x"] + x, box["y"] + y
-
-
-def test_every_tab_asks_what_the_hand_can_find_out(visit):
-    """Above the packing; in force space for a value near the largest one that is possible."""
-    page = visit()
-    turn = page.locator(".turn")
-    for tab, words in (
-        ("Friction", "at which friction do forces vary most?"),
-        ("Push", "how hard can these two disks be pushed apart?"),
-        # By the bounds, once they are known: other tests may have had them computed.
-        ("How far?", re.compile("how strong can you make|can you make this force larger than")),
-        ("Force space", "can you bring the green force above"),
-    ):
-        page.get_by_role("tab", name=tab).click()
-        turn.get_by_text(words).wait_for()
-    largest = max(column(page, "outer", "x"))
-    asked = float(re.search(r"above ([\d.]+)\?", turn.inner_text())[1])
-    assert 0.85 * largest < asked < largest
-    page.get_by_role("tab", name="How far?").click()
-    x, y = inviting(page)
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x, y - 20, steps=4)
-    turn.wait_for(state="hidden")  # from now on it is known
-    page.mouse.up()
-    searched(page, "pulls=")
-    page.keyboard.press("Escape")
-    page.get_by_role("tab", name="Force space").click()
-    until(page, "scene.pair.length === 2")
-    assert turn.is_hidden()

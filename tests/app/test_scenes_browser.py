@@ -549,27 +549,6 @@ def test_thirteen_disks_ask_for_a_ratio_a_value_and_a_friction(look):
     assert ask(page, "small.body.empty")
 
 
-def test_who_is_new_finds_out_how_far_s_goes(look):
-    """S hides until the first question is answered or all is asked for; the tour speaks of it."""
-    page = look("?scene=box", first=True)
-    assert ask(page, "small.space.fog") and not desk(page).locator(".ranges").is_visible()
-    assert "how large can the violet normal force get?" in desk(page).locator(".quest").inner_text()
-    desk(page).locator("canvas.space").focus()
-    page.keyboard.press("ArrowUp")
-    until(page, "small.space.been.way.length > 1 && small.space.been.sides.size === 0")
-    for _ in range(40):
-        page.keyboard.press("ArrowUp")
-    desk(page).locator(".quest").get_by_text("Next (2 of 3)").wait_for()
-    until(page, "!small.space.fog && small.space.been.sides.size > 0")
-    assert desk(page).locator(".ranges").is_visible()
-    page = look("?scene=groove&mu=0.4", first=True)
-    assert ask(page, "small.space.fog")
-    desk(page).get_by_role("button", name="More …").click()
-    until(page, "!small.space.fog")
-    page = look("?scene=groove&tour=2", first=True)
-    assert not ask(page, "small.space.fog")
-
-
 def test_a_guess_comes_first_and_is_told_beside_the_answer(look):
     page = look("?scene=groove&mu=0.5", first=True)
     quest, space = desk(page).locator(".quest"), desk(page).locator("canvas.space")
