@@ -241,7 +241,7 @@ def float_array(values: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
 
 
 def friction(mu: Any) -> float:
-    """μ as a float on the storage grid (9 significant digits); InputError unless finite and ≥ 0."""
+    """μ as a float on the storage grid (15 digits); InputError unless finite and ≥ 0."""
     try:
         value = float(mu)
     except (TypeError, ValueError, OverflowError):

@@ -43,8 +43,10 @@ CARRYING = 1e-7
 # less that has to be shown: states balanced to BALANCED had 3e-7 where nothing can carry.
 SEEN_CARRYING = 1e-4
 
-# A cone coordinate that stays below this (in ⟨f_n⟩) in all of S is held where it is for sampling.
-FLAT = 1e-8
+# A wall of S (a side of a cone, a known bound) that no point of S is farther away from than this is
+# touched by all of S, which has no dimension across it. In ⟨f_n⟩, and for f_t in μ ⟨f_n⟩. Forces of
+# order 1 are rounded to 10⁻¹⁶: of an S as narrow as this, rounding is 10⁻⁴.
+FLAT = 1e-12
 
 # A network that certifies jamming: relative distance |f − f_dyn| / |f_dyn| between the dynamic
 # forces and the nearest admissible network on the same contacts.
@@ -67,5 +69,6 @@ LARGEST_UNIT = 1e60
 # are resolved together: beyond, a unit is wrong.
 MEASURED, ERRORS = 1e6, 1e9
 
-# Friction coefficients are compared and stored on this relative grid (0.1 + 0.2 is 0.3).
-MU_DIGITS = 9
+# Friction coefficients, and all numbers in the keys of results, are compared and stored to so many
+# digits (0.1 + 0.2 is 0.3).
+MU_DIGITS = 15

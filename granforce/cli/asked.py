@@ -192,6 +192,15 @@ def walked(arguments: argparse.Namespace, output: str | None = None) -> Found:
     )
 
 
+def extension(dataset: xr.Dataset) -> dict[str, Any]:
+    """The dimension of S, and of results that say so which directions are taken as pinned."""
+    lines = {"dimension": dataset["dimension"].item()}
+    if "flat_directions" in dataset and dataset["flat_directions"].item():
+        lines["directions_taken_as_pinned"] = dataset["flat_directions"].item()
+        lines["as_narrower_than"] = dataset["resolution"].item()
+    return lines
+
+
 def write_csv(path: str | Path, columns: Mapping[str, Any]) -> None:
     """Columns {name: array} as a table; whole numbers stay whole."""
     with written(path) as file:

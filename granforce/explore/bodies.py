@@ -2,34 +2,36 @@
 
 In cone coordinates S = {y ≥ 0 : A y = b}. Orthonormal coordinates u of its affine hull, in the
 metric of the 2 N_c forces, make of every y_k ≥ 0 a half-space: a contact slides one way at its
-other side (f_t = ±μ f_n), or opens (f_n = 0). Corners are found by Qhull's half-space intersection
-around a point inside, and then solved for from the sides that meet in them, to rounding. Where S
-has no end in some direction, the half-spaces are cut far outside; the corners there give the rays
-along which it goes on, which are certified (A d = 0, d ≥ 0).
+other side (f_t = ±μ f_n), or opens (f_n = 0). In homogeneous coordinates (u, t) corners u/t and the
+rays of an S without end, t = 0, are the edges of one cone. Qhull finds the edges, as the corners of
+a section through the cone; each is then solved for from the sides that meet in it, to rounding. A
+ray counts as one where it is certified: A d = 0, d ≥ 0.
 """
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 from scipy.spatial import HalfspaceIntersection
 
 from granforce import notebook
 from granforce.explore.thin import null_space
-from granforce.explore.walls import inner_point
+from granforce.forces import hull
 from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.numerics import certificates
-from granforce.records import Floats, InputError, Integers, Packing
-from granforce.tolerances import BALANCED, FLAT
+from granforce.numerics import certificates, inner_point
+from granforce.records import Floats, InputError, Integers, Mask, Packing
 
 MOST_DIMENSIONS = 3
-# Far outside: this many times as large as a network inside.
-_FAR = 1e4
-# Cone coordinates that change less than this along S do not change.
-_STILL = 1e-12
-# Corners nearer than this to a side, relative to their own size, lie in it.
-_IN_SIDE = 1e-9
+# Coordinates y, in ⟨f_n⟩, up to which a point inside is as near as those of usual forces.
+_USUAL = 10.0
+# Along a ray no y falls faster than this, relative to the one that changes most: it is rounding.
+_RAY = 1e-12
+# Least cosine between a ray and what Qhull makes of it.
+_PARALLEL = 1 - 1e-6
+# Distance from a wall, relative to the sizes of which it is the difference, of a point on it.
+_ON_WALL, _ROUNDING = 1e-11, 1e-14
+# Least singular value of unit normals of walls that meet in one point.
+_SINGULAR = 1e-13
 
 OPENS, SLIDES_BACK, SLIDES = 0, -1, 1  # f_n = 0, f_t = −μ f_n, f_t = μ f_n
 
@@ -65,8 +67,8 @@ class Body(NamedTuple):
         """Least and largest f_n, f_t (N_c, 2) of the contacts; ±inf where there is no end."""
         low, high = self.forces(self.corners).min(axis=0), self.forces(self.corners).max(axis=0)
         for along in np.tensordot(self.rays, self.axes, axes=1):
-            high = np.where(along > FLAT, np.inf, high)
-            low = np.where(along < -FLAT, -np.inf, low)
+            high = np.where(along > 10 * _RAY, np.inf, high)
+            low = np.where(along < -10 * _RAY, -np.inf, low)
         return low, high
 
     def _repr_html_(self) -> str:
@@ -78,27 +80,27 @@ class Body(NamedTuple):
 def body(S: Ensemble) -> Body:
     """The Body of an Ensemble S of at most MOST_DIMENSIONS dimensions.
 
-    Raises InputError where there are more, or forces are known.
+    Certificates decide where S has no end: along a ray no load is balanced and no cone is left, to
+    a relative 10⁻¹². Where friction is a little less than the μ′ at which S loses its end (the
+    tangent of half the angle of a groove), far corners are known to a relative 10⁻¹⁵/(1 − μ/μ′).
+
+    Raises InputError where there are more dimensions, or forces are known.
     """
     if S.known is not None:
         raise InputError("S is drawn whole only where no forces are known: leave them out")
-    A, b, T = S.scaled_form
-    y, held = inner_point(A, b)
-    moving = np.flatnonzero(~held)
-    null = null_space(A.toarray()[:, moving])
-    h = null.shape[1]
+    h = S.dimension
     if h > MOST_DIMENSIONS:
         raise InputError(f"S has {h} dimensions; up to {MOST_DIMENSIONS} can be drawn whole")
-    y = _balanced(A.toarray(), b, y, moving)
-    scale = S.force_scale
-    x = np.zeros((T.shape[1], h))
-    x[moving] = null
-    turned, stretch = np.linalg.qr(T @ x)
-    slopes = null @ np.linalg.inv(stretch)
-    corners, rays, members = _corners(slopes, y[moving], A, moving)
-    axes = S.to_forces(turned.T)
-    sides = _sides(S, slopes, moving, corners, members)
-    return Body(S.to_forces(scale * (T @ y)), axes, scale * corners, rays, sides)
+    # By forces, not cone coordinates: their f_t, μ times a difference, is rounded μ times as much.
+    origin = _inner(S)
+    axes = null_space(hull.constraints(S, S.hull.held).toarray(), h)
+    walls, moving = hull.distances(S), np.flatnonzero(~S.hull.held)
+    slopes = (walls @ axes)[moving]
+    shape = _shape(slopes, (walls @ origin)[moving])
+    corners, rays = S.force_scale * shape.corners @ shape.stretch, shape.rays @ shape.stretch
+    sides = _sides(S, shape, slopes, moving)
+    origin = S.to_forces(S.force_scale * origin)
+    return Body(origin, S.to_forces(axes.T), corners, _unit(rays), sides)
 
 
 def fall(packing: Packing, mu: float | None = None) -> Floats | None:
@@ -121,84 +123,134 @@ def fall(packing: Packing, mu: float | None = None) -> Floats | None:
     return motion / (np.abs(motion).max() or 1.0)
 
 
-def _balanced(A: sparse.csr_matrix, b: Floats, y: Floats, moving: Integers) -> Floats:
-    """y with what its program left unbalanced spread over what moves."""
-    y = y.copy()
-    for _ in range(3):
-        y[moving] += np.linalg.pinv(A[:, moving] * y[moving]) @ (b - A @ y) * y[moving]
-    if np.abs(A @ y - b).max(initial=0.0) > BALANCED:
-        raise InputError("S has no point inside that balances; change μ slightly")
-    return y
+def _inner(S: Ensemble) -> Floats:
+    """Forces (unknowns,) inside S, in ⟨f_n⟩, balanced to rounding.
+
+    They are of the usual size: the centre of an S that is long lies far out.
+    """
+    A, y = S.scaled_form[0], S.hull.inner
+    if not S.hull.held.any() and y.max(initial=0.0) > _USUAL:
+        near = inner_point.inner_point(A, S.hull.b)
+        y = y if near.held.any() else near.y
+    x = S.scaled_form[2] @ y
+    return inner_point.balanced(S.A.tocsc(), S.b / S.force_scale, x)[0]
 
 
-def _corners(
-    slopes: Floats, inner: Floats, A: sparse.csr_matrix, moving: Integers
-) -> tuple[Floats, Floats, dict[Any, Any]]:
-    """Corners (V, h) and rays (R, h) of {u : inner + slopes u ≥ 0}, and {row: corners in it}."""
-    h = slopes.shape[1]
-    size = np.linalg.norm(slopes, axis=1)
-    rows = np.flatnonzero(size > _STILL)
+class _Shape(NamedTuple):
+    """S in coordinates w around a point inside, its walls at distances of order 1 from that."""
+
+    walls: Floats  # (n, h) Q: wall k is where Q_k·w = −1
+    stretch: Floats  # (h, h) what takes w to orthonormal coordinates of force: u = w · stretch
+    corners: Floats  # (V, h)
+    rays: Floats  # (R, h)
+    at_corner: Mask  # (V, n) walls that meet in each corner
+    at_ray: Mask  # (R, n) walls along which each ray runs
+
+
+def _shape(slopes: Floats, inner: Floats) -> _Shape:
+    """The _Shape of {u : inner + slopes u ≥ 0}, slopes (n, h), inner (n,)."""
+    n, h = slopes.shape
+    walls, root = np.linalg.qr(slopes / inner[:, None])
+    stretch = np.linalg.inv(root).T
+    corners: dict[bytes, tuple[Floats, Mask]] = {}
+    rays: dict[bytes, tuple[Floats, Mask]] = {}
+    for w, t, defining in _meetings(walls):
+        meeting = _on(walls, w, t)
+        meeting[defining] = True
+        ray = _along(walls[meeting], w) if h else w
+        change = slopes @ (ray @ stretch)
+        change = change / max(np.abs(change).max(initial=0.0), 1e-300)
+        if h and change.min() >= -_RAY and ray @ w > _PARALLEL * np.linalg.norm(w):
+            along = change <= 10 * _RAY
+            rays.setdefault(along.tobytes(), (ray, along))
+            continue
+        w = np.linalg.lstsq(walls[meeting], -np.ones(meeting.sum()), rcond=_SINGULAR)[0]
+        meeting = _on(walls, w, 1.0)
+        if np.linalg.matrix_rank(_unit(walls[meeting]), _SINGULAR) == h:
+            corners.setdefault(meeting.tobytes(), (w, meeting))
+    found = [
+        (
+            np.reshape([w for w, _ in ends], (len(ends), h)),
+            np.reshape([at for _, at in ends], (len(ends), n)).astype(np.bool_),
+        )
+        for ends in (list(corners.values()), list(rays.values()))
+    ]
+    return _Shape(walls, stretch, found[0][0], found[1][0], found[0][1], found[1][1])
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Vectors (…, h) at the length 1."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _along(walls: Floats, w: Floats) -> Floats:
+    """The direction of length 1 along all these walls, nearest to w."""
+    direction = np.linalg.svd(walls)[2][-1] if len(walls) else w
+    return _unit(direction * np.sign(direction @ w or 1.0))
+
+
+def _on(walls: Floats, w: Floats, t: float) -> Mask:
+    """(n,) walls on which the point w/t lies, to rounding."""
+    length = np.linalg.norm(w)
+    size = np.linalg.norm(walls, axis=1) * length + t
+    return np.abs(walls @ w + t) <= _ON_WALL * size + _ROUNDING * np.hypot(length, t)
+
+
+def _meetings(walls: Floats) -> list[tuple[Floats, float, list[int]]]:
+    """(w, t, walls) of the ends of {w : Q w ≥ −1}: corners w/t, or, where t = 0, rays w.
+
+    In homogeneous coordinates (w, t) corners and rays are the edges of one cone, and the corners of
+    a bounded section through it, in which nothing is far out.
+    """
+    h, which = walls.shape[1], _different(walls)
     if h == 0:
-        return np.zeros((1, 0)), np.zeros((0, 0)), {}
-    slope, rest = slopes[rows] / size[rows, None], inner[rows] / size[rows]
-    open_ended = certificates.recession(A[:, moving]) is not None
-    total, reach = slopes.sum(axis=0), _FAR * inner.sum()
-    if open_ended:
-        slope = np.vstack([slope, -total / np.linalg.norm(total)])
-        rest = np.append(rest, reach / np.linalg.norm(total))
-    found = _meetings(slope, rest)
-    near = np.abs(rest + found @ slope.T)
-    in_side = near <= _IN_SIDE * (1 + np.linalg.norm(found, axis=1))[:, None]
-    far = in_side[:, -1] if open_ended else np.zeros(len(found), bool)
-    real = slice(None, -1) if open_ended else slice(None)
-    # To rounding, from the sides that meet there.
-    sides = [np.flatnonzero(member[real]) for member in in_side[~far]]
-    corners = [np.linalg.lstsq(slope[some], -rest[some], rcond=None)[0] for some in sides]
-    rays = [_along(slope[real], member[real], total) for member in in_side[far]]
-    members = {int(row): np.flatnonzero(in_side[~far][:, k]) for k, row in enumerate(rows)}
-    return np.reshape(corners, (-1, h)), np.reshape(rays, (-1, h)), members
+        return [(np.zeros(0), 1.0, [])]
+    rows = np.column_stack([walls[which], np.ones(len(which))])
+    rows = np.vstack([rows, np.append(np.zeros(h), 1.0)])
+    # Across the sum of all rows, which grows along every edge.
+    across = np.linalg.svd(rows.sum(axis=0)[None])[2][1:]
+    slope = rows @ across.T
+    if h == 1:
+        facets = [[int(np.argmax(slope))], [int(np.argmin(slope))]]
+        found = -1 / slope[np.ravel(facets)]
+    else:
+        met = HalfspaceIntersection(np.column_stack([-slope, -np.ones(len(slope))]), np.zeros(h))
+        found, facets = met.intersections, met.dual_facets
+    ends = np.append(np.zeros(h), 1.0) + found @ across
+    defining = [[int(which[k]) for k in facet if k < len(which)] for facet in facets]
+    return [(end[:-1], float(end[-1]), some) for end, some in zip(ends, defining, strict=True)]
 
 
-def _meetings(slope: Floats, rest: Floats) -> Floats:
-    """Points (V, h) where sides rest + slope u ≥ 0 around u = 0 meet."""
-    if slope.shape[1] == 1:
-        up, down = slope[:, 0] > 0, slope[:, 0] < 0
-        return np.array([[-rest[up].min()], [rest[down].min()]])
-    found = HalfspaceIntersection(
-        np.column_stack([-slope, -rest]), np.zeros(slope.shape[1])
-    ).intersections
-    found = found[np.all(np.isfinite(found), axis=1)]
-    scale = 1 + np.linalg.norm(found, axis=1)
-    apart = np.linalg.norm(found[:, None] - found[None], axis=-1) > _IN_SIDE * scale[:, None]
-    first = [k for k in range(len(found)) if np.all(apart[k, :k])]
-    return found[first]
+def _different(walls: Floats) -> Integers:
+    """The first of all walls in each place, without those that are nowhere."""
+    size = np.linalg.norm(walls, axis=1)
+    apart = np.linalg.norm(walls[:, None] - walls[None], axis=-1) > _ON_WALL * size[:, None]
+    return np.flatnonzero([size[k] > 0 and np.all(apart[k, :k]) for k in range(len(walls))])
 
 
-def _along(slope: Floats, member: Any, total: Floats) -> Floats:
-    """The direction that stays in all of these sides and goes outwards."""
-    direction = np.linalg.svd(slope[member])[2][-1] if member.any() else np.ones(len(total))
-    return direction * np.sign(direction @ total) / np.linalg.norm(direction)
+def _sides(S: Ensemble, shape: _Shape, slopes: Floats, moving: Integers) -> tuple[Side, ...]:
+    """Sides: walls that meet S in one of full size, those in one place together."""
+    h = len(shape.stretch)
+    ends = [np.pad(shape.corners, ((0, 0), (0, 1)), constant_values=1.0)]
+    ends.append(np.pad(shape.rays, ((0, 0), (0, 1))))
+    edges, meets = _unit(np.vstack(ends)), np.vstack([shape.at_corner, shape.at_ray])
+    places: dict[bytes, list[int]] = {}
+    for k in range(len(moving) if h else 0):
+        if np.linalg.matrix_rank(edges[meets[:, k]], _SINGULAR) == h:
+            places.setdefault(meets[:, k].tobytes(), []).append(k)
+    return tuple(_side(S, shape, slopes, moving, walls) for walls in places.values())
 
 
-def _sides(
-    S: Ensemble, slopes: Floats, moving: Integers, corners: Floats, members: Any
-) -> tuple[Side, ...]:
-    """Sides of rows that meet the body in one of full size, those of one place together."""
-    h = slopes.shape[1]
-    stops: dict[tuple[int, ...], list[tuple[int, int]]] = {}
-    places: dict[tuple[int, ...], int] = {}
-    for row, inside in members.items():
-        if len(inside) >= max(1, h - 1):
-            stops.setdefault(tuple(inside.tolist()), []).append(_stop(S, int(moving[row])))
-            places[tuple(inside.tolist())] = row
-    sides = []
-    for inside, labels in stops.items():
-        normal = -slopes[places[inside]] / np.linalg.norm(slopes[places[inside]])
-        order = np.array(inside)
-        if h == 3:
-            order = order[_around(corners[order], normal)]
-        sides.append(Side(order, tuple(_joined(labels)), normal))
-    return tuple(sides)
+def _side(
+    S: Ensemble, shape: _Shape, slopes: Floats, moving: Integers, walls: Sequence[int]
+) -> Side:
+    """The Side of walls (positions in moving) that are in one place."""
+    first = walls[0]
+    corners, normal = np.flatnonzero(shape.at_corner[:, first]), -_unit(slopes[first])
+    if len(normal) == 3:
+        points, rays = shape.corners[corners], shape.rays[shape.at_ray[:, first]]
+        corners = corners[_around(points @ shape.stretch, rays @ shape.stretch, normal)]
+    return Side(corners, tuple(_joined(_stop(S, int(moving[k])) for k in walls)), normal)
 
 
 def _stop(S: Ensemble, column: int) -> tuple[int, int]:
@@ -216,8 +268,12 @@ def _joined(labels: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
     return sorted(both.items())
 
 
-def _around(points: Floats, normal: Floats) -> Integers:
-    """The order of points (k, 3) of a plane around their middle."""
+def _around(points: Floats, rays: Floats, normal: Floats) -> Integers:
+    """The order of points (k, 3) of a plane around their middle, begun where rays (r, 3) go out."""
     across = np.linalg.svd(normal[None])[2][1:]
     flat = (points - points.mean(axis=0)) @ across.T
-    return np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))
+    angle = np.arctan2(flat[:, 1], flat[:, 0])
+    if len(rays):
+        out = rays.sum(axis=0) @ across.T
+        angle = (angle - np.arctan2(out[1], out[0])) % (2 * np.pi)
+    return np.argsort(angle)

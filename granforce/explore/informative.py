@@ -12,7 +12,7 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network
 from granforce.records import Cancel, Floats, InputError, Integers, Progress, whole
 from granforce.system import cancelling
-from granforce.tolerances import FLAT
+from granforce.tolerances import INTERVAL_GAP
 
 
 class Informative(NamedTuple):
@@ -87,10 +87,10 @@ def _expected(normal: Floats) -> Floats:
     """(N_c,) part by which the mean deviation of f_n (states, N_c) falls once one is known."""
     off = normal - normal.mean(axis=0)
     spread = off.std(axis=0)
-    unit = np.divide(off, spread, out=np.zeros_like(off), where=spread > FLAT)
+    unit = np.divide(off, spread, out=np.zeros_like(off), where=spread > INTERVAL_GAP)
     correlation = np.clip(unit.T @ unit / len(unit), -1.0, 1.0)
     left = np.sqrt(1 - correlation**2)
-    return np.where(spread > FLAT, 1 - left @ spread / max(spread.sum(), FLAT), 0.0)
+    return np.where(spread > INTERVAL_GAP, 1 - left @ spread / max(spread.sum(), INTERVAL_GAP), 0.0)
 
 
 def _mean_extent(ensemble: Ensemble, workers: int) -> float:

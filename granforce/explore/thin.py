@@ -14,7 +14,6 @@ from granforce.numerics.lanes import LANES
 from granforce.numerics.wall_matrix import DEPENDENT
 from granforce.records import Floats, Integers
 from granforce.system import cancelling
-from granforce.tolerances import FLAT
 
 
 class ThinMatrix(NamedTuple):
@@ -54,13 +53,14 @@ class ThinMatrix(NamedTuple):
 
 
 def thin_matrix(
-    balance: Floats, y: Floats, levers: Floats, weight: Floats, count: int
+    balance: Floats, y: Floats, levers: Floats, weight: Floats, count: int, dimension: int
 ) -> ThinMatrix:
     """The ThinMatrix at y (w,), of its balance (rows, w); weight (2 N_c,): W on levers.
 
-    Which rows follow from others is told before they are weighted by y: that may be 10⁻⁹.
+    The null space has so many dimensions. It is found before rows are weighted by y, which may be
+    as small as FLAT.
     """
-    free = null_space(balance, DEPENDENT)
+    free = null_space(balance, dimension)
     null = cancelling.apart(np.linalg.qr, free / y[:, None])[0]
     along = levers @ null
     H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
@@ -69,7 +69,7 @@ def thin_matrix(
     return ThinMatrix(null, root, levers, inverse, count)
 
 
-def null_space(dense: Floats, least: float = FLAT) -> Floats:
-    """Orthonormal (n, h) of a matrix (rows, n), by singular values below a part of the largest."""
-    _, values, rows = cancelling.apart(np.linalg.svd, dense)
-    return rows[int(np.sum(values > least * values.max(initial=0.0))) :].T
+def null_space(dense: Floats, dimension: int) -> Floats:
+    """Orthonormal (n, dimension) across which a matrix (rows, n) does least."""
+    _, _, rows = cancelling.apart(np.linalg.svd, dense)
+    return rows[len(rows) - dimension :].T

@@ -23,7 +23,7 @@ from granforce.numerics import lanes
 from granforce.numerics.wall_matrix import PROBES
 from granforce.records import Cancel, Cancelled, Floats, InputError, Integers, Mask, Progress
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
+from granforce.tolerances import ADMISSIBLE, BALANCED
 
 # Mean length of a path in root mean square distances of states from the centre; what an effective
 # state costs has its minimum, a flat one, near this.
@@ -404,11 +404,11 @@ def forces_of(ensemble: Ensemble, made: Walls, slacks: Floats) -> Floats:
 def varying(ensemble: Ensemble, made: Walls) -> Mask:
     """Mask (N_c, 2) of components that are not the same in all of S: some random change has them.
 
-    The numbers drawn are always the same.
+    Changes count from a tenth of the resolution of S on. The numbers drawn are always the same.
     """
     T = ensemble.scaled_form[2].tocsc()
     g = np.random.default_rng(0).standard_normal((PROBES, made.count))
     relative = made.moved(g)[:, : len(made.moving)]
     change = T[:, made.moving] @ (made.centre[made.moving] * relative).T
-    size = norm(T, axis=1) * np.sqrt(PROBES)
-    return ensemble.to_forces(np.linalg.norm(change, axis=1) > FLAT * size) > 0
+    least = 0.1 * ensemble.hull.resolution * norm(T, axis=1) * np.sqrt(PROBES)
+    return ensemble.to_forces(np.linalg.norm(change, axis=1) > least) > 0

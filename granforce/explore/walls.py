@@ -11,33 +11,22 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from granforce.explore.billiard import LANES
-from granforce.explore.thin import ThinMatrix, null_space, thin_matrix
-from granforce.forces import knowledge
-from granforce.forces.contact_problem import (
-    MOST_DENSE,
-    independent_problem_of,
-    inner_network,
-    is_a_point,
-)
+from granforce.explore.thin import ThinMatrix, thin_matrix
+from granforce.forces import hull, knowledge
+from granforce.forces.contact_problem import MOST_DENSE, independent_problem_of
 from granforce.forces.ensemble import Ensemble
-from granforce.numerics import certificates, contact_program, wall_matrix
-from granforce.numerics import highs as programs
+from granforce.numerics import contact_program, wall_matrix
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import DEPENDENT, POLISH, PROBES, WallMatrix
 from granforce.records import Floats, InputError, Integers, Mask, UndecidedError
 from granforce.system import cancelling
-from granforce.tolerances import BALANCED, FLAT
+from granforce.tolerances import BALANCED
 
-# What every coordinate is asked to reach, if it can, in the point the centring starts from.
-_AWAY = 0.01
 _MOST_NEWTON_STEPS = 200
 # Newton's decrement at the centre: it only has to make S round.
 _NEAR_CENTRE = 1e-3
-# Dimensions up to which they are counted by dense matrices as well.
-_THIN = 4
 
 
 class Walls(NamedTuple):
@@ -91,13 +80,8 @@ def walls(
     Raises NotJammedError where S is empty, InputError where the centre lies at infinity,
     UndecidedError where no solver could tell, or S is thinner than rounding.
     """
-    A, b, _ = ensemble.scaled_form
-    y = inner_network(ensemble)
-    if y is None:
-        y, held = inner_point(A, b)
-    else:
-        held = (y == 0) | is_a_point(ensemble)
-    frame = _frame(ensemble, y, held, weight, measured)
+    y = ensemble.hull.inner
+    frame = _frame(ensemble, weight, measured)
     centre = _centred(frame, y, _matrix)
     # Where rows are lost, no centre may be found, or a wrong one.
     thin = _is_thin(frame, y if centre is None else centre)
@@ -116,42 +100,6 @@ def walls(
             "larger friction coefficient, or prescribe less"
         )
     return _walls(frame, centre, thin)
-
-
-def inner_point(A: sparse.csr_matrix, b: Floats) -> tuple[Floats, Mask]:
-    """A point y (n,) inside the polytope relative to its affine hull, and the mask of what is held.
-
-    Held are coordinates that stay below FLAT in all of the polytope. Each program raises the sum
-    of what was not seen above it yet, each coordinate counted up to a small value only.
-    """
-    n = A.shape[1]
-    held = np.ones(n, dtype=bool)
-    found = []
-    while held.any():
-        y = _raised(A, b, np.flatnonzero(held))
-        found.append(y)
-        newly = held & (y > FLAT)
-        if not newly.any():
-            break
-        held &= ~newly
-    return np.mean(found, axis=0), held
-
-
-def _raised(A: sparse.csr_matrix, b: Floats, low: Integers) -> Floats:
-    """The y with the largest Σ min(y, _AWAY) over the coordinates `low`."""
-    n = A.shape[1]
-    upper = np.concatenate([np.full(n, np.inf), np.full(len(low), _AWAY)])
-    cost = np.concatenate([np.zeros(n), np.full(len(low), -1.0)])
-    both = sparse.hstack([A, A.tocsc()[:, low]])
-    model = programs.bounded(both, (b, b), (np.zeros(len(upper)), upper), cost, solver="ipm")
-    model.setOptionValue("run_crossover", "off")  # inner points are wanted, not vertices
-    solution = programs.optimal(model)
-    if solution is None:
-        raise certificates.why_unsolved(A, b)
-    solution = np.maximum(solution, 0.0)
-    y = solution[:n]
-    y[low] += solution[n:]
-    return y
 
 
 class _Frame(NamedTuple):
@@ -180,6 +128,10 @@ class _Frame(NamedTuple):
         """The stiffness (N_c, 2) without W."""
         return np.where(self.stiff < PINNED, 0.0, PINNED)
 
+    def conductances(self, curvature: Floats, stiff: Floats) -> tuple[Floats, Floats, Integers]:
+        """`hull.conductances` of a stiffness (n,) along the coordinates and W (N_c, 2)."""
+        return hull.conductances(self.ensemble, self.held, curvature, stiff)
+
     def forces(self, y: Floats) -> Floats:
         """f_n, f_t/μ (N_c, 2) of y (n,)."""
         pairs = y[: self.cones].reshape(len(self.stiff), -1)
@@ -192,43 +144,19 @@ class _Frame(NamedTuple):
         return (self.weight * (self.target - self.forces(y))).ravel()
 
 
-def _frame(
-    ensemble: Ensemble, y: Floats, held: Mask, weight: Floats | float, measured: Floats | float
-) -> _Frame:
-    contacts, mu, known = len(ensemble.index), ensemble.mu, ensemble.known
-    unit = knowledge.units(mu)
-    contact = np.repeat(np.arange(contacts), ensemble.per_contact)
-    normal = np.tile([[1.0, 1.0], [1.0, -1.0]] if mu > 0 else [[1.0, 0.0]], (contacts, 1))
+def _frame(ensemble: Ensemble, weight: Floats | float, measured: Floats | float) -> _Frame:
+    contacts, unit = len(ensemble.index), knowledge.units(ensemble.mu)
     stiff, target = np.empty((2, contacts, 2))
     stiff[:], target[:] = weight * unit**2, measured / unit
-    if mu == 0:
-        stiff[:, 1] = PINNED
-    if known is not None:
-        contact = np.append(contact, known.contact)
-        normal = np.vstack([normal, -known.sign[:, None] * np.eye(2)[known.component]])
-        stiff = np.where(known.pinned, PINNED, stiff)
-    problem = independent_problem_of(ensemble)
-    frame = _Frame(ensemble, problem, contact, normal, held, stiff, target)
-    if held.any():
-        C, _, _ = _conductances(frame, _barrier(frame, y), stiff)
+    stiff = np.maximum(stiff, hull.pinned_stiffness(ensemble))
+    problem, found = independent_problem_of(ensemble), ensemble.hull
+    frame = _Frame(ensemble, problem, *hull.normals(ensemble), found.held, stiff, target)
+    if found.held.any():
+        C, _, _ = frame.conductances(_barrier(frame, found.inner), stiff)
         _, out = wall_matrix.factored(problem.network, C, problem.diagonal, DEPENDENT)
         without = contact_program.without_rows(problem, problem.diagonal, out)
         frame = frame._replace(problem=without)
     return frame
-
-
-def _conductances(
-    frame: _Frame, curvature: Floats, stiff: Floats
-) -> tuple[Floats, Floats, Integers]:
-    """`wall_matrix.conductances` of a stiffness (n,) along the coordinates and W (N_c, 2)."""
-    cones = frame.cones
-    # Half of it still counts as pinned.
-    d = np.where(frame.held, 4 * PINNED, curvature)
-    k = stiff.copy()
-    np.add.at(k, (frame.contact[cones:], (frame.normal[cones:, 1] != 0).astype(int)), d[cones:])
-    if frame.ensemble.mu > 0:
-        return wall_matrix.conductances(d[:cones].reshape(-1, 2), k)
-    return wall_matrix.conductances(np.repeat(d[:cones, None] / 2, 2, axis=1), k)
 
 
 def _barrier(frame: _Frame, y: Floats) -> Floats:
@@ -239,8 +167,8 @@ def _barrier(frame: _Frame, y: Floats) -> Floats:
 def _matrix(frame: _Frame, y: Floats) -> tuple[WallMatrix, Integers]:
     """(K at y, its walls' positions in y)."""
     curvature = _barrier(frame, y)
-    C, _, free = _conductances(frame, curvature, frame.stiff)
-    own, _, _ = _conductances(frame, curvature, frame.known)
+    C, _, free = frame.conductances(curvature, frame.stiff)
+    own, _, _ = frame.conductances(curvature, frame.known)
     moving = np.flatnonzero(~frame.held & (free[frame.contact] > 0))
     padding = -len(moving) % LANES
     contact = np.append(frame.contact[moving], np.zeros(padding, dtype=np.int64))
@@ -265,7 +193,8 @@ def _thin_matrix(frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
     by_pivots, moving = _matrix(frame, y)
     balance = _balance(frame.ensemble, moving)
     levers = np.array([frame.forces(one).ravel() for one in np.diag(y)[moving]]).T
-    return thin_matrix(balance, y[moving], levers, frame.weight.ravel(), by_pivots.count), moving
+    weight, h = frame.weight.ravel(), frame.ensemble.hull.dimension
+    return thin_matrix(balance, y[moving], levers, weight, by_pivots.count, h), moving
 
 
 def _balanced(
@@ -273,8 +202,8 @@ def _balanced(
 ) -> Floats:
     """y, what it lacks of the balance added."""
     if isinstance(matrix, ThinMatrix):
-        A, b, _ = frame.ensemble.scaled_form
-        lacking = matrix.inverse @ (b - A @ y)
+        A, _, _ = frame.ensemble.scaled_form
+        lacking = matrix.inverse @ (frame.ensemble.hull.b - A @ y)
     else:
         lacking = wall_matrix.balancing(matrix, *_rest(frame, y))[: len(moving)]
     return _shifted(y, moving, lacking)
@@ -288,7 +217,7 @@ def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
 def _is_thin(frame: _Frame, y: Floats) -> bool:
     """Whether the sparse factor lost rows of the balance at y, as dense matrices tell."""
     ensemble = frame.ensemble
-    A, b, _ = ensemble.scaled_form
+    A, b = ensemble.scaled_form[0], ensemble.hull.b
     if A.shape[0] > MOST_DENSE:
         return False
     matrix, moving = _matrix(frame, y)
@@ -304,7 +233,7 @@ def _is_thin(frame: _Frame, y: Floats) -> bool:
     if not np.abs(change @ (balance * y[moving]).T).max(initial=0.0) <= BALANCED / 10:
         return True
     h, _ = _shape(frame, _barrier(frame, y), frame.known)
-    return h <= _THIN and h != null_space(balance).shape[1]
+    return h != ensemble.hull.dimension
 
 
 def _centred(
@@ -381,7 +310,7 @@ def _shape(frame: _Frame, curvature: Floats, stiff: Floats) -> tuple[int, float]
     A has part in.
     """
     network, diagonal = frame.problem.network, frame.problem.diagonal
-    C, logs, free = _conductances(frame, curvature, stiff)
+    C, logs, free = frame.conductances(curvature, stiff)
     factors, out = wall_matrix.factored(network, C, diagonal, 0.0)
     rows = int(np.sum((diagonal == 0) & ~out)) + wall_matrix.global_rows(network, factors)
     log_rows = wall_matrix.log_determinant(network, factors)

@@ -20,6 +20,7 @@ from granforce.numerics import (
 )
 from granforce.numerics.contact_matrix import Network
 from granforce.numerics.contact_program import Problem
+from granforce.numerics.linear_programs import Centre
 from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
@@ -34,10 +35,8 @@ SHIFT = 1e-11
 # Rows whose pivot is below this, relative to the largest, follow from others; of so many rows at
 # most that is asked of dense matrices.
 DEPENDENT, MOST_DENSE = 1e-10, 3000
-# Unbalance of a centre, rows of order 1, up to which charts restore its balance; steps it takes.
-UNBALANCED, _RESTORED = 1e-9, 3
-# Least cone coordinate (in ⟨f_n⟩) of a centre that is one for sure.
-WELL_INSIDE = 1e-5
+# How often `in_balance` restores a balance.
+_RESTORED = 3
 
 
 def balance_of(
@@ -125,6 +124,7 @@ def forces_of(ensemble: Ensemble, y: Floats) -> Floats:
 
 _known: weakref.WeakKeyDictionary[Ensemble, list[Any]] = weakref.WeakKeyDictionary()
 _systems: weakref.WeakKeyDictionary[Ensemble, certified_values.System] = weakref.WeakKeyDictionary()
+_centres: weakref.WeakKeyDictionary[Ensemble, Centre] = weakref.WeakKeyDictionary()
 _lock = threading.Lock()
 
 
@@ -170,6 +170,14 @@ def _kept(ensemble: Ensemble) -> list[Any]:
     return found
 
 
+def centre_of(ensemble: Ensemble) -> Centre:
+    """The analytic centre of an ensemble's independent Problem, found on first use."""
+    found = _centres.get(ensemble)
+    if found is None:
+        found = _centres[ensemble] = linear_programs.centre(independent_problem_of(ensemble))
+    return found
+
+
 def make_system(ensemble: Ensemble) -> certified_values.System:
     """The certified_values.System of an ensemble, in the cone coordinates of its Problem.
 
@@ -189,21 +197,24 @@ def _new_system(ensemble: Ensemble) -> certified_values.System:
     T = sparse.kron(sparse.identity(count), block, format="csc")
     A, b = (ensemble.A @ T).tocsr(), ensemble.b / ensemble.force_scale
     loads = ensemble.A.tocsc()[:, :: ensemble.per_contact]
+    sides = slice(len(b), len(b) + (0 if known is None else len(known.contact)))
     bounding = ensemble.pressure_row if ensemble.has_pressure_row else None
     if known is not None:
         value = np.where(known.wholly[:, None], [1.0, 0.0], known.value)
         A, b, _ = knowledge.extended(A, b + _instead(ensemble, known), T, known, mu, value)
         loads = sparse.vstack([loads, sparse.csc_matrix((len(b) - loads.shape[0], count))])
         bounding = None
-    if ensemble.member is not None:
+    if ensemble.reference is not None:
         # Multipliers of rows that follow from others may be large: what the own unbalance of a
         # network, up to BALANCED, contradicts there would pass for a bound.
-        given = A @ _coordinates(ensemble, ensemble.member)
+        given = A @ _coordinates(ensemble, ensemble.reference)
         off = np.abs(given - b)
+        off[sides] = 0.0
         if off.max(initial=0.0) <= 2 * BALANCED:
             b = np.where(off > 10 * ROUNDING, given, b)
     problem = independent_problem_of(ensemble)
-    return certified_values.make_system(problem, A.tocsr(), b, loads.tocsc(), bounding)
+    middle = centre_of(ensemble)
+    return certified_values.make_system(problem, middle, A.tocsr(), b, loads.tocsc(), bounding)
 
 
 def _coordinates(ensemble: Ensemble, forces: Floats) -> Floats:
@@ -231,38 +242,6 @@ def known_part(ensemble: Ensemble, axes: Floats) -> Floats:
         return np.zeros(axes.shape[:-2])
     value = np.where(ensemble.known.wholly[:, None], ensemble.known.value, 0.0)
     return (axes * value).sum(axis=(-2, -1))
-
-
-def inner_network(ensemble: Ensemble) -> Floats | None:
-    """The analytic centre of S in the coordinates of `Ensemble.scaled_form`, None without one.
-
-    S has none where some contact's force is fixed at the wall of its cone, or nearly so. Rows that
-    are scaled up, or all but follow from others, magnify what the centre is out of balance by: that
-    is taken off first.
-    """
-    if ensemble.member is not None and ensemble.is_determined:
-        y = ensemble.coordinates(ensemble.member)
-        return np.where(y > 0.1 * BALANCED, y, 0.0)
-    middle = linear_programs.centre(independent_problem_of(ensemble))
-    y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
-    if not middle.reached or not middle.y.min(initial=1.0) > WELL_INSIDE:
-        return None
-    if ensemble.known is not None:
-        forces, unit = ensemble.known.value, knowledge.units(ensemble.mu)
-        own = np.stack([forces @ (1 / unit), forces @ (np.array([1.0, -1.0]) / unit)], axis=1)
-        y = np.where(ensemble.known.wholly[:, None], np.maximum(own, 0.0), y)
-    inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
-    inner = np.append(inner, middle.y[y.size :])
-    A, b, _ = ensemble.scaled_form
-    if np.abs(A @ inner - b).max(initial=0.0) <= UNBALANCED or A.shape[0] > MOST_DENSE:
-        return inner
-    inner = in_balance(A, b, inner)
-    return inner if inner.min(initial=1.0) > 0 else None
-
-
-def is_a_point(ensemble: Ensemble) -> bool:
-    """Whether S is known to be the network at hand alone."""
-    return ensemble.member is not None and ensemble.is_determined
 
 
 def in_balance(A: sparse.csr_matrix, b: Floats, y: Floats, away: float = 0.0) -> Floats:

@@ -21,8 +21,10 @@ from scipy import sparse
 
 from granforce import notebook
 from granforce.forces import backbone, balance, knowledge
+from granforce.forces.hull import LARGEST_RANK, Hull, hull_of, left_free
 from granforce.forces.knowledge import Known
 from granforce.forces.nearest import nearest
+from granforce.numerics import inner_point
 from granforce.records import (
     Contacts,
     Floats,
@@ -38,9 +40,6 @@ from granforce.tolerances import ADMISSIBLE, BALANCED
 
 # What is prescribed, by its number of values.
 _NAMES = {1: "pressure", 3: "stress"}
-
-# Rows beyond which the dense eigenvalues that give a rank are not worth their time.
-LARGEST_RANK = 3000
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,37 +80,65 @@ class Ensemble:
         return (1 + self.per_contact) * len(self.grains)
 
     @cached_property
+    def hull(self) -> Hull:
+        """The affine hull of S: a point inside, the walls held, and the dimension; see `hull`."""
+        return hull_of(self)
+
+    @property
     def dimension(self) -> int:
-        """Dimension h of S: unknowns that are not pinned, less independent rows.
+        """Dimension h of S: what the balance, all that is pinned and the held walls leave free.
 
         2N_c − (3M − 1) in a disordered packing with prescribed pressure (N_c − (2M − 1) at μ = 0),
-        more in crystals, whose rows depend on each other: rows are counted by the eigenvalues of
-        A Aᵀ. Two less where the whole stress is prescribed, and 2 N_c (N_c at μ = 0) without
-        equations, where the balance of all grains is left open. Beyond LARGEST_RANK rows the
-        generic value is given.
+        more in crystals, whose rows depend on each other, two less where the whole stress is
+        prescribed, and 2 N_c (N_c at μ = 0) without equations, where the balance of all grains is
+        left open. Directions in which S is narrower than FLAT do not count (`flat_directions`).
         """
-        A = self.free_columns
-        rows, unknowns = A.shape
-        if rows > LARGEST_RANK:
-            dependent = 2 if self.has_pressure_row else 3
-            dependent = 0 if balance.left_open_in(self.packing).any() else dependent
-            return max(0, unknowns - (rows - dependent))
-        if not (rows and unknowns):  # the balance of every grain is left open, or all is known
-            return unknowns
-        square = cancelling.apart(np.linalg.eigvalsh, (A @ A.T).toarray())
-        return unknowns - int(np.sum(square > 1e-12 * square[-1]))
+        return self.hull.dimension
+
+    @property
+    def flat_directions(self) -> int:
+        """Directions in which forces could balance but S is too narrow to be resolved: not in h.
+
+        No wall is farther than `hull.resolution` from any point of S there. Components with equal
+        bounds do not count, as their one value is given.
+        """
+        exactly = self.known is not None and self.to_vector(self.known.low == self.known.high)
+        columns = self.A.tocsc()[:, ~np.broadcast_to(exactly, self.free.shape).astype(np.bool_)]
+        same = columns.shape == self.free_columns.shape
+        return max(0, (self.freedom if same else self._left_free(columns)) - self.dimension)
+
+    @cached_property
+    def freedom(self) -> int:
+        """Dimensions that A x = b leaves, whatever the walls: free unknowns less independent rows.
+
+        Beyond LARGEST_RANK rows the generic value is given.
+        """
+        return self._left_free(self.free_columns)
+
+    def _left_free(self, columns: sparse.csc_matrix) -> int:
+        rows, unknowns = columns.shape
+        if rows <= LARGEST_RANK:
+            return left_free(columns)
+        dependent = 2 if self.has_pressure_row else 3
+        dependent = 0 if balance.left_open_in(self.packing).any() else dependent
+        return max(0, unknowns - (rows - dependent))
 
     @property
     def is_determined(self) -> bool:
-        """Whether A x = b leaves no freedom: h = 0, known up to LARGEST_RANK rows."""
-        return self.A.shape[0] <= LARGEST_RANK and self.dimension == 0
+        """Whether A x = b leaves no freedom, known up to LARGEST_RANK rows."""
+        return self.A.shape[0] <= LARGEST_RANK and self.freedom == 0
 
     @property
-    def free_columns(self) -> sparse.csr_matrix:
-        """A without the columns of components that are pinned."""
+    def free(self) -> Mask:
+        """(unknowns,) bool: components that are not pinned."""
         if self.known is None:
-            return self.A
-        return self.A.tocsc()[:, ~self.to_vector(self.known.pinned).astype(np.bool_)]
+            return np.ones(self.A.shape[1], dtype=bool)
+        return ~self.to_vector(self.known.pinned).astype(np.bool_)
+
+    @property
+    def free_columns(self) -> sparse.csc_matrix:
+        """A without the columns of components that are pinned."""
+        return self.A.tocsc()[:, self.free]
 
     @property
     def coordination(self) -> float:
@@ -138,6 +165,22 @@ class Ensemble:
         return next((forces for forces in at_hand if self.admits(forces)), None)
 
     @cached_property
+    def reference(self) -> Floats | None:
+        """The `member` by which rows that follow from others are made to agree; None without one.
+
+        Up to LARGEST_RANK rows it is balanced to rounding, if that leaves it in S: its own
+        unbalance, up to BALANCED, may be more than a thin S is wide, and far ends magnify it.
+        """
+        if self.member is None or self.A.shape[0] > LARGEST_RANK:
+            return self.member
+        vector, free = self.to_vector(self.member) / self.force_scale, self.free
+        A, b = self.free_columns, self.b / self.force_scale
+        rest = b - self.A @ np.where(free, 0.0, vector)
+        vector[free], _ = cancelling.apart(inner_point.balanced, A, rest, vector[free])
+        near = self.to_forces(vector * self.force_scale)
+        return near if self.admits(near) else self.member
+
+    @cached_property
     def scaled_form(self) -> tuple[sparse.csc_matrix, Floats, sparse.csc_matrix]:
         """(A, b, T) of S = {x = ⟨f_n⟩ T y : A y = b, y ≥ 0}; where forces are known, with slacks.
 
@@ -149,7 +192,7 @@ class Ensemble:
         A, b, T = self.scaled_balance
         if self.known is not None:
             A, b, T = knowledge.extended(A, b, T, self.known, self.mu, self.known.value)
-        y = None if self.member is None else self.coordinates(self.member)
+        y = None if self.reference is None else self.coordinates(self.reference)
         if y is not None and self.residual(self.to_forces(T @ y * self.force_scale)) <= BALANCED:
             b = A @ y
         return A, b, T
@@ -200,6 +243,7 @@ class Ensemble:
             "friction coefficient μ": self.mu,
             "mean coordination z": self.coordination,
             "dimension h": self.dimension,
+            **({"directions taken as pinned": flat} if (flat := self.flat_directions) else {}),
             "mean normal force ⟨fₙ⟩": self.force_scale,
             "prescribed": self.prescribed,
         }

@@ -12,7 +12,7 @@ from scipy import sparse
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import Floats, InputError, Integers, Mask, NotJammedError, are_whole
-from granforce.tolerances import ADMISSIBLE, BALANCED
+from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
 
 _NAMES = "f_n", "f_t"
 # Multipliers of statements that take part in a contradiction, relative to the largest.
@@ -108,11 +108,11 @@ def polygons(bounds: Floats, mu: float, scale: float, index: Integers) -> Polygo
         c = int(np.argmax(short))
         raise NotJammedError(_beyond_coulomb(index[c], bounds[c], mu, needed[c], short[c] * scale))
     pinned, value = np.zeros(low.shape, dtype=bool), np.zeros(low.shape)
-    pinned[:, 0] = most[:, 0] - least[:, 0] <= ADMISSIBLE
+    pinned[:, 0] = most[:, 0] - least[:, 0] <= FLAT
     value[pinned[:, 0], 0] = np.maximum(most[pinned[:, 0], 0], 0.0)
     cone = mu * np.where(pinned[:, 0], value[:, 0], most[:, 0]) if mu > 0 else np.zeros(len(low))
     least[:, 1], most[:, 1] = np.maximum(least[:, 1], -cone), np.minimum(most[:, 1], cone)
-    pinned[:, 1] = most[:, 1] - least[:, 1] <= ADMISSIBLE * min(mu, 1.0)
+    pinned[:, 1] = most[:, 1] - least[:, 1] <= FLAT * mu
     pinned[:, 1] &= (mu > 0) | pinned[:, 0]
     fixed = pinned[:, 1]
     value[fixed, 1] = 0.5 * (least[fixed, 1] + most[fixed, 1])

@@ -46,19 +46,20 @@ class System(NamedTuple):
 
 def make_system(
     problem: Problem,
+    middle: Centre,
     A: sparse.csr_matrix,
     b: Floats,
     loads: sparse.csc_matrix,
     bounding: int | None,
 ) -> System:
-    """The System of a Problem; bounding: the row of A that bounds y > 0, None without one.
+    """The System of a Problem and its centre.
 
-    A has the rows of the Problem's balance, then those of its sides and pinned components.
+    bounding: the row of A that bounds y > 0, None without one. A has the rows of the Problem's
+    balance, then those of its sides and pinned components.
 
     Raises NotJammedError where S is empty, InputError where it is not bounded, UndecidedError where
     neither could be shown.
     """
-    middle = linear_programs.centre(problem)
     if bounding is not None:
         combination = np.zeros(len(b))
         combination[bounding] = 1.0

@@ -12,7 +12,7 @@ from granforce.explore.stress_outline import StressOutline
 from granforce.explore.volume import Volume
 from granforce.forces.ensemble import Ensemble
 from granforce.records import Floats
-from granforce.study.schema import labelled
+from granforce.study.schema import extension, labelled
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
 UNDETERMINED = 1e-6
@@ -39,7 +39,7 @@ def intervals_dataset(S: Ensemble, bounds: Intervals, *, seconds: float = 0.0) -
             "cluster": cluster,
             "eta3": measures.eta3(low, high),
             "correlation": measures.correlation(original[:, 0], extent),
-            "dimension": S.dimension,
+            **extension(S),
             "coordination": S.coordination,
             "packing_fraction": S.packing.packing_fraction,
             "force_scale": S.force_scale,
@@ -58,7 +58,7 @@ def informative_dataset(S: Ensemble, found: Informative, *, seconds: float = 0.0
             "part_expected": found.expected,
             "mean_before": found.before,
             "mean_after": found.after,
-            "dimension": S.dimension,
+            **extension(S),
             "force_scale": S.force_scale,
             "seconds": seconds,
         }
@@ -93,7 +93,7 @@ def stress_dataset(S: Ensemble, found: StressOutline, *, seconds: float = 0.0) -
             "stress_own": found.own,
             "friction": found.friction,
             "friction_bound": found.friction_bound,
-            "dimension": S.dimension,
+            **extension(S),
             "seconds": seconds,
         },
         {"counts": json.dumps(found.counts)},
@@ -110,7 +110,7 @@ def volume_dataset(S: Ensemble, found: Volume) -> xr.Dataset:
             "log_volume_per_grain": found.per_grain,
             "extent": found.extent,
             "reached": found.reached,
-            "dimension": found.dimension,
+            **extension(S),
             "coordination": S.coordination,
             "force_scale": S.force_scale,
             **S.skipped,

@@ -23,7 +23,7 @@ ENTRY = re.compile(rf"[a-z][a-z0-9_]*-[0-9a-f]{{{KEY_DIGITS}}}")
 def canonical(value: Any) -> str:
     """Canonical JSON of parameters: equal values give equal text.
 
-    Floats are rounded to 9 significant digits and 1.0 is 1; numpy scalars, tuples and nested
+    Floats are rounded to 15 significant digits and 1.0 is 1; numpy scalars, tuples and nested
     dicts are taken. Raises TypeError for anything else, non-finite numbers included.
     """
     return json.dumps(_plain(value, "parameters"), sort_keys=True, separators=(",", ":"))

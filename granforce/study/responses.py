@@ -11,7 +11,7 @@ from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
 from granforce.perturb.critical_force import CriticalForce
 from granforce.records import Floats, Packing
-from granforce.study.schema import labelled
+from granforce.study.schema import extension, labelled
 
 
 def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> xr.Dataset:
@@ -55,7 +55,7 @@ def perturbation_dataset(S: Ensemble, parts: Sequence[xr.Dataset]) -> xr.Dataset
             "fit_inner": found.ranges[:, 0],
             "fit_outer": found.ranges[:, 1],
             "fit_exponent": found.exponents,
-            "dimension": S.dimension,
+            **extension(S),
             "force_scale": S.force_scale,
             **S.skipped,
             "seconds": float(whole["contact_seconds"].sum()),

@@ -11,7 +11,7 @@ from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
 from granforce.forces.ensemble import Ensemble
 from granforce.records import Floats, Integers
-from granforce.study.schema import labelled
+from granforce.study.schema import extension, labelled
 
 
 def walk_dataset(
@@ -91,7 +91,7 @@ def inference_dataset(
         "chi_square": found.chi_square,
         "freedom": found.freedom,
         "force_scale": S.force_scale,
-        "dimension": S.dimension,
+        **extension(S),
         **S.skipped,
         "seconds": seconds,
     }
@@ -135,7 +135,7 @@ def _measured(S: Ensemble, states: Floats, pick: slice | Integers) -> dict[str, 
         "original": S.original,
         "packing_fraction": S.packing.packing_fraction,
         "coordination": S.coordination,
-        "dimension": S.dimension,
+        **extension(S),
         "force_scale": S.force_scale,
     }
     if not len(states):

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from granforce.forces.ensemble import Ensemble
 from granforce.records import Contacts, Packing
 
 
@@ -166,6 +167,8 @@ VARIABLES: dict[str, Variable] = {
     "packing_fraction": _real("", "1", "packing fraction φ, rattlers included"),
     "coordination": _real("", "1", "mean coordination number z of the backbone"),
     "dimension": _whole("", "dimension h of the ensemble"),
+    "flat_directions": _whole("", "directions too narrow to be resolved, taken as pinned"),
+    "resolution": _real("", _SCALE, "width up to which directions are taken as pinned"),
     "force_scale": _real("", "force", "mean normal force ⟨f_n⟩"),
     "original_distance": _real("", _SCALE, "distance of the original network from the centre"),
     "acceptance": _real("", "1", "accepted states per attempt"),
@@ -234,6 +237,15 @@ VARIABLES |= {
     "shown_normal": _real("shown_state shown", _SCALE, "f_n in some states"),
     "shown_count": _whole("shown ratio", "states of the walk by f_n over its original value"),
 }
+
+
+def extension(S: Ensemble) -> dict[str, Any]:
+    """In how many dimensions S extends, and in how many directions it is too narrow to count."""
+    return {
+        "dimension": S.dimension,
+        "flat_directions": S.flat_directions,
+        "resolution": S.hull.resolution,
+    }
 
 
 def labelled(arrays: Mapping[str, Any], attrs: Mapping[str, Any] | None = None) -> xr.Dataset:

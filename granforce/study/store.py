@@ -43,7 +43,7 @@ class Entry(NamedTuple):
 
     name: str  # folder in the store: <kind>-<key>
     kind: str
-    params: Parameters  # as they entered the key: floats to 9 significant digits
+    params: Parameters  # as they entered the key: floats to 15 significant digits
     version: int | str  # of the algorithm
     bytes: int  # on disk
     created: str  # UTC, ISO 8601

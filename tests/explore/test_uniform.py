@@ -29,9 +29,10 @@ from granforce.explore import billiard, uniform
 from granforce.explore.mixing import mixing
 from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
-from granforce.explore.walls import inner_point, walls
+from granforce.explore.walls import walls
 from granforce.forces.ensemble import ensemble
 from granforce.forces.knowledge import Known
+from granforce.numerics.inner_point import inner_point
 from granforce.packing.importers import read_lammps
 from granforce.records import Cancelled, InputError, NotJammedError
 from granforce.study import cells as study
@@ -329,7 +330,7 @@ def test_flat_bodies_are_sampled_in_their_hull():
     """A segment in 5 coordinates: y0 + y1 = 1 and y2 + y3 + y4 = 0."""
     A = sparse.csc_matrix([[1.0, 1, 0, 0, 0], [0, 0, 1, 1, 1]])
     b = np.array([1.0, 0.0])
-    y, held = inner_point(A, b)
+    y, held, _ = inner_point(A, b)
     assert held.tolist() == [False, False, True, True, True] and y[:2].min() > 1e-3
 
 

@@ -6,9 +6,9 @@ import pytest
 from packings import lattice, packed
 
 import granforce as gf
-from granforce.explore.walls import inner_point
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
+from granforce.numerics.inner_point import inner_point
 from granforce.records import InputError, NotJammedError, UndecidedError
 
 STATUS = highspy.HighsModelStatus
@@ -79,7 +79,7 @@ def saying(monkeypatch, verdicts, spoil=lambda y: y):
 def test_where_one_solver_gives_up_another_goes_on(S, monkeypatch, verdict):
     saying(monkeypatch, [verdict, verdict])
     A, b, _ = S.scaled_form
-    inside, held = inner_point(A, b)
+    inside, held, _ = inner_point(A, b)
     assert np.abs(A @ inside - b).max() <= 1e-8 and inside.min() > 0 and not held.any()
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.cli.asked import conditions, found, known_forces, numbers, write_csv
+from granforce.cli.asked import conditions, extension, found, known_forces, numbers, write_csv
 from granforce.perturb.critical_force import COUNTS
 from granforce.study import kinds
 from granforce.study.cells import Kind
@@ -67,7 +67,7 @@ def intervals(arguments: argparse.Namespace) -> None:
     histogram = np.histogram(position[np.isfinite(position)], bins=10, range=(0, 1))[0]
     lines = {
         "contacts": len(extent),
-        "dimension": dataset["dimension"].item(),
+        **extension(dataset),
         "coordination": dataset["coordination"].item(),
         "exact_eta3": dataset["eta3"].item(),
         "mean_extent_of_f_n": float(extent.mean() / scale),
@@ -114,7 +114,7 @@ def stress(arguments: argparse.Namespace) -> None:
     _, _, dataset, ends = found(arguments, kinds.STRESS, arguments.csv, **asked)
     own = dataset["stress_own"].values
     lines = {
-        "dimension": dataset["dimension"].item(),
+        **extension(dataset),
         "largest_shear_over_pressure": dataset["friction"].item(),
         "certainly_not_above": dataset["friction_bound"].item(),
         "own_shear_over_pressure": float(np.hypot(*own)),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from granforce.cli.asked import (
     conditions,
+    extension,
     found,
     numbers,
     packing_parameters,
@@ -29,6 +30,7 @@ def walk(arguments: argparse.Namespace) -> None:
     lines = {
         "entry": entry,
         **{name: dataset[name].item() for name in (*study.ROW, *study.ROW_COUNTS)},
+        **extension(dataset),
         "mean_iterations": float(dataset["sweeps"].mean()),
         "largest_residual": float(dataset["residual"].max()),
         "largest_violation": float(dataset["violation"].max()),
@@ -38,7 +40,7 @@ def walk(arguments: argparse.Namespace) -> None:
 
 
 UNIFORM_LINES = (
-    *("packing_fraction", "coordination", "dimension", "eta1", "eta2", "eta3", "worst_r_hat"),
+    *("packing_fraction", "coordination", "eta1", "eta2", "eta3", "worst_r_hat"),
     *("least_bulk_size", "least_tail_size", "turns", "refused", "dropped", "held", "skipped"),
     *("rattlers", "unloaded_contacts"),
 )
@@ -58,6 +60,7 @@ def uniform(arguments: argparse.Namespace) -> int:
     lines = {
         "entry": entry,
         "states": dataset.sizes["state"],
+        **extension(dataset),
         **{name: dataset[name].item() for name in UNIFORM_LINES},
         "reached": reached,
         "mean_distance_to_centre": float(dataset["distance_to_centre"].mean()),
@@ -80,7 +83,7 @@ def volume(arguments: argparse.Namespace) -> int:
     reached = bool(dataset["reached"].item())
     lines = {
         "entry": entry,
-        "dimension": dataset["dimension"].item(),
+        **extension(dataset),
         "ln_volume": dataset["log_volume"].item(),
         "standard_error": dataset["log_volume_error"].item(),
         "ln_volume_on_the_way_down": float(down),
@@ -100,10 +103,11 @@ def measure(arguments: argparse.Namespace) -> None:
     _, parameters, dataset, _ = walked(arguments, arguments.contacts)
     scale = dataset["force_scale"].item()
     extent = (dataset["high"] - dataset["low"]).values[:, 0]
-    names = ("coordination", "packing_fraction", "dimension", "eta1", "eta2", "eta3")
+    names = ("coordination", "packing_fraction", "eta1", "eta2", "eta3")
     lines = {
         "mu": parameters["mu"],
         "states": parameters["states"],
+        **extension(dataset),
         **{name: dataset[name].item() for name in names},
         "mean_normal_force": scale,
         "mean_extent_of_f_n": float(extent.mean() / scale),

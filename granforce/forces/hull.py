@@ -1,0 +1,196 @@
+"""The affine hull of S: in which directions S extends, decided once for everything that asks.
+
+Each wall of S is a coordinate y ≥ 0 of `Ensemble.scaled_form`: the distance from a side of a
+Coulomb cone, or from a known bound. A wall whose distance stays below FLAT in all of S is *held*:
+doubles cannot resolve what lies between it and the wall opposite. S counts as flat across held
+walls, and its dimension is that of the networks that balance and keep the held walls.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import norm
+
+from granforce.forces import knowledge
+from granforce.forces.contact_problem import (
+    MOST_DENSE,
+    centre_of,
+    in_balance,
+    independent_problem_of,
+)
+from granforce.numerics import wall_matrix
+from granforce.numerics.contact_program import PINNED
+from granforce.numerics.inner_point import inner_point
+from granforce.records import Floats, Integers, Mask, NotJammedError, UndecidedError
+from granforce.system import cancelling
+from granforce.tolerances import BALANCED, FLAT
+
+if TYPE_CHECKING:  # it needs this file to run
+    from granforce.forces.ensemble import Ensemble
+
+# Rows up to which ranks are those of dense matrices, by eigenvalues relative to the largest.
+LARGEST_RANK, _LEAST_EIGENVALUE = 3000, 1e-12
+# Least distance of a wall from an analytic centre that certainly is one, in ⟨f_n⟩.
+_WELL_INSIDE = 1e-5
+# Unbalance of a centre, rows of order 1, above which its balance is restored.
+_UNBALANCED = 1e-9
+
+
+class Hull(NamedTuple):
+    """A point inside S relative to its affine hull, the walls that hold S in it, and h."""
+
+    inner: Floats  # (n,) y of `Ensemble.scaled_form`, positive where not held
+    held: Mask  # (n,) bool
+    dimension: int
+    b: Floats  # (rows,) A inner, A that of `Ensemble.scaled_form`
+    resolution: float  # in ⟨f_n⟩ (f_t in μ ⟨f_n⟩): no held wall is farther from any point of S
+
+
+def hull_of(ensemble: Ensemble) -> Hull:
+    """The Hull of an ensemble.
+
+    Raises NotJammedError where S is empty, UndecidedError where no solver could tell.
+    """
+    A, b, _ = ensemble.scaled_form
+    if ensemble.member is not None and ensemble.is_determined:
+        y = ensemble.coordinates(ensemble.member)
+        y, held = np.where(y > 0.1 * BALANCED, y, 0.0), np.ones(len(y), dtype=bool)
+        return Hull(y, held, 0, b, FLAT)
+    y = _centre(ensemble)
+    if y is not None:
+        held = np.zeros(len(y), dtype=bool)
+        return Hull(y, held, _dimension(ensemble, held), b, FLAT)
+    try:
+        b = _with_own_limits(ensemble)
+        y, held, resolution = inner_point(A, b)
+    except (NotJammedError, UndecidedError):
+        # Bounds may contradict each other by as little as the judges admit.
+        b = ensemble.scaled_form[1]
+        y, held, resolution = inner_point(A, b)
+    held = _with_opposite(ensemble, held)
+    return Hull(y, held, _dimension(ensemble, held), b, resolution)
+
+
+def _with_own_limits(ensemble: Ensemble) -> Floats:
+    """b (rows,) with known bounds as they are, however far the network at hand exceeds them."""
+    known, b = ensemble.known, ensemble.scaled_form[1]
+    if known is None:
+        return b
+    b, first = b.copy(), ensemble.A.shape[0]
+    limit = known.limit / knowledge.units(ensemble.mu)[known.component]
+    b[first : first + len(limit)] = limit
+    return b
+
+
+def _with_opposite(ensemble: Ensemble, held: Mask) -> Mask:
+    """The held walls, and with each known bound the other bound of its component."""
+    if ensemble.known is None:
+        return held
+    held, first = held.copy(), ensemble.per_contact * len(ensemble.index)
+    component = 2 * ensemble.known.contact + ensemble.known.component
+    held[first:] = np.isin(component, component[held[first:]])
+    return held
+
+
+def _centre(ensemble: Ensemble) -> Floats | None:
+    """The analytic centre y (n,) of S, None where S has none, or is thin.
+
+    S has none where some contact's force is fixed at the wall of its cone. Rows that are scaled up,
+    or all but follow from others, magnify the unbalance of the centre: that is removed first.
+    """
+    middle = centre_of(ensemble)
+    y = middle.y[: 2 * len(ensemble.index)].reshape(-1, 2)
+    if not middle.reached or not middle.y.min(initial=1.0) > _WELL_INSIDE:
+        return None
+    if ensemble.known is not None:
+        forces, unit = ensemble.known.value, knowledge.units(ensemble.mu)
+        own = np.stack([forces @ (1 / unit), forces @ (np.array([1.0, -1.0]) / unit)], axis=1)
+        y = np.where(ensemble.known.wholly[:, None], np.maximum(own, 0.0), y)
+    inner = (y if ensemble.mu > 0 else y.mean(axis=1)).ravel()
+    inner = np.append(inner, middle.y[y.size :])
+    A, b, _ = ensemble.scaled_form
+    if np.abs(A @ inner - b).max(initial=0.0) <= _UNBALANCED or A.shape[0] > MOST_DENSE:
+        return inner
+    inner = in_balance(A, b, inner)
+    return inner if inner.min(initial=1.0) > 0 else None
+
+
+def normals(ensemble: Ensemble) -> tuple[Integers, Floats]:
+    """(contact (n,), normal (n, 2)) of each wall: what unit f_n, f_t/μ add to its distance."""
+    contacts, known = len(ensemble.index), ensemble.known
+    contact = np.repeat(np.arange(contacts), ensemble.per_contact)
+    normal = np.tile([[1.0, 1.0], [1.0, -1.0]] if ensemble.mu > 0 else [[1.0, 0.0]], (contacts, 1))
+    if known is None:
+        return contact, normal
+    sides = -known.sign[:, None] * np.eye(2)[known.component]
+    return np.append(contact, known.contact), np.vstack([normal, sides])
+
+
+def conductances(
+    ensemble: Ensemble, held: Mask, curvature: Floats, stiff: Floats
+) -> tuple[Floats, Floats, Integers]:
+    """`wall_matrix.conductances` of a curvature (n,) along the walls and a stiffness (N_c, 2).
+
+    held (n,): walls along which nothing moves.
+    """
+    contact, normal = normals(ensemble)
+    cones = ensemble.per_contact * len(ensemble.index)
+    # Half of it still counts as pinned.
+    d = np.where(held, 4 * PINNED, curvature)
+    k = stiff.copy()
+    np.add.at(k, (contact[cones:], (normal[cones:, 1] != 0).astype(int)), d[cones:])
+    if ensemble.mu > 0:
+        return wall_matrix.conductances(d[:cones].reshape(-1, 2), k)
+    return wall_matrix.conductances(np.repeat(d[:cones, None] / 2, 2, axis=1), k)
+
+
+def pinned_stiffness(ensemble: Ensemble) -> Floats:
+    """(N_c, 2) PINNED for components of which one value is known, and f_t at μ = 0; else 0."""
+    stiff = np.zeros((len(ensemble.index), 2))
+    if ensemble.mu == 0:
+        stiff[:, 1] = PINNED
+    return stiff if ensemble.known is None else np.where(ensemble.known.pinned, PINNED, stiff)
+
+
+def _dimension(ensemble: Ensemble, held: Mask) -> int:
+    """Unknowns less independent rows, of the balance and of the held walls."""
+    if not held.any() and ensemble.A.shape[0] <= LARGEST_RANK:
+        return ensemble.freedom
+    if ensemble.A.shape[0] > LARGEST_RANK:
+        C, _, free = conductances(ensemble, held, np.ones(len(held)), pinned_stiffness(ensemble))
+        problem = independent_problem_of(ensemble)
+        least = wall_matrix.DEPENDENT if held.any() else 0.0
+        factors, out = wall_matrix.factored(problem.network, C, problem.diagonal, least)
+        rows = int(np.sum((problem.diagonal == 0) & ~out))
+        return int(free.sum()) - rows - wall_matrix.global_rows(problem.network, factors)
+    return left_free(constraints(ensemble, held))
+
+
+def constraints(ensemble: Ensemble, held: Mask) -> sparse.csr_matrix:
+    """(k, free unknowns) rows that vanish along S: the balance, and held walls at the length 1."""
+    walls = distances(ensemble)[held][:, ensemble.free]
+    length = norm(walls, axis=1)
+    length[length == 0] = 1.0
+    return sparse.vstack([ensemble.free_columns, sparse.diags(1 / length) @ walls]).tocsr()
+
+
+def distances(ensemble: Ensemble) -> sparse.csr_matrix:
+    """(n, unknowns) what each unknown adds to the distance y of each wall."""
+    contact, normal = normals(ensemble)
+    size, unit = ensemble.per_contact, knowledge.units(ensemble.mu)
+    rows, columns = np.arange(len(contact))[:, None], size * contact[:, None] + np.arange(size)
+    rows = np.broadcast_to(rows, columns.shape)
+    values = (normal[:, :size] / unit[:size]).ravel()
+    shape = len(contact), size * len(ensemble.index)
+    return sparse.csr_matrix((values, (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def left_free(rows: sparse.csr_matrix) -> int:
+    """Unknowns less independent rows, of rows (k, unknowns) of order 1."""
+    if not all(rows.shape):  # all is pinned, or the balance of every grain is left open
+        return rows.shape[1]
+    square = cancelling.apart(np.linalg.eigvalsh, (rows @ rows.T).toarray())
+    return rows.shape[1] - int(np.sum(square > _LEAST_EIGENVALUE * square[-1]))

@@ -1,0 +1,133 @@
+"""A point inside a polytope {y ≥ 0 : A y = b} relative to its affine hull, however thin it is.
+
+Coordinates of a thin polytope may be as small as 10⁻¹², where solvers of linear programs balance
+to 10⁻¹⁰ only. So a program is solved in a unit of 1, and what was not seen above 0 there once more
+in a unit of 10⁻⁴, as the change from a point that is balanced to rounding (iterative refinement of
+linear programs: Gleixner, Steffy, Wolter, INFORMS J. Comput. 28, 449 (2016)).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from granforce.numerics import certificates
+from granforce.numerics import highs as programs
+from granforce.records import Floats, Mask
+from granforce.system import cancelling
+from granforce.tolerances import FLAT
+
+# Units of the programs. In the last one, FLAT is what solvers tell from 0 beyond doubt.
+_UNITS = 1.0, 1e-4
+# What every coordinate is asked to reach, if it can, in each unit.
+_AWAY = 0.01
+# How often a balance is restored; what is added to the diagonal for rows that follow from others.
+_BALANCING, _SHIFT = 6, 1e-14
+# The last of those steps are all rounding; so many times as much can be told from it.
+_LAST, _BEYOND = 3, 10.0
+
+
+class InnerPoint(NamedTuple):
+    """A point of a polytope, and which of its coordinates cannot move."""
+
+    y: Floats  # (n,)
+    held: Mask  # (n,) bool, coordinates that stay below `resolution` in all of the polytope
+    resolution: float  # FLAT, or what rounding of the balance moves coordinates by, if that is more
+
+
+def inner_point(A: sparse.csr_matrix, b: Floats) -> InnerPoint:
+    """The InnerPoint of {y ≥ 0 : A y = b}, rows of A of order 1; y > 0 in all that is not held.
+
+    Each program raises the sum of what was not seen above the resolution yet, each coordinate
+    counted up to a small value only. What counts as seen is read off points only that are balanced
+    to rounding.
+
+    Raises NotJammedError where the polytope is empty, UndecidedError where no solver could tell.
+    """
+    A = sparse.csc_matrix(A)
+    y, held, resolution = np.zeros(A.shape[1]), np.ones(A.shape[1], dtype=bool), FLAT
+    for unit in _UNITS:
+        y, held, resolution = _searched(A, b, unit, InnerPoint(y, held, resolution))
+    y = np.maximum(y, 0.0)
+    free, rest = A[:, ~held], b - A[:, held] @ y[held]
+    y[~held], _ = cancelling.apart(balanced, free, rest, y[~held])
+    return InnerPoint(y, held | (y <= 0), resolution)
+
+
+def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -> InnerPoint:
+    """The InnerPoint to which programs in this unit lead from one in a larger unit."""
+    held, resolution = start.held.copy(), start.resolution
+    found: list[Floats] = []
+    wanted, untried = held, held
+    while wanted.any():
+        point = _raised(A, b, unit, start, wanted)
+        if point is None:
+            break
+        point, noise = cancelling.apart(balanced, A, b, point)
+        resolution = max(resolution, _BEYOND * noise)
+        least = max(resolution, FLAT * unit / _UNITS[-1])
+        if unit < _UNITS[0] and point.min() < -least:
+            break
+        found.append(point)
+        newly = held & (point > least)
+        if newly.any():
+            held = held & ~newly
+            wanted = untried = held
+            continue
+        # Both sides of a narrow band may be above the least together, each only alone.
+        untried = untried & ~wanted if wanted.sum() == 1 else untried
+        rest = np.where(untried, point, 0.0)
+        wanted = (np.arange(len(rest)) == np.argmax(rest)) & (rest.sum() > least)
+    y = np.mean(found, axis=0) if found else start.y
+    return InnerPoint(y, held, resolution)
+
+
+def _raised(
+    A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint, wanted: Mask
+) -> Floats | None:
+    """A y, all but balanced, with the largest Σ min(y, _AWAY unit) over the coordinates wanted.
+
+    Beyond the first unit y is looked for around the start, a balanced point that may be negative
+    by what solvers allow where coordinates are held; no other one falls to less than half. None
+    where none was found.
+    """
+    first, n, some = unit == _UNITS[0], len(start.y), np.flatnonzero(start.held)
+    # Coordinates that are held count from 0, all others from the start.
+    origin = np.where(start.held, 0.0, start.y)
+    lower = np.zeros(n) if first else -0.5 * origin / unit
+    right = b if first else A[:, some] @ (start.y[some] / unit)
+    cost = np.append(np.zeros(n), -wanted[some].astype(float))
+    columns = (
+        np.append(lower, np.zeros(len(some))),
+        np.append(np.full(n, np.inf), np.full(len(some), _AWAY)),
+    )
+    both = sparse.hstack([A, A[:, some]])
+    # Inner points are wanted, but beyond the first unit vertices alone are as near as asked for.
+    model = programs.bounded(
+        both, (right, right), columns, cost, solver="ipm" if first else "simplex"
+    )
+    model.setOptionValue("run_crossover", "off")
+    solution = programs.optimal(model)
+    if solution is None and first:
+        raise certificates.why_unsolved(A, b)
+    if solution is None:
+        return None
+    solution = np.maximum(solution, columns[0])
+    y = solution[:n]
+    y[some] += solution[n:]
+    return origin + unit * y
+
+
+def balanced(A: sparse.csc_matrix, b: Floats, y: Floats) -> tuple[Floats, float]:
+    """y (n,), what it lacks of A y = b added by the least change; how far rounding moves it."""
+    rows, n = A.shape
+    if not rows:
+        return y, 0.0
+    one, shift = sparse.identity(n), -_SHIFT * sparse.identity(rows)
+    factors = splu(sparse.bmat([[one, A.T], [A, shift]], format="csc"))
+    steps = []
+    for _ in range(_BALANCING):
+        steps.append(factors.solve(np.append(np.zeros(n), b - A @ y))[:n])
+        y = y + steps[-1]
+    return y, float(np.abs(steps[-_LAST:]).max(initial=0.0))
