@@ -9,9 +9,9 @@ slacks 1 + w and a weight W on them, K = N H⁻¹ Nᵀ.
 from typing import NamedTuple
 
 import numpy as np
+from scipy import linalg
 
 from granforce.numerics.lanes import LANES
-from granforce.numerics.wall_matrix import DEPENDENT
 from granforce.records import Floats, Integers
 from granforce.system import cancelling
 
@@ -52,21 +52,40 @@ class ThinMatrix(NamedTuple):
         return np.pad(slacks, ((0, 0), (0, self.count - slacks.shape[1])))
 
 
-def thin_matrix(
-    balance: Floats, y: Floats, levers: Floats, weight: Floats, count: int, dimension: int
-) -> ThinMatrix:
-    """The ThinMatrix at y (w,), of its balance (rows, w); weight (2 N_c,): W on levers.
+class Basis(NamedTuple):
+    """What a balance leaves free, and what restores it, before y weights them."""
 
-    The null space has so many dimensions. It is found before rows are weighted by y, which may be
-    as small as FLAT.
-    """
-    free = null_space(balance, dimension)
-    null = cancelling.apart(np.linalg.qr, free / y[:, None])[0]
+    free: Floats  # (w, h) orthonormal
+    inverse: Floats  # (w, rows) the least change of y that takes up an unbalance
+
+
+def basis(balance: Floats, dimension: int) -> Basis:
+    """The Basis of a balance (rows, w) that leaves so many dimensions."""
+    left, values, right = cancelling.apart(np.linalg.svd, balance)
+    rank = min(len(values), len(right) - dimension)
+    inverse = (right[:rank].T / values[:rank]) @ left[:, :rank].T
+    return Basis(right[len(right) - dimension :].T, inverse)
+
+
+def thin_matrix(found: Basis, y: Floats, levers: Floats, weight: Floats, count: int) -> ThinMatrix:
+    """The ThinMatrix at y (w,), which may be as small as FLAT; weight (2 N_c,): W on levers."""
+    null = cancelling.apart(_orthonormal, found.free / y[:, None])
     along = levers @ null
     H = np.eye(null.shape[1]) + along.T @ (weight[:, None] * along)
     root = np.linalg.solve(np.linalg.cholesky(H), null.T).T
-    inverse = cancelling.apart(np.linalg.pinv, balance * y, DEPENDENT)
-    return ThinMatrix(null, root, levers, inverse, count)
+    return ThinMatrix(null, root, levers, found.inverse / y[:, None], count)
+
+
+def _orthonormal(columns: Floats) -> Floats:
+    """Columns (w, h) of the same span, orthonormal, to rounding in every row by itself.
+
+    Householder's method is so stable with pivoting and rows in order of their size (Cox, Higham,
+    in Numerical Analysis 1997, 57).
+    """
+    order = np.argsort(-np.abs(columns).max(axis=1, initial=0.0))
+    found = np.empty_like(columns)
+    found[order] = linalg.qr(columns[order], mode="economic", pivoting=True)[0]
+    return found
 
 
 def null_space(dense: Floats, dimension: int) -> Floats:

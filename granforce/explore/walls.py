@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granforce.explore import thin
 from granforce.explore.billiard import LANES
-from granforce.explore.thin import ThinMatrix, thin_matrix
+from granforce.explore.thin import ThinMatrix
 from granforce.forces import hull, knowledge
 from granforce.forces.contact_problem import MOST_DENSE, independent_problem_of
 from granforce.forces.ensemble import Ensemble
-from granforce.numerics import contact_program, wall_matrix
+from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import DEPENDENT, POLISH, PROBES, WallMatrix
 from granforce.records import Floats, InputError, Integers, Mask, UndecidedError
@@ -84,9 +85,10 @@ def walls(
     frame = _frame(ensemble, weight, measured)
     centre = _centred(frame, y, _matrix)
     # Where rows are lost, no centre may be found, or a wrong one.
-    thin = _is_thin(frame, y if centre is None else centre)
-    if thin:
-        centre = _centred(frame, y, _thin_matrix)
+    matrix_at: _MatrixAt = _matrix
+    if _is_thin(frame, y if centre is None else centre):
+        matrix_at = _Thin(frame)
+        centre = _centred(frame, y, matrix_at)
     if centre is None and np.any(weight):
         raise UndecidedError(
             "no centre of what is measured was found: its errors are too small, for the forces or "
@@ -99,7 +101,7 @@ def walls(
             "these conditions leave so little room to the forces that rounding hides it: take a "
             "larger friction coefficient, or prescribe less"
         )
-    return _walls(frame, centre, thin)
+    return _walls(frame, centre, matrix_at)
 
 
 class _Frame(NamedTuple):
@@ -188,13 +190,20 @@ def _rest(frame: _Frame, y: Floats) -> tuple[Floats, Floats]:
     return rest[: len(problem.b)], rest[len(problem.b) :]
 
 
-def _thin_matrix(frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
-    """K at y by singular values, and its walls' positions in y."""
-    by_pivots, moving = _matrix(frame, y)
-    balance = _balance(frame.ensemble, moving)
-    levers = np.array([frame.forces(one).ravel() for one in np.diag(y)[moving]]).T
-    weight, h = frame.weight.ravel(), frame.ensemble.hull.dimension
-    return thin_matrix(balance, y[moving], levers, weight, by_pivots.count, h), moving
+class _Thin:
+    """K at y by singular values, and its walls' positions in y, for any y."""
+
+    def __init__(self, frame: _Frame) -> None:
+        _, self.moving = _matrix(frame, frame.ensemble.hull.inner)
+        balance = _balance(frame.ensemble, self.moving)
+        self.basis = thin.basis(balance, frame.ensemble.hull.dimension)
+
+    def __call__(self, frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
+        moving = self.moving
+        count = len(moving) + -len(moving) % LANES
+        levers = np.array([frame.forces(one).ravel() for one in np.diag(y)[moving]]).T
+        weight = frame.weight.ravel()
+        return thin.thin_matrix(self.basis, y[moving], levers, weight, count), moving
 
 
 def _balanced(
@@ -207,6 +216,9 @@ def _balanced(
     else:
         lacking = wall_matrix.balancing(matrix, *_rest(frame, y))[: len(moving)]
     return _shifted(y, moving, lacking)
+
+
+_MatrixAt = Callable[[_Frame, Floats], tuple[WallMatrix | ThinMatrix, Integers]]
 
 
 def _balance(ensemble: Ensemble, moving: Integers) -> Floats:
@@ -239,7 +251,7 @@ def _is_thin(frame: _Frame, y: Floats) -> bool:
 def _centred(
     frame: _Frame,
     y: Floats,
-    matrix_at: Callable[[_Frame, Floats], tuple[WallMatrix | ThinMatrix, Integers]],
+    matrix_at: _MatrixAt,
 ) -> Floats | None:
     """The y with the largest Σ log y − ½ Σ W (f − m)² from y on, by damped Newton steps.
 
@@ -280,12 +292,12 @@ def _shifted(y: Floats, moving: Integers, relative: Floats) -> Floats:
     return y
 
 
-def _walls(frame: _Frame, y: Floats, thin: bool) -> Walls:
+def _walls(frame: _Frame, y: Floats, matrix_at: _MatrixAt) -> Walls:
     """The Walls around y."""
     ensemble = frame.ensemble
     matrix: WallMatrix | ThinMatrix
-    if thin:
-        matrix, moving = _thin_matrix(frame, y)
+    if isinstance(matrix_at, _Thin):
+        matrix, moving = matrix_at(frame, y)
         h = matrix.null.shape[1]
         forces = ensemble.scaled_form[2].tocsc()[:, moving] @ (y[moving, None] * matrix.null)
         units = 0.5 * float(np.linalg.slogdet(forces.T @ forces)[1])

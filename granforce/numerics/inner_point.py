@@ -59,15 +59,16 @@ def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -
     """The InnerPoint to which programs in this unit lead from one in a larger unit."""
     held, resolution = start.held.copy(), start.resolution
     found: list[Floats] = []
-    wanted, untried = held, held
+    wanted, untried, last = held, held, unit == _UNITS[-1]
     while wanted.any():
         point = _raised(A, b, unit, start, wanted)
         if point is None:
             break
         point, noise = cancelling.apart(balanced, A, b, point)
         resolution = max(resolution, _BEYOND * noise)
-        least = max(resolution, FLAT * unit / _UNITS[-1])
-        if unit < _UNITS[0] and point.min() < -least:
+        # In the first unit all is seen that would reach the limit of the last one.
+        least = resolution if last else max(resolution, _AWAY * _UNITS[-1])
+        if last and point.min() < -least:
             break
         found.append(point)
         newly = held & (point > least)
@@ -75,6 +76,8 @@ def _searched(A: sparse.csc_matrix, b: Floats, unit: float, start: InnerPoint) -
             held = held & ~newly
             wanted = untried = held
             continue
+        if not last:
+            break
         # Both sides of a narrow band may be above the least together, each only alone.
         untried = untried & ~wanted if wanted.sum() == 1 else untried
         rest = np.where(untried, point, 0.0)

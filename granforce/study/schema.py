@@ -1,14 +1,18 @@
 """The schema: every array that granforce keeps, declared once, and packings as datasets."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from granforce.forces.ensemble import Ensemble
 from granforce.records import Contacts, Packing
+
+if TYPE_CHECKING:  # reading a store needs no kernels
+    from granforce.forces.ensemble import Ensemble
 
 
 class Variable(NamedTuple):

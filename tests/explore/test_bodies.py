@@ -1,6 +1,7 @@
 """S drawn whole: its corners against every meeting of sides, its sides, its ends and its falls."""
 
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from granforce.explore import bodies
 from granforce.packing.scenes import sketched
 from granforce.records import InputError
 
+TESTS = Path(__file__).parents[1]
 BODIES = [
     ("groove", 0.5),
     ("pyramid", 0.4),
@@ -116,6 +118,63 @@ def test_what_has_no_end_goes_on_inside_all_cones():
         far = found.forces(found.corners[0]) + 1e3 * ray
         assert S.residual(far) < 1e-9 and S.violation(far) < 1e-9
     assert np.isinf(found.intervals[1]).any() and np.all(np.isfinite(found.intervals[0][:, 0]))
+
+
+def groove(angle, ratio):
+    """The Body of a disk of weight 1 in a groove, and its exact least and largest f_n.
+
+    With half the angle α, f_n sin α + f_t cos α = 1/2 upwards, |f_t| ≤ μ f_n: f_n is least where
+    f_t = μ f_n, and largest where f_t = −μ f_n, without end from μ = tan α on. ratio: μ / tan α.
+    """
+    half = np.radians(angle) / 2
+    S = gf.ensemble(gf.scene("groove", ratio * np.tan(half), angle=angle))
+    least = 0.5 / (np.sin(half) + S.mu * np.cos(half))
+    largest = 0.5 / (np.sin(half) - S.mu * np.cos(half)) if ratio < 1 else np.inf
+    return gf.body(S), least, largest
+
+
+@pytest.mark.parametrize("angle", [10, 12.5, 30, 45, 60, 77, 90, 120, 150, 179])
+def test_a_groove_ends_where_the_closed_form_says(angle):
+    for ratio in (0.01, 0.3, 0.9, 0.99, 1 - 1e-3, 1 - 1e-4, 1 - 1e-5):
+        found, least, largest = groove(angle, ratio)
+        ends = np.sort(found.forces(found.corners)[:, :, 0], axis=0)
+        assert found.bounded and len(found.corners) == 2 and len(found.sides) == 2
+        error = max(1e-9, 1e-14 / (1 - ratio))  # 10° is 10⁻¹⁵ off in the scene
+        np.testing.assert_allclose(ends, [[least] * 2, [largest] * 2], rtol=error)
+
+
+@pytest.mark.parametrize("angle", [10, 30, 45, 90, 120, 150, 179.9])
+def test_a_groove_locks_from_the_tangent_of_half_its_angle_on(angle):
+    for ratio in (1, 1 + 1e-12, 1 + 1e-9, 1 + 1e-6, 1.001, 2, 8):
+        found, least, _ = groove(angle, ratio)
+        assert not found.bounded and len(found.rays) == len(found.corners) == 1
+        np.testing.assert_allclose(found.forces(found.corners)[0, :, 0], least, rtol=1e-9)
+        low, high = found.intervals
+        np.testing.assert_allclose(low[:, 0], least, rtol=1e-9)
+        assert np.all(np.isinf(high[:, 0]))
+
+
+def test_just_before_it_locks_a_groove_has_an_end():
+    for angle in (45, 90, 150):
+        for gap in (1e-6, 1e-8, 1e-10):
+            found, _, largest = groove(angle, 1 - gap)
+            end = found.forces(found.corners)[:, :, 0].max()
+            assert found.bounded and end == pytest.approx(largest, rel=2e-14 / gap)
+
+
+def test_sides_in_one_place_have_no_corner_of_their_own():
+    """Two contacts open together: the sides of both are one edge, cut at a random place before."""
+    S = gf.ensemble(gf.load_packing(TESTS / "attacks" / "n40_mu1_coincident.npz"))
+    found = gf.body(S)
+    assert len(found.axes) == 2 and len(found.corners) == len(found.sides)
+    assert [len(side.corners) for side in found.sides] == [2] * len(found.sides)
+    u = found.corners - found.corners.mean(axis=0)
+    u = u[np.argsort(np.arctan2(u[:, 1], u[:, 0]))]
+    edges = np.roll(u, -1, axis=0) - u
+    after = np.roll(edges, -1, axis=0)
+    turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
+    sizes = np.linalg.norm(edges, axis=1) * np.linalg.norm(after, axis=1)
+    assert (turns / sizes).min() > 1e-6
 
 
 def test_more_dimensions_cannot_be_drawn():
