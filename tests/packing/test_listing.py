@@ -2,6 +2,7 @@
 
 import gzip
 import io
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from app.photoelastic import account
 from granforce.cli.parser import main
 from granforce.packing.importers import read_pegs
 from granforce.packing.importers.boundary import boundary
-from granforce.packing.importers.walls import fitted
+from granforce.packing.importers.walls import fitted, flagged
 from granforce.records import InputError
 from granforce.study import series
 
@@ -23,7 +24,7 @@ def read(grains, rows, **options):
     return read_pegs(file(grains, "positions.txt"), file(rows, "adjacency.txt"), **CLEAN, **options)
 
 
-def flagged(grains, flag):
+def with_flag(grains, flag):
     return [[*row[:-1], flag] for row in grains]
 
 
@@ -52,14 +53,14 @@ def same(found, taken):
 def test_a_flag_of_all_grains_is_no_flag_of_walls(made, flag):
     """Those at the boundary are at walls: nearly the same as with the right flags."""
     grains, rows = made
-    found = read(flagged(grains, flag), rows)
+    found = read(with_flag(grains, flag), rows)
     right = np.array([row[-1] for row in grains]) != 0
     assert np.mean(found.at_wall == right) > 0.85
     (note,) = found.report["notes"]
     assert f"{N} of {N} grains are flagged" in note and "\n" not in note
     assert found.report["flags_ignored"] == N
     assert f"Beware: {N} disks are flagged" in " ".join(account(found.report))
-    same(found, read(flagged(grains, flag), rows, flag="ignore"))
+    same(found, read(with_flag(grains, flag), rows, flag="ignore"))
     assert "notes" not in read(grains, rows, flag="ignore").report
     with pytest.raises(InputError, match="flag"):
         read(grains, rows, flag="use")
@@ -69,11 +70,11 @@ def test_a_flag_of_all_grains_is_no_flag_of_walls(made, flag):
 @pytest.mark.parametrize("walls", ["box", "auto"])
 def test_walls_are_found_without_flags(made, flag, walls):
     grains, rows = made
-    found = read(flagged(grains, flag), rows, walls=walls)
+    found = read(with_flag(grains, flag), rows, walls=walls)
     assert found.walls == ("left", "right", "bottom", "top")
     assert ("notes" in found.report) == (flag == 1)
     numbers = "box:0,{0},0,{0}".format(max(row[2] for row in grains) + 20)
-    given = read(flagged(grains, flag), rows, walls=numbers)
+    given = read(with_flag(grains, flag), rows, walls=numbers)
     assert given.walls == found.walls and 8 < given.report["grains_at_walls"] < 30
 
 
@@ -81,12 +82,12 @@ def annulus(rng, inner):
     """Disks of radius 5 in a ring of radii 60 and 130, without room for more."""
     x = np.mgrid[-150:150:9.9, -150:150:9.9].reshape(2, -1).T + rng.normal(0, 0.3, (961, 2))
     away = np.hypot(*x.T)
-    return x[(away < 125) & (away > inner + 5)] + [500, 300], np.hypot
+    return x[(away < 125) & (away > inner + 5)] + [500, 300]
 
 
 @pytest.mark.parametrize("inner", [0, 60])
 def test_an_annulus_is_told_from_a_circle(rng, inner):
-    x, _ = annulus(rng, inner)
+    x = annulus(rng, inner)
     r = np.full(len(x), 5.0)
     sides = boundary(x, r)
     away = np.hypot(*(x - [500, 300]).T)
@@ -98,8 +99,18 @@ def test_an_annulus_is_told_from_a_circle(rng, inner):
     assert np.allclose(found.numbers[-1], 128, atol=5)
 
 
+def test_one_flag_for_both_walls_of_an_annulus_is_told_apart(rng):
+    x = annulus(rng, 60)
+    r = np.full(len(x), 5.0)
+    sides = boundary(x, r)
+    listing = SimpleNamespace(x=x, r=r, flag=np.abs(sides).astype(float), ends=np.zeros((1, 2)))
+    for walls in ("annulus", "auto"):
+        assert np.array_equal(flagged(listing, None, walls)[0], sides)
+    assert np.array_equal(flagged(listing, None, "box")[0], listing.flag)
+
+
 def test_an_outline_without_a_shape_is_refused(rng):
-    x = np.concatenate([annulus(rng, 0)[0], annulus(rng, 0)[0] + [230, 0]])
+    x = np.concatenate([annulus(rng, 0), np.add(annulus(rng, 0), [230, 0])])
     sides = boundary(x, r := np.full(len(x), 5.0))
     with pytest.raises(InputError, match="auto: neither box nor circle fits"):
         fitted("auto", x, r, sides != 0, sides.astype(float))
@@ -125,7 +136,7 @@ def test_ids_that_begin_anew_begin_another_frame(made, taken, numbered, flags):
     listed = columns(grains + moved, 1, 2, 3, 4, 5)
     listed = listed if flags else columns(listed, 0, 1, 2, 3)
     texts = [one.getvalue() for one in (file(listed), file(contacts))]
-    taken = taken if flags else read(flagged(grains, 0), rows)
+    taken = taken if flags else read(with_flag(grains, 0), rows)
     found = read_pegs(*map(io.StringIO, texts), **CLEAN)
     same(found, taken)
     assert found.packing.x[:, 0].min() > 900 and "told apart by the ids" in found.report["columns"]
@@ -159,6 +170,8 @@ def test_a_third_column_of_zeros_is_a_flag(made, taken):
     """No grain is in every contact."""
     grains, rows = made
     same(read(grains, [[row[1], row[2], 0, row[3], row[4]] for row in rows]), taken)
+    with pytest.raises(InputError, match="0 throughout, which names no grain"):
+        read(grains, [[1, row[1], 0, row[3], row[4]] for row in rows])
 
 
 def test_columns_are_named_by_header_or_number(made, taken):
@@ -202,7 +215,7 @@ def test_by_the_command_line_with_compressed_files(away, made, capsys):
     """Notes go to stderr; series read the same files with the same options."""
     grains, rows = made
     for name, lines in (
-        ("positions", flagged(grains, 1)),
+        ("positions", with_flag(grains, 1)),
         ("adjacency", columns(rows, 1, 2, 4, 3)),
     ):
         text = "\n".join(" ".join(f"{value:.12g}" for value in row) for row in lines)

@@ -336,6 +336,16 @@ def _by_content(name: str, numbers: Floats, wanted: Sequence[str]) -> Sequence[s
     """Names of the columns by their number and what is in them."""
     width = numbers.shape[1]
     found = _as_contacts(numbers) if "id1" in wanted else _as_grains(numbers)
+    if (
+        found
+        and found[0] == "id1"
+        and width == 5
+        and len(np.unique(numbers[:, 0])) == 1 < len(numbers)
+    ):
+        raise InputError(
+            f"{name}: the third of five columns is 0 throughout, which names no grain; where the "
+            "second grain is named is not told: name the columns (--columns i=…,j=…,ft=…,fn=…)"
+        )
     if found is None:
         raise InputError(
             f"{name}: {width} fields in a line, which are not "

@@ -144,6 +144,9 @@ def flagged(
     told = given.any() or np.any(listing.ends < 0)
     believed = many <= _NEARLY_ALL or len(given) < _FEW
     if flag is None and believed and (told or not shaped):
+        if walls in ("annulus", "auto") and not np.any(given < 0):  # one flag for both walls
+            at_hole = (boundary(listing.x, listing.r) < 0) & (given != 0)
+            return np.where(at_hole, -1.0, given), None
         return given, None
     found: Floats = (
         _nearest_side(listing, walls)
@@ -245,7 +248,9 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Out
         return Outline("box", tuple(map(float, numbers)))
     inner = flag < 0
     if shape == "annulus" and inner.sum() < 3:
-        raise InputError("walls annulus: too few grains are flagged −1 for the inner wall")
+        raise InputError(
+            "walls annulus: too few grains are flagged −1, or lie at a hole, for the inner wall"
+        )
     if shape == "circle":
         inner[:] = False
 
