@@ -12,7 +12,7 @@ from granforce.numerics.lanes import ONE
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay, flow
 from granforce.perturb.critical_force import critical_force, critical_forces, response
-from granforce.perturb.step import make_step
+from granforce.forces.step import make_step
 from granforce.records import Cancelled, InputError, UndecidedError
 from granforce.study import cells as study
 from granforce.study import kinds

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from granforce.numerics.lanes import lanes_for
-from granforce.perturb.flow import (
+from granforce.forces.flow import (
     Flows,
     Outcome,
     Push,
@@ -28,7 +28,7 @@ from granforce.perturb.flow import (
     start,
     until_one_ends,
 )
-from granforce.perturb.step import Step
+from granforce.forces.step import Step
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 

@@ -35,7 +35,7 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.perturb.step import Step
+from granforce.forces.step import Step
 from granforce.records import Floats, Integers, Mask
 from granforce.tolerances import BALANCED
 
@@ -397,7 +397,8 @@ def _next_forces(step, flows, c, lanes):
     pace = load(flows.pace, 0, lanes)
     rows, border = flows.velocity.rows, flows.velocity.border
     w_n, w_t = contact_matrix.pull(step.network, c, rows, border, lanes)
-    f_n = load(flows.forces, 2 * c, lanes) - pace * step.stiffness[c, 0] * w_n
+    f_n = load(flows.forces, 2 * c, lanes)
+    f_n = f_n - pace * step.stiffness[c, 0] * (w_n + step.closing[c])
     f_t = load(flows.forces, 2 * c + 1, lanes) - pace * step.stiffness[c, 1] * w_t
     f_n = larger(f_n, 0.0)
     limit = step.mu * f_n

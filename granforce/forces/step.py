@@ -44,6 +44,7 @@ class Step(NamedTuple):
     mass: Floats  # (rows,) M
     mass_border: Floats  # (m,)
     stiffness: Floats  # (N_c, 2) D: effective masses of the contacts
+    closing: Floats  # (N_c,) approach velocity that just closes a contact's gap
     mu: float
     place: Integers  # (rows of the ensemble,) where they are among rows and border
 
@@ -63,12 +64,18 @@ def make_step(ensemble: Ensemble) -> Step:
     inertia = np.ones(len(b) + len(b_border))
     inertia[place] = _inertia(ensemble)
     mass, mass_border = inertia[: len(b)], inertia[len(b) :]
+    stiffness = effective_masses(network, mass, mass_border)
+    closing = np.zeros(len(stiffness))
+    return Step(network, b, b_border, mass, mass_border, stiffness, closing, ensemble.mu, place)
+
+
+def effective_masses(network: Network, mass: Floats, mass_border: Floats) -> Floats:
+    """D (N_c, 2), 1/D = Aᵀ M⁻¹ A of each contact alone; 1 where nothing yields."""
     rows = 3 * np.stack([network.high, network.low], axis=1)[:, :, None] + np.arange(3)
     columns = network.columns.reshape(-1, 2, 2, 3)
     yielding = np.einsum("cpgk,cgk->cp", columns**2, 1 / mass[rows])
-    yielding += network.border.reshape(len(rows), 2, len(b_border)) ** 2 @ (1 / mass_border)
-    stiffness = 1 / np.where(yielding > 0, yielding, 1.0)
-    return Step(network, b, b_border, mass, mass_border, stiffness, ensemble.mu, place)
+    yielding += network.border.reshape(len(rows), 2, len(mass_border)) ** 2 @ (1 / mass_border)
+    return 1 / np.where(yielding > 0, yielding, 1.0)
 
 
 def _inertia(ensemble: Ensemble) -> Floats:
