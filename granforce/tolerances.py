@@ -3,14 +3,14 @@
 Lengths are relative to the largest radius, forces to the mean normal force ⟨f_n⟩.
 """
 
-# Two grains whose gap (in largest radii) is below this when a packing comes to rest touch;
-# the final projection then brings the gap of every touching pair to rounding error.
-TOUCHING = 1e-6
-
-# Once a packing is closed, gaps (in largest radii) of its contacts are below CLOSED, which is
-# rounding, and those of all other pairs above APART: no pair lies between.
+# Contacts of a finished packing are closed to rounding: their gaps (in largest radii) are below
+# CLOSED. A pair without force whose gap is below TOUCHING touches, too; it is a contact and counted
+# as one that strict complementarity does not decide.
 CLOSED = 1e-11
-APART = 1e-7
+TOUCHING = 1e-9
+
+# Two disks of a table whose gap (in largest radii) is below this touch, unless it says otherwise.
+LISTED_TOUCHING = 1e-6
 
 # Largest overlap (in largest radii) that a finished rigid packing may show.
 OVERLAP = 1e-9
@@ -47,10 +47,6 @@ SEEN_CARRYING = 1e-4
 # touched by all of S, which has no dimension across it. In ⟨f_n⟩, and for f_t in μ ⟨f_n⟩. Forces of
 # order 1 are rounded to 10⁻¹⁶: of an S as narrow as this, rounding is 10⁻⁴.
 FLAT = 1e-12
-
-# A network that certifies jamming: relative distance |f − f_dyn| / |f_dyn| between the dynamic
-# forces and the nearest admissible network on the same contacts.
-JAMMED_DISTANCE = 1e-1
 
 # Largest duality gap (in ⟨f_n⟩) of a certified bound on a force, or of a limit load.
 INTERVAL_GAP = 1e-8

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granforce.forces.step import Step
 from granforce.numerics import contact_matrix, lu
 from granforce.numerics.contact_matrix import Factors
 from granforce.numerics.lanes import (
@@ -35,7 +36,6 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.forces.step import Step
 from granforce.records import Floats, Integers, Mask
 from granforce.tolerances import BALANCED
 
@@ -202,13 +202,13 @@ def outcome_of(step: Step, flows: Flows, lane: int, seconds: float) -> Outcome:
 def until_one_ends(step, flows, rest, stop, lanes):
     """Newton steps of all flows, until one that is going has ended."""
     while not stop[0]:
-        _answer(step, flows, lanes)
+        answer(step, flows, lanes)
         contact_matrix.copy(flows.merit, flows.least, lanes)
         contact_matrix.copy(flows.before, flows.state, lanes)
         for to, given in ((flows.base, flows.velocity), (flows.direction, flows.rest)):
             contact_matrix.copy(to.rows, given.rows, lanes)
             contact_matrix.copy(to.border, given.border, lanes)
-        _factor(step, flows, stop, lanes)
+        factor(step, flows, stop, lanes)
         direction = flows.direction
         lu.solve(step.network, flows.factors, direction.rows, direction.border, lanes)
         _search(step, flows, lanes)
@@ -281,9 +281,9 @@ def _search(step, flows, lanes):
     settled = ~flows.going
     for _ in range(HALVINGS):
         length = load(flows.length, 0, lanes)
-        _step_along(flows.velocity.rows, flows.base.rows, length, flows.direction.rows, lanes)
-        _step_along(flows.velocity.border, flows.base.border, length, flows.direction.border, lanes)
-        _answer(step, flows, lanes)
+        step_along(flows.velocity.rows, flows.base.rows, length, flows.direction.rows, lanes)
+        step_along(flows.velocity.border, flows.base.border, length, flows.direction.border, lanes)
+        answer(step, flows, lanes)
         for lane in range(len(lanes)):
             if settled[lane]:
                 continue
@@ -320,7 +320,7 @@ def _is_solved(flows, lane):
 
 
 @within
-def _step_along(values, given, length, direction, lanes):
+def step_along(values, given, length, direction, lanes):
     """values ← given + length · direction."""
     for k in range(len(values)):
         store(values, k, lanes, load(given, k, lanes) + length * load(direction, k, lanes))
@@ -347,7 +347,7 @@ def _measure(step, flows, lanes):
 
 
 @within
-def _factor(step, flows, stop, lanes):
+def factor(step, flows, stop, lanes):
     """Factor M + A (∂Π) τ D Aᵀ, not symmetric, as f_t of a sliding contact follows f_n."""
     network, m, factors = step.network, len(step.mass_border), flows.factors
     contact_matrix.begin(network, step.mass, factors, lanes)
@@ -368,7 +368,7 @@ def _factor(step, flows, stop, lanes):
 
 
 @within
-def _answer(step, flows, lanes):
+def answer(step, flows, lanes):
     """Forces Π(f − τ D Aᵀ U), states of the contacts and A f⁺ − b − M U; the latter's Σ /M."""
     velocity, rest = flows.velocity, flows.rest
     for k in range(len(step.mass)):

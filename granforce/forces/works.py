@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from granforce.numerics.lanes import lanes_for
 from granforce.forces.flow import (
     Flows,
     Outcome,
@@ -29,6 +28,7 @@ from granforce.forces.flow import (
     until_one_ends,
 )
 from granforce.forces.step import Step
+from granforce.numerics.lanes import lanes_for
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 

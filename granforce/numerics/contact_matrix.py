@@ -51,7 +51,13 @@ def make_network(
     first, second (N_c, 3, 2): what unit f_n, f_t do to the rows of grains i and j; border
     (N_c, m, 2): to the global rows.
     """
-    layout = pattern(x, i, j)
+    return turned(pattern(x, i, j), i, j, first, second, border)
+
+
+def turned(
+    layout: Pattern, i: Integers, j: Integers, first: Floats, second: Floats, border: Floats
+) -> Network:
+    """The Network of contacts whose pattern is known; arguments as for `make_network`."""
     at_i, at_j = layout.position[i], layout.position[j]
     later = (at_i > at_j)[:, None, None]
     columns = np.concatenate(

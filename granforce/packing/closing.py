@@ -1,12 +1,9 @@
-"""The last step of a compaction: grains and box move by the least amount that closes every contact.
+"""Contacts of a finished packing, and the linear programs that finish one without friction.
 
-Which pairs are contacts is decided by their gaps, not by what they carry: a pair that carried
-nothing may touch all the same, and belongs to S. Once the carrying contacts are closed, gaps are
-rounding (below CLOSED) or clearly larger (above APART); where one lies between, or more contacts
-had carried than rigid disks can close at once, the dynamics goes on. At μ = 0 contact dynamics
-does not reach isostaticity: there linear programs shrink the box under linearised non-overlap. A
-box that is free in its shape strains in three ways, not one (e_x, e_y, g as in `box_motion`), and
-its networks have to carry the same pressure along x and y, and no shear stress.
+At μ = 0 contact dynamics does not reach isostaticity: there linear programs shrink the box under
+linearised non-overlap. A box that is free in its shape strains in three ways, not one (e_x, e_y, g
+as in `box_motion`), and its networks have to carry the same pressure along x and y, and no shear
+stress.
 """
 
 from typing import Any, NamedTuple
@@ -18,8 +15,8 @@ from granforce.forces.contact_dynamics import Motion
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics import highs as programs
-from granforce.numerics import quadratic
 from granforce.packing.neighbours import find_pairs, separations
+from granforce.packing.pair_list import SKIN, cell_of
 from granforce.records import (
     Cell,
     Contacts,
@@ -33,55 +30,15 @@ from granforce.records import (
     make_packing,
 )
 from granforce.system import cancelling
-from granforce.tolerances import APART, CLOSED, JAMMED_DISTANCE, TOUCHING
+from granforce.tolerances import CLOSED, TOUCHING
 
-# Skin of the neighbour list and reach of the finishing programs, in largest radii.
-SKIN = 0.2
-# Steps of the quadratic program that finds a network: where one exists it was found in 9 to 21
-# (N = 400), where none exists the program would go on to its limit.
-NETWORK_ITERATIONS = 60
-# Largest displacement of a grain that the finishing of a frictional packing may need, and Newton
-# steps on its gaps.
-LARGEST_CORRECTION, MOST_CLOSINGS = 1e-2, 16
 # Largest move of a grain in one of the linear programs, along each axis.
 TRUST = 0.05
-# By the number of strains of the box: what weighs each against the displacements of grains, and its
-# bounds and part of the area's change in the linear programs.
-WEIGHTS = {1: 1.0, 3: np.array([0.5, 0.5, 0.25]) ** 0.5}
+# Bounds of each strain of the box and its part of the area's change, by the number of strains.
 STRAINS = {
     1: ((-TRUST / 2,), (0.0,), (1.0,)),
     3: ((-TRUST / 3,) * 3, (TRUST / 3,) * 3, (0.5, 0.5, 0.0)),
 }
-
-
-def cell_of(motion: Motion) -> Cell:
-    """The periodic cell of a moving packing."""
-    return Cell(motion.box, float(motion.tilt[0]))
-
-
-def jammed_network(motion: Motion, mu: float) -> Packing | None:
-    """The packing at rest, if an admissible network lies close to the dynamic forces.
-
-    Its contacts are all pairs that touch once the carrying ones are closed. None, too, where a pair
-    neither touches nor is apart for certain: then the dynamics has to go on.
-    """
-    gap = separations(motion.x, motion.r, cell_of(motion), motion.i, motion.j, motion.shift)[2]
-    touching = (motion.force[:, 0] > 0) | (gap < TOUCHING)
-    if not touching.any():
-        return None
-    as_it_moves = _packing_of(motion, motion.x, cell_of(motion), touching, motion.force, mu)
-    if _near_forces(as_it_moves, **_asked(motion)) is None:
-        return None
-    closed = _close_contacts(motion, touching, gap)
-    if closed is None:
-        return None
-    packing = _packing_of(motion, *closed, motion.force, mu)
-    found = _near_forces(packing, **_asked(motion))
-    if found is None:
-        # Overlap had jammed more contacts than rigid disks can have: go on from where they fit.
-        motion.x[:], (motion.box[:], motion.tilt[0]) = closed[:2]
-        return None
-    return _on_backbone(packing._replace(forces=found), **_asked(motion))
 
 
 def _rates(motion: Motion) -> int:
@@ -89,7 +46,7 @@ def _rates(motion: Motion) -> int:
     return motion.dilation.size
 
 
-def _asked(motion: Motion) -> dict[str, Any]:
+def prescribed_of(motion: Motion) -> dict[str, Any]:
     """What the ensemble prescribes besides the pressure, in units of it."""
     if _rates(motion) == 1:
         return {}
@@ -105,14 +62,14 @@ class Margin(NamedTuple):
     @property
     def certain(self) -> bool:
         """Whether no gap lies between rounding and what is clearly apart."""
-        return self.contact < CLOSED and self.other > APART
+        return self.contact < CLOSED and self.other > TOUCHING
 
 
 def margin(packing: Packing) -> Margin:
     """The Margin of a packing's contacts, by the gaps of all its pairs.
 
-    Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs 10⁻⁶ apart or more;
-    soft or measured disks overlap, and their contacts have no such margin.
+    Rigid disks at rest have contacts closed to rounding, 10⁻¹³, and other pairs are apart; soft or
+    measured disks overlap, and their contacts have no such margin.
     """
     if not len(packing.r):
         return Margin(0.0, SKIN / 2)
@@ -142,14 +99,6 @@ def _listed(contacts: Contacts, i: Integers, j: Integers, normal: Floats, n: int
     return found
 
 
-def _near_forces(packing: Packing, **asked: Any) -> Floats | None:
-    """The balanced network nearest to the packing's forces, or None if it is not close to them."""
-    S = ensemble(packing, prune=False, **asked)
-    forces = nearest(S, S.original, max_iterations=NETWORK_ITERATIONS).forces
-    far = np.linalg.norm(forces - packing.forces) / np.linalg.norm(packing.forces)
-    return forces if S.admits(forces) and far <= JAMMED_DISTANCE else None
-
-
 def _on_backbone(packing: Packing, **asked: Any) -> Packing | None:
     """The packing with forces on its backbone alone, balanced to the last digits; None if not."""
     try:
@@ -160,7 +109,7 @@ def _on_backbone(packing: Packing, **asked: Any) -> Packing | None:
     return packing._replace(forces=S.expand(forces)) if S.admits(forces) else None
 
 
-def _packing_of(
+def packing_of(
     motion: Motion, x: Floats, cell: Cell, touching: Mask, force: Floats, mu: float
 ) -> Packing:
     i, j, shift = motion.i[touching], motion.j[touching], motion.shift[touching]
@@ -171,52 +120,6 @@ def _packing_of(
     return make_packing(x, motion.r, cell.box, contacts, force[touching], mu, 1.0, tilt=cell.tilt)
 
 
-def _close_contacts(
-    motion: Motion, touching: Mask, gap: Floats
-) -> tuple[Floats, Cell, Mask] | None:
-    """Centres, cell, contacts: moved as little as brings touching gaps to 0, others to 0 or more.
-
-    Least Σ|u|² + N (ε L)², u the displacements and ε the strain of the box (of a free cell, ε² is
-    (e_x² + e_y² + g²/2)/2): near μ = 0 the contacts are as many as the coordinates, and close only
-    together with the box. gap (P,): those of all pairs as they are. Newton on the gaps, each step a
-    quadratic program. Pairs that came to touch on the way are contacts from then on. None where the
-    contacts cannot all close, or where no margin parts them from other pairs.
-    """
-    x, cell = motion.x.copy(), _own_cell(motion)
-    pairs = motion.i, motion.j, motion.shift
-    near = touching | (gap < SKIN / 2)
-    i, j, shift = (which[near] for which in pairs)
-    exact, force = touching[near].copy(), motion.force[near, 0]
-    opened = np.zeros(len(i), bool)
-    for _ in range(MOST_CLOSINGS):
-        cancelling.check("compaction")
-        normal, length, gap = separations(x, motion.r, cell, i, j, shift)
-        if max(np.abs(gap[exact]).max(), -gap.min()) < CLOSED:
-            came = ~exact & ~opened & (gap < APART)
-            if not came.any():
-                closed = np.zeros(len(near), bool)
-                closed[near] = exact
-                # What had to open may have come to rest in between: that is for the dynamics.
-                return None if np.any(opened & (gap < APART)) else (x, cell, closed)
-            exact |= came
-        weight = cell.box[0] * np.sqrt(len(x)) * WEIGHTS[_rates(motion)]
-        stretch = _stretch(normal, length, _rates(motion)) / weight
-        R = sparse.hstack([_approach(i, j, normal, len(x)), sparse.csc_matrix(stretch)])
-        move, had_to = _least_motion(sparse.csr_matrix(R), gap, exact, force)
-        opened |= had_to
-        exact &= ~had_to
-        u, strain = move[: x.size], move[x.size :] / weight
-        if np.abs(u).max() > LARGEST_CORRECTION or not exact.any():
-            return None
-        x, cell = _strained(x, cell, strain)
-        x = x + u.reshape(-1, 2)
-    return None
-
-
-def _own_cell(motion: Motion) -> Cell:
-    return cell_of(motion)._replace(box=motion.box.copy())
-
-
 def _stretch(normal: Floats, length: Floats, rates: int) -> Floats:
     """First-order change (pairs, rates) of each gap with the strain of the box."""
     if rates == 1:
@@ -225,7 +128,7 @@ def _stretch(normal: Floats, length: Floats, rates: int) -> Floats:
     return np.column_stack([n_x * n_x, n_y * n_y, n_x * n_y]) * length[:, None]
 
 
-def _strained(x: Floats, cell: Cell, strain: Floats) -> tuple[Floats, Cell]:
+def strained(x: Floats, cell: Cell, strain: Floats) -> tuple[Floats, Cell]:
     """Points (N, 2) and cell after a strain (1,) of a square box, or (3,) of a free cell."""
     if len(strain) == 1:
         return x * (1 + strain), Cell(cell.box * (1 + strain), cell.tilt)
@@ -243,44 +146,6 @@ def _approach(i: Integers, j: Integers, normal: Floats, n: int) -> sparse.csc_ma
     return sparse.csc_matrix((value, (row, column)), shape=(len(i), 2 * n))
 
 
-def _least_motion(
-    R: sparse.csc_matrix, gap: Floats, exact: Mask, force: Floats
-) -> tuple[Floats, Mask]:
-    """u with the least |u|² such that R u = −gap (exact) and R u ≥ −gap (others); who had to open.
-
-    Overlap that piled up during the dynamics can leave more contacts than rigid disks can close
-    at once (near μ = 0). Then those open whose work Σ f_n · opening is least.
-    """
-    others = ~exact
-    n, closed = R.shape[1], int(exact.sum())
-    # Scaled by the largest gap to be closed, so that the solver's tolerance is relative to it.
-    scale = max(np.abs(gap[exact]).max(), -gap.min(), 1e-300)
-    cost = 1e4 * (force[exact] / max(force.mean(), 1e-300) + 1e-3)
-    for slack in (0, closed):
-        opening = sparse.eye(closed, slack)
-        program = (
-            sparse.block_diag([sparse.identity(n), 1e-8 * sparse.identity(slack)], format="csc"),
-            np.concatenate([np.zeros(n), cost[:slack]]),
-            sparse.csc_matrix(sparse.hstack([R[exact], -opening])),
-            -gap[exact] / scale,
-            sparse.csc_matrix(
-                sparse.hstack([R[others], sparse.csr_matrix((int(others.sum()), slack))])
-            ),
-            -gap[others] / scale,
-            np.concatenate([np.full(n, -np.inf), np.zeros(slack)]),
-        )
-        if n > quadratic.LONG:
-            move = cancelling.in_child(quadratic.solution, *program)[:n]
-        else:
-            move = quadratic.solution(*program)[:n]
-        left = R[exact] @ move + gap[exact] / scale
-        if np.abs(left).max() < 1e-3:
-            break
-    opened = np.zeros(len(gap), bool)
-    opened[exact] = left > 1e-3
-    return move * scale, opened
-
-
 def shrink_to_isostatic(motion: Motion, mu: float, work: dict[str, Any]) -> Packing | None:
     """Frictionless finish: linear programs that shrink the box until no grain can make room.
 
@@ -296,7 +161,7 @@ def shrink_to_isostatic(motion: Motion, mu: float, work: dict[str, Any]) -> Pack
         stretch = _stretch(normal, length, _rates(motion))
         move, strain = _shrink_program(i, j, normal, stretch, gap, len(x))
         work["linear_programs"] += 1
-        x, cell = _strained(x, cell, strain)
+        x, cell = strained(x, cell, strain)
         x = x + move
         # Rattlers move at the programs' whim to the end; only the box tells that nothing is left.
         if strain[:2].mean() > -1e-13:
@@ -304,8 +169,8 @@ def shrink_to_isostatic(motion: Motion, mu: float, work: dict[str, Any]) -> Pack
     i, j, shift = find_pairs(x, motion.r, cell, TOUCHING)
     at_rest = motion._replace(i=i, j=j, shift=shift)
     touching = np.ones(len(i), bool)
-    packing = _packing_of(at_rest, x, cell, touching, np.zeros((len(i), 2)), mu)
-    return _on_backbone(packing, **_asked(motion))
+    packing = packing_of(at_rest, x, cell, touching, np.zeros((len(i), 2)), mu)
+    return _on_backbone(packing, **prescribed_of(motion))
 
 
 def _without_overlap(motion: Motion) -> tuple[Floats, Cell]:

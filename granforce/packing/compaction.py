@@ -1,10 +1,10 @@
-"""From a dilute gas of disks to a jammed packing, at constant pressure (arXiv:0803.3566).
+"""From a dilute gas of disks to a jammed packing at rest, at constant pressure (arXiv:0803.3566).
 
 Each time step of contact dynamics is solved by Gauss–Seidel sweeps, over- or under-relaxed, to a
-stated accuracy; steps grow longer as grains slow down. The dynamics runs until a network certifies
-that it is jammed: an admissible force network on the present contacts, close to the dynamic forces.
-Then the contacts are closed exactly (`closing`). At μ = 0 contact dynamics alone does not reach
-isostaticity, and below 1e-4 it takes ever longer to come to rest: there linear programs finish.
+stated accuracy; steps grow longer as grains slow down. Once grains are nearly in balance the last
+phase (`settling`) brings them to rest, which a certificate shows; grains that move on are handed
+back to the dynamics. At μ = 0 contact dynamics alone does not reach isostaticity, and below 1e-4 it
+takes ever longer to come to rest: there linear programs finish (`closing`).
 """
 
 from collections.abc import Callable
@@ -14,15 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce.forces import contact_dynamics as dynamics
+from granforce.forces.rest import Rest, rest
 from granforce.numerics.lanes import compiled
-from granforce.packing.closing import (
-    SKIN,
-    cell_of,
-    jammed_network,
-    margin,
-    shrink_to_isostatic,
-)
-from granforce.packing.neighbours import find_pairs
+from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
+from granforce.packing.pair_list import MOVED, cell_of, relisted
+from granforce.packing.settling import come_to_rest
 from granforce.records import (
     Cancel,
     Floats,
@@ -42,13 +38,10 @@ from granforce.system import cancelling
 from granforce.tolerances import LARGEST_FRICTION
 
 INITIAL_FRACTION = 0.5
-# A network is looked for every so many steps, once no grain's momentum changes by more than this in
-# a step, in ⟨f_n⟩. Looked for at 0.3, exact η3 was a sixth to a half too small at μ = 0.3, and one
-# packing in five bore no load; at 0.003 h and η3 are within their scatter of those at 3e-6. From
-# μ = 1 on sweeps seldom get below a few thousandths, and time would go into waiting for it.
+# The last phase is tried every so many steps, once no grain's momentum changes by more than this in
+# a step, in ⟨f_n⟩.
 CHECK_EVERY = 25
-NEARLY_BALANCED, NEARLY_BALANCED_AT_LARGE = 0.003, 0.01
-LARGE = 1.0
+NEARLY_BALANCED = 0.05
 # Longest time step, and most sweeps in it. From SETTLED_FROM on steps of 0.1 leave wider intervals
 # than shorter ones do, by 8 % at μ = 0.3, 13 % at 0.5, half at 1; those of 0.03 and less all leave
 # the same if the last sweeps of a step settle, of which a quarter are enough, too.
@@ -61,13 +54,16 @@ SETTLING = 5  # one part in so many of the sweeps
 NEARLY_FRICTIONLESS = 1e-4
 # Strain of the box per step below which frictionless grains are handed to the linear programs.
 BOX_AT_REST = 1e-6
-# The neighbour list is made anew once two grains may have approached by MOVED, in largest radii.
-MOVED = SKIN - dynamics.REACH
 # Time steps begin with this part of the longest, and grow while no grain that carries moves farther
 # than STRIDE (in largest radii).
 SHORTEST, STRIDE = 0.1, 0.02
 # What the box may be, with the number of its strain rates.
 BOXES = {"square": 1, "isotropic": 3}
+# What is counted of a compaction besides its steps and sweeps.
+WORK = (
+    *("list_rebuilds", "linear_programs", "certificates_tried", "implicit_steps"),
+    *("linear_systems", "touching_without_force"),
+)
 # Steps between two looks of whoever watches.
 WATCH_EVERY = 5
 
@@ -153,7 +149,7 @@ def pack(
     pace = dynamics.Pace(box_mass, SHORTEST * dt, dt, STRIDE, int(sweeps), settling, accuracy)
     settings = {"dt": dt, "box_mass": box_mass, "sweeps": sweeps, "accuracy": accuracy}
     counters = np.zeros(4, dtype=np.int64)
-    work = {"list_rebuilds": 0, "certificates_tried": 0, "linear_programs": 0}
+    work = dict.fromkeys(WORK, 0)
     look = None if watch is None else _looking(watch, unit, pressure, counters)
     if look is not None:
         look(motion, np.inf)
@@ -163,8 +159,8 @@ def pack(
         if progress is not None:
             progress(step, None)
         cancelling.check("compaction")
-        finished = _finish(motion, mu, unbalance, work)
-        if finished is not None:
+        motion, finished, certificate = _finish(motion, mu, unbalance, work, look)
+        if finished is not None and certificate is not None:
             break
         if step >= max_steps:
             raise NotJammedError(
@@ -185,6 +181,8 @@ def pack(
         "mean_overlap_of_dynamics": overlap,
         "largest_contact_gap": apart.contact,
         "least_other_gap": apart.other,
+        "distance_to_rest": certificate.distance,
+        "noise_at_rest": max(certificate.noise),
         **work,
     }
     return _in_users_units(finished, unit, pressure, info)
@@ -259,7 +257,7 @@ def _dilute_gas(r: Floats, rng: np.random.Generator, rates: int) -> dynamics.Mot
         fraction *= 0.9
     n = len(r)
     velocity = np.zeros((n, 3))
-    return _with_new_list(
+    return relisted(
         dynamics.Motion(
             *(x, velocity, r, np.pi * r**2, np.full(2, side), np.zeros(1)),
             np.zeros(1) if rates == 1 else np.zeros((1, rates)),
@@ -315,64 +313,6 @@ def _insert(
     return x, True
 
 
-def _with_new_list(motion: dynamics.Motion) -> dynamics.Motion:
-    motion = _leant_back(motion)
-    if cell_of(motion).shortest <= 2 * motion.r.max():
-        raise NotJammedError(
-            "the box shrank to the largest disk's diameter without jamming: too few disks"
-        )
-    i, j, shift = find_pairs(motion.x, motion.r, cell_of(motion), SKIN)
-    # In an order of their own, pairs are swept in the same order however often the list is made.
-    order = np.lexsort((shift[:, 1], shift[:, 0], j, i))
-    i, j, shift = i[order], j[order], shift[order]
-    force = _carry_over(motion.i, motion.j, motion.shift, motion.force, i, j, shift)
-    return motion._replace(i=i, j=j, shift=shift, force=force, drift=np.zeros(1))
-
-
-def _leant_back(motion: dynamics.Motion) -> dynamics.Motion:
-    """The motion with a tilt between ∓L_x/2 that spans the same lattice."""
-    times = np.round(motion.tilt[0] / motion.box[0])
-    if times == 0:
-        return motion
-    # The image s_x a + s_y b is (s_x + times s_y) a + s_y (b − times a).
-    along = motion.shift[:, 0] + int(times) * motion.shift[:, 1]
-    return motion._replace(
-        tilt=motion.tilt - times * motion.box[0],
-        shift=np.column_stack([along, motion.shift[:, 1]]),
-    )
-
-
-@compiled
-def _carry_over(
-    old_i: Integers,
-    old_j: Integers,
-    old_shift: Integers,
-    old_force: Floats,
-    i: Integers,
-    j: Integers,
-    shift: Integers,
-) -> Floats:
-    """Forces of the old pairs on the new ones, by grain numbers and image."""
-    grains = 0
-    for a in old_i:
-        grains = max(grains, a + 1)
-    for a in i:
-        grains = max(grains, a + 1)
-    start = np.zeros(grains + 1, np.int64)
-    # Lists come grouped by i, so the old pairs of one grain lie side by side.
-    for a in old_i:
-        start[a + 1] += 1
-    for a in range(grains):
-        start[a + 1] += start[a]
-    force = np.zeros((len(i), 2))
-    for p in range(len(i)):
-        for q in range(start[i[p]], start[i[p] + 1]):
-            same = shift[p, 0] == old_shift[q, 0] and shift[p, 1] == old_shift[q, 1]
-            if old_j[q] == j[p] and same:
-                force[p, 0], force[p, 1] = old_force[q, 0], old_force[q, 1]
-    return force
-
-
 def _looking(
     watch: Callable[[Glimpse], object],
     unit: float,
@@ -420,7 +360,7 @@ def _advance(
         )
         cancelling.check("compaction")
         if motion.drift[0] > MOVED:
-            motion = _with_new_list(motion)
+            motion = relisted(motion)
             work["list_rebuilds"] += 1
         if look is not None:
             look(motion, unbalance)
@@ -436,17 +376,24 @@ def _fastest_strain(motion: dynamics.Motion) -> float:
 
 
 def _finish(
-    motion: dynamics.Motion, mu: float, unbalance: float, work: dict[str, Any]
-) -> Packing | None:
-    """The finished packing in natural units, or None while it is not jammed."""
-    if mu <= NEARLY_FRICTIONLESS:
-        if _fastest_strain(motion) * motion.pace[0] > BOX_AT_REST:
-            return None
-        return shrink_to_isostatic(motion, mu, work)
-    if unbalance > (NEARLY_BALANCED if mu < LARGE else NEARLY_BALANCED_AT_LARGE):
-        return None
-    work["certificates_tried"] += 1  # so are the networks looked for called in stored packings
-    return jammed_network(motion, mu)
+    motion: dynamics.Motion,
+    mu: float,
+    unbalance: float,
+    work: dict[str, Any],
+    look: Callable[[dynamics.Motion, float], object] | None,
+) -> tuple[dynamics.Motion, Packing | None, Rest | None]:
+    """The finished packing in natural units with its certificate, or None while it moves."""
+    if mu > NEARLY_FRICTIONLESS:
+        if unbalance > NEARLY_BALANCED:
+            return motion, None, None
+        return come_to_rest(motion, mu, work, look)
+    if _fastest_strain(motion) * motion.pace[0] > BOX_AT_REST:
+        return motion, None, None
+    packing = shrink_to_isostatic(motion, mu, work)
+    if packing is None:
+        return motion, None, None
+    certificate = rest(packing, **prescribed_of(motion))
+    return motion, packing if certificate.at_rest else None, certificate
 
 
 def _in_users_units(

@@ -21,10 +21,10 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from granforce.explore.intervals import limit_load_bounds
-from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.forces.nearest import starting_network
 from granforce.forces import flow
+from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.flow import Outcome, Push
+from granforce.forces.nearest import starting_network
 from granforce.forces.step import Step, grain_velocities, make_step, relative_velocities
 from granforce.forces.works import follow, relax
 from granforce.records import (

@@ -18,11 +18,11 @@ from scipy import sparse
 import granforce as gf
 from granforce.explore import billiard, uniform
 from granforce.explore.walls import walls
-from granforce.numerics import elimination
-from granforce.numerics import highs as programs
 from granforce.forces.flow import Push
 from granforce.forces.step import make_step
 from granforce.forces.works import follow, relax
+from granforce.numerics import elimination
+from granforce.numerics import highs as programs
 from granforce.system import cancelling
 
 # What is a second on an idle machine; hours are what the work would take.

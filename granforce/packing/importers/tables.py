@@ -20,7 +20,7 @@ from granforce.records import (
     make_packing,
     positive,
 )
-from granforce.tolerances import TOUCHING
+from granforce.tolerances import LISTED_TOUCHING
 
 # Columns of grains, then of contacts.
 NAMES = ("id", "x", "y", "r", "fx", "fy", "torque")
@@ -38,7 +38,7 @@ def read_table(
     forces: bool | None = None,
     reverse: bool = False,
     pressure: float = 1.0,
-    tolerance: float = TOUCHING,
+    tolerance: float = LISTED_TOUCHING,
     most_grains: int | None = None,
 ) -> Packing:
     """A Packing from a CSV of grains and, if there is one, a CSV of contacts (paths or open files).

@@ -1,0 +1,94 @@
+"""Rest: whether contact dynamics leaves a packing where it is.
+
+A network in S shows that balance and friction allow rest. It does not show that grains stay:
+sliding contacts do not dilate, so that the same contacts and loads may allow motion as well, and
+which of the two happens depends on the forces from which one starts. A packing is at rest where the
+exact step of contact dynamics (`step`, `flow`), all velocities zero before it, ends without motion
+from the packing's own forces, and again from the network that it ended in, with noise on every
+force.
+"""
+
+from collections.abc import Generator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from granforce.forces import flow
+from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.flow import Outcome, Push
+from granforce.forces.step import make_step
+from granforce.forces.works import follow, relax
+from granforce.records import Cancel, Floats, InputError, Mask, Packing, random_seed, whole
+from granforce.system import cancelling
+
+# Standard deviation of the noise on each force (in ⟨f_n⟩), and draws of each.
+NOISE, DRAWS = (1e-4, 1e-2), 3
+# Implicit steps in which a network comes to rest or is said not to.
+MOST_STEPS = 500
+
+
+class Rest(NamedTuple):
+    """The certificate of rest of a packing; see `rest`."""
+
+    at_rest: bool  # from the packing's own forces, and with noise in every draw
+    distance: float  # ⟨f_n⟩, of its own forces from the network they end in; NaN without rest
+    noise: tuple[float, ...]  # ⟨f_n⟩, standard deviations
+    stayed: Mask  # (len(noise), draws) bool, which draws came to rest; none without rest before
+    forces: Floats  # (contacts, 2) the network that the own forces end in; where something sets
+    # off, the forces with which it moves
+
+
+@cancelling.cancellable
+def rest(
+    packing: Packing | Ensemble,
+    *,
+    noise: tuple[float, ...] = NOISE,
+    draws: int = DRAWS,
+    seed: int = 0,
+    cancel: Cancel | None = None,
+    **conditions: Any,
+) -> Rest:
+    """Whether contact dynamics leaves a packing at rest, from its own forces and with noise.
+
+    packing: a Packing with forces, of any origin, or its Ensemble. noise: standard deviations of
+    the normal noise on every component, in ⟨f_n⟩; draws of each, by seed. conditions: as for
+    `ensemble`. cancel() returning True raises Cancelled.
+
+    Raises NotJammedError where S is empty, InputError for a packing without forces of its own.
+    """
+    S = packing if isinstance(packing, Ensemble) else ensemble(packing, **conditions)
+    draws = whole(draws, "draws", least=1)
+    if not S.original.any():
+        raise InputError("the packing has no forces of its own that could come to rest")
+    step, own = make_step(S), S.original / S.force_scale
+    first = relax(step, _from(own))
+    stayed = np.zeros((len(noise), draws), dtype=bool)
+    if not first.at_rest:
+        return Rest(False, np.nan, noise, stayed, _on_all(S, first.forces))
+    rng = np.random.default_rng(random_seed(seed))
+    starts = [
+        first.forces + level * rng.standard_normal(own.shape)
+        for level in noise
+        for _ in range(draws)
+    ]
+    ends: list[Outcome | None] = [None] * len(starts)
+    follow(step, [_one(_from(start)) for start in starts], ends.__setitem__)
+    stayed.flat = [end is not None and end.at_rest for end in ends]
+    forces = first.forces
+    for end in ends:
+        if end is not None and not end.at_rest:
+            forces = end.forces
+    distance = float(np.abs(first.forces - own).max())
+    return Rest(bool(stayed.all()), distance, noise, stayed, _on_all(S, forces))
+
+
+def _from(forces: Floats) -> Push:
+    return Push(forces, 0, 0.0, MOST_STEPS, flow.STEADY)
+
+
+def _one(asked: Push) -> Generator[Push, Outcome, Outcome]:
+    return (yield asked)
+
+
+def _on_all(S: Ensemble, forces: Floats) -> Floats:
+    return S.expand(forces * S.force_scale)

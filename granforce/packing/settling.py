@@ -1,0 +1,273 @@
+"""The last phase of a compaction: from slow grains to a packing at rest, with a certificate.
+
+1. Overdamped motion of stiff disks (`forces.overdamped`) from the forces of the dynamics, until
+   every grain and the box are in balance to rounding. Disks then overlap by about the softness.
+2. Overlaps are closed with the forces as they are: the least motion Σ M u² that brings the gaps of
+   pressing contacts to 0 and leaves no other pair overlapping. As that turns contacts, forces are
+   out of balance by about the displacements, and the motion goes on with stiffer disks; overlaps
+   are again closed, and so on. Each round takes what is left by a factor of its own size, so that
+   three end at rounding: what presses is a contact, what does not press has a gap.
+3. The certificate of rest (`forces.rest`): from the forces of the last round, and with noise on all
+   of them, the exact step of contact dynamics comes to rest without moving. Where something sets
+   off, it moves on from there by the first.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from granforce.forces import overdamped
+from granforce.forces.balance import stress_rows
+from granforce.forces.contact_dynamics import Motion
+from granforce.forces.flow import STEADY, Push
+from granforce.forces.gauss_seidel import BOX_MASS
+from granforce.forces.rest import Rest, rest
+from granforce.forces.step import Step, effective_masses
+from granforce.forces.works import relax
+from granforce.numerics import contact_matrix
+from granforce.numerics.contact_matrix import Network
+from granforce.packing.closing import packing_of, prescribed_of, strained
+from granforce.packing.neighbours import separations
+from granforce.packing.pair_list import cell_of, relisted
+from granforce.records import Floats, Integers, Mask, Packing, make_contacts
+from granforce.system import cancelling
+from granforce.tolerances import CLOSED, TOUCHING
+
+# Softness ε of the overdamped motion, first and once overlaps have been closed: overlaps of
+# strongly pressed contacts, in largest radii.
+SOFT, STIFF = 1e-4, 1e-6
+# Displacements after which the geometry is made anew, in √ε: what they leave out of the gaps,
+# their square, changes forces by a hundredth.
+STRIDE = 0.1
+# Implicit steps between two looks, and looks at most, of one softness.
+STEPS_A_LOOK, MOST_LOOKS = 50, 1000
+FIRST_PACE = 100.0
+# Pairs nearer than NEAR take part; they are chosen anew once two grains may have approached by
+# APPROACHED (both in largest radii).
+NEAR, APPROACHED = 0.02, 0.015
+# Rounds of closing at most, and the largest displacement in one of them, in largest radii.
+CLOSINGS, FARTHEST = 8, 1e-2
+# A closing starts from forces this many times as large as they are: only a contact that presses far
+# less than others do is opened by a displacement.
+ENLARGED = 1e3
+CLOSING_STEPS = 60
+# Times that grains that set off under noise are moved on, before the dynamics takes over again.
+ATTEMPTS = 20
+
+Look = Callable[[Motion, float], object]
+
+
+class _Near(NamedTuple):
+    """The pairs that take part."""
+
+    pairs: Integers  # (K,) of the motion's list
+    network: Network
+    drift: float  # of the motion when they were chosen
+
+
+class _Place(NamedTuple):
+    """What a geometry gives: the step problem, and where its rows are."""
+
+    step: Step
+    gap: Floats  # (K,)
+    grains: Integers  # (N, 3) rows of the grains
+    unit: float  # Σ ℓ
+
+
+def come_to_rest(
+    motion: Motion, mu: float, work: dict[str, Any], look: Look | None = None
+) -> tuple[Motion, Packing | None, Rest | None]:
+    """The motion at rest, its packing in natural units and the certificate; None if it moves on.
+
+    work: counts of what was done, which are added to. look(motion, unbalance) is called now and
+    then.
+    """
+    motion.velocity[:], motion.dilation[:] = 0.0, 0.0
+    for _ in range(ATTEMPTS):
+        motion, rested = _creep(motion, mu, SOFT, work, look)
+        if rested:
+            motion, rested = _closed(motion, mu, work, look)
+        if not rested:
+            return motion, None, None
+        packing, listed = _packing(motion, mu, work)
+        work["certificates_tried"] += 1
+        certificate = rest(packing, **prescribed_of(motion))
+        if certificate.at_rest:
+            return motion, packing._replace(forces=certificate.forces), certificate
+        motion.force[:] = 0.0
+        motion.force[listed] = certificate.forces
+    return motion, None, None
+
+
+def _creep(
+    motion: Motion, mu: float, softness: float, work: dict[str, Any], look: Look | None
+) -> tuple[Motion, bool]:
+    """Overdamped motion at one softness; whether all came to rest."""
+    pace, stride = FIRST_PACE, STRIDE * softness**0.5
+    counts, near = np.zeros(3, dtype=np.int64), None
+    for _ in range(MOST_LOOKS):
+        cancelling.check("compaction")
+        motion, near = _chosen(motion, near)
+        place = _place(motion, near, mu)
+        moving = overdamped.make_overdamped(
+            place.step, motion.force[near.pairs], place.gap, softness, pace
+        )
+        velocity = moving.flows.velocity
+        velocity.rows[place.grains, 0] = motion.velocity
+        velocity.border[:, 0] = motion.dilation.ravel()
+        ended = overdamped.move(
+            place.step, moving, softness, stride, STEPS_A_LOOK, counts, cancelling.flag()
+        )
+        pace = float(moving.flows.pace[0, 0])
+        motion.velocity[:] = velocity.rows[place.grains, 0]
+        motion.dilation.ravel()[:] = velocity.border[:, 0]
+        _displace(motion, moving.moved[place.grains], moving.strain / place.unit)
+        _correct(motion, near, place.step, moving, softness)
+        if look is not None:
+            look(motion, _unbalance(place.step, velocity))
+        if ended != overdamped.MOVED:
+            break
+    work["linear_systems"] += int(counts[overdamped.SYSTEMS])
+    work["implicit_steps"] += int(counts[overdamped.STEPS])
+    return motion, ended == overdamped.AT_REST
+
+
+def _chosen(motion: Motion, near: _Near | None) -> tuple[Motion, _Near]:
+    """The pairs that take part, chosen anew where others may have come near."""
+    if near is not None and motion.drift[0] - near.drift < APPROACHED:
+        return motion, near
+    motion = relisted(motion)
+    gap = separations(motion.x, motion.r, cell_of(motion), motion.i, motion.j, motion.shift)[2]
+    pairs = np.flatnonzero((gap < NEAR) | (motion.force[:, 0] > 0))
+    normal, length, _ = _geometry(motion, pairs)
+    network = contact_matrix.make_network(
+        motion.x, motion.i[pairs], motion.j[pairs], *_columns(motion, pairs, normal, length)
+    )
+    return motion, _Near(pairs, network, float(motion.drift[0]))
+
+
+def _geometry(motion: Motion, pairs: Integers) -> tuple[Floats, Floats, Floats]:
+    which = motion.i[pairs], motion.j[pairs], motion.shift[pairs]
+    return separations(motion.x, motion.r, cell_of(motion), *which)
+
+
+def _columns(
+    motion: Motion, pairs: Integers, normal: Floats, length: Floats, frictionless: bool = False
+) -> tuple[Floats, Floats, Floats]:
+    """What unit f_n, f_t do to the rows of both grains (K, 3, 2) and of the box (K, m, 2)."""
+    first, second = np.zeros((2, len(pairs), 3, 2))
+    second[:, :2, 0] = normal
+    second[:, :2, 1] = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    first[:, :2] = -second[:, :2]
+    first[:, 2, 1] = second[:, 2, 1] = -1.0  # torque/r of rigid disks
+    i, j, r = motion.i[pairs], motion.j[pairs], motion.r
+    rows = stress_rows(make_contacts(i, j, normal, length, r)) / length.sum()
+    if frictionless:
+        first[..., 1] = second[..., 1] = rows[..., 1] = 0.0
+    pressure = rows[0] + rows[1]
+    if motion.dilation.size == 1:
+        return first, second, pressure[:, None]
+    return first, second, np.stack([pressure, 0.5 * (rows[0] - rows[1]), rows[2]], axis=1)
+
+
+def _place(motion: Motion, near: _Near, mu: float) -> _Place:
+    normal, length, gap = _geometry(motion, near.pairs)
+    i, j, unit = motion.i[near.pairs], motion.j[near.pairs], float(length.sum())
+    network = contact_matrix.turned(
+        near.network.layout, i, j, *_columns(motion, near.pairs, normal, length, mu == 0)
+    )
+    grains = 3 * network.layout.position[:, None] + np.arange(3)
+    mass, volume = np.empty(grains.size), float(np.prod(motion.box))
+    mass[grains] = motion.mass[:, None] * np.array([1.0, 1.0, 0.5])
+    box = np.full(motion.dilation.size, 2 * volume * BOX_MASS / unit**2)
+    b = np.zeros(len(box))
+    b[0] = 2 * volume / unit
+    stiffness = effective_masses(network, mass, box)
+    everywhere = np.append(grains.ravel(), grains.size + np.arange(len(box)))
+    step = Step(network, np.zeros(len(mass)), b, mass, box, stiffness, 0.0 * gap, mu, everywhere)
+    return _Place(step, gap, grains, unit)
+
+
+def _displace(motion: Motion, moved: Floats, strain: Floats) -> None:
+    """Move grains (N, 3) and the box, by the strains (m,) that go with its rows."""
+    if len(strain) == 3:
+        mean, half, shear = strain
+        strain = np.array([mean + 0.5 * half, mean - 0.5 * half, shear])
+    x, cell = strained(motion.x, cell_of(motion), strain)
+    motion.x[:], motion.box[:], motion.tilt[0] = x + moved[:, :2], cell.box, cell.tilt
+    farthest = np.hypot(*moved[:, :2].T).max()
+    motion.drift[0] += 2.0 * farthest + 3.0 * np.abs(strain).sum() * motion.r.max()
+
+
+def _correct(
+    motion: Motion, near: _Near, step: Step, moving: overdamped.Overdamped, softness: float
+) -> None:
+    """Keep the forces, with what the squares of displacements change in the gaps."""
+    gap = _geometry(motion, near.pairs)[2]
+    forces = moving.flows.forces.reshape(-1, 2).copy()
+    forces[:, 0] -= step.stiffness[:, 0] * (gap - moving.gap) / softness
+    forces[forces[:, 0] <= 0] = 0.0
+    motion.force[:] = 0.0
+    motion.force[near.pairs] = forces
+
+
+def _unbalance(step: Step, velocity: Any) -> float:
+    return float(np.abs(step.mass * velocity.rows[:, 0]).max())
+
+
+def _closed(
+    motion: Motion, mu: float, work: dict[str, Any], look: Look | None
+) -> tuple[Motion, bool]:
+    """The motion with overlaps closed, at rest again; whether it got there."""
+    near = None
+    for _ in range(CLOSINGS):
+        motion, near = _chosen(motion, near)
+        if not _close(motion, near, work):
+            return motion, False
+        motion, rested = _creep(motion, mu, STIFF, work, look)
+        if not rested:
+            return motion, False
+        gap, pressing = _gaps(motion)
+        if np.abs(gap[pressing]).max() < CLOSED and gap.min() > -CLOSED:
+            return motion, True
+    return motion, False
+
+
+def _gaps(motion: Motion) -> tuple[Floats, Mask]:
+    """Gaps of all listed pairs, and which of them press."""
+    gap = separations(motion.x, motion.r, cell_of(motion), motion.i, motion.j, motion.shift)[2]
+    return gap, motion.force[:, 0] > 0
+
+
+def _close(motion: Motion, near: _Near, work: dict[str, Any]) -> bool:
+    """Move grains and box by the least that closes pressing contacts and leaves no overlap.
+
+    It is a frictionless step from rest in which nothing but the gaps is out of balance. Where
+    overlaps had jammed more contacts than rigid disks can close at once, the weakest open.
+    """
+    place = _place(motion, near, 0.0)
+    forces = motion.force[near.pairs] * [ENLARGED, 0.0]
+    network, rows = place.step.network, np.zeros(len(place.step.mass))
+    for side, first in ((network.high, 0), (network.low, 3)):
+        for k in range(3):
+            np.add.at(rows, 3 * side + k, network.columns[:, first + k] * forces[:, 0])
+    border = network.border[:, : len(place.step.b_border)].T @ forces[:, 0]
+    step = place.step._replace(b=rows, b_border=border, closing=place.gap)
+    outcome = relax(step, Push(forces, 0, 0.0, CLOSING_STEPS, STEADY))
+    work["linear_systems"] += outcome.iterations
+    moved = outcome.velocity[: rows.size].reshape(-1, 3)
+    if not outcome.converged or np.abs(moved).max() > FARTHEST:
+        return False
+    _displace(motion, moved, outcome.velocity[rows.size :] / place.unit)
+    motion.force[near.pairs[outcome.forces[:, 0] == 0]] = 0.0
+    return True
+
+
+def _packing(motion: Motion, mu: float, work: dict[str, Any]) -> tuple[Packing, Integers]:
+    """The packing in natural units, and the places of its contacts in the list."""
+    gap, pressing = _gaps(motion)
+    touching = pressing | (gap < TOUCHING)
+    work["touching_without_force"] = int((touching & ~pressing).sum())
+    packing = packing_of(motion, motion.x, cell_of(motion), touching, motion.force, mu)
+    return packing, np.flatnonzero(touching)
