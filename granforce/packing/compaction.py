@@ -41,7 +41,7 @@ INITIAL_FRACTION = 0.5
 # The last phase is tried every so many steps, once no grain's momentum changes by more than this in
 # a step, in ⟨f_n⟩.
 CHECK_EVERY = 25
-NEARLY_BALANCED = 0.05
+NEARLY_BALANCED = 0.02
 # Longest time step, and most sweeps in it. From SETTLED_FROM on steps of 0.1 leave wider intervals
 # than shorter ones do, by 8 % at μ = 0.3, 13 % at 0.5, half at 1; those of 0.03 and less all leave
 # the same if the last sweeps of a step settle, of which a quarter are enough, too.

@@ -204,9 +204,7 @@ def _displace(motion: Motion, moved: Floats, strain: Floats) -> None:
     motion.drift[0] += 2.0 * farthest + 3.0 * np.abs(strain).sum() * motion.r.max()
 
 
-def _correct(
-    motion: Motion, near: _Near, step: Step, moving: overdamped.Overdamped
-) -> None:
+def _correct(motion: Motion, near: _Near, step: Step, moving: overdamped.Overdamped) -> None:
     """Keep the forces, with what the squares of displacements change in the gaps."""
     gap = _geometry(motion, near.pairs)[2]
     forces = moving.flows.forces.reshape(-1, 2).copy()

@@ -6,12 +6,13 @@ from packings import lattice, packed, reference
 
 from granforce.explore.intervals import limit_load_bounds, limit_loads
 from granforce.forces import contact_dynamics as dynamics
+from granforce.forces import flow
 from granforce.forces.ensemble import ensemble
 from granforce.forces.gauss_seidel import from_rest
 from granforce.forces.step import make_step
 from granforce.numerics.lanes import ONE
 from granforce.perturb import critical_force as perturb
-from granforce.perturb import decay, flow
+from granforce.perturb import decay
 from granforce.perturb.critical_force import critical_force, critical_forces, response
 from granforce.records import Cancelled, InputError, UndecidedError
 from granforce.study import cells as study
