@@ -33,6 +33,8 @@ _HOME = {
     "nearest": "forces.nearest",
     "nearest_of_many": "forces.nearest",
     "nearest_piqp": "forces.nearest_piqp",
+    "rest": "forces.rest",
+    "Rest": "forces.rest",
     "walk": "explore.random_walk",
     "Walk": "explore.random_walk",
     "Found": "explore.random_walk",

@@ -45,6 +45,8 @@ from granforce.forces.knowledge import Known as Known
 from granforce.forces.nearest import nearest as nearest
 from granforce.forces.nearest import nearest_of_many as nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp as nearest_piqp
+from granforce.forces.rest import Rest as Rest
+from granforce.forces.rest import rest as rest
 from granforce.packing.closing import Margin as Margin
 from granforce.packing.closing import margin as margin
 from granforce.packing.compaction import Glimpse as Glimpse

@@ -12,7 +12,7 @@ from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.nearest import nearest
-from granforce.packing import compaction
+from granforce.packing import pair_list
 from granforce.packing.compaction import pack
 from granforce.records import Packing
 from granforce.study import cells as study
@@ -83,15 +83,15 @@ def _finish(S: Ensemble) -> dict[str, Any]:
 def _neighbour_lists(n: int, mu: float) -> dict[str, Any]:
     """Compaction with its neighbour list, and with one made anew in every step."""
     pack(n, mu, 1)  # compiled, in memory
-    seconds, rebuilds, usual = [], [], compaction.MOVED
+    seconds, rebuilds, usual = [], [], pair_list.MOVED
     try:
         for moved in (usual, 0.0):
-            compaction.MOVED = moved
+            pair_list.MOVED = moved
             spent, packing = timed(pack, n, mu, 1)
             rebuilds.append(packing.info["list_rebuilds"])
             seconds.append(spent)
     finally:
-        compaction.MOVED = usual
+        pair_list.MOVED = usual
     return _row("new neighbour lists, one compaction", rebuilds[1] - rebuilds[0], *seconds)
 
 

@@ -34,8 +34,9 @@ class Rest(NamedTuple):
     distance: float  # ⟨f_n⟩, of its own forces from the network they end in; NaN without rest
     noise: tuple[float, ...]  # ⟨f_n⟩, standard deviations
     stayed: Mask  # (len(noise), draws) bool, which draws came to rest; none without rest before
-    forces: Floats  # (contacts, 2) the network that the own forces end in; where something sets
-    # off, the forces with which it moves
+    # (contacts, 2) the network that its own forces end in; if something sets off, the forces with
+    # which it moves
+    forces: Floats
 
 
 @cancelling.cancellable
@@ -62,24 +63,22 @@ def rest(
         raise InputError("the packing has no forces of its own that could come to rest")
     step, own = make_step(S), S.original / S.force_scale
     first = relax(step, _from(own))
-    stayed = np.zeros((len(noise), draws), dtype=bool)
     if not first.at_rest:
-        return Rest(False, np.nan, noise, stayed, _on_all(S, first.forces))
+        none = np.zeros((len(noise), draws), dtype=bool)
+        return Rest(False, np.nan, noise, none, _on_all(S, first.forces))
     rng = np.random.default_rng(random_seed(seed))
     starts = [
         first.forces + level * rng.standard_normal(own.shape)
         for level in noise
         for _ in range(draws)
     ]
-    ends: list[Outcome | None] = [None] * len(starts)
+    ends: dict[int, Outcome] = {}
     follow(step, [_one(_from(start)) for start in starts], ends.__setitem__)
-    stayed.flat = [end is not None and end.at_rest for end in ends]
-    forces = first.forces
-    for end in ends:
-        if end is not None and not end.at_rest:
-            forces = end.forces
+    outcomes = [ends[k] for k in range(len(starts))]
+    stayed = np.array([end.at_rest for end in outcomes]).reshape(len(noise), draws)
+    moving = next((end.forces for end in outcomes if not end.at_rest), first.forces)
     distance = float(np.abs(first.forces - own).max())
-    return Rest(bool(stayed.all()), distance, noise, stayed, _on_all(S, forces))
+    return Rest(bool(stayed.all()), distance, noise, stayed, _on_all(S, moving))
 
 
 def _from(forces: Floats) -> Push:

@@ -16,8 +16,9 @@ import numpy.typing as npt
 from granforce.forces import contact_dynamics as dynamics
 from granforce.forces.rest import Rest, rest
 from granforce.numerics.lanes import compiled
+from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
-from granforce.packing.pair_list import MOVED, cell_of, relisted
+from granforce.packing.pair_list import cell_of, relisted
 from granforce.packing.settling import come_to_rest
 from granforce.records import (
     Cancel,
@@ -356,10 +357,10 @@ def _advance(
     while (left := int(goal - counters[dynamics.STEPS])) > 0:
         steps = left if look is None else min(left, WATCH_EVERY)
         overlap, unbalance = dynamics.advance(
-            motion, mu, 1.0, pace, MOVED, steps, counters, cancelling.flag()
+            motion, mu, 1.0, pace, pair_list.MOVED, steps, counters, cancelling.flag()
         )
         cancelling.check("compaction")
-        if motion.drift[0] > MOVED:
+        if motion.drift[0] > pair_list.MOVED:
             motion = relisted(motion)
             work["list_rebuilds"] += 1
         if look is not None:

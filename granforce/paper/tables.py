@@ -20,7 +20,6 @@ from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
 from granforce.records import Floats, InputError, Integers, Packing, friction
 from granforce.study import cells, kinds
-from granforce.study.cells import packing_version
 from granforce.study.schema import ROW_SCALARS, dataset_packing, labelled
 from granforce.study.store import Entry, Store, open_store
 
@@ -327,14 +326,13 @@ def _version_words(row: Mapping[str, Any]) -> str:
 
 
 def check_versions(rows: Sequence[Mapping[str, Any]]) -> None:
-    """InputError where rows of one part, or packings that one algorithm makes, differ in version.
+    """InputError where rows of one part, or their packings, differ in version.
 
     What an older table did not tell is one version by itself.
     """
     first: dict[Any, Any] = {}
     for row in rows:
-        made = packing_version(row.get("packing_mu", row["mu"]))
-        for group, version in zip((row["part"], made), _versions(row), strict=True):
+        for group, version in zip((row["part"], "packings"), _versions(row), strict=True):
             other = first.setdefault(group, (row, version))
             if other[1] != version:
                 raise InputError(

@@ -9,19 +9,14 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from granforce.packing.compaction import SETTLED_FROM
 from granforce.records import Cancel, Progress
 from granforce.study.keys import Parameters
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 
-
-def packing_version(mu: float) -> int:
-    """Of the algorithm that makes packings: 4 where sweeps of a step settle, else 3.
-
-    It is among their parameters, so that everything that rests on a packing is named by it.
-    """
-    return 3 if mu < SETTLED_FROM else 4
+# Version of the algorithm that makes packings: 5, certified to be at rest. It is among their
+# parameters, so that everything that rests on a packing is named by it.
+PACKING_VERSION = 5
 
 
 def _as_asked(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
@@ -113,9 +108,7 @@ def is_current(kind: Kind, entry: Entry) -> bool:
     packing = entry.params.get("packing")
     # Imported ones are named by what they are.
     older = (
-        isinstance(packing, dict)
-        and "n" in packing
-        and packing.get("version") != packing_version(packing["mu"])
+        isinstance(packing, dict) and "n" in packing and packing.get("version") != PACKING_VERSION
     )
     return entry.version == kind.version and not older
 

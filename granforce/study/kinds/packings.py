@@ -11,7 +11,7 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.compaction import Glimpse, check_box, default_steps, draw_radii, pack
 from granforce.records import InputError, Packing, Progress, friction, positive, random_seed, whole
 from granforce.study import slices
-from granforce.study.cells import Kind, get, packing_version, save
+from granforce.study.cells import PACKING_VERSION, Kind, get, save
 from granforce.study.conditions import conditions
 from granforce.study.conditions import of as conditions_of
 from granforce.study.keys import Parameters
@@ -59,7 +59,7 @@ def _packing_parameters(
         "box_mass": positive(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
         "accuracy": positive(accuracy, "accuracy"),
-        "version": packing_version(mu),
+        "version": PACKING_VERSION,
         # Only where it is not square: keys of packings in square boxes stay what they were.
         **({} if check_box(box) == "square" else {"box": box}),
     }
@@ -145,7 +145,7 @@ def check_complete(result: Any, what: str) -> None:
 
 PACKING = Kind(
     name="packing",
-    version=3,  # those of version 4 tell it by their parameters alone
+    version=3,  # later ones are told apart by PACKING_VERSION in their parameters
     title="compaction",
     unit="step",
     parameters=_packing_parameters,
