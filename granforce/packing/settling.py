@@ -30,7 +30,15 @@ from granforce.numerics.contact_matrix import Network
 from granforce.packing.closing import packing_of, prescribed_of, strained
 from granforce.packing.neighbours import separations
 from granforce.packing.pair_list import cell_of, relisted
-from granforce.records import Floats, Integers, Mask, Packing, make_contacts
+from granforce.records import (
+    Floats,
+    Integers,
+    Mask,
+    NotJammedError,
+    Packing,
+    UndecidedError,
+    make_contacts,
+)
 from granforce.system import cancelling
 from granforce.tolerances import CLOSED, TOUCHING
 
@@ -96,7 +104,10 @@ def come_to_rest(
             return motion, None, None
         packing, listed = _packing(motion, mu, work)
         work["certificates_tried"] += 1
-        certificate = rest(packing, **prescribed_of(motion))
+        try:
+            certificate = rest(packing, **prescribed_of(motion))
+        except (NotJammedError, UndecidedError):
+            return motion, None, None
         if certificate.at_rest:
             return motion, packing._replace(forces=certificate.forces), certificate
         motion.force[:] = 0.0
@@ -132,6 +143,7 @@ def _creep(
             look(motion, _unbalance(place.step, velocity))
         if ended != overdamped.MOVED:
             break
+    motion.velocity[:], motion.dilation[:] = 0.0, 0.0
     work["linear_systems"] += int(counts[overdamped.SYSTEMS])
     work["implicit_steps"] += int(counts[overdamped.STEPS])
     return motion, ended == overdamped.AT_REST

@@ -31,8 +31,8 @@ def pack(arguments: argparse.Namespace) -> None:
     check_outputs(arguments.out)
     store = store_of(arguments)
     packing, cached = get_packing(store, parameters, max_steps=max_steps)
-    told = "steps", "sweeps_done", "unfinished_steps", "largest_contact_gap", "least_other_gap"
-    work = {name: packing.info[name] for name in told}
+    reported = "steps", "sweeps_done", "largest_contact_gap", "least_other_gap", "distance_to_rest"
+    work = {name: packing.info[name] for name in reported}
     lines = {**importers.report(packing), **work, "cached": cached}
     print_report(lines, arguments.json)
     _save(packing, arguments)
