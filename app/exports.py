@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-import zarr
 
 from granforce.packing import importers
 from granforce.records import Packing
+from granforce.study.entries import encoded
 from granforce.study.keys import canonical
 from granforce.study.schema import packing_dataset
 
@@ -137,11 +137,9 @@ def netcdf(whole: xr.Dataset) -> bytes:
 
 def zarr_zip(whole: xr.Dataset) -> bytes:
     """A dataset as a zipped Zarr group, which zarr.storage.ZipStore opens."""
-    written: dict[str, Any] = {}
-    whole.to_zarr(zarr.storage.MemoryStore(store_dict=written), zarr_format=3, consolidated=False)
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        for name, content in sorted(written.items()):
+        for name, content in sorted(encoded(whole).items()):
             archive.writestr(name, content.to_bytes())
     return file.getvalue()
 

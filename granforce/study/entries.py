@@ -4,6 +4,7 @@ import functools
 import hashlib
 import json
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from importlib import metadata
@@ -113,11 +114,22 @@ def write(folder: Path, variables: Variables, attrs: Mapping[str, Any]) -> None:
         arrays[str(name)] = json.loads(encoded[f"{name}/zarr.json"].to_bytes())
         for rows in _by_chunks(variable):
             array[rows] = variable.values[rows]
-            _move(encoded, folder)
+            move(encoded, folder)
     seal(folder, arrays, attrs)
 
 
-def _move(encoded: dict[str, Buffer], folder: Path) -> None:
+def encoded(dataset: xr.Dataset) -> dict[str, Buffer]:
+    """The files, by key, of any dataset as a Zarr group whose metadata are consolidated."""
+    files: dict[str, Buffer] = {}
+    with warnings.catch_warnings():
+        # Of names as text and of consolidated metadata, which Zarr has not laid down for good;
+        # xarray reads both, and warns where metadata are not consolidated.
+        warnings.simplefilter("ignore")
+        dataset.to_zarr(MemoryStore(files), mode="w", zarr_format=3, consolidated=True)
+    return files
+
+
+def move(encoded: dict[str, Buffer], folder: Path) -> None:
     """Write out what Zarr has encoded, by its keys."""
     for key in list(encoded):
         path = folder / key

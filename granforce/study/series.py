@@ -9,7 +9,6 @@ import itertools
 import json
 import re
 import shutil
-import warnings
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -35,6 +34,7 @@ from granforce.records import (
     random_seed,
     whole,
 )
+from granforce.study import entries
 from granforce.study.cells import Cell, Kind, get
 from granforce.study.keys import Parameters
 from granforce.study.scan import run
@@ -436,11 +436,7 @@ def save_series(dataset: xr.Dataset, path: str | Path) -> None:
     path = check_folder(path)
     aside = beside(path)
     try:
-        with warnings.catch_warnings():
-            # Of names as text and of consolidated metadata, which Zarr has not laid down for good;
-            # xarray reads both, and warns where metadata are not consolidated.
-            warnings.simplefilter("ignore")
-            dataset.to_zarr(aside, mode="w", consolidated=True)
+        entries.move(entries.encoded(dataset), aside)
         if path.exists():
             shutil.rmtree(path)
         aside.rename(path)

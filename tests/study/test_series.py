@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from frames import write
+from full_disk import files_of
 from packings import packed
 
 from granforce.cli.parser import main
@@ -160,3 +161,14 @@ def test_names_of_files_of_positions_and_adjacency(tmp_path):
     write(tmp_path, grains, rows)
     (frame,) = series.frames_of(tmp_path)
     assert frame.positions.endswith("positions.txt") and frame.number == 1
+
+
+def test_a_series_that_cannot_be_written_leaves_nothing(tmp_path):
+    rng = np.random.default_rng(0)
+    whole = xr.Dataset({"f": (("frame", "contact"), rng.random((50, 200)))})
+    path = tmp_path / "series.zarr"
+    with files_of(4000), pytest.raises(InputError, match="File too large"):
+        series.save_series(whole, path)
+    assert not list(tmp_path.iterdir())
+    series.save_series(whole, path)
+    xr.testing.assert_equal(xr.open_zarr(path).load(), whole)

@@ -5,7 +5,6 @@ import multiprocessing
 import os
 import random
 import re
-import resource
 import shutil
 import signal
 import socket
@@ -15,7 +14,6 @@ import tempfile
 import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +21,7 @@ import platformdirs
 import pytest
 import xarray as xr
 import zarr
+from full_disk import files_of
 
 from granforce.records import Contacts, InputError, Packing, make_contacts, make_packing
 from granforce.study import entries, keys
@@ -735,17 +734,6 @@ def test_temporaries_of_dead_writers_are_cleaned(store):
     os.utime(store.path / f".tmp-far_away-{ended.pid}-dd", (0, 0))
     open_store(store.path)
     assert {item.name[-2:] for item in store.path.glob(".tmp-*")} == {"bb"}
-
-
-@contextmanager
-def files_of(most):
-    """Files cannot grow beyond so many bytes, as on a disk that is full."""
-    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most, usual[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
 
 
 def test_failed_write_leaves_nothing(store):
