@@ -93,6 +93,11 @@ def read_series(S, folder):
     return gf.infer_series(folder / "s.zarr", gf.frames_of(folder), mu=0.3, states=4, workers=1)
 
 
+def evolved(S, folder):
+    snapshots = read(gf.open_lammps, small_dumps(), mu=0.3)
+    return gf.evolution(folder / "e.zarr", snapshots, workers=1)
+
+
 def measured(S):
     m, states = gf.measures, S.original * np.linspace(0.9, 1.1, 5)[:, None, None]
     low, high = m.intervals_seen(states)
@@ -150,6 +155,12 @@ CALLS = {
     "report": lambda S, _: gf.report(S.packing),
     "frames_of": read_series,
     "infer_series": read_series,
+    "open_lammps": lambda S, _: read(gf.open_lammps, small_dumps(), mu=0.3),
+    "open_mercury": lambda S, _: read(gf.open_mercury, mercury(), mu=MU, box=packed(N, MU).box),
+    "save_lammps": lambda S, folder: gf.save_lammps(S.packing, folder / "p", folder / "c"),
+    "save_vtk": lambda S, folder: gf.save_vtk(S.packing, folder / "p.vtp", folder / "c.vtp"),
+    "evolution": evolved,
+    "rest": lambda S, _: gf.rest(S, draws=1),
     "open_store": lambda S, folder: list(gf.open_store(folder / "store.zarr")),
     "measures": lambda S, _: measured(S),
 }
