@@ -332,16 +332,16 @@ SCENES = {
     "leaning": _Scene("A pyramid against a wall", 0.4, _leaning),
     "six": _Scene(
         "Six disks under pressure", 0.5,
-        partial(_pressed, disks=6, packed_mu=0.5, dimension=2), packed=True,
+        partial(_pressed, disks=6, packed_mu=0.3, dimension=2), packed=True,
     ),
     "solid": _Scene(
         "Six disks, S a solid body", 0.5,
-        partial(_pressed, disks=6, packed_mu=0.5, dimension=3), packed=True,
+        partial(_pressed, disks=6, packed_mu=0.3, dimension=3), packed=True,
     ),
     "column": _Scene("Ten disks in a column", 0.3, _column),
     "thirteen": _Scene(
         "Thirteen disks under pressure", 0.3,
-        partial(_pressed, disks=13, packed_mu=0.3, dimension=8), packed=True,
+        partial(_pressed, disks=13, packed_mu=0.1, dimension=8), packed=True,
     ),
     "many": _Scene("400 disks under pressure", 0.1, _many),
 }  # fmt: skip
