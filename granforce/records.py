@@ -9,17 +9,23 @@ f_n n + f_t t, and f_n ≥ 0 presses.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from granforce import notebook
-from granforce.tolerances import LARGEST_UNIT, MU_DIGITS, RIGID_OVERLAP
+from granforce.tolerances import LARGEST_FRICTION, LARGEST_UNIT, MU_DIGITS, RIGID_OVERLAP
 
 # Whole numbers up to here are exact in kernels, in JSON and in floats alike.
 LARGEST_WHOLE = 2**53
+# More threads, or processes, than any machine has.
+MOST_WORKERS = 4096
+
+T = TypeVar("T")
+# What arrays may hold instead of real numbers, by numpy's letters.
+_KINDS = {"c": "complex ones", "M": "dates", "m": "times", "U": "text", "S": "text", "V": "records"}
 
 # What arrays hold; their shapes stand in comments and docstrings.
 Floats = npt.NDArray[np.float64]
@@ -32,7 +38,10 @@ Cancel = Callable[[], bool]  # asked again and again whether to end
 
 
 class InputError(ValueError):
-    """What was given cannot be used; the message says what is wrong and what to do."""
+    """What was given cannot be used; the message says what is wrong and what to do, in one line."""
+
+    def __str__(self) -> str:
+        return " ".join(super().__str__().split())
 
 
 class NotJammedError(InputError):
@@ -222,15 +231,41 @@ class Relaxation(NamedTuple):
     seconds: float  # wall time
 
 
+def refuse_hidden(values: T, name: str) -> T:
+    """The values themselves, unless a cast to floats would change them in silence.
+
+    Raises InputError naming the array for masked values, imaginary parts, dates, and text.
+    """
+    if np.ma.isMaskedArray(values) and np.ma.getmaskarray(values).any():
+        raise InputError(f"{name} has masked values; leave them out, or fill them in")
+    try:
+        kind = np.asarray(values).dtype.kind
+    except ValueError:
+        raise InputError(f"{name} must be a regular array, not rows of different lengths") from None
+    if kind not in "biufO":
+        raise InputError(f"{name} must be real numbers, got {_KINDS.get(kind, 'something else')}")
+    return values
+
+
+def real_array(values: npt.ArrayLike, name: str) -> Floats:
+    """A contiguous float64 array of its own, of real numbers; NaN and infinity may be among them.
+
+    Raises InputError as `refuse_hidden`, and for what is no regular array of numbers.
+    """
+    try:
+        return np.array(refuse_hidden(values, name), dtype=np.float64, order="C")
+    except InputError:
+        raise
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} must be real numbers in a regular array") from None
+
+
 def float_array(values: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Floats:
     """Cast to a contiguous float64 array of the given shape (−1: any) and check it is finite.
 
-    Raises InputError naming the array.
+    Raises InputError naming the array, as `real_array` does.
     """
-    try:
-        array = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers of shape {shape}") from None
+    array = real_array(values, name)
     if array.ndim != len(shape) or any(
         want not in (-1, have) for want, have in zip(shape, array.shape, strict=True)
     ):
@@ -240,25 +275,59 @@ def float_array(values: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
     return array
 
 
+def real(value: Any, name: str) -> float:
+    """One real number as a float, NaN and infinity among them; InputError otherwise."""
+    array = real_array(value, name)
+    if array.ndim:
+        raise InputError(f"{name} must be one number, got {brief(value)}")
+    return float(array)
+
+
+def choice(value: Any, options: Collection[str], name: str) -> str:
+    """The value, if it is one of the options; InputError otherwise."""
+    if not isinstance(value, str) or value not in options:
+        *others, last = options
+        raise InputError(f"{name} must be {', '.join(others)} or {last}, got {brief(value)}")
+    return value
+
+
+def worker_count(value: Any, name: str = "workers") -> int:
+    """The value as a number of threads or processes; InputError otherwise."""
+    return whole(value, name, 1, MOST_WORKERS)
+
+
+def brief(value: Any) -> str:
+    """A value as a message shows it: one line of at most 40 characters."""
+    return " ".join(repr(value).split())[:40]
+
+
 def friction(mu: Any) -> float:
-    """μ as a float on the storage grid (15 digits); InputError unless finite and ≥ 0."""
+    """μ as a float on the storage grid (15 digits).
+
+    Raises InputError unless it lies between 0 and LARGEST_FRICTION.
+    """
     try:
         value = float(mu)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"friction coefficient must be a number, got {mu!r}") from None
+        raise InputError(f"friction coefficient must be a number, got {brief(mu)}") from None
     if not np.isfinite(value) or value < 0:
-        raise InputError(f"friction coefficient must be finite and ≥ 0, got {mu}")
+        raise InputError(f"friction coefficient must be finite and ≥ 0, got {value:g}")
+    if value > LARGEST_FRICTION:
+        raise InputError(
+            f"friction coefficient {value:g} is too large for the balance of forces in double "
+            f"precision; take at most {LARGEST_FRICTION:g}"
+        )
     return float(f"{value:.{MU_DIGITS}g}")
 
 
-def positive(value: Any, name: str) -> float:
-    """The value as a finite float > 0; InputError otherwise."""
+def positive(value: Any, name: str, *, or_zero: bool = False) -> float:
+    """The value as a finite float > 0, or ≥ 0 where that is allowed; InputError otherwise."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} must be a number, got {value!r}") from None
-    if not np.isfinite(number) or number <= 0:
-        raise InputError(f"{name} must be finite and > 0, got {value}")
+        raise InputError(f"{name} must be a number, got {brief(value)}") from None
+    if not np.isfinite(number) or number < 0 or (number == 0 and not or_zero):
+        raise InputError(f"{name} must be finite and {'≥' if or_zero else '>'} 0, got {number:g}")
     return number
 
 
@@ -270,11 +339,11 @@ def whole(value: Any, name: str, least: int = 0, most: int | None = LARGEST_WHOL
     except (TypeError, ValueError, OverflowError):
         exact = False
     if not exact:
-        raise InputError(f"{name} must be a whole number, got {value!r:.40}")
+        raise InputError(f"{name} must be a whole number, got {brief(value)}")
     if number < least:
-        raise InputError(f"{name} must be at least {least}, got {value!r:.40}")
+        raise InputError(f"{name} must be at least {least}, got {brief(value)}")
     if most is not None and number > most:
-        raise InputError(f"{name} must be at most {most}, got {value!r:.40}")
+        raise InputError(f"{name} must be at most {most}, got {brief(value)}")
     return number
 
 
@@ -318,7 +387,8 @@ def make_contacts(
 
     Raises InputError for grains outside 0 … N − 1, self-contacts, no unit vectors, distances ≤ 0.
     """
-    i, j = np.asarray(i), np.asarray(j)
+    r = float_array(r, (-1,), "radii")
+    i, j = _numbers_of_grains(i, "i"), _numbers_of_grains(j, "j")
     if i.ndim != 1 or i.shape != j.shape:
         raise InputError(f"contact lists i and j differ in shape: {i.shape} and {j.shape}")
     count = len(i)
@@ -338,6 +408,12 @@ def make_contacts(
     soft = count > 0 and gap.min() < -RIGID_OVERLAP * r.max()
     inward = gap / 2 if soft else np.zeros(count)
     return Contacts(i, j, normal / norm[:, None], length, gap, r[i] + inward, r[j] + inward)
+
+
+def _numbers_of_grains(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
+    """As they are: a cast to floats would round large ones."""
+    values = np.asarray(refuse_hidden(values, f"contact list {name}"))
+    return real_array(values, f"contact list {name}") if values.dtype.kind == "O" else values
 
 
 def make_packing(
@@ -371,6 +447,7 @@ def make_packing(
     box, tilt = make_cell(box, tilt)
     _check_own_images(Cell(box, tilt), 2 * r.max(initial=0))
     load = np.zeros((len(r), 3)) if load is None else _loads(load, len(r))
+    pressure = real(pressure, "pressure")
     if not np.isnan(pressure):
         pressure = moderate(pressure, "pressure")
     forces = float_array(forces, (len(contacts.i), 2), "forces")
@@ -391,11 +468,12 @@ def make_cell(box: npt.ArrayLike, tilt: float = 0.0) -> Cell:
     Raises InputError for anything else, and for a tilted cell that is open in a direction.
     """
     try:
-        box, tilt = np.array(box, dtype=np.float64), float(tilt)
-    except (TypeError, ValueError):
-        raise InputError(f"box must be two sides and tilt a number, got {box}, {tilt}") from None
+        box = real_array(box, "box")
+    except InputError as error:
+        raise InputError(f"box must be two sides L_x, L_y > 0: {error}") from None
+    tilt = real(tilt, "tilt")
     if box.shape != (2,) or not np.all(box > 0):
-        raise InputError(f"box must be two sides L_x, L_y > 0, got {box}")
+        raise InputError(f"box must be two sides L_x, L_y > 0, got {brief(box)}")
     if not np.isfinite(tilt):
         raise InputError(f"the tilt of the cell must be a finite number, got {tilt}")
     if tilt and not np.all(np.isfinite(box)):
@@ -425,8 +503,10 @@ def _check_own_images(cell: Cell, diameter: float) -> None:
 
 def _loads(load: npt.ArrayLike, count: int) -> Floats:
     """Loads (N, 3) whose rows are finite, or NaN as a whole."""
-    load = np.array(load, dtype=np.float64, order="C")
-    left_open = np.isnan(load).all(axis=-1) if load.ndim == 2 else np.zeros(len(load), dtype=bool)
+    load = real_array(load, "loads")
+    if load.shape != (count, 3):
+        raise InputError(f"loads must have shape {(count, 3)}, got {load.shape}")
+    left_open = np.asarray(np.isnan(load).all(axis=-1))
     float_array(np.where(left_open[..., None], 0.0, load), (count, 3), "loads")
     return load
 

@@ -9,11 +9,11 @@ LONG = "9" * 23
 SEEDS = ["-1", f"-{LONG}", "1.5", "nan", "inf", "", "one", "0x1", "1e3", "−1"]
 WHOLE = ["0", "-1", f"-{LONG}", "1.5", "nan", "inf", "", "many"]
 POSITIVE = ["0", "-1", "nan", "inf", "-inf", "1e999", "", "wide", "1,5"]
-FRICTION = ["-1", "nan", "inf", "-inf", "1e999", "", "much", "0.1,0.2"]
+FRICTION = ["-1", "nan", "inf", "-inf", "1e999", "1e300", "10001", "", "much", "0.1,0.2"]
 MEMORY = ["1000000000000", LONG, "9" * 400]
 CONTACTS = ["", ",", "0,", "a", "0;1", "-1", "nan", "1.5", LONG, "9" * 5000, "99999"]
 SLICES = ["", "0,1", "nan,1,0,1", "0,inf,0,1", "0.5,0.2,0,1", "0,1,0,1,0", "a,b,c,d", "-1,2,0,1"]
-FRICTIONS = ["", ",", "a", "0.1;1", "-1", "nan", "0.1,inf", "0.1,,1"]
+FRICTIONS = ["", ",", "a", "0.1;1", "-1", "nan", "0.1,inf", "0.1,1e300", "0.1,,1"]
 
 # Names in the folder that `prepare` makes.
 OUTPUTS = ["none/x", "folder", "file/x", "loop", "x" * 300, "y/" * 3000, "a\0b", "", "/proc/none"]
@@ -32,10 +32,10 @@ RADII = [
 PACKING = {
     "-n": [*WHOLE, "2", *MEMORY],
     "--radii": RADII,
-    "--pressure": POSITIVE,
-    "--dt": POSITIVE,
-    "--step-accuracy": POSITIVE,
-    "--box-mass": POSITIVE,
+    "--pressure": [*POSITIVE, "1e300", "1e-300"],
+    "--dt": [*POSITIVE, "1e300", "1e-300"],
+    "--step-accuracy": [*POSITIVE, "1e300", "1e-300"],
+    "--box-mass": [*POSITIVE, "1e300", "1e-300"],
     "--box": ["", "round", "1 1"],
     "--sweeps": [*WHOLE, LONG],
 }

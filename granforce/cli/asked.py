@@ -11,7 +11,7 @@ import xarray as xr
 
 from granforce import measures
 from granforce.packing import importers
-from granforce.records import InputError, Packing, whole
+from granforce.records import InputError, Packing, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.cells import Kind
@@ -89,7 +89,7 @@ def prepared(
 
     Everything that can be told from the command line alone is told before a packing is made.
     """
-    whole(arguments.workers, "--workers", 1)
+    worker_count(arguments.workers, "--workers")
     if arguments.packing is None:
         packing = None
         named = packing_parameters(arguments, required_mu(arguments), arguments.seed)

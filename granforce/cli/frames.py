@@ -12,7 +12,7 @@ import xarray as xr
 from granforce.cli.asked import check_outputs, write_csv
 from granforce.packing.importers.repair import KINDS
 from granforce.packing.importers.snapshots import Snapshots
-from granforce.records import InputError, whole
+from granforce.records import InputError, whole, worker_count
 from granforce.study import series
 from granforce.study.evolution import SCALARS, evolution
 from granforce.study.store import open_store
@@ -27,7 +27,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
         raise InputError("give the friction coefficient: --mu 0.5")
     if not arguments.files:
         raise InputError("--frames needs a folder, *_solved.mat files, or positions and adjacency")
-    whole(arguments.workers, "--workers", 1)
+    worker_count(arguments.workers, "--workers")
     frames = series.frames_of(*arguments.files, columns=options["columns"])
     numbers = _chosen([frame.number for frame in frames], arguments.frames)
     frames = [frame for frame in frames if frame.number in numbers]
@@ -61,7 +61,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
 def import_frames(arguments: argparse.Namespace, snapshots: Snapshots) -> int:
     """Compute what was asked for of snapshots; print a line of each. 1 if one failed."""
     states = whole(arguments.states, "--states", 0)
-    whole(arguments.workers, "--workers", 1)
+    worker_count(arguments.workers, "--workers")
     numbers = _chosen(snapshots.numbers, arguments.frames)
     check_outputs(arguments.csv)
     if arguments.out is not None:

@@ -61,9 +61,10 @@ def carrying(
     Each contact takes one linear program, none where f_n = 0 was seen in a known network. Raises
     InputError and NotJammedError as `infer` does.
     """
+    within = positive(within, "within")
     m, s = checked(ensemble, measured, sigma)
     best = likeliest(ensemble, m, s, unmeasured)
-    width = np.fmax(positive(within, "within"), _BEYOND * np.abs(best.deviation)) * s
+    width = np.fmax(within, _BEYOND * np.abs(best.deviation)) * s
     most = _MOST * np.nanmax(np.abs(m), initial=np.abs(best.forces).max())
     bounds = ensemble.bounds
     bounds[..., 0] = np.maximum(np.nan_to_num(m - width, nan=-most), bounds[..., 0])

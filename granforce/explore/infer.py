@@ -23,8 +23,9 @@ from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, Likeliest, checked, likeliest
-from granforce.records import Cancel, Floats, Integers, Progress, whole
+from granforce.records import Cancel, Floats, Integers, Progress, random_seed, whole, worker_count
 from granforce.system import cancelling
+from granforce.system.memory import check_memory
 
 # Residuals beyond so many standard errors are told.
 SUSPECT = 3.0
@@ -130,7 +131,7 @@ def infer(
     Raises InputError for shapes that do not fit and σ ≤ 0, NotJammedError where S is empty.
     """
     begin = time.perf_counter()
-    numbers = states, chains, workers
+    numbers, seed = (states, chains, workers), random_seed(seed)
     m, s, best, numbers = asked(ensemble, measured, sigma, unmeasured, numbers)
     draws = None
     if numbers[0]:
@@ -150,8 +151,9 @@ def asked(
     least: int = 0,
 ) -> tuple[Floats, Floats, Likeliest, tuple[int, int, int]]:
     """(m, σ, the likeliest network, numbers) of arguments; numbers: draws, chains, workers."""
-    names = ("the number of draws", least), ("chains", 1), ("workers", 1)
-    draws, chains, workers = (whole(n, *name) for n, name in zip(numbers, names, strict=True))
+    draws, chains = whole(numbers[0], "states", least), whole(numbers[1], "chains", 1)
+    workers, most = worker_count(numbers[2]), max(draws, chains)
+    check_memory(16 * most * len(ensemble.index), f"{most} states")
     m, s = checked(ensemble, measured, sigma)
     return m, s, likeliest(ensemble, m, s, unmeasured), (draws, chains, workers)
 

@@ -59,6 +59,8 @@ def informative(
     k, check = whole(k, "k", 1), whole(check, "check")
     if sample is None:
         sample = sample_uniform(ensemble, states, seed=seed, workers=workers)
+    else:
+        ensemble.refuse_foreign(sample.states, sample.residual, "the sample")
     normal, held = sample.flat[..., 0] / ensemble.force_scale, sample.flat.mean(axis=0)
     if not ensemble.admits(held):  # states of an S as thin as rounding may keep an unbalance
         held = some_network(ensemble, held)

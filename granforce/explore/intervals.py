@@ -265,10 +265,10 @@ def _positions(ensemble: Ensemble, contacts: npt.ArrayLike | None) -> Integers:
     """Positions (k,) in the ensemble of contacts by their numbers in the packing, or of all."""
     if contacts is None:
         return np.arange(len(ensemble.index))
-    contacts = np.asarray(contacts).ravel()
-    if len(np.unique(contacts)) < len(contacts):
+    places = ensemble.positions(contacts)
+    if len(np.unique(places)) < len(places):
         raise InputError("a contact is named twice")
-    return ensemble.positions(contacts)
+    return places
 
 
 def bound_of(ensemble: Ensemble, contact: int, component: int, side: int) -> Program:
@@ -291,7 +291,8 @@ class Seen:
     def __init__(self, ensemble: Ensemble, states: Floats | None) -> None:
         """states (…, N_c, 2): those that are not admitted count for nothing."""
         shape = (-1, len(ensemble.index), 2)
-        states = np.asarray(() if states is None else states, dtype=np.float64).reshape(shape)
+        states = np.empty((0, *shape[1:])) if states is None else states
+        states = ensemble.networks(states, "states").reshape(shape)
         normal = states[ensemble.admits(states), :, 0] / ensemble.force_scale
         self.least = normal.min(axis=0, initial=np.inf)
 

@@ -18,7 +18,17 @@ from granforce.forces.contact_problem import cone_costs, forces_of, known_part, 
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
-from granforce.records import Cancel, Cancelled, Floats, InputError, Mask, Progress, float_array
+from granforce.records import (
+    Cancel,
+    Cancelled,
+    Floats,
+    InputError,
+    Mask,
+    Progress,
+    float_array,
+    moderate,
+    positive,
+)
 from granforce.system import cancelling
 
 _FIRST = 16  # directions to begin with
@@ -69,9 +79,12 @@ def outline(
     NotJammedError where it is empty.
     """
     axes = float_array(axes, (2, len(ensemble.index), 2), "axes")
-    length = np.sqrt((axes**2).sum(axis=(1, 2)).max())
-    if length == 0:
+    tolerance = positive(tolerance, "tolerance")
+    largest = np.abs(axes).max(initial=0.0)
+    if largest == 0:
         raise InputError("the axes are zero; give two directions of force space")
+    moderate(largest, "the largest component of the axes")
+    length = np.sqrt((axes**2).sum(axis=(1, 2)).max())
     solver = Solver(make_system(ensemble), workers=workers)
     plane = cone_costs(ensemble, axes / length).T, known_part(ensemble, axes / length)
     angle = 2 * np.pi * np.arange(_FIRST) / _FIRST

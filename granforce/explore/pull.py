@@ -30,6 +30,7 @@ from granforce.records import (
     Mask,
     UndecidedError,
     float_array,
+    real_array,
 )
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
@@ -91,11 +92,13 @@ def pull(
     Raises InputError for a contact that carries nothing, and for values outside the exact interval,
     naming it; NotJammedError where S is empty.
     """
-    (position,) = ensemble.positions([contact])
-    values = float_array(np.atleast_1d(values), (-1,), "values")
+    position = ensemble.position(contact)
+    values = float_array(np.atleast_1d(real_array(values, "values")), (-1,), "values")
+    if not len(values):
+        raise InputError("give at least one value that the contact is pulled to")
     if state is None:
         state = starting_network(ensemble)
-    state = float_array(state, (len(ensemble.index), 2), "state")
+    state = ensemble.network(state, "state")
     states = _pulled_all(ensemble, position, values, state, workers)
     missed = ~ensemble.admits(states)
     if missed.any():
@@ -112,7 +115,7 @@ def _pulled_all(
     width = 1 if len(state) > _ALONE else LANES
     groups = [values[first : first + width] for first in range(0, len(values), width)]
     with cancelling.threads(workers) as pool:
-        found = pool.map(lambda some: _pulled(ensemble, int(position), some, state), groups)
+        found = pool.map(lambda some: _pulled(ensemble, position, some, state), groups)
         return np.concatenate(list(found))
 
 
@@ -158,7 +161,7 @@ def _near_ends(ensemble: Ensemble, contact: int, values: Floats, state: Floats) 
             f"the network nearest to the given one was not reached; contact {contact} has the same "
             "normal force in all of them"
         )
-    (position,) = ensemble.positions([contact])
+    position = ensemble.position(contact)
     for part in _INWARD:
         inside = found.lower + part * width, found.upper - part * width
         states = _pulled_all(ensemble, position, np.clip(values, *inside), state)
@@ -190,8 +193,8 @@ def reach(
     Raises InputError for a contact that carries nothing, UndecidedError where the interval could
     not be certified, NotJammedError where S is empty.
     """
-    (position,) = ensemble.positions([contact])
-    keys = [(int(position), 0, side) for side in (0, 1)]
+    position = ensemble.position(contact)
+    keys = [(position, 0, side) for side in (0, 1)]
     points: dict[Any, Floats] = {}
     system = make_system(ensemble)
     if needs_no_program(ensemble, system):

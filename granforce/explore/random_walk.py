@@ -25,8 +25,13 @@ from granforce.records import (
     NotJammedError,
     Progress,
     Relaxation,
+    brief,
+    random_seed,
+    worker_count,
 )
+from granforce.records import whole as whole_number
 from granforce.system import cancelling
+from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
 # Chains from which on a thread steps them side by side: eight lanes cost as much as three chains.
@@ -118,8 +123,15 @@ def walk(
     InputError for sizes below 1, and for more than one chain that goes on or ends by `enough`;
     NotJammedError when max_attempts bring too few of a whole walk.
     """
-    if states < 1 or chains < 1 or workers < 1 or chains > states:
-        raise InputError("states, chains and workers must be at least 1, and chains ≤ states")
+    states, chains = whole_number(states, "states", 1), whole_number(chains, "chains", 1)
+    workers, seed = worker_count(workers), random_seed(seed)
+    if max_attempts is not None:
+        max_attempts = whole_number(max_attempts, "max_attempts", 1)
+    if chains > states:
+        raise InputError(f"there must be at least as many states as chains, got {states}")
+    if not callable(relax):
+        raise InputError(f"relax must be a function, such as granforce.nearest, got {brief(relax)}")
+    check_memory(16 * states * len(ensemble.index), f"{states} states")
     if chains > 1 and not (begun is None and enough is None):
         raise InputError("only one chain alone goes on from a walk, or ends when it is enough")
     all_chains = [
@@ -127,6 +139,7 @@ def walk(
         for k, own in enumerate(np.random.SeedSequence(seed).spawn(chains))
     ]
     if begun is not None:
+        ensemble.refuse_foreign(begun.states, begun.residual, "the walk to go on from")
         all_chains[0].go_on(begun, watch)
 
     def tell() -> None:

@@ -23,7 +23,7 @@ from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import fitted_many
 from granforce.numerics.lanes import LANES
-from granforce.records import Cancel, Floats, Progress
+from granforce.records import Cancel, Floats, Progress, random_seed
 from granforce.system import cancelling
 
 # Forces that were not measured are known to so many ⟨f_n⟩ beforehand.
@@ -73,7 +73,7 @@ def remeasured(
     Raises InputError for shapes that do not fit and σ ≤ 0, NotJammedError where S is empty.
     """
     begin = time.perf_counter()
-    numbers = states, chains, workers
+    numbers, seed = (states, chains, workers), random_seed(seed)
     m, s, best, numbers = asked(ensemble, measured, sigma, unmeasured, numbers, least=1)
     ready = time.perf_counter()
     width = np.where(np.isnan(m), unmeasured * ensemble.force_scale, s)

@@ -8,12 +8,13 @@ linear in the forces, so that the stresses of S fill a convex polygon.
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from granforce import notebook
 from granforce.explore.outline import outline, supports
 from granforce.forces.balance import stress_of, stress_rows
 from granforce.forces.ensemble import Ensemble
-from granforce.records import Cancel, Floats, InputError, Progress, whole
+from granforce.records import Cancel, Floats, InputError, Progress, float_array, whole
 from granforce.system import cancelling
 
 # Largest gap between the polygons, relative to the extent of the outline.
@@ -48,7 +49,7 @@ class StressOutline(NamedTuple):
 @cancelling.cancellable
 def stress_outline(
     ensemble: Ensemble,
-    angles: int = 64,
+    angles: int | npt.ArrayLike = 64,
     *,
     workers: int = 1,
     progress: Progress | None = None,
@@ -61,11 +62,13 @@ def stress_outline(
 
     Raises InputError where the pressure is not prescribed, or the whole stress is.
     """
-    if np.ndim(angles) == 0:
+    if not isinstance(angles, (list, tuple, np.ndarray)):
         count = whole(angles, "the number of angles", 1, 4096)
         angles = 2 * np.pi * np.arange(count) / count
     axes = stress_axes(ensemble)
-    angles = np.asarray(angles, dtype=np.float64)
+    angles = float_array(angles, (-1,), "angles")
+    if not len(angles):
+        raise InputError("give at least one angle")
     support, gap = supports(ensemble, axes, angles, workers=workers)
     found = outline(ensemble, axes, tolerance=TOLERANCE, workers=workers, progress=progress)
     reached = np.hypot(*found.inner.T).max(initial=0.0)

@@ -21,8 +21,21 @@ from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import lanes
 from granforce.numerics.wall_matrix import PROBES
-from granforce.records import Cancel, Cancelled, Floats, InputError, Integers, Mask, Progress
+from granforce.records import (
+    Cancel,
+    Cancelled,
+    Floats,
+    Integers,
+    Mask,
+    Progress,
+    choice,
+    positive,
+    random_seed,
+    whole,
+    worker_count,
+)
 from granforce.system import cancelling
+from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
 
 # Mean length of a path in root mean square distances of states from the centre; what an effective
@@ -222,15 +235,17 @@ def sample_uniform(
     Where S is one point (h = 0) every state is that point and no path is taken. Raises InputError
     for sizes below 1 or forces without bounds, NotJammedError where S is empty.
     """
-    if states < 1 or chains < 1 or workers < 1:
-        raise InputError("states, chains and workers must be at least 1")
-    if effective is not None and not effective > 0:
-        raise InputError("the effective sample size that is wanted must be above 0")
-    if method not in METHODS:
-        raise InputError(f"unknown method {method!r}: take one of {', '.join(METHODS)}")
+    states, chains = whole(states, "states", 1), whole(chains, "chains", 1)
+    workers, seed = worker_count(workers), random_seed(seed)
+    if effective is not None:
+        effective = positive(effective, "the effective sample size")
+    most = max(states, chains, effective or 0)
+    check_memory(16 * most * len(ensemble.index), f"{most:.9g} states")
+    method = choice(method, METHODS, "method")
     if previous is None:
         sample, stores = _start(ensemble, chains, seed, method, workers)
     else:
+        ensemble.refuse_foreign(previous.states, previous.residual, "the sample to go on from")
         sample, stores = previous, stores_for(previous.walls, len(previous.ends), workers)
     most = MOST_STATES * max(states, effective or 0)
     while True:

@@ -27,7 +27,15 @@ from granforce import notebook
 from granforce.explore import billiard, uniform
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
-from granforce.records import Cancel, Floats, Integers, Progress, positive, random_seed, whole
+from granforce.records import (
+    Cancel,
+    Floats,
+    Integers,
+    Progress,
+    positive,
+    random_seed,
+    worker_count,
+)
 from granforce.system import cancelling
 
 # Standard deviation of ½ (β − β′) q, by which steps of the ladder are chosen.
@@ -102,7 +110,7 @@ def volume(
     """
     begin = time.perf_counter()
     accuracy, seed = positive(accuracy, "accuracy"), random_seed(seed)
-    workers = whole(workers, "workers", 1)
+    workers = worker_count(workers)
     made = walls(ensemble)
     grains = max(1, len(ensemble.grains))
     if not made.dimension:

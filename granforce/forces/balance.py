@@ -31,7 +31,9 @@ from granforce.records import (
     Mask,
     Packing,
     are_whole,
+    choice,
     float_array,
+    refuse_hidden,
 )
 from granforce.tolerances import BALANCED, ROUNDING
 
@@ -43,8 +45,7 @@ def prescribed_stress(
 
     Raises InputError where that makes no sense here.
     """
-    if prescribed not in ("pressure", "stress", "none"):
-        raise InputError(f"prescribed must be pressure, stress or none, got {prescribed!r:.40}")
+    prescribed = choice(prescribed, ("pressure", "stress", "none"), "prescribed")
     if stress is not None and prescribed != "stress":
         raise InputError('a stress is given, but not prescribed: add prescribed="stress"')
     closed = np.isfinite(packing.volume) and not np.isnan(packing.pressure)
@@ -207,7 +208,7 @@ def _held_in_balance(A: sparse.csr_matrix, b: Floats, original: Floats, toleranc
 
 def frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
     """Positions (k,) of the frozen of so many contacts, from a mask (N_c,) or positions."""
-    frozen = np.asarray(frozen)
+    frozen = np.asarray(refuse_hidden(frozen, "frozen contacts"))
     if frozen.dtype == bool:
         if frozen.shape != (count,):
             raise InputError(f"frozen must mask {count} contacts, got shape {frozen.shape}")

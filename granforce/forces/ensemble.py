@@ -33,10 +33,14 @@ from granforce.records import (
     Mask,
     NotJammedError,
     Packing,
+    float_array,
     friction,
+    real_array,
+    refuse_hidden,
+    whole,
 )
 from granforce.system import cancelling
-from granforce.tolerances import ADMISSIBLE, BALANCED
+from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED, LARGEST_UNIT
 
 # What is prescribed, by its number of values.
 _NAMES = {1: "pressure", 3: "stress"}
@@ -277,7 +281,9 @@ class Ensemble:
 
     def positions(self, contacts: npt.ArrayLike) -> Integers:
         """Positions (k,) in the ensemble of contacts (k,) of the packing; InputError for others."""
-        contacts = np.asarray(contacts)
+        contacts = np.asarray(refuse_hidden(contacts, "contacts"))
+        if contacts.ndim != 1 or not (contacts.dtype.kind in "iuf" or not contacts.size):
+            raise InputError("contacts are given by their numbers in the packing: a list of them")
         unknown = contacts[~np.isin(contacts, self.index)]
         if len(unknown):
             raise InputError(
@@ -286,9 +292,44 @@ class Ensemble:
             )
         return np.searchsorted(self.index, contacts)
 
+    def position(self, contact: int) -> int:
+        """Position in the ensemble of one contact of the packing; InputError for any other."""
+        return int(self.positions([whole(contact, "the number of a contact")])[0])
+
+    def networks(self, forces: Any, name: str = "forces") -> Any:
+        """Forces as an array (…, N_c, 2); InputError for those of another number of contacts."""
+        if not (type(forces) is np.ndarray and forces.dtype == np.float64):
+            forces = real_array(forces, name)
+        count = len(self.index)
+        if forces.shape[-2:] != (count, 2):
+            raise InputError(
+                f"{name} of shape {forces.shape} are no networks of this ensemble, which has "
+                f"{count} contacts: (…, {count}, 2)"
+            )
+        return forces
+
+    def network(self, forces: npt.ArrayLike, name: str) -> Floats:
+        """One finite network (N_c, 2) to begin with, not so large that its squares overflow."""
+        found = float_array(forces, (len(self.index), 2), name)
+        if np.abs(found).max(initial=0.0) > LARGEST_UNIT * self.force_scale:
+            raise InputError(f"{name} is beyond {LARGEST_UNIT:g} times the mean normal force")
+        return found
+
+    def refuse_foreign(self, forces: Any, residual: Any, name: str) -> None:
+        """InputError unless networks (…, N_c, 2) of a result belong to this ensemble.
+
+        They have to balance here, or nearly as well as they did where they were found (residual
+        (…,)), and to respect its cones: of another packing, or at another μ, they would give wrong
+        numbers in silence.
+        """
+        forces = self.networks(forces, name)
+        balanced = np.all(self.residual(forces) <= np.maximum(AT_REST, 2 * np.asarray(residual)))
+        if not (balanced and np.all(self.violation(forces) <= AT_REST)):
+            raise InputError(f"{name} belongs to another ensemble: it has no networks of this one")
+
     def to_vector(self, forces: Any) -> Any:
         """Forces (…, N_c, 2) as vectors x (…, unknowns)."""
-        forces = np.asarray(forces, dtype=np.float64)
+        forces = self.networks(forces)
         unknowns = forces.shape[-2] * self.per_contact
         return forces[..., : self.per_contact].reshape(*forces.shape[:-2], unknowns)
 
@@ -304,7 +345,7 @@ class Ensemble:
 
         Frozen contacts get their original forces.
         """
-        forces = np.asarray(forces)
+        forces = self.networks(forces)
         count = len(self.packing.contacts.i)
         full = np.zeros((*forces.shape[:-2], count, 2))
         full[..., self.index, :] = forces
@@ -332,7 +373,7 @@ class Ensemble:
 
     def violation(self, forces: Floats) -> Any:
         """Largest violation of f_n ≥ 0, |f_t| ≤ μ f_n and what is known, in ⟨f_n⟩, (…,)."""
-        forces = np.asarray(forces, dtype=np.float64)
+        forces = self.networks(forces)
         normal, tangential = forces[..., 0], forces[..., 1]
         excess = np.maximum(-normal, np.abs(tangential) - self.mu * np.maximum(normal, 0.0))
         worst = np.maximum(excess.max(axis=-1, initial=0.0), 0.0) / self.force_scale

@@ -21,7 +21,17 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import Cancel, Floats, InputError, Integers, Relaxation
+from granforce.records import (
+    Cancel,
+    Floats,
+    InputError,
+    Integers,
+    Relaxation,
+    choice,
+    positive,
+    random_seed,
+    whole,
+)
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
 
@@ -75,7 +85,9 @@ def gauss_seidel(
 
     Raises InputError where the whole stress is prescribed, or forces are known.
     """
-    alone = SideBySide(ensemble, 1, **options)
+    order = choice(order, ("sequential", "random"), "order")
+    start = ensemble.network(start, "start")
+    seed, alone = random_seed(seed), SideBySide(ensemble, 1, **options)
     if order == "random":
         alone.rng = np.random.default_rng(seed)
     alone.begin(0, start)
@@ -101,8 +113,9 @@ class SideBySide:
         max_iterations: int = 100_000,
         rest: float | None = AT_REST,
     ) -> None:
-        self.ensemble, self.tolerance, self.rest = ensemble, tolerance, rest
-        self.most = max_iterations
+        self.ensemble, self.tolerance = ensemble, positive(tolerance, "tolerance", or_zero=True)
+        self.rest = None if rest is None else positive(rest, "rest")
+        self.most = whole(max_iterations, "max_iterations", 1)
         self.rng: np.random.Generator | None = None
         self.problem, self.at_rest, self.dilation, self.unit = from_rest(ensemble)
         set_stiffness(self.problem)

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from granforce.numerics import certificates, cone_projection, contact_program, h
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.interior_point import OPTIMUM, PROJECTED
 from granforce.numerics.lanes import LANES, MANY, ONE
-from granforce.records import Cancel, Floats, Relaxation
+from granforce.records import Cancel, Floats, InputError, Relaxation, positive, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 
@@ -87,11 +87,21 @@ def nearest_of_many(
             return nearest_of_many(
                 ensemble, starts, tolerance=tolerance, max_iterations=max_iterations
             )
+    tolerance = positive(tolerance, "tolerance", or_zero=True)
+    max_iterations = whole(max_iterations, "max_iterations", 1)
+    starts = [ensemble.network(start, "start") for start in _each(starts)]
     found: list[Relaxation] = []
     while len(found) < len(starts):
         left = starts[len(found) :]
         found += _batch(ensemble, left[: LANES if len(left) > 1 else 1], tolerance, max_iterations)
     return found
+
+
+def _each(starts: Any) -> list[Any]:
+    try:
+        return list(starts)
+    except TypeError:
+        raise InputError("starts are a sequence of networks (N_c, 2)") from None
 
 
 def _batch(

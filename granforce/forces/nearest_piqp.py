@@ -14,7 +14,7 @@ from scipy import sparse
 
 from granforce.forces.contact_problem import MOST_DENSE, in_balance
 from granforce.numerics import highs as programs
-from granforce.records import Floats, Relaxation
+from granforce.records import Floats, Relaxation, positive, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 
@@ -39,6 +39,9 @@ def nearest_piqp(
     solved before, and the same start would no longer give the same forces.
     """
     begin = time.perf_counter()
+    tolerance = positive(tolerance, "tolerance", or_zero=True)
+    max_iterations = whole(max_iterations, "max_iterations", 1)
+    start = ensemble.network(start, "start")
     T = ensemble.scaled_form[2]
     y, status, steps = _least(ensemble, T, ensemble.to_vector(start), max_iterations)
     forces = ensemble.to_forces(T @ y * ensemble.force_scale)

@@ -7,12 +7,21 @@ import numpy as np
 from scipy import sparse, stats
 from scipy.sparse import csgraph
 
-from granforce.records import Floats, InputError, Integers
+from granforce.records import Floats, InputError, Integers, moderate, refuse_hidden
 
 
 def _some(states: Floats) -> Floats:
+    states = np.asarray(refuse_hidden(states, "states"))
+    if states.ndim != 3 or states.shape[-1] != 2:
+        raise InputError(
+            f"states must have shape (S, N_c, 2), got {states.shape}; take the states of all "
+            "chains one after the other (`flat` of a sample)"
+        )
     if not states.size:
         raise InputError("nothing to measure: there are no states, or no contacts")
+    largest = max(states.max(), -states.min())
+    if largest:
+        moderate(largest, "the largest force")
     return states
 
 

@@ -22,7 +22,7 @@ from scipy import sparse
 from granforce.numerics import certificates, highs, linear_programs
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.linear_programs import Centre, Outcome, Program
-from granforce.records import Cancelled, Floats, Progress
+from granforce.records import Cancelled, Floats, Progress, worker_count
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
 
@@ -134,7 +134,7 @@ class Solver:
         found(key, attained, bound): called as each program ends, and progress(done, total), which
         counts on from `done`. All come from one thread at a time.
         """
-        self.system, self.workers = system, workers
+        self.system, self.workers = system, worker_count(workers)
         self.seen, self.progress, self.total, self.done = seen, progress, total, done
         self.found = found or (lambda key, attained, bound: None)
         self.counts = {"programs": 0, "again": 0, "iterations": 0}

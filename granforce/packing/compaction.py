@@ -29,14 +29,17 @@ from granforce.records import (
     NotJammedError,
     Packing,
     Progress,
+    brief,
+    choice,
     float_array,
     friction,
     make_packing,
     moderate,
-    positive,
+    random_seed,
+    whole,
 )
 from granforce.system import cancelling
-from granforce.tolerances import LARGEST_FRICTION
+from granforce.system.memory import check_memory
 
 INITIAL_FRACTION = 0.5
 # The last phase is tried every so many steps, once no grain's momentum changes by more than this in
@@ -65,6 +68,9 @@ WORK = (
     *("list_rebuilds", "linear_programs", "certificates_tried", "implicit_steps"),
     *("linear_systems", "touching_without_force"),
 )
+# Memory that a packing needs at the least for each disk: the lists of pairs, and one factor of its
+# balance.
+DISK_BYTES = 2000
 # Steps between two looks of whoever watches.
 WATCH_EVERY = 5
 
@@ -127,22 +133,15 @@ def pack(
     Raises NotJammedError after max_steps, with the state reached, and InputError for bad input.
     """
     mu = friction(mu)
-    if mu > LARGEST_FRICTION:
-        raise InputError(
-            f"friction coefficient {mu:g} is too large for the balance of forces in double "
-            f"precision; take at most {LARGEST_FRICTION:g}"
-        )
     pressure = moderate(pressure, "pressure")
-    if int(n) != n or n < 3:
-        raise InputError(f"a packing needs at least 3 disks, got {n}")
+    n, seed = number_of_disks(n), random_seed(seed)
     dt, sweeps = default_steps(mu, dt, sweeps)
-    for name, value in (("dt", dt), ("box_mass", box_mass), ("accuracy", accuracy)):
-        positive(value, name)
-    if sweeps < 1 or max_steps < 1:
-        raise InputError("sweeps and max_steps must be at least 1")
+    dt, box_mass = moderate(dt, "dt"), moderate(box_mass, "box_mass")
+    accuracy = moderate(accuracy, "accuracy")
+    sweeps, max_steps = whole(sweeps, "sweeps", 1), whole(max_steps, "max_steps", 1)
     check_box(box)
     rng = np.random.default_rng(seed)
-    r = draw_radii(radii, int(n), rng)
+    r = draw_radii(radii, n, rng)
     unit = r.max()
     motion = _dilute_gas(r / unit, rng, BOXES[box])
     motion.pace[:] = SHORTEST * dt, dynamics.MOST_RELAXATION
@@ -189,6 +188,15 @@ def pack(
     return _in_users_units(finished, unit, pressure, info)
 
 
+def number_of_disks(n: int) -> int:
+    """n as an int; InputError for fewer than 3, and for more than fit into memory."""
+    n = whole(n, "the number of disks", most=None)
+    if n < 3:
+        raise InputError(f"a packing needs at least 3 disks, got {n!s:.40}")
+    check_memory(DISK_BYTES * n, f"a packing of {n!s:.40} disks")
+    return n
+
+
 def _state(packing_fraction: float, unbalance: float) -> str:
     rest = f", unbalance {unbalance:.1e} ⟨f_n⟩" if np.isfinite(unbalance) else ""
     return f"φ = {packing_fraction:.4f}{rest}"
@@ -215,9 +223,7 @@ def default_steps(mu: float, dt: float | None, sweeps: int | None) -> tuple[floa
 
 def check_box(box: str) -> str:
     """The name of a box; InputError where there is none of this name."""
-    if not isinstance(box, str) or box not in BOXES:
-        raise InputError(f"box must be square or isotropic, got {box!r:.40}")
-    return box
+    return choice(box, BOXES, "box")
 
 
 def draw_radii(spec: str | npt.ArrayLike, n: int, rng: np.random.Generator) -> Floats:
@@ -237,7 +243,7 @@ def draw_radii(spec: str | npt.ArrayLike, n: int, rng: np.random.Generator) -> F
             r[rng.permutation(n)[: round(values[2] * n)]] = values[1]
         else:
             raise InputError(
-                f"radii {spec!r} not understood: give uniform:LOW,HIGH or "
+                f"radii {brief(spec)} not understood: give uniform:LOW,HIGH or "
                 "bidisperse:SMALL,LARGE,FRACTION_LARGE with 0 < LOW ≤ HIGH"
             )
     for extreme in (r.min(), r.max()):

@@ -26,6 +26,7 @@ from granforce.records import (
     NotJammedError,
     Packing,
     UndecidedError,
+    brief,
     float_array,
     friction,
     make_contacts,
@@ -74,8 +75,8 @@ def scene(name: str, mu: float | None = None, **options: Any) -> Packing:
 
 def sketched(name: str, mu: float | None = None, **options: Any) -> Packing:
     """The same Packing, whether or not anything balances: its forces are 0, or of another μ."""
-    if name not in SCENES:
-        raise InputError(f"there is no scene {name!r:.40}; choose one of {', '.join(SCENES)}")
+    if not isinstance(name, str) or name not in SCENES:
+        raise InputError(f"there is no scene {brief(name)}; choose one of {', '.join(SCENES)}")
     kind = SCENES[name]
     mu = kind.mu if mu is None else friction(mu)
     try:

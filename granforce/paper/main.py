@@ -10,7 +10,7 @@ from typing import Any
 from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
-from granforce.records import InputError, friction, positive, whole
+from granforce.records import InputError, friction, positive, whole, worker_count
 from granforce.study import scan
 from granforce.study.cells import Cell
 from granforce.study.store import open_store
@@ -37,7 +37,7 @@ def main(arguments: argparse.Namespace) -> int:
     formats = [word for word in arguments.formats.split(",") if word]
     if set(formats) - set(drawings.FORMATS):
         raise InputError(f"--formats {arguments.formats!r}: take some of html, png, svg")
-    whole(arguments.workers, "--workers", 1)
+    worker_count(arguments.workers, "--workers")
     if arguments.minutes is not None:
         positive(arguments.minutes, "--minutes")
     renewed = documents.named(arguments.documents)

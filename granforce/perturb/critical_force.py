@@ -35,7 +35,12 @@ from granforce.records import (
     Mask,
     Packing,
     UndecidedError,
+    moderate,
     positive,
+    real,
+    real_array,
+    whole,
+    worker_count,
 )
 from granforce.system import cancelling
 
@@ -141,8 +146,16 @@ def critical_forces(
     Raises UndecidedError where a limit load cannot be certified, or is given as NaN.
     """
     S, protocol = ensemble, Protocol(**protocol)
-    protocol = protocol._replace(precision=positive(protocol.precision, "precision"))
-    positions = S.positions(contacts)
+    precision, rise = positive(protocol.precision, "precision"), positive(protocol.rise, "rise")
+    if rise > 1:
+        raise InputError(f"rise is a part of the way to the limit load, at most 1, got {rise:g}")
+    protocol = Protocol(precision, rise, whole(protocol.max_steps, "max_steps", 1))
+    positions, workers = S.positions(contacts), worker_count(workers)
+    contacts = S.index[positions]
+    if limit_loads is not None:
+        limit_loads = real_array(limit_loads, "limit loads")
+        if limit_loads.shape != positions.shape or np.any(limit_loads < 0):
+            raise InputError(f"give one limit load ≥ 0 for each of the {len(positions)} contacts")
     if limit_loads is None:
         limit_loads = limit_load_bounds(S, contacts, workers=workers).load
         cancelling.check("critical force")  # which leaves limit loads open
@@ -271,14 +284,16 @@ def response(
     Raises InputError where the grains come to rest under this load.
     """
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
+    precision = positive(precision, "precision")
+    position, scale = S.position(contact), S.force_scale
     if critical is None:
         critical = critical_force(S, contact, precision=precision)
-    (position,), scale = S.positions([contact]), S.force_scale
+    _check_its_own(S, critical, contact, position)
     step = make_step(S)
     moving = critical.moving
     load = critical.high / scale + (precision if moving is None else 0.0)
     if force is not None:
-        load, moving = float(force) / scale, None
+        load, moving = moderate(real(force, "force") / scale, "force in ⟨f_n⟩"), None
     if moving is None:
         start = critical.forces / scale
         moving = relax(step, Push(start, position, load, STEADY_STEPS, STEADY))
@@ -288,6 +303,17 @@ def response(
             "the critical force lies above"
         )
     return _response(S, step, int(contact), position, load * scale, moving)
+
+
+def _check_its_own(S: Ensemble, critical: CriticalForce, contact: int, position: int) -> None:
+    """InputError for a critical force of another contact, or of another ensemble."""
+    if critical.contact != contact:
+        raise InputError(
+            f"the critical force is that of contact {critical.contact}, not of {contact}"
+        )
+    loaded = S.networks(critical.forces, "the critical force").copy()
+    loaded[position, 0] += critical.low
+    S.refuse_foreign(loaded, critical.residual, "the critical force")
 
 
 def _response(

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network, starting_network
-from granforce.records import Cancel, Floats, InputError, float_array
+from granforce.records import Cancel, Floats, InputError, float_array, real_array
 from granforce.system import cancelling
+from granforce.tolerances import BALANCED
 
 
 class Loaded(NamedTuple):
@@ -49,11 +50,13 @@ def loaded_networks(
     Raises InputError for a contact that carries nothing, and for a load under which no network was
     found (above the limit load there is none).
     """
-    (position,) = ensemble.positions([contact])
-    loads = float_array(np.atleast_1d(loads), (-1,), "loads")
+    position = ensemble.position(contact)
+    loads = float_array(np.atleast_1d(real_array(loads, "loads")), (-1,), "loads")
+    if not len(loads):
+        raise InputError("give at least one load")
     if state is None:
         state = starting_network(ensemble)
-    state = float_array(state, (len(ensemble.index), 2), "state")
+    state = ensemble.network(state, "state")
     pair = np.zeros_like(state)
     pair[position, 0] = 1.0
     turned = ensemble.A @ ensemble.to_vector(pair)
@@ -61,8 +64,11 @@ def loaded_networks(
     for k, load in enumerate(loads):
         cancelling.check()
         under = replace(ensemble, b=ensemble.b - load * turned, found=None)
-        states[k] = some_network(under, state)
-        if not under.admits(states[k]):
+        # Beyond, the rounding of the load alone breaks the balance.
+        possible = abs(load) * np.finfo(float).eps <= BALANCED * ensemble.force_scale
+        if possible:
+            states[k] = some_network(under, state)
+        if not (possible and under.admits(states[k])):
             raise InputError(
                 f"no network was found that balances a pair of {load:.9g} on contact {contact}; "
                 "above its limit load there is none"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from granforce.forces.knowledge import Known
-from granforce.records import InputError, float_array, whole
+from granforce.records import InputError, choice, float_array, whole
 from granforce.study.keys import Parameters
 
 PRESCRIBED = "pressure", "stress", "none"
@@ -20,8 +20,7 @@ def conditions(
     known: a Known, or rows [contact, least f_n, largest f_n, least f_t, largest f_t] with None
     where nothing is known. Raises InputError for what no packing could be asked.
     """
-    if prescribed not in PRESCRIBED:
-        raise InputError(f"prescribed must be pressure, stress or none, got {prescribed!r:.40}")
+    prescribed = choice(prescribed, PRESCRIBED, "prescribed")
     if stress is not None and prescribed != "stress":
         raise InputError("a stress is given, but not prescribed: prescribe the stress")
     named = {} if prescribed == "pressure" else {"prescribed": prescribed}

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from granforce.records import Cancel, Cancelled, Mask
+from granforce.records import Cancel, Cancelled, Mask, worker_count
 from granforce.system.interrupts import interrupted
 
 P = ParamSpec("P")
@@ -155,7 +155,11 @@ def check(what: str = "work") -> None:
 
 
 def threads(workers: int) -> ThreadPoolExecutor:
-    """A ThreadPoolExecutor whose work is cancelled with the caller's."""
+    """A ThreadPoolExecutor whose work is cancelled with the caller's.
+
+    Raises InputError for a number of workers that is none.
+    """
+    workers = worker_count(workers)
     return ThreadPoolExecutor(workers, initializer=_scope.set, initargs=(_scope.get(),))
 
 

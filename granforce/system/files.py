@@ -54,12 +54,19 @@ def written(path: str | Path) -> Iterator[IO[bytes]]:
 
 
 def check_file(path: str | Path) -> None:
-    """InputError unless a file can be written at path; nothing is opened or changed."""
+    """InputError unless a file can be written at path; nothing is left or changed there.
+
+    Rights do not say all: a new file is begun beside it, and removed.
+    """
     path = expanded(path)
     with _refusing(path):
         kept = _regular(path)
         if kept is not None and not _may_write(kept[0].parent):
             raise PermissionError(errno.EACCES, f"the folder {kept[0].parent} is not writable")
+        if kept is not None:
+            aside = beside(kept[0])
+            os.close(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+            os.unlink(aside)
 
 
 # Paths, each with what names it: an option, say.

@@ -3,14 +3,18 @@
 import contextlib
 import gc
 import io
+import os
 import warnings
 from pathlib import Path
 
 import command_lines
 import pytest
+import random_lines
+from packings import packed
 
 from granforce.cli.parser import main
 from granforce.cli.parsing import LONGEST
+from granforce.packing.importers import save_packing
 
 PACKING = Path(__file__).parents[1] / "reference" / "n100_mu0.1_s11.npz"
 LINES = command_lines.lines()
@@ -89,3 +93,38 @@ def test_all_bad_command_lines(folder):
     """Every wrong word for every option: 1493 lines tried, all survived, in 50 s."""
     assert len(LINES) >= 500
     assert judged(folder, LINES) == {}
+
+
+def misbehaved(folder, words):
+    """What is wrong with how any command line ended; None where nothing is."""
+    try:
+        code, _, said = called(words)
+    except BaseException as error:
+        return f"{type(error).__name__}: {error}"
+    if code == 2 and (len(said) != 1 or not said[0].startswith("granforce: ")):
+        return f"told {said}"
+    return None if code in (0, 1, 2) else f"exit code {code}"
+
+
+@pytest.fixture
+def drawn(folder):
+    """The same with a packing of 8 disks, and other files that are right."""
+    save_packing(packed(8, 0.3), "p.npz")
+    os.symlink("p.npz", "link.npz")
+    Path("r.txt").write_text("1\n" * 8)
+    return folder
+
+
+def test_some_random_command_lines(drawn):
+    lines = random_lines.lines(48, seed=47)
+    assert len({tuple(words) for words in lines}) >= 40
+    found = {str(words): wrong for words in lines if (wrong := misbehaved(drawn, words))}
+    assert found == {}
+
+
+@pytest.mark.stress
+def test_many_random_command_lines(drawn):
+    """1000 lines, about a fifth of which are accepted, in two minutes."""
+    lines = random_lines.lines(1000, seed=48)
+    found = {str(words): wrong for words in lines if (wrong := misbehaved(drawn, words))}
+    assert found == {}

@@ -1,5 +1,6 @@
 """Exact bounds and limit loads: references, certificates, symmetries, limit cases."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -343,8 +344,9 @@ def test_contacts_are_named_by_their_number_in_the_packing(first):
 
 
 def test_what_is_not_certified_is_not_handed_out():
-    # At μ = 10⁷ rounding of the torques is larger than the unbalance that a state may have.
-    S = ensemble(packed(30, 10.0), 1e7)
+    # At μ = 10⁷ rounding of the torques is larger than the unbalance that a state may have: more
+    # than `ensemble` takes.
+    S = replace(ensemble(packed(30, 10.0)), mu=1e7)
     found = intervals(S)
     limits = limit_load_bounds(S)
     assert not found.converged and not limits.converged

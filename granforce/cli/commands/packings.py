@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -34,21 +34,22 @@ def pack(arguments: argparse.Namespace) -> None:
     reported = "steps", "sweeps_done", "largest_contact_gap", "least_other_gap", "distance_to_rest"
     work = {name: packing.info[name] for name in reported}
     lines = {**importers.report(packing), **work, "cached": cached}
-    print_report(lines, arguments.json)
-    _save(packing, arguments)
+    _report(lines, packing, arguments)
 
 
-def _save(packing: Packing, arguments: argparse.Namespace) -> None:
-    """Save a packing where it is wanted: behind the report, which is printed in any case."""
-    if arguments.out is not None:
-        importers.save_packing(packing, arguments.out)
+def _report(lines: Mapping[str, Any], packing: Packing, arguments: argparse.Namespace) -> None:
+    """Save a packing where it is wanted, then report it: that, too, where it cannot be saved."""
+    try:
+        if arguments.out is not None:
+            importers.save_packing(packing, arguments.out)
+    finally:
+        print_report(lines, arguments.json)
 
 
 def _scene(arguments: argparse.Namespace) -> None:
     check_outputs(arguments.out)
     packing = scenes.scene(arguments.scene, arguments.mu)
-    print_report({"scene": arguments.scene, **importers.report(packing)}, arguments.json)
-    _save(packing, arguments)
+    _report({"scene": arguments.scene, **importers.report(packing)}, packing, arguments)
 
 
 # What reads each format; pegs gives more than a packing.
@@ -89,8 +90,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
     named = ("timestep", "time", "contacts_skipped", "walls")
     info = {name: packing.info[name] for name in named if name in packing.info}
     lines = importers.report(packing) | info
-    print_report(lines, arguments.json)
-    _save(packing, arguments)
+    _report(lines, packing, arguments)
     return None
 
 
@@ -106,8 +106,7 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
     )
     for note in found.report.get("notes", []):
         print(f"granforce: {note}", file=sys.stderr)
-    print_report(found.report, arguments.json)
-    _save(found.packing, arguments)
+    _report(found.report, found.packing, arguments)
     if arguments.measured is not None:
         values = np.concatenate([found.measured, found.sigma], axis=1).T
         columns = {"contact": np.arange(len(found.measured))}

@@ -14,7 +14,7 @@ from granforce.cli.asked import (
     walked,
     write_csv,
 )
-from granforce.records import Rows, whole
+from granforce.records import Rows, whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study import scan as scans
@@ -130,7 +130,7 @@ def scan(arguments: argparse.Namespace) -> int:
     """Cells over processes into a store; print their table. Returns 1 if a cell failed."""
     mus = numbers("--mu", arguments.mu, float) or []
     seeds = whole(arguments.seeds, "--seeds", 1)
-    whole(arguments.workers, "--workers", 1)
+    worker_count(arguments.workers, "--workers")
     check_memory(scans.CELL_BYTES * len(mus) * seeds, f"{len(mus) * seeds} cells")
     cells = [
         kinds.WALK.parameters(

@@ -8,8 +8,15 @@ import numpy as np
 import xarray as xr
 
 from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.packing.compaction import Glimpse, check_box, default_steps, draw_radii, pack
-from granforce.records import InputError, Packing, Progress, friction, positive, random_seed, whole
+from granforce.packing.compaction import (
+    Glimpse,
+    check_box,
+    default_steps,
+    draw_radii,
+    number_of_disks,
+    pack,
+)
+from granforce.records import InputError, Packing, Progress, friction, moderate, random_seed, whole
 from granforce.study import slices
 from granforce.study.cells import PACKING_VERSION, Kind, get, save
 from granforce.study.conditions import conditions
@@ -18,11 +25,6 @@ from granforce.study.keys import Parameters
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.study.store import Store
 from granforce.system import cancelling
-from granforce.system.memory import check_memory
-
-# Memory that a packing needs at the least for each disk: the lists of pairs, and one factor of its
-# balance.
-DISK_BYTES = 2000
 
 
 def _packing_parameters(
@@ -42,10 +44,7 @@ def _packing_parameters(
 
     Raises InputError for what `pack` would refuse, and for more disks than fit into memory.
     """
-    n = whole(n, "the number of disks", most=None)
-    if n < 3:
-        raise InputError(f"a packing needs at least 3 disks, got {n!s:.40}")
-    check_memory(DISK_BYTES * n, f"a packing of {n!s:.40} disks")
+    n = number_of_disks(n)
     drawn = draw_radii(radii, n, np.random.default_rng(0))
     mu = friction(mu)
     dt, sweeps = default_steps(mu, dt, sweeps)
@@ -54,11 +53,11 @@ def _packing_parameters(
         "mu": mu,
         "seed": random_seed(seed),
         "radii": radii if isinstance(radii, str) else drawn.tolist(),
-        "pressure": positive(pressure, "pressure"),
-        "dt": positive(dt, "dt"),
-        "box_mass": positive(box_mass, "box_mass"),
+        "pressure": moderate(pressure, "pressure"),
+        "dt": moderate(dt, "dt"),
+        "box_mass": moderate(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
-        "accuracy": positive(accuracy, "accuracy"),
+        "accuracy": moderate(accuracy, "accuracy"),
         "version": PACKING_VERSION,
         # Only where it is not square: keys of packings in square boxes stay what they were.
         **({} if check_box(box) == "square" else {"box": box}),

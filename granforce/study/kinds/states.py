@@ -19,7 +19,7 @@ from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.records import InputError, Progress, positive, random_seed, whole
+from granforce.records import InputError, Progress, brief, positive, random_seed, whole
 from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load
 from granforce.study.keys import Parameters
@@ -65,7 +65,7 @@ def _walk_parameters(
     skip: whether nothing is relaxed where S is one point. asked: the conditions.
     """
     if relax not in RELAXATIONS:
-        raise InputError(f"unknown relaxation {relax!r}: take one of {', '.join(RELAXATIONS)}")
+        raise InputError(f"unknown relaxation {brief(relax)}: take one of {', '.join(RELAXATIONS)}")
     size = _size(packing, states, seed, chains, keep)
     if size["chains"] > size["states"]:
         raise InputError("there must be at least as many states as chains")
