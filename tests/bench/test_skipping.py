@@ -10,13 +10,13 @@ from packings import lattice
 from granforce import bench
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import ensemble
-from granforce.packing import closing, compaction
+from granforce.packing import pair_list
 from granforce.packing.compaction import pack
 
 
 def test_neighbour_lists_made_in_every_step_give_the_same_packing(monkeypatch):
     kept = pack(60, 0.3, 1)
-    monkeypatch.setattr(compaction, "MOVED", 0.0)
+    monkeypatch.setattr(pair_list, "MOVED", 0.0)
     anew = pack(60, 0.3, 1)
     assert anew.info["list_rebuilds"] > 3 * kept.info["list_rebuilds"]
     assert np.array_equal(anew.x, kept.x)
@@ -35,13 +35,6 @@ def test_tangential_unknowns_left_out_are_zero_without_friction():
     assert np.ptp([one.lower[0, 0], one.upper[0, 0]]) > 0.1
     assert np.abs(one.lower - other.lower).max() < 1e-5 * without.force_scale
     assert np.abs(one.upper - other.upper).max() < 1e-5 * without.force_scale
-
-
-def test_a_network_not_found_is_no_packing(monkeypatch):
-    """Networks looked for in 60 steps jam the same packing as those that go on to 200."""
-    short = pack(60, 0.5, 2)
-    monkeypatch.setattr(closing, "NETWORK_ITERATIONS", 200)
-    assert np.array_equal(pack(60, 0.5, 2).forces, short.forces)
 
 
 def test_the_benchmark_counts_every_skip():
