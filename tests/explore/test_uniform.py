@@ -315,7 +315,7 @@ def test_dependent_rows_are_no_obstacle(packing):
 
 
 def test_contacts_that_carry_nothing_are_held():
-    packing = packed(60, 0.3, 3)
+    packing = packed(60, 0.3, 7)
     S, full = ensemble(packing), ensemble(packing, prune=False)
     idle = np.setdiff1d(np.arange(len(full.index)), S.index)
     assert len(idle)
