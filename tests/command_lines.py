@@ -34,7 +34,7 @@ PACKING = {
     "--radii": RADII,
     "--pressure": [*POSITIVE, "1e300", "1e-300"],
     "--dt": [*POSITIVE, "1e300", "1e-300"],
-    "--step-accuracy": [*POSITIVE, "1e300", "1e-300"],
+    "--step-accuracy": POSITIVE,
     "--box-mass": [*POSITIVE, "1e300", "1e-300"],
     "--box": ["", "round", "1 1"],
     "--sweeps": [*WHOLE, LONG],

@@ -98,7 +98,7 @@ def pull(
         raise InputError("give at least one value that the contact is pulled to")
     if state is None:
         state = starting_network(ensemble)
-    state = ensemble.network(state, "state")
+    state = float_array(ensemble.network(state, "state"), (-1, 2), "state")
     states = _pulled_all(ensemble, position, values, state, workers)
     missed = ~ensemble.admits(states)
     if missed.any():

@@ -33,7 +33,6 @@ from granforce.records import (
     Mask,
     NotJammedError,
     Packing,
-    float_array,
     friction,
     real_array,
     refuse_hidden,
@@ -309,8 +308,13 @@ class Ensemble:
         return forces
 
     def network(self, forces: npt.ArrayLike, name: str) -> Floats:
-        """One finite network (N_c, 2) to begin with, not so large that its squares overflow."""
-        found = float_array(forces, (len(self.index), 2), name)
+        """One network (N_c, 2) to begin with, not so large that its squares overflow.
+
+        NaN is left to whoever asks: nothing converges from there.
+        """
+        found = real_array(forces, name)
+        if found.shape != (len(self.index), 2):
+            raise InputError(f"{name} must have shape {(len(self.index), 2)}, got {found.shape}")
         if np.abs(found).max(initial=0.0) > LARGEST_UNIT * self.force_scale:
             raise InputError(f"{name} is beyond {LARGEST_UNIT:g} times the mean normal force")
         return found

@@ -35,6 +35,7 @@ from granforce.records import (
     friction,
     make_packing,
     moderate,
+    positive,
     random_seed,
     whole,
 )
@@ -137,7 +138,7 @@ def pack(
     n, seed = number_of_disks(n), random_seed(seed)
     dt, sweeps = default_steps(mu, dt, sweeps)
     dt, box_mass = moderate(dt, "dt"), moderate(box_mass, "box_mass")
-    accuracy = moderate(accuracy, "accuracy")
+    accuracy = positive(accuracy, "accuracy")
     sweeps, max_steps = whole(sweeps, "sweeps", 1), whole(max_steps, "max_steps", 1)
     check_box(box)
     rng = np.random.default_rng(seed)

@@ -56,7 +56,7 @@ def loaded_networks(
         raise InputError("give at least one load")
     if state is None:
         state = starting_network(ensemble)
-    state = ensemble.network(state, "state")
+    state = float_array(ensemble.network(state, "state"), (-1, 2), "state")
     pair = np.zeros_like(state)
     pair[position, 0] = 1.0
     turned = ensemble.A @ ensemble.to_vector(pair)

@@ -16,7 +16,16 @@ from granforce.packing.compaction import (
     number_of_disks,
     pack,
 )
-from granforce.records import InputError, Packing, Progress, friction, moderate, random_seed, whole
+from granforce.records import (
+    InputError,
+    Packing,
+    Progress,
+    friction,
+    moderate,
+    positive,
+    random_seed,
+    whole,
+)
 from granforce.study import slices
 from granforce.study.cells import PACKING_VERSION, Kind, get, save
 from granforce.study.conditions import conditions
@@ -57,7 +66,7 @@ def _packing_parameters(
         "dt": moderate(dt, "dt"),
         "box_mass": moderate(box_mass, "box_mass"),
         "sweeps": whole(sweeps, "sweeps", 1),
-        "accuracy": moderate(accuracy, "accuracy"),
+        "accuracy": positive(accuracy, "accuracy"),
         "version": PACKING_VERSION,
         # Only where it is not square: keys of packings in square boxes stay what they were.
         **({} if check_box(box) == "square" else {"box": box}),
