@@ -20,7 +20,11 @@ NAMES = {
     "system/compiled.py": ("numba.core", "a listener tells that kernels are compiled"),
 }
 _OURS = {"_asdict", "_fields", "_make", "_replace", "_exit"}  # documented, in spite of their names
-_TYPES = {"_ActionsContainer", "_ArgumentGroup", "_SubParsersAction"}  # argparse's, in annotations that nobody reads
+_TYPES = {
+    "_ActionsContainer",
+    "_ArgumentGroup",
+    "_SubParsersAction",
+}  # argparse's, in annotations that nobody reads
 
 
 def used(path):
