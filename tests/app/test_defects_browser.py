@@ -93,7 +93,7 @@ def test_a_server_that_is_gone_is_told_and_its_return_restores_the_view(visit, s
 def test_what_is_refused_is_told_where_the_sidebar_is_closed(visit):
     page = visit(width=390, height=844)
     ask(page, "10e9")
-    told = page.get_by_role("alert").filter(has_text="friction coefficient must lie")
+    told = page.get_by_role("alert").filter(has_text="too large for the balance of forces")
     told.wait_for()
     edges = told.bounding_box()
     assert edges["y"] + edges["height"] <= 844 and edges["x"] >= 0
