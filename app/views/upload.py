@@ -6,7 +6,7 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmui
 
-from granforce.records import InputError, friction, make_cell, positive
+from granforce.records import InputError, brief, friction, make_cell, positive
 
 from .. import photoelastic, uploads
 from ..limits import LIMITS
@@ -146,7 +146,9 @@ class View:
                     "nothing if it is open"
                 )
             options["box"] = [positive(side, "a side of the box") for side in sides[:2]] or None
-            options["tilt"] = make_cell(options["box"], sides[2]).tilt if sides[2:] else 0.0
+            options["tilt"] = (
+                make_cell(options["box"], _number(sides[2])).tilt if sides[2:] else 0.0
+            )
             options["pressure"] = positive(self.pressure.value, "the pressure")
         return options
 
@@ -180,3 +182,10 @@ class View:
 
     def _refuse(self, line: str) -> None:
         self.error.param.update(title=line, visible=bool(line))
+
+
+def _number(tilt: str) -> float:
+    try:
+        return float(tilt)
+    except ValueError:
+        raise InputError(f"the tilt must be a number, got {brief(tilt)}") from None
