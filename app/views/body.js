@@ -109,7 +109,9 @@ export class Body {
       rows = [...this.rows, ...cap(reach * scale)]
       corners = this.meetings(rows)
       far = corners.filter((corner) => corner.cap)
-      this.rays = far.map(({ u }) => this.along(u, total.slope)).filter((ray) => ray && this.isRay(ray))
+      this.rays = far.map(({ u }) => this.along(u, total.slope))
+        .filter((ray) => ray && this.isRay(ray))
+        .filter((ray, k, all) => all.findIndex((other) => dot(other, ray) > 1 - 1e-12) === k) // of parallel sides one
       if (!far.length || this.rays.length) break
     }
     this.empty = !corners.length
