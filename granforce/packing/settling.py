@@ -201,7 +201,9 @@ def _place(motion: Motion, near: _Near, mu: float) -> _Place:
     b[0] = 2 * volume / unit
     stiffness = effective_masses(network, mass, box)
     everywhere = np.append(grains.ravel(), grains.size + np.arange(len(box)))
-    step = Step(network, np.zeros(len(mass)), b, mass, box, stiffness, 0.0 * gap, mu, everywhere)
+    step = Step(
+        network, np.zeros(len(mass)), b, mass, box, stiffness, np.zeros(len(gap)), mu, everywhere
+    )
     return _Place(step, gap, grains, unit)
 
 

@@ -326,7 +326,7 @@ def test_a_periodic_scene_is_explained_and_its_numbers_are_clear_of_arrows(look)
     assert "Disk 3 is loose" in special and "pressure 1" in special and "copies" in special
     # Two sides are slips between the same disks, to one side and to the other: f_t = ± μ f_n.
     said = ask(page, "small.body.sides.map(side => small.space.told('words', side))")
-    assert len(set(said)) == len(said) > 2
+    assert len(set(said)) == len(said) == 6
     clear = """small.body.scene.r.length && small.arrows.places.every((k, d) => {
         const { arrows, body } = small
         const [x, y] = arrows.numberAt(d, k)
