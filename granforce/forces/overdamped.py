@@ -31,7 +31,7 @@ from granforce.records import Floats
 from granforce.tolerances import BALANCED
 
 # Growth of τ after a step, its cut after one that failed, and its bounds.
-GROWTH, CUT = 3.0, 0.3
+GROWTH, CUT = 3.0, 0.1
 LONGEST, SHORTEST = 1e7, 1e-2
 # Newton steps of an implicit step.
 NEWTON = 5

@@ -49,8 +49,9 @@ SOFTNESS = 1e-6
 # Displacement after which the geometry is made anew, in largest radii: what it leaves out of the
 # gaps, its square, changes forces by a hundredth.
 STRIDE = 0.1 * SOFTNESS**0.5
-# Implicit steps between two looks, and looks at most: what moves farther is left to the dynamics.
-STEPS_A_LOOK, MOST_LOOKS = 50, 150
+# Implicit steps between two looks; linear systems, beyond which what still moves is left to the
+# dynamics.
+STEPS_A_LOOK, MOST_SYSTEMS = 50, 500
 FIRST_PACE = 100.0
 # Pairs nearer than NEAR take part; they are chosen anew once two grains may have approached by
 # APPROACHED (both in largest radii).
@@ -120,8 +121,8 @@ def _creep(
 ) -> tuple[Motion, bool]:
     """Overdamped motion; whether all came to rest."""
     pace = FIRST_PACE
-    counts, near = np.zeros(3, dtype=np.int64), None
-    for _ in range(MOST_LOOKS):
+    counts, near, ended = np.zeros(3, dtype=np.int64), None, overdamped.MOVED
+    while counts[overdamped.SYSTEMS] < MOST_SYSTEMS:
         cancelling.check("compaction")
         motion, near = _chosen(motion, near)
         place = _place(motion, near, mu)

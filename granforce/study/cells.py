@@ -14,9 +14,9 @@ from granforce.study.keys import Parameters
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
 
-# Version of the algorithm that makes packings: 5, certified to be at rest. It is among their
+# Version of the algorithm that makes packings, certified to be at rest. It is among their
 # parameters, so that everything that rests on a packing is named by it.
-PACKING_VERSION = 5
+PACKING_VERSION = 6
 
 
 def _as_asked(parameters: Parameters, dataset: xr.Dataset) -> Parameters:
