@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from granforce.records import Floats
 from granforce.study import kinds
 from granforce.study.bounds import UNDETERMINED
 from granforce.study.cells import entry_name
 from granforce.study.store import Store
+from granforce.types import Floats
 
 from .data import Cell, Library, readable
 from .selection import Selection, unusual

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.records import Floats, Integers, Mask, Packing
+from granforce.records import Packing
+from granforce.types import Floats, Integers, Mask
 
 # Width of the strip around the periodic cell in which images are drawn, in largest radii.
 MARGIN = 1.0

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import param
 
-from granforce.records import Floats, InputError
+from granforce.records import InputError
 from granforce.study.pulls import Puller
+from granforce.types import Floats
 
 from . import known, planes
 from .data import Cell, Library

@@ -9,9 +9,10 @@ import numpy as np
 import param
 import xarray as xr
 
-from granforce.records import Floats, InputError, Integers
+from granforce.records import InputError
 from granforce.study import kinds
 from granforce.tolerances import CARRYING
+from granforce.types import Floats, Integers
 
 from . import compute
 from .data import Cell, Library, Shown

@@ -14,8 +14,8 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from granforce import measures
-from granforce.records import Floats, Integers
 from granforce.study.keys import Parameters
+from granforce.types import Floats, Integers
 
 from .replays import FRAME_BYTES, Replay, fitting
 from .selection import Selection

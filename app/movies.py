@@ -8,7 +8,8 @@ import matplotlib as mpl
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from granforce.records import Cancel, Cancelled, Floats, Progress
+from granforce.records import Cancelled
+from granforce.types import Cancel, Floats, Progress
 
 from .geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from .replays import Replay

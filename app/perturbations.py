@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from granforce.records import Floats, Packing
+from granforce.records import Packing
 from granforce.study import kinds
 from granforce.study.cells import entries
 from granforce.study.keys import Parameters
 from granforce.study.responses import moved_grains
+from granforce.types import Floats
 
 from .compute import found_or_made
 from .data import Cell, Library, readable

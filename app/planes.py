@@ -13,10 +13,11 @@ import xarray as xr
 from scipy.spatial import ConvexHull, QhullError
 
 from granforce import measures
-from granforce.records import Floats, InputError
+from granforce.records import InputError
 from granforce.study import kinds
 from granforce.study.keys import Parameters
 from granforce.study.stresses import stress_axes
+from granforce.types import Floats
 
 from .compute import found_or_made
 from .data import Cell, Library

@@ -7,7 +7,8 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
-from granforce.records import Floats, Integers, Packing
+from granforce.records import Packing
+from granforce.types import Floats, Integers
 
 from . import geometry
 

@@ -10,16 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from granforce.packing import importers, scenes
-from granforce.records import (
-    Floats,
-    InputError,
-    Integers,
-    NotJammedError,
-    Packing,
-    float_array,
-    friction,
-)
+from granforce.records import InputError, NotJammedError, Packing, float_array, friction
 from granforce.study import hulls
+from granforce.types import Floats, Integers
 
 FIRST, MANY, OWN = "groove", "many", "own"
 MOST_DISKS, MOST_WALLS = 30, 12

@@ -13,7 +13,7 @@ from bokeh.document import Document
 from bokeh.embed import components
 from bokeh.resources import Resources
 
-from granforce.records import Floats
+from granforce.types import Floats
 
 from . import planes
 from .data import Cell, Library

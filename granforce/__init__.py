@@ -12,7 +12,7 @@ find_a_place()
 # function returns stands beside it.
 _HOME = {
     "Cancelled": "records",
-    "Cell": "records",
+    "Cell": "cell",
     "Contacts": "records",
     "InputError": "records",
     "NotJammedError": "records",

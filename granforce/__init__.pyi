@@ -2,6 +2,7 @@
 
 from granforce import figures as figures
 from granforce import measures as measures
+from granforce.cell import Cell as Cell
 from granforce.explore.bodies import Body as Body
 from granforce.explore.bodies import Side as Side
 from granforce.explore.bodies import body as body
@@ -81,7 +82,6 @@ from granforce.perturb.critical_force import response as response
 from granforce.perturb.loaded import Loaded as Loaded
 from granforce.perturb.loaded import loaded_networks as loaded_networks
 from granforce.records import Cancelled as Cancelled
-from granforce.records import Cell as Cell
 from granforce.records import Contacts as Contacts
 from granforce.records import InputError as InputError
 from granforce.records import NotJammedError as NotJammedError

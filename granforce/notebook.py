@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from granforce.cell import Cell
 from granforce.glossary import TERMS
-
-if TYPE_CHECKING:  # records show themselves by this file, which they must not need to run
-    from granforce.records import Floats, Packing
+from granforce.types import Floats, Integers
 
 SIDE = 420  # of the picture, pixels
 LINE = 16  # height of a line of words below it, pixels
@@ -56,7 +55,20 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def packing_svg(packing: Packing) -> str:
+class Picture(NamedTuple):
+    """What a picture of a packing shows, as arrays."""
+
+    cell: Cell
+    x: Floats  # (N, 2) centres, length
+    r: Floats  # (N,) radii
+    first: Integers  # (N_c,) the grain from which each branch starts
+    branch: Floats  # (N_c, 2) from centre to centre
+    forces: Floats  # (N_c, 2) f_n, f_t
+    mu: float
+    packing_fraction: float  # 0 in an open box
+
+
+def packing_svg(packing: Picture) -> str:
     """A packing to scale: disks, force chains (width f_n, colour f_t/(μ f_n)), and its numbers."""
     low, sides = _window(packing)
     scale = SIDE / max(sides)
@@ -84,21 +96,21 @@ def packing_svg(packing: Packing) -> str:
     )
 
 
-def _window(packing: Packing) -> tuple[Floats, Floats]:
+def _window(packing: Picture) -> tuple[Floats, Floats]:
     """Lower left corner (2,) and sides (2,) of what is drawn: the cell, or the disks where open."""
     if not len(packing.r):
         return np.zeros(2), np.ones(2)
     low = (packing.x - packing.r[:, None]).min(axis=0)
     high = (packing.x + packing.r[:, None]).max(axis=0)
-    closed = np.isfinite(packing.box)
+    closed = np.isfinite(packing.cell.box)
     corner, opposite = packing.cell.extent
     low = np.where(closed, corner, low)
     return low, np.where(closed, opposite, high) - low
 
 
-def _cut(packing: Packing, place: Callable[[Floats], Floats], drawn: list[str]) -> list[str]:
+def _cut(packing: Picture, place: Callable[[Floats], Floats], drawn: list[str]) -> list[str]:
     """What is drawn, cut at the sides of a tilted cell, and those sides."""
-    if not packing.tilt:
+    if not packing.cell.tilt:
         return drawn
     outline = " ".join(f"{a:.1f},{b:.1f}" for a, b in place(packing.cell.corners[:4]))
     # Named by its shape: pictures of one document that share a name share the shape.
@@ -112,7 +124,7 @@ def _cut(packing: Packing, place: Callable[[Floats], Floats], drawn: list[str]) 
 
 
 def _disks(
-    packing: Packing, place: Callable[[Floats], Floats], x: Floats, scale: float
+    packing: Picture, place: Callable[[Floats], Floats], x: Floats, scale: float
 ) -> Iterator[str]:
     if not len(x) or len(x) > MOST_DRAWN:
         return
@@ -126,10 +138,10 @@ def _disks(
 
 
 def _chains(
-    packing: Packing, place: Callable[[Floats], Floats], x: Floats, scale: float
+    packing: Picture, place: Callable[[Floats], Floats], x: Floats, scale: float
 ) -> Iterator[str]:
     """Contacts that press, as lines between centres: one path for each width and colour."""
-    contacts, (normal, tangential) = packing.contacts, packing.forces.T
+    normal, tangential = packing.forces.T
     pressing = np.flatnonzero(normal > 0)
     if not len(pressing):
         return
@@ -140,8 +152,8 @@ def _chains(
     mobilised = np.divide(tangential[pressing], friction, np.zeros_like(force), where=friction > 0)
     colour = ((np.clip(mobilised, -1, 1) + 1) / 2 * len(COLOURS)).astype(int)
     colour = np.minimum(colour, len(COLOURS) - 1)
-    begin = x[contacts.i[pressing]]
-    end = begin + contacts.length[pressing, None] * contacts.normal[pressing]
+    begin = x[packing.first[pressing]]
+    end = begin + packing.branch[pressing]
     paths: dict[tuple[int, int], list[str]] = {}
     cell = packing.cell
     ends = cell.across(begin), cell.across(end)
@@ -159,12 +171,12 @@ def _chains(
     yield "</g>"
 
 
-def _words(packing: Packing) -> list[str]:
+def _words(packing: Picture) -> list[str]:
     """The numbers of a packing in two lines."""
     normal = packing.forces[:, 0]
     pressing = normal[normal > 0]
     first = [f"{len(packing.r)} disks", f"μ = {packing.mu:g}"]
-    if np.isfinite(packing.volume):
+    if np.isfinite(packing.cell.box).all():
         first.append(f"φ = {packing.packing_fraction:.4f}")
     second = [f"{len(pressing)} of {len(normal)} contacts press"]
     if len(pressing):

@@ -10,9 +10,10 @@ from packings import reference, skewed
 
 import granforce as gf
 from granforce.bench import solvers
+from granforce.cell import Cell
 from granforce.packing.importers.geometry import touching
 from granforce.perturb import decay
-from granforce.records import Cell, InputError, make_cell, make_contacts, make_packing
+from granforce.records import InputError, make_cell, make_contacts, make_packing
 from granforce.study import kinds, slices
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.tolerances import TOUCHING

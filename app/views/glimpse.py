@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import param
 
-from granforce.records import Floats, Integers, Packing
+from granforce.records import Packing
+from granforce.types import Floats, Integers
 
 from .. import geometry
 from .messages import Message

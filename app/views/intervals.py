@@ -10,7 +10,7 @@ from bokeh.events import Tap
 from bokeh.models import ColumnDataSource, Label, Node, Range1d, Span, TapTool
 from bokeh.plotting import figure as Figure
 
-from granforce.records import Integers
+from granforce.types import Integers
 
 from .. import live
 from ..geometry import nearly

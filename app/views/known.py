@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import param
 
-from granforce.records import Integers
+from granforce.types import Integers
 
 from ..known import Knowledge, Ranked
 from ..state import AppState

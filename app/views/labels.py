@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.records import Floats
+from granforce.types import Floats
 
 # Pixels between the axes of the smallest plot that has labels, and of a letter and a point.
 SMALLEST, LETTER, POINT = (270.0, 190.0), (6.0, 11.0), 4.0

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.records import Floats
+from granforce.types import Floats
 
 from .. import live, planes
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION, nearly

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import param
 
-from granforce.records import Floats
+from granforce.types import Floats
 
 from ..geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
 from ..looks import Seen

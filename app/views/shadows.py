@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from granforce.records import Floats
+from granforce.types import Floats
 
 from .. import planes
 from ..planes import Outlined, Plane

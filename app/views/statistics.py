@@ -19,7 +19,7 @@ from bokeh.models import (
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
-from granforce.records import Floats
+from granforce.types import Floats
 
 from .. import distributions
 from ..data import Cell, Library

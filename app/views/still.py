@@ -5,7 +5,7 @@ import xarray as xr
 from bokeh.plotting import figure as Figure
 from param.parameterized import discard_events
 
-from granforce.records import Floats
+from granforce.types import Floats
 
 from ..data import Library
 from ..links import View

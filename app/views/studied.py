@@ -10,7 +10,7 @@ from bokeh.models import ColumnDataSource, DataRange1d, FixedTicker, GlyphRender
 from bokeh.plotting import figure as Figure
 
 from granforce.measures import statistics
-from granforce.records import Floats
+from granforce.types import Floats
 
 from .. import distributions, studied
 from ..distributions import Row

@@ -20,8 +20,8 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.knowledge import Known
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack
-from granforce.records import Floats, Integers
 from granforce.system.clock import timed
+from granforce.types import Floats, Integers
 
 # Part of the contacts that are known, and how well; values of a pull, in parts of its interval.
 KNOWN_PART, KNOWN_WITHIN = 0.1, 0.1

@@ -13,8 +13,8 @@ from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing
-from granforce.records import Floats
 from granforce.system.clock import timed
+from granforce.types import Floats
 
 
 def read_reference(path: str | Path) -> tuple[Ensemble, Any]:

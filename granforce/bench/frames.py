@@ -11,7 +11,8 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.compaction import pack
 from granforce.packing.importers.pegs import read_pegs
 from granforce.packing.importers.synthetic import synthetic_frame
-from granforce.records import Floats, Mask, Packing
+from granforce.records import Packing
+from granforce.types import Floats, Mask
 
 # σ in ⟨f_n⟩, part of contacts missed, and the friction taken over the true one.
 CASES = (

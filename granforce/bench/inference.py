@@ -13,8 +13,8 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.likeliest import checked, fitted
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack
-from granforce.records import Floats
 from granforce.system.clock import timed
+from granforce.types import Floats
 
 # Errors of f_n and f_t in ⟨f_n⟩, and seconds after which HiGHS is not waited for.
 ERRORS, PATIENCE = (0.2, 0.1), 120.0

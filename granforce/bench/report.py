@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.records import Rows
+from granforce.types import Rows
 
 LIBRARIES = ("granforce", "numpy", "scipy", "numba", "highspy", "piqp", "siconos")
 

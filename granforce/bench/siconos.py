@@ -17,7 +17,7 @@ from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.gauss_seidel import from_rest
 from granforce.numerics.lanes import ONE
-from granforce.records import Floats
+from granforce.types import Floats
 
 # Environment variable naming a Python that can import Siconos, which has no package on PyPI.
 INTERPRETER = "GRANFORCE_SICONOS_PYTHON"

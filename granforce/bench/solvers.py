@@ -13,8 +13,9 @@ from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
-from granforce.records import Floats, Packing, Relaxation, Rows, make_contacts, make_packing
+from granforce.records import Packing, Relaxation, make_contacts, make_packing
 from granforce.system.clock import timed
+from granforce.types import Floats, Rows
 
 BASELINE = "Gauss–Seidel alone"
 # Residual (in ⟨f_n⟩) all solvers are asked for.

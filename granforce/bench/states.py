@@ -19,9 +19,10 @@ from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.packing.compaction import pack
-from granforce.records import Floats, NotJammedError, Packing
+from granforce.records import NotJammedError, Packing
 from granforce.system.clock import timed
 from granforce.tolerances import EQUILIBRIUM
+from granforce.types import Floats
 
 Ways = Mapping[str, dict[str, Any]]
 WALKS: Ways = {

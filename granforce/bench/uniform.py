@@ -22,8 +22,8 @@ from granforce.explore.walls import walls
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
-from granforce.records import Floats
 from granforce.system.clock import timed
+from granforce.types import Floats
 
 # Dimension up to which hopsy's own rounding, which takes 40 s at h = 43 and 126 s at 79, is waited
 # for. Beyond it hopsy gets our rounding only.

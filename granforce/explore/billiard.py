@@ -16,8 +16,8 @@ import numpy as np
 
 from granforce.numerics import lanes
 from granforce.numerics.lanes import MANY, compiled, inline, within
-from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
+from granforce.types import Floats, Integers, Mask
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.explore.walls import Walls

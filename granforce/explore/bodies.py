@@ -19,7 +19,8 @@ from granforce.explore.thin import null_space
 from granforce.forces import hull
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.numerics import certificates, inner_point
-from granforce.records import Floats, InputError, Integers, Mask, Packing
+from granforce.records import InputError, Packing
+from granforce.types import Floats, Integers, Mask
 
 MOST_DIMENSIONS = 3
 # Coordinates y, in ⟨f_n⟩, up to which a point inside is as near as those of usual forces.

@@ -11,9 +11,10 @@ from granforce.forces.contact_problem import make_system
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, checked, likeliest
 from granforce.numerics.certified_values import Solver
-from granforce.records import Cancel, Floats, Integers, Mask, Progress, positive
+from granforce.records import positive
 from granforce.system import cancelling
 from granforce.tolerances import CARRYING, INTERVAL_GAP
+from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 # Forces that were not measured stay below this, in the largest measured one.
 _MOST = 10.0

@@ -23,9 +23,10 @@ from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED, Likeliest, checked, likeliest
-from granforce.records import Cancel, Floats, Integers, Progress, random_seed, whole, worker_count
+from granforce.records import random_seed, whole, worker_count
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
+from granforce.types import Cancel, Floats, Integers, Progress
 
 # Residuals beyond so many standard errors are told.
 SUSPECT = 3.0

@@ -10,9 +10,10 @@ from granforce.explore.intervals import intervals
 from granforce.explore.uniform import UniformSample, sample_uniform
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network
-from granforce.records import Cancel, Floats, InputError, Integers, Progress, whole
+from granforce.records import InputError, whole
 from granforce.system import cancelling
 from granforce.tolerances import INTERVAL_GAP
+from granforce.types import Cancel, Floats, Integers, Progress
 
 
 class Informative(NamedTuple):

@@ -24,9 +24,10 @@ from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
 from granforce.numerics.certified_values import Solver, System
 from granforce.numerics.linear_programs import Program
-from granforce.records import Cancel, Floats, InputError, Integers, Mask, Progress, float_array
+from granforce.records import InputError, float_array
 from granforce.system import cancelling
 from granforce.tolerances import CARRYING, INTERVAL_GAP
+from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 Key = tuple[int, int, int]  # contact, component and side of a bound
 Bounds = dict[Key, tuple[float, float]]  # value attained, and the value that bounds it

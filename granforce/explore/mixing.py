@@ -11,8 +11,8 @@ import numpy as np
 from scipy import fft, stats
 from scipy.special import ndtri
 
-from granforce.records import Floats, Mask
 from granforce.system import cancelling
+from granforce.types import Floats, Mask
 
 # Split chains of fewer draws say nothing.
 FEWEST_DRAWS = 4

@@ -18,18 +18,9 @@ from granforce.forces.contact_problem import cone_costs, forces_of, known_part, 
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.linear_programs import Program
-from granforce.records import (
-    Cancel,
-    Cancelled,
-    Floats,
-    InputError,
-    Mask,
-    Progress,
-    float_array,
-    moderate,
-    positive,
-)
+from granforce.records import Cancelled, InputError, float_array, moderate, positive
 from granforce.system import cancelling
+from granforce.types import Cancel, Floats, Mask, Progress
 
 _FIRST = 16  # directions to begin with
 _MOST = 4096  # directions after which it is given up

@@ -22,18 +22,10 @@ from granforce.forces.nearest_piqp import restored
 from granforce.numerics.certified_values import Solver
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.lanes import LANES
-from granforce.records import (
-    Cancel,
-    Floats,
-    InputError,
-    Integers,
-    Mask,
-    UndecidedError,
-    float_array,
-    real_array,
-)
+from granforce.records import InputError, UndecidedError, float_array, real_array
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
+from granforce.types import Cancel, Floats, Integers, Mask
 
 # A force of zero is approached to within this (in ⟨f_n⟩), so that its contact has an inside.
 _LEAST = 1e-13

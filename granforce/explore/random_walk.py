@@ -18,12 +18,8 @@ from granforce.forces.gauss_seidel import SideBySide, gauss_seidel
 from granforce.forces.nearest import nearest, nearest_of_many, starting_network
 from granforce.numerics.lanes import LANES
 from granforce.records import (
-    Cancel,
-    Floats,
     InputError,
-    Integers,
     NotJammedError,
-    Progress,
     Relaxation,
     brief,
     random_seed,
@@ -33,6 +29,7 @@ from granforce.records import whole as whole_number
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
+from granforce.types import Cancel, Floats, Integers, Progress
 
 # Chains from which on a thread steps them side by side: eight lanes cost as much as three chains.
 WORTH_LANES = 4

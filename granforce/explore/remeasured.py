@@ -23,8 +23,9 @@ from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import fitted_many
 from granforce.numerics.lanes import LANES
-from granforce.records import Cancel, Floats, Progress, random_seed
+from granforce.records import random_seed
 from granforce.system import cancelling
+from granforce.types import Cancel, Floats, Progress
 
 # Forces that were not measured are known to so many ⟨f_n⟩ beforehand.
 UNMEASURED = 2.0

@@ -14,8 +14,9 @@ from granforce import notebook
 from granforce.explore.outline import outline, supports
 from granforce.forces.balance import stress_of, stress_rows
 from granforce.forces.ensemble import Ensemble
-from granforce.records import Cancel, Floats, InputError, Progress, float_array, whole
+from granforce.records import InputError, float_array, whole
 from granforce.system import cancelling
+from granforce.types import Cancel, Floats, Progress
 
 # Largest gap between the polygons, relative to the extent of the outline.
 TOLERANCE = 1e-4

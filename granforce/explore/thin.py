@@ -12,8 +12,8 @@ import numpy as np
 from scipy import linalg
 
 from granforce.numerics.lanes import LANES
-from granforce.records import Floats, Integers
 from granforce.system import cancelling
+from granforce.types import Floats, Integers
 
 
 class ThinMatrix(NamedTuple):

@@ -21,22 +21,11 @@ from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
 from granforce.numerics import lanes
 from granforce.numerics.wall_matrix import PROBES
-from granforce.records import (
-    Cancel,
-    Cancelled,
-    Floats,
-    Integers,
-    Mask,
-    Progress,
-    choice,
-    positive,
-    random_seed,
-    whole,
-    worker_count,
-)
+from granforce.records import Cancelled, choice, positive, random_seed, whole, worker_count
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
 from granforce.tolerances import ADMISSIBLE, BALANCED
+from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 # Mean length of a path in root mean square distances of states from the centre; what an effective
 # state costs has its minimum, a flat one, near this.

@@ -27,16 +27,9 @@ from granforce import notebook
 from granforce.explore import billiard, uniform
 from granforce.explore.walls import Walls, walls
 from granforce.forces.ensemble import Ensemble
-from granforce.records import (
-    Cancel,
-    Floats,
-    Integers,
-    Progress,
-    positive,
-    random_seed,
-    worker_count,
-)
+from granforce.records import positive, random_seed, worker_count
 from granforce.system import cancelling
+from granforce.types import Cancel, Floats, Integers, Progress
 
 # Standard deviation of ½ (β − β′) q, by which steps of the ladder are chosen.
 STEP = 0.7

@@ -21,9 +21,10 @@ from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, contact_program, wall_matrix
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.wall_matrix import DEPENDENT, POLISH, PROBES, WallMatrix
-from granforce.records import Floats, InputError, Integers, Mask, UndecidedError
+from granforce.records import InputError, UndecidedError
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+from granforce.types import Floats, Integers, Mask
 
 _MOST_NEWTON_STEPS = 200
 # Newton's decrement at the centre: it only has to make S round.

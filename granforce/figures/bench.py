@@ -6,7 +6,7 @@ from typing import Any
 import holoviews as hv
 
 from granforce.figures import style
-from granforce.records import Rows
+from granforce.types import Rows
 
 
 def benchmark(results: Mapping[str, Rows], *, backend: str = "bokeh") -> hv.Layout | None:

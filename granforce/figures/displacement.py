@@ -5,7 +5,8 @@ import numpy as np
 
 from granforce.figures import style
 from granforce.figures.networks import contact_points, outline
-from granforce.records import Floats, Packing
+from granforce.records import Packing
+from granforce.types import Floats
 
 # The length of the arrow of the fastest grain, in mean diameters.
 LONGEST_ARROW = 2.0

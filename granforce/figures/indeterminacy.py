@@ -8,7 +8,7 @@ import numpy as np
 
 from granforce.figures import style
 from granforce.measures import statistics
-from granforce.records import Floats, Rows
+from granforce.types import Floats, Rows
 
 _MEASURES = (
     *(("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15)),

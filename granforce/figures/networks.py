@@ -7,7 +7,8 @@ import holoviews as hv
 import numpy as np
 
 from granforce.figures import style
-from granforce.records import Floats, Integers, Packing
+from granforce.records import Packing
+from granforce.types import Floats, Integers
 
 SHOWN_CONTACTS = 40
 LARGEST = 3.0  # f_n / f_n,orig at which frames are cut

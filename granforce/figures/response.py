@@ -8,7 +8,7 @@ import numpy as np
 
 from granforce.figures import style
 from granforce.measures import statistics
-from granforce.records import Rows
+from granforce.types import Rows
 
 
 def perturbation(rows: Rows, *, limit: bool = False, backend: str = "bokeh") -> hv.Layout:

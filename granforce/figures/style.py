@@ -10,8 +10,9 @@ from typing import Any
 import holoviews as hv
 from holoviews.plotting.util import process_cmap
 
-from granforce.records import Floats, InputError
+from granforce.records import InputError
 from granforce.system.files import written
+from granforce.types import Floats
 
 # Okabe and Ito's palette: told apart by colour-blind eyes.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")

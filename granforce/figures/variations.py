@@ -9,7 +9,7 @@ import numpy as np
 from granforce.figures import style
 from granforce.figures.style import Points
 from granforce.measures import statistics
-from granforce.records import Rows
+from granforce.types import Rows
 
 _MEASURES = (("eta1", "η1", 1.0), ("eta2", "η2", 1.0), ("eta3", "0.15 η3", 0.15))
 

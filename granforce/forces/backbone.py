@@ -25,8 +25,9 @@ from granforce.forces import knowledge
 from granforce.forces.nearest import nearest, some_network
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import Floats, Integers, Mask, NotJammedError, Packing
+from granforce.records import NotJammedError, Packing
 from granforce.tolerances import CARRYING, SEEN_CARRYING
+from granforce.types import Floats, Integers, Mask
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

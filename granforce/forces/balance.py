@@ -25,10 +25,7 @@ from scipy import sparse
 
 from granforce.records import (
     Contacts,
-    Floats,
     InputError,
-    Integers,
-    Mask,
     Packing,
     are_whole,
     choice,
@@ -36,6 +33,7 @@ from granforce.records import (
     refuse_hidden,
 )
 from granforce.tolerances import BALANCED, ROUNDING
+from granforce.types import Floats, Integers, Mask
 
 
 def prescribed_stress(

@@ -35,7 +35,7 @@ from granforce.numerics.lanes import (
     vanishes,
     within,
 )
-from granforce.records import Floats, Integers
+from granforce.types import Floats, Integers
 
 
 class StepProblem(NamedTuple):

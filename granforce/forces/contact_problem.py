@@ -21,9 +21,9 @@ from granforce.numerics import (
 from granforce.numerics.contact_matrix import Network
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.linear_programs import Centre
-from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
+from granforce.types import Floats, Integers, Mask
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

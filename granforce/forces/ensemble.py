@@ -27,10 +27,7 @@ from granforce.forces.nearest import nearest
 from granforce.numerics import inner_point
 from granforce.records import (
     Contacts,
-    Floats,
     InputError,
-    Integers,
-    Mask,
     NotJammedError,
     Packing,
     friction,
@@ -40,6 +37,7 @@ from granforce.records import (
 )
 from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED, LARGEST_UNIT
+from granforce.types import Floats, Integers, Mask
 
 # What is prescribed, by its number of values.
 _NAMES = {1: "pressure", 3: "stress"}

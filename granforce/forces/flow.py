@@ -36,8 +36,8 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import Floats, Integers, Mask
 from granforce.tolerances import BALANCED
+from granforce.types import Floats, Integers, Mask
 
 # Pace τ: the first step's, its growth after a step, and its cut where Newton's method failed.
 FIRST, GROWTH, CUT = 1e2, 4.0, 0.2

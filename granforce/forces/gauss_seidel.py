@@ -21,19 +21,10 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import (
-    Cancel,
-    Floats,
-    InputError,
-    Integers,
-    Relaxation,
-    choice,
-    positive,
-    random_seed,
-    whole,
-)
+from granforce.records import InputError, Relaxation, choice, positive, random_seed, whole
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
+from granforce.types import Cancel, Floats, Integers
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

@@ -24,9 +24,10 @@ from granforce.forces.contact_problem import (
 from granforce.numerics import wall_matrix
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.inner_point import inner_point
-from granforce.records import Floats, Integers, Mask, NotJammedError, UndecidedError
+from granforce.records import NotJammedError, UndecidedError
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, FLAT
+from granforce.types import Floats, Integers, Mask
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

@@ -11,8 +11,9 @@ from scipy import sparse
 
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import Floats, InputError, Integers, Mask, NotJammedError, are_whole
+from granforce.records import InputError, NotJammedError, are_whole
 from granforce.tolerances import ADMISSIBLE, BALANCED, FLAT
+from granforce.types import Floats, Integers, Mask
 
 _NAMES = "f_n", "f_t"
 # Multipliers of statements that take part in a contradiction, relative to the largest.

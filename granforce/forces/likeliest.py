@@ -20,9 +20,10 @@ from granforce.numerics import certificates, contact_program, interior_point
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.interior_point import OPTIMUM
 from granforce.numerics.lanes import LANES, MANY, ONE
-from granforce.records import Floats, InputError, positive
+from granforce.records import InputError, positive
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ERRORS, MEASURED
+from granforce.types import Floats
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

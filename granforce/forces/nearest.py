@@ -26,9 +26,10 @@ from granforce.numerics import certificates, cone_projection, contact_program, h
 from granforce.numerics.contact_program import PINNED, Problem
 from granforce.numerics.interior_point import OPTIMUM, PROJECTED
 from granforce.numerics.lanes import LANES, MANY, ONE
-from granforce.records import Cancel, Floats, InputError, Relaxation, positive, whole
+from granforce.records import InputError, Relaxation, positive, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+from granforce.types import Cancel, Floats
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

@@ -14,9 +14,10 @@ from scipy import sparse
 
 from granforce.forces.contact_problem import MOST_DENSE, in_balance
 from granforce.numerics import highs as programs
-from granforce.records import Floats, Relaxation, positive, whole
+from granforce.records import Relaxation, positive, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+from granforce.types import Floats
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

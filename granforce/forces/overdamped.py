@@ -27,8 +27,8 @@ from granforce.forces.flow import Flows, answer, factor, make_flows, step_along
 from granforce.forces.step import Step
 from granforce.numerics import contact_matrix, lu
 from granforce.numerics.lanes import ONE, compiled, within
-from granforce.records import Floats
 from granforce.tolerances import BALANCED
+from granforce.types import Floats
 
 # Growth of τ after a step, its cut after one that failed, and its bounds.
 GROWTH, CUT = 3.0, 0.1

@@ -18,8 +18,9 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.forces.flow import Outcome, Push
 from granforce.forces.step import make_step
 from granforce.forces.works import follow, relax
-from granforce.records import Cancel, Floats, InputError, Mask, Packing, random_seed, whole
+from granforce.records import InputError, Packing, random_seed, whole
 from granforce.system import cancelling
+from granforce.types import Cancel, Floats, Mask
 
 # Standard deviation of the noise on each force (in ⟨f_n⟩), and draws of each.
 NOISE, DRAWS = (1e-4, 1e-2), 3

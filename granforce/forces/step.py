@@ -26,7 +26,8 @@ from granforce.forces.contact_problem import balance_of
 from granforce.forces.gauss_seidel import BOX_MASS
 from granforce.numerics.contact_matrix import Network, pull
 from granforce.numerics.lanes import ONE, compiled
-from granforce.records import Floats, InputError, Integers
+from granforce.records import InputError
+from granforce.types import Floats, Integers
 
 if TYPE_CHECKING:  # it needs this file to run
     from granforce.forces.ensemble import Ensemble

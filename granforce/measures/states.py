@@ -7,7 +7,8 @@ import numpy as np
 from scipy import sparse, stats
 from scipy.sparse import csgraph
 
-from granforce.records import Floats, InputError, Integers, moderate, refuse_hidden
+from granforce.records import InputError, moderate, refuse_hidden
+from granforce.types import Floats, Integers
 
 
 def _some(states: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize, stats
 
-from granforce.records import Floats, Rows
+from granforce.types import Floats, Rows
 
 T = TypeVar("T")
 

@@ -15,8 +15,9 @@ import numpy as np
 from scipy import sparse
 
 from granforce.numerics import highs as programs
-from granforce.records import Floats, InputError, NotJammedError, UndecidedError
+from granforce.records import InputError, NotJammedError, UndecidedError
 from granforce.tolerances import BALANCED, CARRYING
+from granforce.types import Floats
 
 # Mean of y (in ⟨f_n⟩) up to which a proof of emptiness excludes networks in spite of rounding.
 _LARGEST_MEAN = 1e4

@@ -22,9 +22,10 @@ from scipy import sparse
 from granforce.numerics import certificates, highs, linear_programs
 from granforce.numerics.contact_program import Problem
 from granforce.numerics.linear_programs import Centre, Outcome, Program
-from granforce.records import Cancelled, Floats, Progress, worker_count
+from granforce.records import Cancelled, worker_count
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
+from granforce.types import Floats, Progress
 
 # HiGHS takes a vertex for the optimum where no slack is below −10⁻¹⁰ of its costs: times as many
 # forces as there are, that may be more than INTERVAL_GAP.

@@ -36,7 +36,7 @@ from granforce.numerics.blocks import (
 )
 from granforce.numerics.contact_matrix import Factors, Network
 from granforce.numerics.lanes import compiled, fma, load, pick, root, store, within
-from granforce.records import Integers, Mask
+from granforce.types import Integers, Mask
 
 # What stands for a pivot that is none: its row gets no weight.
 _NO_WEIGHT = 1e64

@@ -19,7 +19,7 @@ import numpy as np
 
 from granforce.numerics.elimination import Pattern, block_of, pattern
 from granforce.numerics.lanes import fma, inline, load, room, same, store, within
-from granforce.records import Floats, Integers
+from granforce.types import Floats, Integers
 
 
 class Network(NamedTuple):

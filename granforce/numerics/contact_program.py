@@ -33,8 +33,8 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
+from granforce.types import Floats, Integers, Mask
 
 # What d − E f − s may be off by rounding, for forces of order 1.
 _ROUNDING = 1e-13

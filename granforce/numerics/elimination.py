@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.numerics.lanes import compiled, within
-from granforce.records import Floats, Integers
 from granforce.system import cancelling
+from granforce.types import Floats, Integers
 
 # Columns of a panel: more of them do not fit into the fastest cache beside what they change.
 _WIDEST = 8

@@ -12,9 +12,9 @@ import piqp
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from granforce.records import Floats, Integers
 from granforce.system import cancelling
 from granforce.tolerances import PROGRAM
+from granforce.types import Floats, Integers
 
 OPTIMAL = highspy.HighsModelStatus.kOptimal
 _PRIMAL_SIMPLEX = 4  # HiGHS's number

@@ -14,9 +14,9 @@ from scipy.sparse.linalg import splu
 
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
-from granforce.records import Floats, Mask
 from granforce.system import cancelling
 from granforce.tolerances import FLAT
+from granforce.types import Floats, Mask
 
 # Units of the programs. In the last one, FLAT is what solvers tell from 0 beyond doubt.
 _UNITS = 1.0, 1e-4

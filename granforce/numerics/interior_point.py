@@ -46,8 +46,8 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import Floats, Mask
 from granforce.system import cancelling
+from granforce.types import Floats, Mask
 
 # Part of the way to the nearest wall that a step may go, and of one towards the centre.
 _INSIDE, _CENTRING = 0.9995, 0.95

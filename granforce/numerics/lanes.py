@@ -26,7 +26,7 @@ from numba import config, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from granforce.records import Floats
+from granforce.types import Floats
 
 LANES = 8
 # Kernels that are called from Python, and those that are called by kernels only: without what the

@@ -15,9 +15,9 @@ from granforce.numerics import contact_program, interior_point
 from granforce.numerics.contact_program import Iterate, Problem, Workspace
 from granforce.numerics.interior_point import BALANCE, CENTRE, OPTIMUM, REFINED
 from granforce.numerics.lanes import ONE, lanes_for
-from granforce.records import Floats
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, INTERVAL_GAP
+from granforce.types import Floats
 
 # θ relative to the smallest for which all multipliers are ≥ 0; from 1.2 to 20 it costs the same
 # within 4 %.

@@ -32,8 +32,8 @@ from granforce.numerics.lanes import (
     store,
     within,
 )
-from granforce.records import Floats, Integers, Mask
 from granforce.system import cancelling
+from granforce.types import Floats, Integers, Mask
 
 # Rows whose pivot is below this, relative to the diagonal, follow from others.
 DEPENDENT = 1e-13

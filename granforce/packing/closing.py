@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from granforce.cell import Cell
 from granforce.forces.contact_dynamics import Motion
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
@@ -18,11 +19,7 @@ from granforce.numerics import highs as programs
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.packing.pair_list import SKIN, cell_of
 from granforce.records import (
-    Cell,
     Contacts,
-    Floats,
-    Integers,
-    Mask,
     NotJammedError,
     Packing,
     UndecidedError,
@@ -31,6 +28,7 @@ from granforce.records import (
 )
 from granforce.system import cancelling
 from granforce.tolerances import CLOSED, TOUCHING
+from granforce.types import Floats, Integers, Mask
 
 # Largest move of a grain in one of the linear programs, along each axis.
 TRUST = 0.05

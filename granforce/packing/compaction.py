@@ -21,14 +21,9 @@ from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic
 from granforce.packing.pair_list import cell_of, relisted
 from granforce.packing.settling import come_to_rest
 from granforce.records import (
-    Cancel,
-    Floats,
     InputError,
-    Integers,
-    Mask,
     NotJammedError,
     Packing,
-    Progress,
     brief,
     choice,
     float_array,
@@ -41,6 +36,7 @@ from granforce.records import (
 )
 from granforce.system import cancelling
 from granforce.system.memory import check_memory
+from granforce.types import Cancel, Floats, Integers, Mask, Progress
 
 INITIAL_FRACTION = 0.5
 # The last phase is tried every so many steps, once no grain's momentum changes by more than this in

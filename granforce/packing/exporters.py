@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from granforce.records import Floats, InputError, Packing, float_array
+from granforce.records import InputError, Packing, float_array
 from granforce.system.files import written
+from granforce.types import Floats
 
 _VTK_TYPES = {"f": "Float64", "i": "Int64"}
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 
+from granforce.cell import Cell
 from granforce.forces.contact_dynamics import REACH, Motion
 from granforce.numerics.lanes import compiled
 from granforce.packing.neighbours import find_pairs
-from granforce.records import Cell, Floats, Integers, NotJammedError
+from granforce.records import NotJammedError
+from granforce.types import Floats, Integers
 
 # Pairs nearer than SKIN (in largest radii) are listed. The list is made anew once two grains may
 # have approached by MOVED.

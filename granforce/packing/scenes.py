@@ -19,10 +19,7 @@ from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.packing.compaction import pack
 from granforce.records import (
-    Floats,
     InputError,
-    Integers,
-    Mask,
     NotJammedError,
     Packing,
     UndecidedError,
@@ -34,6 +31,7 @@ from granforce.records import (
     positive,
     whole,
 )
+from granforce.types import Floats, Integers, Mask
 
 # A disk touches a wall or another disk where the gap (in largest radii) is below this, if nothing
 # else is said.

@@ -30,17 +30,10 @@ from granforce.numerics.contact_matrix import Network
 from granforce.packing.closing import packing_of, prescribed_of, strained
 from granforce.packing.neighbours import separations
 from granforce.packing.pair_list import cell_of, relisted
-from granforce.records import (
-    Floats,
-    Integers,
-    Mask,
-    NotJammedError,
-    Packing,
-    UndecidedError,
-    make_contacts,
-)
+from granforce.records import NotJammedError, Packing, UndecidedError, make_contacts
 from granforce.system import cancelling
 from granforce.tolerances import CLOSED, TOUCHING
+from granforce.types import Floats, Integers, Mask
 
 # Softness ε of the overdamped motion: the overlap of a contact that presses, in largest radii. At
 # 10⁻⁴ packings come to rest with more contacts than rigid disks have: h is 13.0 ± 1.0 in place of

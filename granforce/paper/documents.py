@@ -20,8 +20,9 @@ from granforce.paper import plan as plans
 from granforce.paper.claims.figure1 import skipped
 from granforce.paper.claims.groups import RANGES, SAMPLERS, drawn, excesses, outside
 from granforce.paper.tables import Table
-from granforce.records import Floats, InputError, Rows
+from granforce.records import InputError
 from granforce.system.files import written
+from granforce.types import Floats, Rows
 
 MARK = re.compile(r"(<!-- study: (\w+) -->\n).*?(<!-- end -->)", re.S)
 

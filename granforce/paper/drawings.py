@@ -10,8 +10,8 @@ from granforce import figures
 from granforce.paper import tails
 from granforce.paper.claims.groups import SAMPLERS, drawn, outside
 from granforce.paper.tables import Table
-from granforce.records import Floats, Progress, Rows
 from granforce.system.files import make_folder
+from granforce.types import Floats, Progress, Rows
 
 SHOWN = (0.001, 0.01, 0.05, 0.1, 0.3, 1, 10)  # frictions of Figure 4, of those that the study has
 LARGEST = 5.0  # ΔF_n of Figure 4, ⟨f_n⟩

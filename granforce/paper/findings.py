@@ -24,7 +24,7 @@ from granforce.paper.claims.groups import (
 )
 from granforce.paper.claims.verdicts import OURS, Claim, peak, slope
 from granforce.paper.tables import Table
-from granforce.records import Floats, Rows
+from granforce.types import Floats, Rows
 
 Values = Mapping[float, Any]  # {μ: a number of each packing}
 

@@ -18,10 +18,11 @@ from granforce.forces.balance import stress_of
 from granforce.measures import statistics
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
-from granforce.records import Floats, InputError, Integers, Packing, friction
+from granforce.records import InputError, Packing, friction
 from granforce.study import cells, kinds
 from granforce.study.schema import ROW_SCALARS, dataset_packing, labelled
 from granforce.study.store import Entry, Store, open_store
+from granforce.types import Floats, Integers
 
 VERSION = 1
 

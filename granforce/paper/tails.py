@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from granforce.paper.tables import FORCES, Table
-from granforce.records import Floats
+from granforce.types import Floats
 
 # What uniform states of large packings are drawn for, in words.
 PRESCRIBED = {"tails": "pressure prescribed", "tails_stress": "whole stress prescribed"}

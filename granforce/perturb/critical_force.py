@@ -28,11 +28,7 @@ from granforce.forces.nearest import starting_network
 from granforce.forces.step import Step, grain_velocities, make_step, relative_velocities
 from granforce.forces.works import follow, relax
 from granforce.records import (
-    Cancel,
-    Floats,
     InputError,
-    Integers,
-    Mask,
     Packing,
     UndecidedError,
     moderate,
@@ -43,6 +39,7 @@ from granforce.records import (
     worker_count,
 )
 from granforce.system import cancelling
+from granforce.types import Cancel, Floats, Integers, Mask
 
 # Part of the way from the last load at rest to the limit load that the next load goes.
 RISE = 0.4

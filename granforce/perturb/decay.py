@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.measures import statistics
-from granforce.records import Floats, Packing
+from granforce.records import Packing
+from granforce.types import Floats
 
 FIT_INNER, FIT_OUTER = 1.5, 0.4
 FIT_RANGES = tuple(itertools.product((1.0, 1.5, 2.0, 3.0), (0.3, 0.4, 0.5)))

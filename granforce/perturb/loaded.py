@@ -17,9 +17,10 @@ import numpy.typing as npt
 
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import some_network, starting_network
-from granforce.records import Cancel, Floats, InputError, float_array, real_array
+from granforce.records import InputError, float_array, real_array
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
+from granforce.types import Cancel, Floats
 
 
 class Loaded(NamedTuple):

@@ -11,8 +11,8 @@ from granforce.explore.outline import Outline
 from granforce.explore.stress_outline import StressOutline
 from granforce.explore.volume import Volume
 from granforce.forces.ensemble import Ensemble
-from granforce.records import Floats
 from granforce.study.schema import extension, labelled
+from granforce.types import Floats
 
 # Forces whose exact interval is longer than this, in ⟨f_n⟩, are undetermined.
 UNDETERMINED = 1e-6

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from granforce.records import Cancel, Progress
 from granforce.study.keys import Parameters
 from granforce.study.store import Entry, Store
 from granforce.system import cancelling
+from granforce.types import Cancel, Progress
 
 # Version of the algorithm that makes packings, certified to be at rest. It is among their
 # parameters, so that everything that rests on a packing is named by it.

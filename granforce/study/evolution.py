@@ -10,13 +10,14 @@ import xarray as xr
 
 from granforce.packing.importers.network import judged
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
-from granforce.records import InputError, Packing, Progress
+from granforce.records import InputError, Packing
 from granforce.study import kinds
 from granforce.study.cells import Cell, get
 from granforce.study.scan import run
 from granforce.study.schema import VARIABLES
 from granforce.study.series import ends_of, over_frames, pair_names
 from granforce.study.store import open_store
+from granforce.types import Progress
 
 
 def _of_schema(*names: str) -> dict[str, tuple[str, str]]:

@@ -15,7 +15,8 @@ from granforce.explore import outline as outlines
 from granforce.explore.intervals import intervals
 from granforce.forces.ensemble import ensemble
 from granforce.numerics import certificates
-from granforce.records import Floats, InputError, Integers, Packing, are_whole
+from granforce.records import InputError, Packing, are_whole
+from granforce.types import Floats, Integers
 
 # Singular values of A below this, relative to the largest, are 0.
 _RANK = 1e-10

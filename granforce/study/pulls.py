@@ -15,8 +15,9 @@ from granforce.explore.pull import Pull, Reach, pull, reach
 from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest
 from granforce.perturb.loaded import Loaded, loaded_networks
-from granforce.records import Floats, InputError, Mask, Packing
+from granforce.records import InputError, Packing
 from granforce.study import conditions
+from granforce.types import Floats, Mask
 
 STOPS = 17  # networks along a rail
 # Of more contacts so many that they go side by side, and so far within its ends (part of its

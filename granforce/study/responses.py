@@ -10,8 +10,9 @@ from granforce.forces.ensemble import Ensemble
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay
 from granforce.perturb.critical_force import CriticalForce
-from granforce.records import Floats, Packing
+from granforce.records import Packing
 from granforce.study.schema import extension, labelled
+from granforce.types import Floats
 
 
 def contact_dataset(S: Ensemble, critical: CriticalForce, precision: float) -> xr.Dataset:

@@ -10,8 +10,8 @@ from granforce.explore.infer import Draws, Inference
 from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
 from granforce.forces.ensemble import Ensemble
-from granforce.records import Floats, Integers
 from granforce.study.schema import extension, labelled
+from granforce.types import Floats, Integers
 
 
 def walk_dataset(

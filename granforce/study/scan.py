@@ -25,12 +25,13 @@ from granforce.explore.uniform import sample_uniform
 from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
-from granforce.records import InputError, Packing, Progress
+from granforce.records import InputError, Packing
 from granforce.study import kinds
 from granforce.study.cells import Cell, get, load, row
 from granforce.study.keys import Parameters, canonical
 from granforce.study.store import open_store
 from granforce.system.terminal import one_line
+from granforce.types import Progress
 
 # How often it is asked what dask has finished, and how long it may have no worker until that is
 # said, s.

@@ -23,17 +23,7 @@ from granforce.forces.ensemble import Ensemble, ensemble
 from granforce.packing.importers.geometry import vectors
 from granforce.packing.importers.pegs import Photoelastic, open_frames, read_pegs
 from granforce.packing.importers.repair import KINDS
-from granforce.records import (
-    Contacts,
-    Floats,
-    InputError,
-    Integers,
-    Progress,
-    friction,
-    positive,
-    random_seed,
-    whole,
-)
+from granforce.records import Contacts, InputError, friction, positive, random_seed, whole
 from granforce.study import entries
 from granforce.study.cells import Cell, Kind, get
 from granforce.study.keys import Parameters
@@ -41,6 +31,7 @@ from granforce.study.scan import run
 from granforce.study.schema import labelled, packing_dataset, to_builtin
 from granforce.study.store import Store, is_store, open_store
 from granforce.system.files import beside, expanded
+from granforce.types import Floats, Integers, Progress
 
 # Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
 STATES, UNMEASURED = 200, 1.0

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from granforce.records import InputError, Mask, Packing
+from granforce.records import InputError, Packing
+from granforce.types import Mask
 
 
 def edges(given: Sequence[float]) -> list[float]:

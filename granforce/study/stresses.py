@@ -2,7 +2,8 @@
 
 from granforce.explore import stress_outline
 from granforce.forces.ensemble import ensemble
-from granforce.records import Floats, Packing
+from granforce.records import Packing
+from granforce.types import Floats
 
 
 def stress_axes(packing: Packing, mu: float) -> Floats:

@@ -21,8 +21,9 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from granforce.records import Cancel, Cancelled, Mask, worker_count
+from granforce.records import Cancelled, worker_count
 from granforce.system.interrupts import interrupted
+from granforce.types import Cancel, Mask
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from packings import packed
 
+from granforce.cell import Cell
 from granforce.forces import contact_dynamics as dynamics
 from granforce.forces.balance import stress_of
 from granforce.forces.ensemble import ensemble
@@ -19,14 +20,7 @@ from granforce.packing.compaction import (
 )
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.packing.pair_list import _leant_back, cell_of, relisted
-from granforce.records import (
-    Cancelled,
-    Cell,
-    InputError,
-    NotJammedError,
-    make_contacts,
-    make_packing,
-)
+from granforce.records import Cancelled, InputError, NotJammedError, make_contacts, make_packing
 from granforce.tolerances import CLOSED, LARGEST_FRICTION, TOUCHING
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from granforce.cell import Cell
 from granforce.packing.neighbours import find_pairs, separations
-from granforce.records import Cell
 
 
 def every_pair(x, r, cell, cutoff, images=3):

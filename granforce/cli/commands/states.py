@@ -14,7 +14,7 @@ from granforce.cli.asked import (
     walked,
     write_csv,
 )
-from granforce.records import Rows, whole, worker_count
+from granforce.records import whole, worker_count
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study import scan as scans
@@ -22,6 +22,7 @@ from granforce.study.keys import Parameters
 from granforce.study.store import open_store
 from granforce.system.memory import check_memory
 from granforce.system.terminal import Bar, print_report, table
+from granforce.types import Rows
 
 
 def walk(arguments: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import Delaunay, QhullError
 
-from granforce.records import Floats, Integers
+from granforce.types import Floats, Integers
 
 # Triangles of neighbours have circles up to so many mean radii about them: with those of a grain
 # that is missing among others, and without those that bridge a bay of the outside.

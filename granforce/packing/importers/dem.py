@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from granforce.cell import Cell
 from granforce.packing.importers.geometry import check_disks, components, listed, once
 from granforce.packing.importers.network import LOAD_MISFIT, adopt
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
@@ -35,17 +36,15 @@ from granforce.packing.importers.text import (
     some_of,
 )
 from granforce.records import (
-    Cell,
     Contacts,
-    Floats,
     InputError,
-    Integers,
     Packing,
     friction,
     make_cell,
     make_contacts,
     make_packing,
 )
+from granforce.types import Floats, Integers
 
 # Centres lie in a plane where they leave it by less than this part of a radius.
 _FLAT = 1e-3

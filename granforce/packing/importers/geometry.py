@@ -5,19 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
+from granforce.cell import Cell
 from granforce.packing.neighbours import find_pairs, separations
-from granforce.records import (
-    Cell,
-    Contacts,
-    Floats,
-    InputError,
-    Integers,
-    Mask,
-    make_contacts,
-    make_packing,
-    positive,
-    repeated,
-)
+from granforce.records import Contacts, InputError, make_contacts, make_packing, positive, repeated
+from granforce.types import Floats, Integers, Mask
 
 # Contacts may overlap, or gape, by this part of the smaller radius before the file must be wrong.
 OVERLAP_ALLOWED = 0.2

@@ -4,7 +4,8 @@ import numpy as np
 
 from granforce.forces.knowledge import Known
 from granforce.packing.importers.text import Source, Table, read_csv
-from granforce.records import Floats, InputError
+from granforce.records import InputError
+from granforce.types import Floats
 
 _COMPONENTS = "f_n", "f_t"
 

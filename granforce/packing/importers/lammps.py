@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from granforce.cell import Cell
 from granforce.packing.importers.geometry import MISFIT, check_disks, components, listed, once
 from granforce.packing.importers.network import LOAD_MISFIT, adopt
 from granforce.packing.importers.snapshots import Snapshot, Snapshots
@@ -18,16 +19,8 @@ from granforce.packing.importers.text import (
     renamed,
     some_of,
 )
-from granforce.records import (
-    Cell,
-    Contacts,
-    Floats,
-    InputError,
-    Packing,
-    friction,
-    make_cell,
-    make_packing,
-)
+from granforce.records import Contacts, InputError, Packing, friction, make_cell, make_packing
+from granforce.types import Floats
 
 # Columns of the contact dump: grains, centre distance, normal and tangential force on atom1.
 CONTACT_COLUMNS = ("atom1", "atom2", "distance", "fx", "fy", "px", "py")

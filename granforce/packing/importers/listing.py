@@ -24,7 +24,8 @@ from typing import Any, NamedTuple, Protocol, SupportsIndex
 import numpy as np
 
 from granforce.packing.importers.text import LARGEST, Source, read_text
-from granforce.records import Floats, InputError, Integers, Mask
+from granforce.records import InputError
+from granforce.types import Floats, Integers, Mask
 
 _GRAINS = ("frame", "id", "x", "y", "radius", "flag")
 _CONTACTS = ("frame", "id1", "id2", "tangential", "normal")

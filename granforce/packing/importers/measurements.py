@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.packing.importers.text import LARGEST, Source, read_csv
-from granforce.records import Floats, InputError, Integers
+from granforce.records import InputError
+from granforce.types import Floats, Integers
 
 COLUMNS = ("f_n", "f_t", "sigma_n", "sigma_t")
 

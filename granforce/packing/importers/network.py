@@ -9,8 +9,9 @@ from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
 from granforce.packing.closing import margin
 from granforce.packing.importers.geometry import gain_by_reversing, overlapping
-from granforce.records import Floats, InputError, Integers, NotJammedError, Packing, UndecidedError
+from granforce.records import InputError, NotJammedError, Packing, UndecidedError
 from granforce.tolerances import CARRYING, RIGID_OVERLAP
+from granforce.types import Floats, Integers
 
 # The loads of an open set may miss balance by this part of ⟨f_n⟩ (digits lost in the file); the
 # difference is then taken off them, since S would be empty otherwise.

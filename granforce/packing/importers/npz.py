@@ -12,7 +12,6 @@ from granforce.packing.importers.geometry import OVERLAP_ALLOWED, check_contacts
 from granforce.packing.importers.text import Source, check_grains
 from granforce.records import (
     Contacts,
-    Floats,
     InputError,
     Packing,
     float_array,
@@ -20,6 +19,7 @@ from granforce.records import (
     make_packing,
 )
 from granforce.system.files import written
+from granforce.types import Floats
 
 _GRAINS = ("x", "r", "P", "mu")
 _ARMS = "arm_i", "arm_j"

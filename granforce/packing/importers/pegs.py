@@ -32,10 +32,7 @@ from granforce.packing.importers.walls import (
     wall_contacts,
 )
 from granforce.records import (
-    Floats,
     InputError,
-    Integers,
-    Mask,
     Packing,
     UndecidedError,
     friction,
@@ -43,6 +40,7 @@ from granforce.records import (
     make_packing,
     positive,
 )
+from granforce.types import Floats, Integers, Mask
 
 # What changing a measured force by ⟨f_n⟩ costs, where ⟨f_n⟩ of unbalance costs 1.
 _CHANGE = 0.2

@@ -12,7 +12,8 @@ import numpy as np
 
 from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
 from granforce.packing.importers.listing import Listing, plain
-from granforce.records import Floats, InputError, Integers
+from granforce.records import InputError
+from granforce.types import Floats, Integers
 
 # Kind of finding → what it is called, whether it is of grains (0) or contacts (1), and how much of
 # the data it spoils: 1 what is left out or not measured any more, 0 what is only told.

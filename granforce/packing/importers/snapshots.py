@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from granforce.records import Floats, InputError, Packing
+from granforce.records import InputError, Packing
+from granforce.types import Floats
 
 
 class Snapshot(NamedTuple):

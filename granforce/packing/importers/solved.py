@@ -25,7 +25,8 @@ import numpy.typing as npt
 from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.matfile import read_struct
 from granforce.packing.importers.text import LARGEST, Source
-from granforce.records import Floats, InputError
+from granforce.records import InputError
+from granforce.types import Floats
 
 _NEEDED = ("id", "x", "y", "r", "neighbours", "forces", "alphas")
 _FIELDS = (*_NEEDED, "betas", "fitError", "edge")

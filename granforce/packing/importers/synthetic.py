@@ -9,18 +9,10 @@ from scipy.spatial import cKDTree
 from granforce.forces.ensemble import ensemble
 from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.pegs import Photoelastic
-from granforce.records import (
-    Contacts,
-    Floats,
-    InputError,
-    Integers,
-    Packing,
-    positive,
-    random_seed,
-    whole,
-)
+from granforce.records import Contacts, InputError, Packing, positive, random_seed, whole
 from granforce.system.files import written
 from granforce.tolerances import LARGEST_UNIT
+from granforce.types import Floats, Integers
 
 
 class SyntheticFrame(NamedTuple):

@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from granforce.cell import Cell
 from granforce.packing.importers.geometry import check_disks, listed, touching
 from granforce.packing.importers.network import adopt, find
 from granforce.packing.importers.text import Source, Table, check_grains, read_csv, renamed
 from granforce.records import (
-    Cell,
     Contacts,
-    Floats,
     InputError,
     Packing,
     friction,
@@ -21,6 +20,7 @@ from granforce.records import (
     positive,
 )
 from granforce.tolerances import LISTED_TOUCHING
+from granforce.types import Floats
 
 # Columns of grains, then of contacts.
 NAMES = ("id", "x", "y", "r", "fx", "fy", "torque")

@@ -15,7 +15,8 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from granforce.records import Floats, InputError, Integers, Mask, are_whole
+from granforce.records import InputError, are_whole
+from granforce.types import Floats, Integers, Mask
 
 # Numbers beyond this size cannot be lengths or forces, and their squares would overflow.
 LARGEST = 1e100

@@ -22,7 +22,8 @@ from granforce.packing.importers.boundary import boundary
 from granforce.packing.importers.geometry import components
 from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.repair import rows_of
-from granforce.records import Contacts, Floats, InputError, Integers, Mask, make_contacts, positive
+from granforce.records import Contacts, InputError, make_contacts, positive
+from granforce.types import Floats, Integers, Mask
 
 SIDES = ("left", "right", "bottom", "top")  # least and largest x, least and largest y
 _NORMALS = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])

@@ -10,7 +10,7 @@ from granforce.paper.claims.figure1 import peaked
 from granforce.paper.claims.groups import SAMPLERS, items, positive_friction
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import Table
-from granforce.records import Floats
+from granforce.types import Floats
 
 FEWEST_SHELLS = 4  # fewer tell no law from another
 _ANSWERS = (("critical_force", "F_crit"), ("decay_exponent", "α"))

@@ -20,7 +20,7 @@ from granforce.paper.claims.groups import (
 )
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import Table
-from granforce.records import Floats
+from granforce.types import Floats
 
 # Of `statistics.departure`: 0.05 is that of a Weibull distribution with exponent 1.5.
 FLAT, RAISED = 0.05, 0.1

@@ -17,7 +17,7 @@ from granforce.paper.claims.groups import (
 )
 from granforce.paper.claims.verdicts import PRL, Claim, at_each
 from granforce.paper.tables import Table
-from granforce.records import Mask
+from granforce.types import Mask
 
 
 def _marked(table: Table, sampler: str, measure: Callable[..., Any]) -> Groups:

@@ -20,7 +20,7 @@ from granforce.paper.claims.groups import (
 )
 from granforce.paper.claims.verdicts import Claim, at_each, over_all
 from granforce.paper.tables import Table
-from granforce.records import Floats
+from granforce.types import Floats
 
 PERMUTATIONS = 40
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.paper.tables import Table
-from granforce.records import Rows
+from granforce.types import Rows
 
 Ends = tuple[float, float]  # of a range or of an interval
 Groups = dict[float, list[tuple[int, Any]]]  # {μ: [(disks, value) of each packing]}

@@ -16,7 +16,7 @@ import numpy as np
 
 from granforce.measures import statistics
 from granforce.paper.claims.groups import Ends, Groups
-from granforce.records import Floats
+from granforce.types import Floats
 
 REPRODUCED, UNDECIDED, DIFFERS = "reproduced", "undecided", "differs"
 FAILED, FEW, MISSING = "not reproduced", "too few data", "no data"

@@ -10,7 +10,7 @@ from granforce.explore.intervals import intervals, limit_load_bounds
 from granforce.explore.outline import outline
 from granforce.explore.stress_outline import stress_outline
 from granforce.forces.ensemble import Ensemble
-from granforce.records import Floats, InputError, Progress, positive, whole
+from granforce.records import InputError, positive, whole
 from granforce.study import slices
 from granforce.study.bounds import (
     intervals_dataset,
@@ -24,6 +24,7 @@ from granforce.study.kinds.packings import check_complete, chosen_contacts, cone
 from granforce.study.store import Store
 from granforce.system import cancelling
 from granforce.system.clock import timed
+from granforce.types import Floats, Progress
 
 
 def _exact_parameters(

@@ -16,16 +16,7 @@ from granforce.packing.compaction import (
     number_of_disks,
     pack,
 )
-from granforce.records import (
-    InputError,
-    Packing,
-    Progress,
-    friction,
-    moderate,
-    positive,
-    random_seed,
-    whole,
-)
+from granforce.records import InputError, Packing, friction, moderate, positive, random_seed, whole
 from granforce.study import slices
 from granforce.study.cells import PACKING_VERSION, Kind, get, save
 from granforce.study.conditions import conditions
@@ -34,6 +25,7 @@ from granforce.study.keys import Parameters
 from granforce.study.schema import dataset_packing, packing_dataset
 from granforce.study.store import Store
 from granforce.system import cancelling
+from granforce.types import Progress
 
 
 def _packing_parameters(

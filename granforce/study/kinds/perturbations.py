@@ -15,12 +15,13 @@ from granforce.perturb.critical_force import (
     critical_force,
     critical_forces,
 )
-from granforce.records import InputError, Integers, Progress, positive, random_seed, whole
+from granforce.records import InputError, positive, random_seed, whole
 from granforce.study.cells import Kind, load, save
 from granforce.study.keys import Parameters
 from granforce.study.kinds.packings import check_complete, chosen_contacts, cones_of, ensemble_of
 from granforce.study.responses import contact_dataset, perturbation_dataset
 from granforce.study.store import Store
+from granforce.types import Integers, Progress
 
 # What names how loads on a contact are raised.
 PROTOCOL = ("precision", "rise", "max_steps")

@@ -19,7 +19,7 @@ from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
-from granforce.records import InputError, Progress, brief, positive, random_seed, whole
+from granforce.records import InputError, brief, positive, random_seed, whole
 from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load
 from granforce.study.keys import Parameters
@@ -30,6 +30,7 @@ from granforce.system import cancelling
 from granforce.system.clock import timed
 from granforce.system.memory import check_memory
 from granforce.tolerances import EQUILIBRIUM
+from granforce.types import Progress
 
 # Memory that a walk needs at the least for each state and disk: f_n and f_t of one and a half
 # contacts, as they are made and as they are handed over.
