@@ -10,7 +10,7 @@ import numpy as np
 from arviz_stats.base import array_stats
 from scipy import linalg, sparse, spatial, stats
 
-from granforce.explore.billiard import LANES
+from granforce.explore.billiard import BLOCK
 
 
 class Body(NamedTuple):
@@ -79,7 +79,7 @@ class BodyWalls:
         """W (k, n), d (k,): weighted with exp(−½ |W y − d|²)."""
         self.dimension = body.dimension
         self.moving = np.arange(len(body.mean))
-        self.count = len(self.moving) + -len(self.moving) % LANES
+        self.count = len(self.moving) + -len(self.moving) % BLOCK
         null = linalg.null_space(body.A.toarray(), rcond=1e-9)
         self.centre = body.mean if W is None else _centre(body.mean, null, W.toarray(), d)
         relative = np.zeros((self.count, self.dimension))

@@ -5,7 +5,7 @@ import io
 import numpy as np
 from packings import packed
 
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 
 PIXELS, NEWTON = 50.0, 0.01
 

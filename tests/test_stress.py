@@ -12,10 +12,10 @@ from packings import lattice, packed, reference
 from granforce import measures
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
-from granforce.forces.ensemble import ensemble
-from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.motion.gauss_seidel import gauss_seidel
 from granforce.packing.compaction import pack
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.records import Contacts, NotJammedError, make_contacts, make_packing

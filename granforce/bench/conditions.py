@@ -16,7 +16,8 @@ from granforce.bench.report import note
 from granforce.explore.intervals import intervals
 from granforce.explore.pull import pull
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.knowledge import Known
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack

@@ -10,7 +10,8 @@ from scipy.optimize import linprog
 
 from granforce.bench.report import table
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing
 from granforce.system.clock import timed

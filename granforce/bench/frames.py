@@ -7,7 +7,8 @@ import numpy as np
 
 from granforce.bench.report import note
 from granforce.explore.remeasured import remeasured
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.packing.compaction import pack
 from granforce.packing.importers.pegs import read_pegs
 from granforce.packing.importers.synthetic import synthetic_frame

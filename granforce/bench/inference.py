@@ -9,7 +9,8 @@ from scipy import sparse
 
 from granforce.bench.report import note
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import checked, fitted
 from granforce.numerics import highs as programs
 from granforce.packing.compaction import pack

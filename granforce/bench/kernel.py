@@ -13,8 +13,8 @@ import numpy as np
 from granforce.bench.report import exponent, note
 from granforce.bench.solvers import FRICTIONS, kicked, tile
 from granforce.explore.intervals import intervals, limit_loads
+from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import make_problem
-from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics import cholesky, contact_program

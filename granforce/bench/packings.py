@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from granforce.bench.report import exponent, note
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.compaction import pack
 from granforce.records import NotJammedError
 from granforce.system.clock import timed

@@ -13,9 +13,9 @@ import numpy as np
 from scipy import sparse
 
 from granforce.bench.report import note
-from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.gauss_seidel import from_rest
+from granforce.motion.contact_dynamics import add_forces, set_stiffness, sweep
+from granforce.motion.gauss_seidel import from_rest
 from granforce.numerics.lanes import ONE
 from granforce.types import Floats
 

@@ -9,9 +9,10 @@ import numpy as np
 from granforce.bench.report import note
 from granforce.bench.solvers import kicked
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
+from granforce.motion.gauss_seidel import gauss_seidel
 from granforce.packing import pair_list
 from granforce.packing.compaction import pack
 from granforce.records import Packing

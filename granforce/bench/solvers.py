@@ -7,10 +7,11 @@ import numpy as np
 
 from granforce.bench.report import exponent, note
 from granforce.bench.siconos import ABSENT, TOLERANCES, against_siconos
-from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.forces.gauss_seidel import SideBySide, gauss_seidel
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.motion.gauss_seidel import SideBySide, gauss_seidel
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
 from granforce.records import Packing, Relaxation, make_contacts, make_packing

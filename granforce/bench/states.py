@@ -14,10 +14,11 @@ from granforce import measures
 from granforce.bench.report import note
 from granforce.explore.intervals import intervals as exact_intervals
 from granforce.explore.random_walk import walk
-from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.motion.gauss_seidel import gauss_seidel
 from granforce.packing.compaction import pack
 from granforce.records import NotJammedError, Packing
 from granforce.system.clock import timed

@@ -19,7 +19,8 @@ from granforce.explore.billiard import make_rows, room_for_rows
 from granforce.explore.mixing import Mixing, mixing
 from granforce.explore.uniform import METHODS, forces_of, sample_uniform, step, varying, warm_up
 from granforce.explore.walls import walls
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
 from granforce.system.clock import timed
@@ -164,10 +165,10 @@ def _set_up(S: Ensemble) -> tuple[Any, Any]:
 
 def _all_rows(made: Any, part: float) -> Any:
     """All rows of K where they fit into a part of the memory, none of them yet where not."""
-    rows = room_for_rows(made, part)
+    rows = room_for_rows(made.count, part)
     if rows.whole:
         for first in range(0, len(made.moving), LANES):
-            make_rows(made, rows.kept, range(first, min(first + LANES, len(made.moving))))
+            make_rows(made.rows, rows.kept, range(first, min(first + LANES, len(made.moving))))
     return rows
 
 

@@ -9,8 +9,8 @@ is until it is made, and goes on, bit for bit as if it had been there.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,11 +19,8 @@ from granforce.numerics.lanes import MANY, compiled, inline, within
 from granforce.system import cancelling
 from granforce.types import Floats, Integers, Mask
 
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.explore.walls import Walls
-
-# Walls are padded to a multiple of this, so that the search for the next one runs in lanes.
-LANES = 64
+# The search for the next wall skips blocks of this many: walls are padded to a multiple of it.
+BLOCK = 64
 # Memory for rows of K, all threads together: all those of 11,500 walls (3500 disks at μ = 0.1) fit.
 MEMORY = 1 << 30
 # Turns after which a path is not taken, per dimension; a usual path has less than one.
@@ -33,6 +30,10 @@ _LEAST = 1e-300
 # Flight.count: paths done, turns on this one, turns and paths not taken in all; whether on a path,
 # and the wall that is next on it.
 _PATH, _HITS, _TURNS, _REFUSED, _FLYING, _NEXT = range(6)
+
+
+# Rows (k, walls) of K, for walls (k,).
+RowsOf = Callable[[Integers], Floats]
 
 
 class Kept(NamedTuple):
@@ -67,13 +68,13 @@ class Flight(NamedTuple):
     count: Integers  # type: ignore[assignment]  # (6,) path, its hits, turns, …, as named above
 
 
-def room_for_rows(walls: Walls, part: float = 1.0) -> Rows:
-    """Rows with room in a part of MEMORY, none of them there yet."""
-    count = max(1, walls.count)
+def room_for_rows(walls: int, part: float = 1.0) -> Rows:
+    """Rows of so many walls, with room in a part of MEMORY, none of them there yet."""
+    count = max(1, walls)
     places = min(count, max(2 * lanes.LANES, int(part * MEMORY / (8 * count))))
     kept = Kept(
-        values=np.zeros((places, walls.count)),
-        place=np.full(walls.count, -1),
+        values=np.zeros((places, walls)),
+        place=np.full(walls, -1),
         owner=np.full(places, -1),
         used=np.zeros(places, dtype=bool),
         hand=np.zeros(1, dtype=np.int64),
@@ -81,12 +82,12 @@ def room_for_rows(walls: Walls, part: float = 1.0) -> Rows:
     return Rows(kept, threading.Lock())
 
 
-def make_rows(walls: Walls, rows: Kept, wanted: Sequence[int]) -> None:
+def make_rows(rows_of: RowsOf, rows: Kept, wanted: Sequence[int]) -> None:
     """Put the rows of so many walls where others were not used for long; those there stay."""
     wanted = [wall for wall in wanted if rows.place[wall] < 0]
     if not wanted:
         return
-    for wall, row in zip(wanted, walls.rows(np.array(wanted, dtype=int)), strict=True):
+    for wall, row in zip(wanted, rows_of(np.array(wanted, dtype=int)), strict=True):
         while rows.used[rows.hand[0]]:
             rows.used[rows.hand[0]] = False
             rows.hand[0] = (rows.hand[0] + 1) % len(rows.owner)
@@ -111,19 +112,21 @@ def make_flight(slacks: Floats) -> Flight:
 
 
 def follow(
-    walls: Walls,
+    rows_of: RowsOf,
+    dimension: int,
     rows: Rows,
     starts: Sequence[Floats],
     drawn: Sequence[tuple[Floats, Floats, Floats]],
 ) -> tuple[Floats, Floats, Integers]:
     """Paths of some chains, as `fly` takes them, from slacks starts (walls,) each.
 
+    rows_of: makes rows of K; dimension: h of S, which bounds the turns of a path.
     Returns slacks where they end (chains, walls) and after each path (chains, paths, walls), and
     the turns and paths not taken (chains, 2). Where rows are missing, those of the walls that are
     next for each chain are made side by side.
     """
-    flights, limit = [make_flight(s) for s in starts], MOST_TURNS * (walls.dimension + 1)
-    outs = np.ones((len(starts), len(drawn[0][0]), walls.count))
+    flights, limit = [make_flight(s) for s in starts], MOST_TURNS * (dimension + 1)
+    outs = np.ones((len(starts), len(drawn[0][0]), len(rows.kept.place)))
     kept, waiting = rows.kept, list(range(len(starts)))
     while waiting:
         stop = cancelling.flag()
@@ -140,7 +143,7 @@ def follow(
         wanted = list(dict.fromkeys(wanted))[: max(lanes.LANES, len(waiting))]
         if wanted:
             with rows.making:
-                make_rows(walls, kept, wanted)
+                make_rows(rows_of, kept, wanted)
     counts = [flight.count[[_TURNS, _REFUSED]] for flight in flights]
     return np.stack([flight.s for flight in flights]), outs, np.array(counts)
 
@@ -224,11 +227,11 @@ def _onward(flight, middle, harmonic, row, time, kick):
     cos, sin = (np.cos(time), np.sin(time)) if harmonic else (1.0, time)
     # Rounding must not move a harmonic path where it begins.
     moves, lowest = kick != 0.0 or not harmonic, -np.inf if harmonic else _LEAST
-    for first in range(0, len(s), LANES):
+    for first in range(0, len(s), BLOCK):
         if moves:
             _move(s, w, middle, row, cos, sin, kick, lowest, first)
         if _some_nearer(s, w, middle, harmonic, soonest, first):
-            for k in range(first, first + LANES):
+            for k in range(first, first + BLOCK):
                 rate = _rate(s[k], w[k], middle[k], harmonic)
                 if rate > soonest:
                     soonest, next_wall = rate, k
@@ -237,8 +240,8 @@ def _onward(flight, middle, harmonic, row, time, kick):
 
 @inline
 def _move(s, w, middle, row, cos, sin, kick, lowest, first):
-    """Motion and turn of LANES walls."""
-    for k in range(first // lanes.LANES, (first + LANES) // lanes.LANES):
+    """Motion and turn of BLOCK walls."""
+    for k in range(first // lanes.LANES, (first + BLOCK) // lanes.LANES):
         slack, speed, m = (
             lanes.load(s, k, MANY),
             lanes.load(w, k, MANY),
@@ -251,9 +254,9 @@ def _move(s, w, middle, row, cos, sin, kick, lowest, first):
 
 @inline
 def _some_nearer(s, w, middle, harmonic, soonest, first):
-    """Whether any of LANES walls has a larger rate than `soonest`, but for rounding."""
+    """Whether any of BLOCK walls has a larger rate than `soonest`, but for rounding."""
     nearer = lanes.same(MANY, 0.0)
-    for k in range(first // lanes.LANES, (first + LANES) // lanes.LANES):
+    for k in range(first // lanes.LANES, (first + BLOCK) // lanes.LANES):
         slack, speed = lanes.larger(lanes.load(s, k, MANY), _LEAST), lanes.load(w, k, MANY)
         by = soonest * slack + speed
         if harmonic:

@@ -17,7 +17,8 @@ from scipy.spatial import HalfspaceIntersection
 from granforce import notebook
 from granforce.explore.thin import null_space
 from granforce.forces import hull
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.numerics import certificates, inner_point
 from granforce.records import InputError, Packing
 from granforce.types import Floats, Integers, Mask

@@ -228,7 +228,7 @@ def step(
     point that one solve gives, cut by the walls: a harmonic path for a quarter of an oscillation
     draws from it. Without a measurement that leaves uniform states.
     """
-    rows, times = rows or billiard.room_for_rows(made), np.array([_TIME])
+    rows, times = rows or billiard.room_for_rows(made.count), np.array([_TIME])
     pulls = np.tile(made.pull, (len(ends), 1))
     ahead: list[Any] = []
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from granforce import measures, notebook
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.gauss_seidel import SideBySide, gauss_seidel
 from granforce.forces.nearest import nearest, nearest_of_many, starting_network
+from granforce.motion.gauss_seidel import SideBySide, gauss_seidel
 from granforce.numerics.lanes import LANES
 from granforce.records import (
     InputError,

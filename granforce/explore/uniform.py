@@ -124,7 +124,7 @@ def step(
     """
     if method == "hit_and_run":
         return walked(made, ends, count, 1, lambda ends, left: _chords(made, ends))
-    rows = rows or billiard.room_for_rows(made)
+    rows = rows or billiard.room_for_rows(made.count)
     straight = np.ones((0, made.count))
 
     def on(ends: list[ChainState], left: int) -> Flown:
@@ -163,7 +163,9 @@ def walked(
 
 def flown(made: Walls, rows: Rows, ends: Sequence[ChainState], drawn: Sequence[Any]) -> Flown:
     """Chains on by a batch of paths; drawn: their speeds, times and middles (`billiard.fly`)."""
-    slacks, outs, counts = billiard.follow(made, rows, [end.slacks for end in ends], drawn)
+    slacks, outs, counts = billiard.follow(
+        made.rows, made.dimension, rows, [end.slacks for end in ends], drawn
+    )
     paths = ends[0].paths + outs.shape[1]
     if paths % BATCH == 0:
         slacks = made.on_hull(slacks)
@@ -271,10 +273,10 @@ def warm_up(
 
 def stores_for(made: Walls, chains: int, workers: int) -> list[Rows]:
     """Rows of K for each thread: the same for all where they fit, else in parts of the memory."""
-    threads, whole = min(workers, chains), billiard.room_for_rows(made)
+    threads, whole = min(workers, chains), billiard.room_for_rows(made.count)
     if whole.whole:
         return [whole] * threads
-    return [billiard.room_for_rows(made, 1 / threads) for _ in range(threads)]
+    return [billiard.room_for_rows(made.count, 1 / threads) for _ in range(threads)]
 
 
 def shared(

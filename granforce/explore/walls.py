@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granforce.explore import thin
-from granforce.explore.billiard import LANES
+from granforce.explore.billiard import BLOCK
 from granforce.explore.thin import ThinMatrix
 from granforce.forces import hull, knowledge
 from granforce.forces.contact_problem import MOST_DENSE, independent_problem_of
@@ -173,7 +173,7 @@ def _matrix(frame: _Frame, y: Floats) -> tuple[WallMatrix, Integers]:
     C, _, free = frame.conductances(curvature, frame.stiff)
     own, _, _ = frame.conductances(curvature, frame.known)
     moving = np.flatnonzero(~frame.held & (free[frame.contact] > 0))
-    padding = -len(moving) % LANES
+    padding = -len(moving) % BLOCK
     contact = np.append(frame.contact[moving], np.zeros(padding, dtype=np.int64))
     normal = np.vstack([frame.normal[moving] / y[moving, None], np.zeros((padding, 2))])
     problem = frame.problem
@@ -201,7 +201,7 @@ class _Thin:
 
     def __call__(self, frame: _Frame, y: Floats) -> tuple[ThinMatrix, Integers]:
         moving = self.moving
-        count = len(moving) + -len(moving) % LANES
+        count = len(moving) + -len(moving) % BLOCK
         levers = np.array([frame.forces(one).ravel() for one in np.diag(y)[moving]]).T
         weight = frame.weight.ravel()
         return thin.thin_matrix(self.basis, y[moving], levers, weight, count), moving

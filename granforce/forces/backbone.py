@@ -15,22 +15,18 @@ network, whichever were known. What idle, dead, pressing and trusted mean: granf
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import highspy
 import numpy as np
 from scipy import sparse
 
 from granforce.forces import knowledge
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest, some_network
 from granforce.numerics import certificates
 from granforce.numerics import highs as programs
 from granforce.records import NotJammedError, Packing
 from granforce.tolerances import CARRYING, SEEN_CARRYING
 from granforce.types import Floats, Integers, Mask
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
 
 
 def without_danglers(packing: Packing, free: Integers, held: Mask) -> Integers:

@@ -32,8 +32,12 @@ from granforce.records import (
     float_array,
     refuse_hidden,
 )
+from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
 from granforce.types import Floats, Integers, Mask
+
+# Rows up to which ranks are those of dense matrices, by eigenvalues relative to the largest.
+LARGEST_RANK, _LEAST_EIGENVALUE = 3000, 1e-12
 
 
 def prescribed_stress(
@@ -214,3 +218,11 @@ def frozen_positions(frozen: npt.ArrayLike, count: int) -> Integers:
     if not are_whole(frozen, count - 1).all():
         raise InputError(f"a frozen contact lies outside 0 … {count - 1}")
     return frozen.astype(np.int64)
+
+
+def left_free(rows: sparse.csr_matrix) -> int:
+    """Unknowns less independent rows, of rows (k, unknowns) of order 1."""
+    if not all(rows.shape):  # all is pinned, or the balance of every grain is left open
+        return rows.shape[1]
+    square = cancelling.apart(np.linalg.eigvalsh, (rows @ rows.T).toarray())
+    return rows.shape[1] - int(np.sum(square > _LEAST_EIGENVALUE * square[-1]))

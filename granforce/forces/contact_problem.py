@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 import weakref
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
 
 from granforce.forces import knowledge
+from granforce.forces.ensemble import Ensemble
+from granforce.forces.knowledge import Polygons
 from granforce.numerics import (
     certified_values,
     contact_matrix,
@@ -24,10 +26,6 @@ from granforce.numerics.linear_programs import Centre
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ROUNDING
 from granforce.types import Floats, Integers, Mask
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
-    from granforce.forces.knowledge import Polygons
 
 # Added to A K Aᵀ where w = 1, relative to the diagonal of A Aᵀ: the translations cost nothing; it
 # slows no step, only bounds them.

@@ -11,6 +11,7 @@ Whether a network is in S is up to two numbers, both in ⟨f_n⟩: by how much i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,17 +21,13 @@ import numpy.typing as npt
 from scipy import sparse
 
 from granforce import notebook
-from granforce.forces import backbone, balance, knowledge
-from granforce.forces.hull import LARGEST_RANK, Hull, hull_of, left_free
-from granforce.forces.knowledge import Known
-from granforce.forces.nearest import nearest
+from granforce.forces import balance, knowledge
+from granforce.forces.balance import LARGEST_RANK, left_free
 from granforce.numerics import inner_point
 from granforce.records import (
     Contacts,
     InputError,
-    NotJammedError,
     Packing,
-    friction,
     real_array,
     refuse_hidden,
     whole,
@@ -39,13 +36,20 @@ from granforce.system import cancelling
 from granforce.tolerances import ADMISSIBLE, AT_REST, BALANCED, LARGEST_UNIT
 from granforce.types import Floats, Integers, Mask
 
-# What is prescribed, by its number of values.
-_NAMES = {1: "pressure", 3: "stress"}
+
+class Hull(NamedTuple):
+    """A point inside S relative to its affine hull, the walls that hold S in it, and h."""
+
+    inner: Floats  # (n,) y of `Ensemble.scaled_form`, positive where not held
+    held: Mask  # (n,) bool
+    dimension: int
+    b: Floats  # (rows,) A inner, A that of `Ensemble.scaled_form`
+    resolution: float  # in ⟨f_n⟩ (f_t in μ ⟨f_n⟩): no held wall is farther from any point of S
 
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `ensemble`."""
+    """S = {x : A x = b, f_n ≥ 0, |f_t| ≤ μ f_n, low ≤ f ≤ high} for one packing; see `build`."""
 
     packing: Packing
     mu: float  # friction coefficient of the cones (not necessarily the packing's)
@@ -60,6 +64,7 @@ class Ensemble:
     skipped: dict[str, int]  # what was left out: rattlers, unloaded contacts, tangential unknowns
     prescribed: str  # "pressure", "stress" (with the pressure) or "none"
     known: knowledge.Polygons | None  # bounds on single forces, in ⟨f_n⟩; None without any
+    find_hull: Callable[[Ensemble], Hull]  # how `hull` is found, by programs that rest on this file
     found: Floats | None = None  # (N_c, 2) a network met while these contacts were sorted out
 
     @property
@@ -83,7 +88,7 @@ class Ensemble:
     @cached_property
     def hull(self) -> Hull:
         """The affine hull of S: a point inside, the walls held, and the dimension; see `hull`."""
-        return hull_of(self)
+        return self.find_hull(self)
 
     @property
     def dimension(self) -> int:
@@ -397,150 +402,3 @@ class Ensemble:
 
 def _plain(values: Floats) -> Floats | float:
     return float(values) if values.ndim == 0 else values
-
-
-def ensemble(
-    packing: Packing,
-    mu: float | None = None,
-    *,
-    prescribed: str = "pressure",
-    stress: npt.ArrayLike | None = None,
-    known: Known | None = None,
-    frozen: npt.ArrayLike | None = None,
-    prune: bool = True,
-) -> Ensemble:
-    """The set S of admissible force networks of a packing.
-
-    mu: friction coefficient of the cones, by default the packing's. prescribed: "pressure", the
-    whole "stress", or "none" (nothing but loads, or forces outside). stress (3,): σ_xx, σ_yy and
-    σ_xy, force per length, by default those of the packing's own network. known: a Known, bounds on
-    single forces. frozen: mask (N_c,) or positions of contacts held at their original forces, which
-    drops the pressure row (PRL 94, 178001). prune: leave out rattlers and contacts that carry
-    nothing in any state of S. Grains whose load is NaN need not balance.
-
-    Raises NotJammedError where S is empty, naming the grains with the largest unbalanced load, or
-    the statements of what is known that cannot hold together; InputError for conditions that make
-    no sense together.
-    """
-    mu = packing.mu if mu is None else friction(mu)
-    count = len(packing.contacts.i)
-    held = np.zeros(count, dtype=bool)
-    if frozen is not None:
-        held[balance.frozen_positions(frozen, count)] = True
-    loaded = np.nan_to_num(packing.load).any()
-    if np.isnan(packing.pressure) and not packing.forces.any() and not loaded:
-        raise InputError(
-            "all forces are zero, and nothing says how large they are: give forces, a pressure, or "
-            "loads on the grains"
-        )
-    bounds = None if known is None else knowledge.bounds_of(known, count)
-    asked = _Asked(mu, held, balance.prescribed_stress(packing, prescribed, stress, held), bounds)
-    free = np.flatnonzero(~held)
-    if prune:
-        free = backbone.without_danglers(packing, free, held)
-    full = _assemble(packing, asked, free)
-    _check_frozen_and_known(packing, held, bounds, full.force_scale)
-    if not prune:
-        return full
-    pruned = _pruned(full, asked)
-    _check_idle_and_known(pruned, bounds)
-    return pruned
-
-
-class _Asked(NamedTuple):
-    """What an ensemble is asked to hold to."""
-
-    mu: float
-    held: Mask  # (contacts,) bool, frozen
-    stress: Floats | None  # prescribed: (1,) pressure, (3,) xx, yy, xy, or None
-    bounds: Floats | None  # (contacts, 2, 2) force, by knowledge.bounds_of
-
-
-def _pruned(full: Ensemble, asked: _Asked) -> Ensemble:
-    """The same without contacts that carry nothing.
-
-    Up to CARRYING counts as nothing, but others may rest on it (where forces are frozen at that):
-    where no network balances without, what presses in the one at hand is kept.
-    """
-    carrying, found = backbone.carrying(full)
-    S = _picked(full, asked, carrying, found)
-    if found is None or S.member is not None:
-        return S
-    near = nearest(S, S.original).forces
-    if S.admits(near):
-        return replace(S, found=near)
-    pressing = found[:, 0] > BALANCED / 10 * full.force_scale
-    return _picked(full, asked, carrying | pressing, found)
-
-
-def _picked(full: Ensemble, asked: _Asked, kept: Mask, found: Floats | None) -> Ensemble:
-    S = full if kept.all() else _assemble(full.packing, asked, full.index[kept])
-    return replace(S, found=None if found is None else found[kept])
-
-
-def _check_frozen_and_known(
-    packing: Packing, held: Mask, bounds: Floats | None, scale: float
-) -> None:
-    if bounds is None or not held.any():
-        return
-    outside = np.maximum(bounds[..., 0] - packing.forces, packing.forces - bounds[..., 1])
-    wrong = np.flatnonzero(held & (outside.max(axis=1) > ADMISSIBLE * scale))
-    if len(wrong):
-        raise InputError(
-            f"contact {wrong[0]} is frozen at a force that contradicts what is known of it: leave "
-            "one of both out"
-        )
-
-
-def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
-    """Contacts that carry nothing may not be known to carry."""
-    if bounds is None:
-        return
-    out = np.setdiff1d(np.arange(len(bounds)), np.append(S.index, S.frozen))
-    short = np.maximum(bounds[out, :, 0], -bounds[out, :, 1]).max(axis=1, initial=0.0)
-    if np.any(short > ADMISSIBLE * S.force_scale):
-        worst = int(np.argmax(short))
-        raise NotJammedError(
-            f"contact {out[worst]} carries nothing in any network of these conditions; what is "
-            f"known of it would have to give {short[worst]:.3g}"
-        )
-
-
-def _assemble(packing: Packing, asked: _Asked, free: Integers) -> Ensemble:
-    mu, held = asked.mu, asked.held
-    if not len(free):
-        if held.any():
-            raise InputError(
-                "no free contact can carry a force; freeze fewer contacts, or take a larger slice"
-            )
-        raise NotJammedError("the packing has no contact that could carry a load")
-    contacts = packing.contacts.picked(free)
-    loaded = np.any(packing.load != 0, axis=1)
-    grains = np.union1d(np.union1d(contacts.i, contacts.j), np.flatnonzero(loaded))
-    left_open = np.flatnonzero(balance.left_open_in(packing))
-    touched = np.intersect1d(grains, left_open)
-    grains = np.setdiff1d(grains, left_open)
-    original = packing.forces[free]
-    A, b, scale = balance.equations(packing, free, grains, held, mu, asked.stress)
-    known = None
-    if asked.bounds is not None:
-        known = knowledge.polygons(asked.bounds[free], mu, scale, free)
-    return Ensemble(
-        packing=packing,
-        mu=mu,
-        index=free,
-        contacts=contacts,
-        grains=grains,
-        A=A,
-        b=b,
-        force_scale=scale,
-        original=original,
-        frozen=np.flatnonzero(held),
-        skipped={
-            "rattlers": len(packing.r) - len(grains) - len(touched),
-            "unloaded_contacts": len(held) - len(free) - int(held.sum()),
-            "tangential_unknowns": len(free) if mu == 0 else 0,
-        },
-        prescribed="none" if asked.stress is None else _NAMES[len(asked.stress)],
-        known=known,
-    )

@@ -6,48 +6,30 @@ doubles cannot resolve what lies between it and the wall opposite. S counts as f
 walls, and its dimension is that of the networks that balance and keep the held walls.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
-
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import norm
 
 from granforce.forces import knowledge
+from granforce.forces.balance import LARGEST_RANK, left_free
 from granforce.forces.contact_problem import (
     MOST_DENSE,
     centre_of,
     in_balance,
     independent_problem_of,
 )
+from granforce.forces.ensemble import Ensemble, Hull
 from granforce.numerics import wall_matrix
 from granforce.numerics.contact_program import PINNED
 from granforce.numerics.inner_point import inner_point
 from granforce.records import NotJammedError, UndecidedError
-from granforce.system import cancelling
 from granforce.tolerances import BALANCED, FLAT
 from granforce.types import Floats, Integers, Mask
 
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
-
-# Rows up to which ranks are those of dense matrices, by eigenvalues relative to the largest.
-LARGEST_RANK, _LEAST_EIGENVALUE = 3000, 1e-12
 # Least distance of a wall from an analytic centre that certainly is one, in ⟨f_n⟩.
 _WELL_INSIDE = 1e-5
 # Unbalance of a centre, rows of order 1, above which its balance is restored.
 _UNBALANCED = 1e-9
-
-
-class Hull(NamedTuple):
-    """A point inside S relative to its affine hull, the walls that hold S in it, and h."""
-
-    inner: Floats  # (n,) y of `Ensemble.scaled_form`, positive where not held
-    held: Mask  # (n,) bool
-    dimension: int
-    b: Floats  # (rows,) A inner, A that of `Ensemble.scaled_form`
-    resolution: float  # in ⟨f_n⟩ (f_t in μ ⟨f_n⟩): no held wall is farther from any point of S
 
 
 def hull_of(ensemble: Ensemble) -> Hull:
@@ -187,11 +169,3 @@ def distances(ensemble: Ensemble) -> sparse.csr_matrix:
     values = (normal[:, :size] / unit[:size]).ravel()
     shape = len(contact), size * len(ensemble.index)
     return sparse.csr_matrix((values, (rows.ravel(), columns.ravel())), shape=shape)
-
-
-def left_free(rows: sparse.csr_matrix) -> int:
-    """Unknowns less independent rows, of rows (k, unknowns) of order 1."""
-    if not all(rows.shape):  # all is pinned, or the balance of every grain is left open
-        return rows.shape[1]
-    square = cancelling.apart(np.linalg.eigvalsh, (rows @ rows.T).toarray())
-    return rows.shape[1] - int(np.sum(square > _LEAST_EIGENVALUE * square[-1]))

@@ -6,7 +6,7 @@ It has the least χ² = Σ ((f − m)/σ)² over S, and is found as a contact pr
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from granforce.forces.contact_problem import forces_of, problem_of
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import likeliest_piqp
 from granforce.numerics import certificates, contact_program, interior_point
@@ -24,9 +25,6 @@ from granforce.records import InputError, positive
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED, ERRORS, MEASURED
 from granforce.types import Floats
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
 
 # What was not measured counts as 0 with a standard error of so many ⟨f_n⟩, if not told otherwise:
 # among networks that the measurement cannot tell apart, the one with the least forces is taken.

@@ -16,11 +16,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from granforce.forces.contact_problem import problem_of
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest_piqp import likeliest_piqp, restored
 from granforce.numerics import certificates, cone_projection, contact_program, highs, interior_point
 from granforce.numerics.contact_program import PINNED, Problem
@@ -30,9 +31,6 @@ from granforce.records import InputError, Relaxation, positive, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Cancel, Floats
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
 
 # Distance to the nearest network itself (over all components) that ends the steps. This and INSIDE
 # are in ⟨f_n⟩, or in rms forces of the start where those are larger.

@@ -6,21 +6,19 @@ And what takes over where the project's own method, of nearest or likeliest netw
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import piqp
 from scipy import sparse
 
 from granforce.forces.contact_problem import MOST_DENSE, in_balance
+from granforce.forces.ensemble import Ensemble
 from granforce.numerics import highs as programs
 from granforce.records import Relaxation, positive, whole
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED
 from granforce.types import Floats
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
 
 # Coordinates y (in ⟨f_n⟩) far below this hardly change where balance is restored.
 _AWAY = 1e-6

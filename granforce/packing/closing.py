@@ -12,9 +12,9 @@ import numpy as np
 from scipy import sparse
 
 from granforce.cell import Cell
-from granforce.forces.contact_dynamics import Motion
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
+from granforce.motion.contact_dynamics import Motion
 from granforce.numerics import highs as programs
 from granforce.packing.neighbours import find_pairs, separations
 from granforce.packing.pair_list import SKIN, cell_of

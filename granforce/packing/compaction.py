@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from granforce.forces import contact_dynamics as dynamics
-from granforce.forces.rest import Rest, rest
+from granforce.motion import contact_dynamics as dynamics
+from granforce.motion.rest import Rest, rest
 from granforce.numerics.lanes import compiled
 from granforce.packing import pair_list
 from granforce.packing.closing import margin, prescribed_of, shrink_to_isostatic

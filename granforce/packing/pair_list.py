@@ -3,7 +3,7 @@
 import numpy as np
 
 from granforce.cell import Cell
-from granforce.forces.contact_dynamics import REACH, Motion
+from granforce.motion.contact_dynamics import REACH, Motion
 from granforce.numerics.lanes import compiled
 from granforce.packing.neighbours import find_pairs
 from granforce.records import NotJammedError

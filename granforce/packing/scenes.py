@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
 from granforce.packing.compaction import pack
 from granforce.records import (

@@ -7,7 +7,7 @@
    out of balance by about the displacements, and the motion goes on with stiffer disks; overlaps
    are again closed, and so on. Each round takes what is left by a factor of its own size, so that
    three end at rounding: what presses is a contact, what does not press has a gap.
-3. The certificate of rest (`forces.rest`): from the forces of the last round, and with noise on all
+3. The certificate of rest (`motion.rest`): from the forces of the last round, and with noise on all
    of them, the exact step of contact dynamics comes to rest without moving. Where something sets
    off, it moves on from there by the first.
 """
@@ -17,14 +17,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.forces import overdamped
 from granforce.forces.balance import stress_rows
-from granforce.forces.contact_dynamics import Motion
-from granforce.forces.flow import STEADY, Push
-from granforce.forces.gauss_seidel import BOX_MASS
-from granforce.forces.rest import Rest, rest
-from granforce.forces.step import Step, effective_masses
-from granforce.forces.works import relax
+from granforce.motion import overdamped
+from granforce.motion.box_motion import BOX_MASS
+from granforce.motion.contact_dynamics import Motion
+from granforce.motion.flow import STEADY, Push
+from granforce.motion.rest import Rest, rest
+from granforce.motion.step import Step, effective_masses
+from granforce.motion.works import relax
 from granforce.numerics import contact_matrix
 from granforce.numerics.contact_matrix import Network
 from granforce.packing.closing import packing_of, prescribed_of, strained

@@ -21,12 +21,14 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from granforce.explore.intervals import limit_load_bounds
-from granforce.forces import flow
-from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.forces.flow import Outcome, Push
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import starting_network
-from granforce.forces.step import Step, grain_velocities, make_step, relative_velocities
-from granforce.forces.works import follow, relax
+from granforce.motion import flow
+from granforce.motion.flow import Outcome, Push
+from granforce.motion.inertia import grain_velocities, make_step
+from granforce.motion.step import Step, relative_velocities
+from granforce.motion.works import follow, relax
 from granforce.records import (
     InputError,
     Packing,

@@ -13,7 +13,7 @@ import numpy as np
 from granforce.explore import bodies
 from granforce.explore import outline as outlines
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.numerics import certificates
 from granforce.records import InputError, Packing, are_whole
 from granforce.types import Floats, Integers

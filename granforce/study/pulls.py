@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from granforce.explore.outline import extremes
 from granforce.explore.pull import Pull, Reach, pull, reach
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest
 from granforce.perturb.loaded import Loaded, loaded_networks
 from granforce.records import InputError, Packing

@@ -22,7 +22,8 @@ from typing import Any, NamedTuple, NoReturn
 from granforce.explore.intervals import intervals
 from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.packing.compaction import pack
 from granforce.perturb.critical_force import critical_forces
 from granforce.records import InputError, Packing

@@ -19,7 +19,8 @@ import xarray as xr
 
 from granforce.explore.infer import infer
 from granforce.explore.remeasured import remeasured
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.packing.importers.geometry import vectors
 from granforce.packing.importers.pegs import Photoelastic, open_frames, read_pegs
 from granforce.packing.importers.repair import KINDS

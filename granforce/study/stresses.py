@@ -1,7 +1,7 @@
 """The plane of stresses among the planes of force space, for whoever draws it."""
 
 from granforce.explore import stress_outline
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.records import Packing
 from granforce.types import Floats
 

@@ -12,7 +12,7 @@ from app.views import chains
 from app.views.controls import Controls
 from app.views.packing import PackingView
 from app.views.upload import View
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import read_pegs
 from granforce.records import InputError
 from granforce.study import series

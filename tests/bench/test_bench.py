@@ -8,7 +8,7 @@ from packings import packed
 
 from granforce import bench
 from granforce.bench import report, siconos, solvers, states
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.numerics.lanes import LANES
 from granforce.packing.compaction import pack
 

@@ -9,7 +9,7 @@ from packings import lattice
 
 from granforce import bench
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing import pair_list
 from granforce.packing.compaction import pack
 

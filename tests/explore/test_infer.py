@@ -13,7 +13,7 @@ from granforce.explore import infer as inference
 from granforce.explore import uniform
 from granforce.explore.infer import infer
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known
 from granforce.numerics import highs as programs
 from granforce.records import Cancelled, InputError

@@ -10,7 +10,7 @@ from granforce.explore.carrying import carrying
 from granforce.explore.informative import informative
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import sample_uniform
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known
 from granforce.packing.importers import load_packing
 from granforce.records import Cancelled, InputError

@@ -12,8 +12,8 @@ from granforce.bench.exact import read_reference
 from granforce.explore import intervals as module
 from granforce.explore.informative import informative
 from granforce.explore.intervals import intervals, limit_load_bounds, limit_loads
+from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import make_system
-from granforce.forces.ensemble import ensemble
 from granforce.numerics import certified_values, linear_programs
 from granforce.numerics import highs as programs
 from granforce.packing.importers import load_packing

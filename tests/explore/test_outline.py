@@ -9,7 +9,7 @@ from granforce import measures
 from granforce.explore.intervals import intervals
 from granforce.explore.outline import outline
 from granforce.explore.random_walk import walk
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.records import Cancelled, InputError
 from granforce.study import cells as study
 from granforce.study import kinds

@@ -6,10 +6,10 @@ from packings import packed, two_disks
 
 from granforce import measures
 from granforce.explore.random_walk import WORTH_LANES, judge, walk
-from granforce.forces.ensemble import ensemble
-from granforce.forces.gauss_seidel import gauss_seidel
+from granforce.forces.build import ensemble
 from granforce.forces.nearest import nearest, starting_network
 from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.motion.gauss_seidel import gauss_seidel
 from granforce.records import Cancelled, InputError, NotJammedError, Relaxation
 
 

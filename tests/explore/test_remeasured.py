@@ -6,7 +6,7 @@ from packings import packed
 
 from granforce.explore.infer import infer
 from granforce.explore.remeasured import remeasured
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.likeliest import fitted, fitted_many
 from granforce.records import InputError
 

@@ -30,7 +30,7 @@ from granforce.explore.mixing import mixing
 from granforce.explore.random_walk import walk
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.walls import walls
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known
 from granforce.numerics.inner_point import inner_point
 from granforce.packing.importers import read_lammps
@@ -409,13 +409,13 @@ def test_the_benchmark_compares_walks_by_cost_and_by_moments():
 
 def test_rows_made_on_demand_change_no_bit(sample):
     """Room for as few rows as there can be: each is made again and again."""
-    made, few = sample.walls, billiard.room_for_rows(sample.walls, 0.0)
-    whole = billiard.room_for_rows(made)
+    made, few = sample.walls, billiard.room_for_rows(sample.walls.count, 0.0)
+    whole = billiard.room_for_rows(made.count)
     assert whole.whole and not few.whole
     on = partial(uniform.step, made, count=10, reach=sample.reach)
     kept_ends, *kept = on(sample.ends, whole)
-    apart = [billiard.room_for_rows(made, 0.0) for _ in range(3)]
-    for stores in ([few], apart, [billiard.room_for_rows(made)] * 3):
+    apart = [billiard.room_for_rows(made.count, 0.0) for _ in range(3)]
+    for stores in ([few], apart, [billiard.room_for_rows(made.count)] * 3):
         ends, *moved = uniform.together(stores, sample.ends, on)
         for one, other in zip(ends, kept_ends, strict=True):
             assert np.array_equal(one.slacks, other.slacks)

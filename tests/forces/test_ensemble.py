@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from granforce.explore.intervals import intervals
 from granforce.forces import backbone
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.nearest import some_network
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.records import Contacts, NotJammedError, make_contacts, make_packing

@@ -12,8 +12,8 @@ from packings import lattice, packed, reference, two_disks
 
 from granforce.bench import tile
 from granforce.explore.random_walk import walk
+from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import problem_of
-from granforce.forces.ensemble import ensemble
 from granforce.forces.nearest import nearest, nearest_of_many
 from granforce.forces.nearest_piqp import nearest_piqp
 from granforce.numerics import cone_projection, contact_matrix, contact_program

@@ -7,8 +7,8 @@ import pytest
 from packings import packed
 
 from granforce.explore.intervals import bound_of
+from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import independent_problem_of
-from granforce.forces.ensemble import ensemble
 from granforce.numerics import contact_program, interior_point, linear_programs
 from granforce.numerics.interior_point import OPTIMUM, REFINED
 from granforce.numerics.lanes import MANY, ONE, room, side_by_side

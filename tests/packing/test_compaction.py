@@ -5,10 +5,10 @@ import pytest
 from packings import packed
 
 from granforce.cell import Cell
-from granforce.forces import contact_dynamics as dynamics
 from granforce.forces.balance import stress_of
-from granforce.forces.ensemble import ensemble
-from granforce.forces.rest import rest
+from granforce.forces.build import ensemble
+from granforce.motion import contact_dynamics as dynamics
+from granforce.motion.rest import rest
 from granforce.packing.closing import _stretch, margin, strained
 from granforce.packing.compaction import (
     WATCH_EVERY,

@@ -8,7 +8,7 @@ import pytest
 from packings import packed, skewed
 
 from granforce.cli.parser import main
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import read_columns, read_mercury, read_table, read_yade
 from granforce.records import InputError
 

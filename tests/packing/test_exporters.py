@@ -11,7 +11,7 @@ from packings import packed, skewed
 
 from granforce.cli.parser import main
 from granforce.explore.random_walk import walk
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.exporters import save_lammps, save_vtk
 from granforce.packing.importers import load_packing, read_lammps, save_packing
 from granforce.packing.scenes import scene

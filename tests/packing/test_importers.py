@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from packings import skewed
 
 from granforce.forces.balance import stress_of
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.closing import margin
 from granforce.packing.compaction import pack
 from granforce.packing.importers import (

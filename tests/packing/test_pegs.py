@@ -5,7 +5,7 @@ import pytest
 from frames import NEWTON, file, frame
 
 from granforce.explore.infer import infer
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import load_packing, read_pegs, save_packing
 from granforce.records import InputError
 

@@ -16,7 +16,7 @@ from packings import packed
 
 from granforce.cli.parser import main
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import (
     dem,
     lammps,

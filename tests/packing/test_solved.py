@@ -7,7 +7,7 @@ import pytest
 from frames import NEWTON, solved
 from scipy.io import savemat
 
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import load_packing, read_pegs, save_packing
 from granforce.records import InputError
 

@@ -5,7 +5,7 @@ import pytest
 from packings import packed
 
 from granforce.explore.remeasured import remeasured
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import read_pegs, synthetic_frame
 from granforce.records import InputError
 

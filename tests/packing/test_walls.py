@@ -5,7 +5,7 @@ import pytest
 from frames import file
 
 from granforce.explore.infer import infer
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import read_pegs
 from granforce.packing.importers.walls import Outline, read_outline, read_wall_force
 from granforce.records import InputError

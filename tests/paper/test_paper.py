@@ -13,7 +13,7 @@ from heeding import heeding, interrupted, until_it_left
 from granforce import measures
 from granforce.cli.parser import main
 from granforce.explore.stress_outline import stress_plane
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.claims import groups, verdicts

@@ -5,11 +5,11 @@ import pytest
 from packings import lattice, packed, reference
 
 from granforce.explore.intervals import limit_load_bounds, limit_loads
-from granforce.forces import contact_dynamics as dynamics
-from granforce.forces import flow
-from granforce.forces.ensemble import ensemble
-from granforce.forces.gauss_seidel import from_rest
-from granforce.forces.step import make_step
+from granforce.forces.build import ensemble
+from granforce.motion import contact_dynamics as dynamics
+from granforce.motion import flow
+from granforce.motion.gauss_seidel import from_rest
+from granforce.motion.inertia import make_step
 from granforce.numerics.lanes import ONE
 from granforce.perturb import critical_force as perturb
 from granforce.perturb import decay

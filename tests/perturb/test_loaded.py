@@ -5,7 +5,7 @@ import pytest
 from packings import packed
 
 from granforce.explore.intervals import limit_loads
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.nearest import starting_network
 from granforce.perturb.critical_force import critical_force
 from granforce.perturb.loaded import loaded_networks

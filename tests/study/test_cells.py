@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from granforce import measures
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.records import InputError
 from granforce.study import cells as study
 from granforce.study import kinds

@@ -9,7 +9,7 @@ from packing.test_simulations import MU, contacts, given, mercury_in_a_box, part
 
 from granforce.cli.parser import main
 from granforce.explore.intervals import intervals
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers import open_lammps
 from granforce.records import InputError
 from granforce.study.evolution import evolution

@@ -6,7 +6,7 @@ from packings import packed
 
 from granforce.explore.intervals import intervals
 from granforce.explore.pull import pull
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.numerics.lanes import LANES
 from granforce.records import InputError
 from granforce.study import pulls

@@ -18,9 +18,9 @@ from scipy import sparse
 import granforce as gf
 from granforce.explore import billiard, uniform
 from granforce.explore.walls import walls
-from granforce.forces.flow import Push
-from granforce.forces.step import make_step
-from granforce.forces.works import follow, relax
+from granforce.motion.flow import Push
+from granforce.motion.inertia import make_step
+from granforce.motion.works import follow, relax
 from granforce.numerics import elimination
 from granforce.numerics import highs as programs
 from granforce.system import cancelling
@@ -61,8 +61,8 @@ def one_endless_path(S):
     flight, out = billiard.make_flight(uniform.init(made, 0).slacks), np.ones((1, made.count))
     speeds = made.moved(np.random.default_rng(0).standard_normal((1, made.count)))
     path = speeds, np.array([1e12]), np.ones((0, made.count)), flight, 10**12
-    rows = billiard.room_for_rows(made)
-    billiard.make_rows(made, rows.kept, range(made.count))
+    rows = billiard.room_for_rows(made.count)
+    billiard.make_rows(made.rows, rows.kept, range(made.count))
     billiard.fly(rows.kept, *path, out, cancelling.flag())
     cancelling.check()
 

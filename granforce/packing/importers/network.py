@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
 from granforce.numerics.highs import least_unbalanced
 from granforce.packing.closing import margin

@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from granforce import notebook
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
 from granforce.packing.importers import solved

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from granforce.forces.ensemble import ensemble
+from granforce.forces.build import ensemble
 from granforce.packing.importers.listing import Listing
 from granforce.packing.importers.pegs import Photoelastic
 from granforce.records import Contacts, InputError, Packing, positive, random_seed, whole

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.forces.ensemble import Ensemble, ensemble
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
 from granforce.packing.compaction import (
     Glimpse,
     check_box,

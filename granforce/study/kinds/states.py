@@ -15,10 +15,10 @@ from granforce.explore.random_walk import Walk, walk
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import volume
 from granforce.forces.ensemble import Ensemble
-from granforce.forces.gauss_seidel import gauss_seidel
 from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
 from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.motion.gauss_seidel import gauss_seidel
 from granforce.records import InputError, brief, positive, random_seed, whole
 from granforce.study.bounds import informative_dataset, volume_dataset
 from granforce.study.cells import Kind, entries, load

@@ -22,6 +22,9 @@ import functools
 from numba import types
 from numba.extending import overload
 
+# Inertia M_λ of the box in masses ρ r_max²: between 1 and 100 it changes the number of sweeps by
+# less than 10 % for μ from 0.01 to 10.
+BOX_MASS = 10.0
 _OPTIONS = {"forceinline": True, "error_model": "numpy"}
 
 

@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.forces.flow import Flows, answer, factor, make_flows, step_along
-from granforce.forces.step import Step
+from granforce.motion.flow import Flows, answer, factor, make_flows, step_along
+from granforce.motion.step import Step
 from granforce.numerics import contact_matrix, lu
 from granforce.numerics.lanes import ONE, compiled, within
 from granforce.tolerances import BALANCED

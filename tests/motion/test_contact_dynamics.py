@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from packings import packed, reference
 
-from granforce.forces.contact_dynamics import add_forces, set_stiffness, sweep
-from granforce.forces.ensemble import ensemble
-from granforce.forces.gauss_seidel import SideBySide, from_rest, gauss_seidel
+from granforce.forces.build import ensemble
 from granforce.forces.nearest_piqp import nearest_piqp
+from granforce.motion.contact_dynamics import add_forces, set_stiffness, sweep
+from granforce.motion.gauss_seidel import SideBySide, from_rest, gauss_seidel
 from granforce.numerics.lanes import ONE
 from granforce.packing.scenes import scene
 

@@ -18,19 +18,13 @@ is reached depends on where one comes from (see `flow`).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from granforce.forces.contact_problem import balance_of
-from granforce.forces.gauss_seidel import BOX_MASS
 from granforce.numerics.contact_matrix import Network, pull
 from granforce.numerics.lanes import ONE, compiled
-from granforce.records import InputError
 from granforce.types import Floats, Integers
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
 
 
 class Step(NamedTuple):
@@ -50,26 +44,6 @@ class Step(NamedTuple):
     place: Integers  # (rows of the ensemble,) where they are among rows and border
 
 
-def make_step(ensemble: Ensemble) -> Step:
-    """The step problem of an ensemble with the inertia of contact dynamics: m, I and box.
-
-    Raises InputError where forces are known: contact dynamics does not hold to that.
-    """
-    if ensemble.known is not None:
-        raise InputError(
-            "grains that move change their forces, whatever is known of them: perturb the packing "
-            "without known forces (its limit loads can be had with them)"
-        )
-    network, b, b_border, _, place = balance_of(ensemble)
-    # Rows that nothing acts on (torques without friction) may have any mass.
-    inertia = np.ones(len(b) + len(b_border))
-    inertia[place] = _inertia(ensemble)
-    mass, mass_border = inertia[: len(b)], inertia[len(b) :]
-    stiffness = effective_masses(network, mass, mass_border)
-    closing = np.zeros(len(stiffness))
-    return Step(network, b, b_border, mass, mass_border, stiffness, closing, ensemble.mu, place)
-
-
 def effective_masses(network: Network, mass: Floats, mass_border: Floats) -> Floats:
     """D (N_c, 2), 1/D = Aᵀ M⁻¹ A of each contact alone; 1 where nothing yields."""
     rows = 3 * np.stack([network.high, network.low], axis=1)[:, :, None] + np.arange(3)
@@ -77,27 +51,6 @@ def effective_masses(network: Network, mass: Floats, mass_border: Floats) -> Flo
     yielding = np.einsum("cpgk,cgk->cp", columns**2, 1 / mass[rows])
     yielding += network.border.reshape(len(rows), 2, len(mass_border)) ** 2 @ (1 / mass_border)
     return 1 / np.where(yielding > 0, yielding, 1.0)
-
-
-def _inertia(ensemble: Ensemble) -> Floats:
-    packing, size = ensemble.packing, 1 + ensemble.per_contact
-    longest = float(packing.r.max())
-    # The velocity that goes with a torque/r is r ω: its inertia is I/r² = m/2.
-    grain = np.pi * (packing.r[ensemble.grains] / longest) ** 2
-    mass = (grain[:, None] * np.array([1.0, 1.0, 0.5])[:size]).ravel()
-    if not ensemble.has_pressure_row:
-        return mass
-    # The one that goes with the mean normal force Σ f_n ℓ / Σ ℓ is λ Σ ℓ; where the whole stress is
-    # prescribed the box may shear as well, with the same inertia.
-    box = 2 * packing.volume * BOX_MASS / ensemble.contacts.length.sum() ** 2
-    return np.append(mass, np.full(ensemble.A.shape[0] - ensemble.pressure_row, box))
-
-
-def grain_velocities(ensemble: Ensemble, velocity: Floats) -> Floats:
-    """Velocities (M, 3) of the backbone grains: intrinsic v_x, v_y and r ω."""
-    size = 1 + ensemble.per_contact
-    grains = velocity[: size * len(ensemble.grains)].reshape(-1, size)
-    return np.column_stack([grains, np.zeros((len(grains), 3 - size))])
 
 
 def relative_velocities(step: Step, velocity: Floats) -> Floats:

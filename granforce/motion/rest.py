@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.forces import flow
-from granforce.forces.ensemble import Ensemble, ensemble
-from granforce.forces.flow import Outcome, Push
-from granforce.forces.step import make_step
-from granforce.forces.works import follow, relax
+from granforce.forces.build import ensemble
+from granforce.forces.ensemble import Ensemble
+from granforce.motion import flow
+from granforce.motion.flow import Outcome, Push
+from granforce.motion.inertia import make_step
+from granforce.motion.works import follow, relax
 from granforce.records import InputError, Packing, random_seed, whole
 from granforce.system import cancelling
 from granforce.types import Cancel, Floats, Mask

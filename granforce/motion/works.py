@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from granforce.forces.flow import (
+from granforce.motion.flow import (
     Flows,
     Outcome,
     Push,
@@ -27,7 +27,7 @@ from granforce.forces.flow import (
     start,
     until_one_ends,
 )
-from granforce.forces.step import Step
+from granforce.motion.step import Step
 from granforce.numerics.lanes import lanes_for
 from granforce.system import cancelling
 from granforce.tolerances import BALANCED

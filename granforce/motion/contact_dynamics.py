@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from granforce.forces.box_motion import (
+from granforce.motion.box_motion import (
     carried,
     driven,
     fastest,

@@ -3,56 +3,20 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from granforce.forces.contact_dynamics import StepProblem, add_forces, set_stiffness, sweep
+from granforce.forces.ensemble import Ensemble
 from granforce.forces.nearest import nearest
-from granforce.numerics.lanes import (
-    MANY,
-    ONE,
-    compiled,
-    larger,
-    load,
-    room,
-    same,
-    size,
-    store,
-    within,
-)
+from granforce.motion import sweeps
+from granforce.motion.box_motion import BOX_MASS
+from granforce.motion.contact_dynamics import StepProblem, add_forces, set_stiffness
+from granforce.numerics.lanes import MANY, ONE, room
 from granforce.records import InputError, Relaxation, choice, positive, random_seed, whole
 from granforce.system import cancelling
 from granforce.tolerances import AT_REST, BALANCED
-from granforce.types import Cancel, Floats, Integers
-
-if TYPE_CHECKING:  # it needs this file to run
-    from granforce.forces.ensemble import Ensemble
-
-# Inertia M_λ of the box in masses ρ r_max²: between 1 and 100 it changes the number of sweeps by
-# less than 10 % for μ from 0.01 to 10.
-BOX_MASS = 10.0
-# Sweeps between two looks at the residual, which costs about as much as a sweep.
-LOOK_EVERY = 20
-# Forces that change by less than this part of the residual in a sweep have settled while grains
-# still move: contacts slide or open for good, and the state is no equilibrium.
-SETTLED = 1e-6
-# The same is concluded where the least residual falls by less than a third while the number of
-# sweeps doubles, at 32,000 sweeps or later: relaxations that end at rest are far faster by then.
-STALL_AFTER = 32_000
-STALLED = 0.7
-
-UNDER_WAY, SETTLED_DOWN, ENDED = range(3)  # at rest or moving steadily; ended without either
-
-
-class _Looks(NamedTuple):
-    """What is remembered of the relaxation in each lane, between two looks at its residual."""
-
-    dilation: Floats  # λ
-    least: Floats  # residual so far
-    earlier: Floats  # the least when half the sweeps until `back` were done
-    back: Integers  # number of sweeps at which progress is judged next
-    state: Integers  # UNDER_WAY, SETTLED_DOWN or ENDED
+from granforce.types import Cancel, Floats
 
 
 @cancelling.cancellable
@@ -114,13 +78,12 @@ class SideBySide:
         width = len(self.lanes)
         self.force = room(len(self.problem.i), 2, width)
         self.velocity = room(*self.at_rest.shape, width)
-        # Lanes in which nothing was begun have ended.
-        self.looks = _Looks(
-            np.zeros(width),
-            np.zeros(width),
-            np.zeros(width),
-            np.zeros(width, dtype=np.int64),
-            np.full(width, ENDED),
+        self.looks = sweeps.Looks(
+            dilation=np.zeros(width),
+            least=np.zeros(width),
+            earlier=np.zeros(width),
+            back=np.zeros(width, dtype=np.int64),
+            state=np.full(width, sweeps.ENDED),  # nothing was begun
         )
         self.sweeps = np.zeros(width, dtype=np.int64)
         self.begun = np.zeros(width)
@@ -133,14 +96,14 @@ class SideBySide:
         self.looks.dilation[lane] = add_forces(self.problem, force, velocity, self.dilation)
         self.force[:, :, lane], self.velocity[:, :, lane] = force, velocity
         self.looks.least[lane] = self.looks.earlier[lane] = np.inf
-        self.looks.back[lane] = STALL_AFTER
-        self.looks.state[lane] = UNDER_WAY
+        self.looks.back[lane] = sweeps.STALL_AFTER
+        self.looks.state[lane] = sweeps.UNDER_WAY
         self.sweeps[lane] = 0
 
     def ended(self) -> list[tuple[int, Relaxation]]:
         """Sweep until one relaxation or more has ended: [(lane, Relaxation)]."""
         before = self.looks.state.copy()
-        _relax(
+        sweeps.relax(
             self.problem,
             self.velocity,
             self.unit,
@@ -155,7 +118,8 @@ class SideBySide:
             self.lanes,
         )
         cancelling.check("relaxation")
-        ended = np.flatnonzero((before == UNDER_WAY) & (self.looks.state != UNDER_WAY))
+        going = sweeps.UNDER_WAY
+        ended = np.flatnonzero((before == going) & (self.looks.state != going))
         return [(lane, self._relaxation(lane)) for lane in ended.tolist()]
 
     def _relaxation(self, lane: int) -> Relaxation:
@@ -170,7 +134,7 @@ class SideBySide:
             iterations=int(self.sweeps[lane]),
             residual=residual,
             violation=S.violation(forces),
-            converged=bool(self.looks.state[lane] == SETTLED_DOWN or residual <= tolerance),
+            converged=bool(self.looks.state[lane] == sweeps.SETTLED_DOWN or residual <= tolerance),
             seconds=time.perf_counter() - self.begun[lane],
         )
 
@@ -229,71 +193,3 @@ def from_rest(ensemble: Ensemble) -> tuple[StepProblem, Floats, float, Floats]:
     weight = np.column_stack([mass, mass, inertia / r]).ravel()
     unit = np.concatenate([weight, np.zeros(3 * held), [box_unit]])
     return problem, velocity, dilation, unit
-
-
-@compiled
-def _relax(problem, velocity, unit, mu, force, tolerance, most, sweeps, looks, rng, stop, lanes):
-    """Sweep in all lanes until a relaxation that was under way has ended."""
-    order = np.arange(problem.i.shape[0])
-    dilation = load(looks.dilation, 0, lanes)
-    change = total = same(lanes, 0.0)
-    residuals = np.empty(len(lanes))
-    changes, totals = np.empty_like(residuals), np.empty_like(residuals)
-    going_on = True
-    while going_on and not stop[0]:
-        for _ in range(_until_a_look(looks, sweeps, most)):
-            if rng is not None:
-                rng.shuffle(order)
-            dilation, change, total = sweep(problem, order, mu, force, velocity, dilation, lanes)
-            sweeps += 1
-            if stop[0]:
-                break
-        store(residuals, 0, lanes, _residual(velocity, dilation, unit, lanes))
-        store(changes, 0, lanes, change)
-        store(totals, 0, lanes, total)
-        for lane in range(sweeps.shape[0]):
-            if looks.state[lane] != UNDER_WAY:
-                continue
-            settled = changes[lane] <= SETTLED * residuals[lane] * totals[lane]
-            _look(looks, lane, sweeps[lane], residuals[lane], settled, tolerance, most)
-            going_on &= looks.state[lane] == UNDER_WAY
-    store(looks.dilation, 0, lanes, dilation)
-
-
-@within
-def _until_a_look(looks, sweeps, most):
-    """Sweeps until one of the relaxations is looked at."""
-    least = LOOK_EVERY
-    for lane in range(sweeps.shape[0]):
-        if looks.state[lane] == UNDER_WAY:
-            done = sweeps[lane]
-            least = min(least, LOOK_EVERY - done % LOOK_EVERY, most - done)
-    return least
-
-
-@within
-def _look(looks, lane, done, residual, settled, tolerance, most):
-    """Whether a relaxation has ended after so many sweeps."""
-    if done % LOOK_EVERY == 0:
-        looks.least[lane] = min(looks.least[lane], residual)
-        if residual <= tolerance or settled:
-            looks.state[lane] = SETTLED_DOWN
-            return
-    if done == looks.back[lane] // 2:
-        looks.earlier[lane] = looks.least[lane]
-    if done == looks.back[lane]:
-        if looks.least[lane] > STALLED * looks.earlier[lane]:
-            looks.state[lane] = SETTLED_DOWN
-            return
-        looks.earlier[lane] = looks.least[lane]
-        looks.back[lane] *= 2
-    if done >= most:
-        looks.state[lane] = ENDED
-
-
-@within
-def _residual(velocity, dilation, unit, lanes):
-    worst = size(dilation * unit[-1])
-    for k in range(unit.shape[0] - 1):
-        worst = larger(worst, size(load(velocity, k, lanes)) * unit[k])
-    return worst

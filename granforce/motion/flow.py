@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granforce.forces.step import Step
+from granforce.motion.step import Step
 from granforce.numerics import contact_matrix, lu
 from granforce.numerics.contact_matrix import Factors
 from granforce.numerics.lanes import (

@@ -1,0 +1,175 @@
+"""Making an Ensemble: the balance, Coulomb's law and known forces of the contacts that carry.
+
+Contacts that carry nothing in any network are left out (see `backbone`), with the grains that have
+no others; what was left out is counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from granforce.forces import backbone, balance, knowledge
+from granforce.forces.ensemble import Ensemble
+from granforce.forces.hull import hull_of
+from granforce.forces.knowledge import Known
+from granforce.forces.nearest import nearest
+from granforce.records import InputError, NotJammedError, Packing, friction
+from granforce.tolerances import ADMISSIBLE, BALANCED
+from granforce.types import Floats, Integers, Mask
+
+# What is prescribed, by its number of values.
+_NAMES = {1: "pressure", 3: "stress"}
+
+
+def ensemble(
+    packing: Packing,
+    mu: float | None = None,
+    *,
+    prescribed: str = "pressure",
+    stress: npt.ArrayLike | None = None,
+    known: Known | None = None,
+    frozen: npt.ArrayLike | None = None,
+    prune: bool = True,
+) -> Ensemble:
+    """The set S of admissible force networks of a packing.
+
+    mu: friction coefficient of the cones, by default the packing's. prescribed: "pressure", the
+    whole "stress", or "none" (nothing but loads, or forces outside). stress (3,): σ_xx, σ_yy and
+    σ_xy, force per length, by default those of the packing's own network. known: a Known, bounds on
+    single forces. frozen: mask (N_c,) or positions of contacts held at their original forces, which
+    drops the pressure row (PRL 94, 178001). prune: leave out rattlers and contacts that carry
+    nothing in any state of S. Grains whose load is NaN need not balance.
+
+    Raises NotJammedError where S is empty, naming the grains with the largest unbalanced load, or
+    the statements of what is known that cannot hold together; InputError for conditions that make
+    no sense together.
+    """
+    mu = packing.mu if mu is None else friction(mu)
+    count = len(packing.contacts.i)
+    held = np.zeros(count, dtype=bool)
+    if frozen is not None:
+        held[balance.frozen_positions(frozen, count)] = True
+    loaded = np.nan_to_num(packing.load).any()
+    if np.isnan(packing.pressure) and not packing.forces.any() and not loaded:
+        raise InputError(
+            "all forces are zero, and nothing says how large they are: give forces, a pressure, or "
+            "loads on the grains"
+        )
+    bounds = None if known is None else knowledge.bounds_of(known, count)
+    conditions = _Conditions(
+        mu, held, balance.prescribed_stress(packing, prescribed, stress, held), bounds
+    )
+    free = np.flatnonzero(~held)
+    if prune:
+        free = backbone.without_danglers(packing, free, held)
+    full = _assemble(packing, conditions, free)
+    _check_frozen_and_known(packing, held, bounds, full.force_scale)
+    if not prune:
+        return full
+    pruned = _pruned(full, conditions)
+    _check_idle_and_known(pruned, bounds)
+    return pruned
+
+
+class _Conditions(NamedTuple):
+    """What the networks of an ensemble have to obey."""
+
+    mu: float
+    held: Mask  # (contacts,) bool, frozen
+    stress: Floats | None  # prescribed: (1,) pressure, (3,) xx, yy, xy, or None
+    bounds: Floats | None  # (contacts, 2, 2) force, by knowledge.bounds_of
+
+
+def _pruned(full: Ensemble, conditions: _Conditions) -> Ensemble:
+    """The same without contacts that carry nothing.
+
+    Up to CARRYING counts as nothing, but others may rest on it (where forces are frozen at that):
+    where no network balances without, what presses in the one at hand is kept.
+    """
+    carrying, found = backbone.carrying(full)
+    S = _picked(full, conditions, carrying, found)
+    if found is None or S.member is not None:
+        return S
+    near = nearest(S, S.original).forces
+    if S.admits(near):
+        return replace(S, found=near)
+    pressing = found[:, 0] > BALANCED / 10 * full.force_scale
+    return _picked(full, conditions, carrying | pressing, found)
+
+
+def _picked(full: Ensemble, conditions: _Conditions, kept: Mask, found: Floats | None) -> Ensemble:
+    S = full if kept.all() else _assemble(full.packing, conditions, full.index[kept])
+    return replace(S, found=None if found is None else found[kept])
+
+
+def _check_frozen_and_known(
+    packing: Packing, held: Mask, bounds: Floats | None, scale: float
+) -> None:
+    if bounds is None or not held.any():
+        return
+    outside = np.maximum(bounds[..., 0] - packing.forces, packing.forces - bounds[..., 1])
+    wrong = np.flatnonzero(held & (outside.max(axis=1) > ADMISSIBLE * scale))
+    if len(wrong):
+        raise InputError(
+            f"contact {wrong[0]} is frozen at a force that contradicts what is known of it: leave "
+            "one of both out"
+        )
+
+
+def _check_idle_and_known(S: Ensemble, bounds: Floats | None) -> None:
+    """Contacts that carry nothing may not be known to carry."""
+    if bounds is None:
+        return
+    out = np.setdiff1d(np.arange(len(bounds)), np.append(S.index, S.frozen))
+    short = np.maximum(bounds[out, :, 0], -bounds[out, :, 1]).max(axis=1, initial=0.0)
+    if np.any(short > ADMISSIBLE * S.force_scale):
+        worst = int(np.argmax(short))
+        raise NotJammedError(
+            f"contact {out[worst]} carries nothing in any network of these conditions; what is "
+            f"known of it would have to give {short[worst]:.3g}"
+        )
+
+
+def _assemble(packing: Packing, conditions: _Conditions, free: Integers) -> Ensemble:
+    mu, held = conditions.mu, conditions.held
+    if not len(free):
+        if held.any():
+            raise InputError(
+                "no free contact can carry a force; freeze fewer contacts, or take a larger slice"
+            )
+        raise NotJammedError("the packing has no contact that could carry a load")
+    contacts = packing.contacts.picked(free)
+    loaded = np.any(packing.load != 0, axis=1)
+    grains = np.union1d(np.union1d(contacts.i, contacts.j), np.flatnonzero(loaded))
+    left_open = np.flatnonzero(balance.left_open_in(packing))
+    touched = np.intersect1d(grains, left_open)
+    grains = np.setdiff1d(grains, left_open)
+    original = packing.forces[free]
+    A, b, scale = balance.equations(packing, free, grains, held, mu, conditions.stress)
+    known = None
+    if conditions.bounds is not None:
+        known = knowledge.polygons(conditions.bounds[free], mu, scale, free)
+    return Ensemble(
+        packing=packing,
+        mu=mu,
+        index=free,
+        contacts=contacts,
+        grains=grains,
+        A=A,
+        b=b,
+        force_scale=scale,
+        original=original,
+        frozen=np.flatnonzero(held),
+        skipped={
+            "rattlers": len(packing.r) - len(grains) - len(touched),
+            "unloaded_contacts": len(held) - len(free) - int(held.sum()),
+            "tangential_unknowns": len(free) if mu == 0 else 0,
+        },
+        prescribed="none" if conditions.stress is None else _NAMES[len(conditions.stress)],
+        known=known,
+        find_hull=hull_of,
+    )
