@@ -12,16 +12,29 @@ from bokeh.document import Document
 from panel.util import edit_readonly  # type: ignore[attr-defined]  # which panel says is no export
 from tornado.ioloop import IOLoop
 
-from . import garbage, scenes
-from .data import Library
-from .jobs import Task, Visitor, computing
-from .state import AppState
-from .views import explanation, export, figure, intervals, perturb, plane, statistics, upload
-from .views.address import Address
-from .views.controls import Controls
-from .views.hints import Hints
-from .views.packing import PackingView
-from .views.parts import (
+from .background import gc_pauses
+from .background.jobs import Task, Visitor, computing
+from .explore import explanation
+from .explore.controls import Controls
+from .explore.page_address import Address
+from .explore.results_line import of_which, tiles
+from .explore.tabs.export import export, figure
+from .explore.tabs.force_space import force_space
+from .explore.tabs.friction import friction
+from .explore.tabs.intervals import intervals
+from .explore.tabs.push import push
+from .explore.tabs.your_packing import upload
+from .explore.volume import Volume
+from .learn.model import small_scenes
+from .learn.small_scene import FIRST_STEPS, Small
+from .obsolete.tour import STEPS, Tour
+from .packing.replay.stream import Stream
+from .packing.view import PackingView
+from .results.library import Library
+from .state.app_state import AppState
+from .state.page_tasks import Work
+from .widgets.hints import Hints
+from .widgets.parts import (
     BESIDE,
     PLAIN,
     answer_with_lock,
@@ -29,13 +42,7 @@ from .views.parts import (
     send_what_waits,
     together,
 )
-from .views.progress import Progress
-from .views.small import FIRST_STEPS, Small
-from .views.stream import Stream
-from .views.summary import of_which, tiles
-from .views.tour import STEPS, Tour
-from .views.volume import Volume
-from .work import Work
+from .widgets.progress import Progress
 
 # Where it lies over the page, the sidebar begins unseen: player.js shows it once it is closed.
 UNSEEN = ".MuiDrawer-modal { visibility: var(--sidebar, hidden) !important }"
@@ -98,9 +105,9 @@ GONE_MS = (
 # before any page is: those that are defined while pages are open, the first page alone learns of.
 TABS: dict[str, tuple[str, Callable[[AppState], Any]]] = {
     "intervals": ("How far?", intervals.View),
-    "statistics": ("Friction", statistics.View),
-    "plane": ("Force space", plane.View),  # the third: see TAB_LESS
-    "perturb": ("Push", perturb.View),
+    "statistics": ("Friction", friction.View),
+    "plane": ("Force space", force_space.View),  # the third: see TAB_LESS
+    "perturb": ("Push", push.View),
     "upload": ("Your packing", upload.View),
     "export": ("Export", export.View),
 }
@@ -121,14 +128,18 @@ def page() -> Any:
     assert document is not None  # a page is made for one
     mend_late_views(document)
     answer_with_lock()
-    asked = scenes.asked(pn.state.location.search if pn.state.location else "")
-    return _large(document, asked.query) if asked.scene == scenes.MANY else _small(document, asked)
+    asked = small_scenes.asked(pn.state.location.search if pn.state.location else "")
+    return (
+        _large(document, asked.query)
+        if asked.scene == small_scenes.MANY
+        else _small(document, asked)
+    )
 
 
-def _small(document: Document, asked: scenes.Asked) -> Any:
+def _small(document: Document, asked: small_scenes.Asked) -> Any:
     """The page of a small scene, which asks no store."""
     task = Task(computing, _turns(document), _visitor(document))
-    plain = asked == scenes.asked("")
+    plain = asked == small_scenes.asked("")
     steps = len(FIRST_STEPS + STEPS)
     view = Small(asked, task, steps, step=asked.step, first=plain, dark=asked.dark)
     whole = pmui.Page(
@@ -220,7 +231,7 @@ def _large(document: Document, query: str) -> Any:
 
 def _at_end(close: Callable[[], object]) -> None:
     """Count the page as open, and call this when it is closed."""
-    closed = garbage.opened()
+    closed = gc_pauses.opened()
 
     def end(context: object) -> None:
         close()
@@ -278,7 +289,7 @@ def _in_transit(document: Document) -> bool:
 
 def _open_library() -> Library:
     """The stores, once for all visitors."""
-    garbage.settle()
+    gc_pauses.settle()
     return Library()
 
 

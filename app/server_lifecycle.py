@@ -41,7 +41,7 @@ if config.autoreload:  # Panel runs main.py then, but not as a part of its packa
         "--dev: start panel serve without"
     )
 try:
-    from .jobs import Job  # which reads the limits
+    from .background.jobs import Job  # which reads the limits
 except InputError as error:
     _end(error)
 

@@ -23,8 +23,8 @@ from serving import (
 from small_store import cell_parameters
 from visitor import wait_for
 
-from app.data import Library
-from app.state import AppState
+from app.results.library import Library
+from app.state.app_state import AppState
 from granforce.study import cells as study
 from granforce.study import kinds
 from granforce.study.store import open_store

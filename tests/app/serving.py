@@ -144,7 +144,7 @@ def column(page, source, name):
 
 
 def scene(page, expression):
-    """An expression of `scene`, the Scene of the packing (app/views/scene.js)."""
+    """An expression of `scene`, the Scene of the packing (app/packing/drawing/scene.js)."""
     return page.locator(".scene").evaluate(
         f"element => {{ const {{scene}} = element; return {expression} }}"
     )

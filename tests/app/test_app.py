@@ -16,19 +16,23 @@ from small_store import DISKS, KEPT, STATES, cell_parameters
 from visitor import wait_for
 
 import granforce as gf
-from app import beside, compute, distributions, limits, replays, work
-from app import jobs as app_jobs
-from app import state as app_state
-from app.data import Library
-from app.garbage import settle
-from app.geometry import MARGIN
-from app.jobs import Job, Pool, Task, Visitor
-from app.limits import LIMITS, NAMES, Limits, read_limits
-from app.links import read_view
-from app.looks import Looks
+from app.background import jobs as app_jobs
+from app.background import limits
+from app.background.gc_pauses import settle
+from app.background.jobs import Job, Pool, Task, Visitor
+from app.background.limits import LIMITS, NAMES, Limits, read_limits
+from app.explore.controls import Controls
+from app.explore.results_line import left_out, of_which
+from app.explore.tabs.intervals.intervals import SOME, View, sorted_contacts
+from app.packing import view as packing_view
+from app.packing.player import frames
+from app.packing.view import PackingView, exact_intervals
 from app.page import TABS, _turns
-from app.replays import make_replay
-from app.selection import (
+from app.results import compute, distributions, replays
+from app.results.geometry import MARGIN
+from app.results.library import Library
+from app.results.replays import make_replay
+from app.results.selection import (
     OPTIONS,
     SOLVERS,
     Selection,
@@ -39,14 +43,11 @@ from app.selection import (
     select,
     selected,
 )
-from app.state import AppState
-from app.views import packing as packing_view
-from app.views.controls import Controls
-from app.views.intervals import SOME, View, sorted_contacts
-from app.views.packing import PackingView, exact_intervals
-from app.views.player import frames
-from app.views.progress import Progress
-from app.views.summary import left_out, of_which
+from app.state import app_state, comparison, page_tasks
+from app.state.app_state import AppState
+from app.state.links import read_view
+from app.state.view_settings import Looks
+from app.widgets.progress import Progress
 from granforce import measures
 from granforce.cli import parser
 from granforce.records import Cancelled, InputError
@@ -345,7 +346,7 @@ def test_the_nearest_mu_are_read_ahead_and_no_others(state, monkeypatch):
         def cancel(self):
             pass
 
-    monkeypatch.setattr(work, "Job", Done)
+    monkeypatch.setattr(page_tasks, "Job", Done)
     state.choose(mu=1)
     wait_for(state)
     assert asked == []  # 0.1 is in memory, and 0 is no neighbour
@@ -719,7 +720,7 @@ def test_a_link_alone_starts_nothing_dear_on_a_shared_server(
     library, monkeypatch, shared, query, dear
 ):
     begun = []
-    monkeypatch.setattr(work.Work, "compute", lambda *asked: begun.append(asked[2]))
+    monkeypatch.setattr(page_tasks.Work, "compute", lambda *asked: begun.append(asked[2]))
     state = AppState(library, query=f"mu=0.2&seed=9&{query}")
     wait_for(state, lambda: state.missing)
     assert [one.dear for one in begun] == ([] if dear else [False])
@@ -734,7 +735,7 @@ def test_a_link_alone_starts_nothing_dear_on_a_shared_server(
 @pytest.fixture
 def shared(monkeypatch):
     """A server for others than its owner."""
-    for module in (app_state, beside):
+    for module in (app_state, comparison):
         monkeypatch.setattr(module, "LIMITS", Limits(seconds=60))
 
 

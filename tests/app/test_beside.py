@@ -4,9 +4,9 @@ import pytest
 from small_store import DISKS, STATES
 from visitor import wait_for
 
-from app.selection import select
-from app.state import AppState
-from app.views.packing import PackingView
+from app.packing.view import PackingView
+from app.results.selection import select
+from app.state.app_state import AppState
 
 
 def asked(mu, **others):

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from app.views.scripts import FOLDER
+from app.browser.bundle import APP
 
 ADDRESS = "http://scripts/"
 
@@ -22,7 +22,7 @@ def blank(chromium):
 def _answer(route):
     name = route.request.url.removeprefix(ADDRESS)
     if name.endswith(".js"):
-        route.fulfill(path=FOLDER / name, content_type="text/javascript")
+        route.fulfill(path=APP / name, content_type="text/javascript")
     else:
         route.fulfill(body="<!doctype html>", content_type="text/html")
 
@@ -46,8 +46,8 @@ def run(blank):
 
 def test_every_script_is_a_module_by_itself(run):
     """As they are written, not as they are joined: `module` makes no module of what is none."""
-    names = [path.stem for path in FOLDER.glob("*.js")]
-    assert len(run(" ".join(names), "(all) => Object.keys(all)")) > len(names) / 2
+    names = [str(path.relative_to(APP).with_suffix("")) for path in APP.glob("**/*.js")]
+    assert len(run("".join(names), "(all) => Object.keys(all)")) > len(names) / 2
 
 
 # Two contacts, four frames, the first one the original.
@@ -65,7 +65,7 @@ WALK = {
 def test_between_two_states_the_straight_line_is_shown(run):
     """Forces, distance from the centre and range so far, at 1.3 of the track and back at 1."""
     there, back = run(
-        "replay",
+        "packing/replay/replay",
         """({ Replay }, { walk }) => {
             const replay = new Replay(walk, null)
             return [3, 1.3, 1].map((to) => {
@@ -91,7 +91,7 @@ def test_between_two_states_the_straight_line_is_shown(run):
 
 def test_to_and_fro_between_two_states_has_a_track_of_two(run):
     found = run(
-        "replay",
+        "packing/replay/replay",
         """({ Replay }, { walk }) => {
             const replay = new Replay(walk, [0, 3])
             replay.go(0.25)
@@ -122,7 +122,7 @@ TYPED = "Object.assign(walk, { normal: Float32Array.from(walk.normal) })"
 
 def test_width_and_colour_of_a_chain_say_its_force_and_its_change(run):
     width, change, mobilised = run(
-        "look",
+        "packing/drawing/chain_style",
         f"""({{ Look }}, {{ model, walk }}) => {{
             const look = new Look(model, {TYPED})
             const mixed = {{ normal: [2.25, 1e-9], tangential: [-1.125, 0] }}
@@ -141,7 +141,7 @@ def test_width_and_colour_of_a_chain_say_its_force_and_its_change(run):
 def test_stress_on_a_disk_is_that_of_its_contacts(run):
     """Pressed by f along x: σ_xx = 2 f/(πr), σ_yy = 0; forces on both sides of a contact cancel."""
     stress, left, middle = run(
-        "look",
+        "packing/drawing/chain_style",
         f"""({{ Look }}, {{ model, walk, mixed }}) => {{
             const look = new Look(model, {TYPED})
             return [look.stressOn(1, mixed), look.forcesOn(0, mixed), look.forcesOn(1, mixed)]
@@ -169,7 +169,7 @@ SCENE = """
 
 def test_pixels_and_places_are_each_others_inverse_and_zoom_keeps_the_place(run):
     centre, place, before, after, half = run(
-        "scene",
+        "packing/drawing/scene",
         f"""({{ Scene }}, {{ walk }}) => {{
             {SCENE}
             const before = scene.toPlace(450, 200)
@@ -188,7 +188,7 @@ def test_pixels_and_places_are_each_others_inverse_and_zoom_keeps_the_place(run)
 
 def test_the_chain_under_the_pointer_is_the_nearest_and_none_at_a_centre(run):
     on, beside, between, disk, outside = run(
-        "scene",
+        "packing/drawing/scene",
         f"""({{ Scene }}, {{ walk }}) => {{
             {SCENE}
             const at = (find, x, y) => scene[find](...scene.toPixel(x, y))
@@ -202,7 +202,7 @@ def test_the_chain_under_the_pointer_is_the_nearest_and_none_at_a_centre(run):
 
 def test_chains_too_thin_or_out_of_sight_are_not_drawn(run):
     whole, part = run(
-        "scene",
+        "packing/drawing/scene",
         f"""({{ Scene }}, {{ walk }}) => {{
             {SCENE}
             scene.repaint() // there is a picture from now on
@@ -221,7 +221,7 @@ def test_chains_too_thin_or_out_of_sight_are_not_drawn(run):
 def test_a_displacement_goes_to_and_fro_by_half_a_largest_radius(run):
     """The disk that moves most, at the turning point a quarter of the swing after its middle."""
     ahead, back, rests = run(
-        "scene sway",
+        "packing/drawing/scene packing/drawing/displacement",
         f"""({{ Scene, Sway }}, {{ walk, field }}) => {{
             {SCENE}
             document.body.append(scene.root)
@@ -246,7 +246,7 @@ def test_a_displacement_goes_to_and_fro_by_half_a_largest_radius(run):
 def test_the_path_in_force_space_ends_where_the_replay_is(run):
     """On the straight line between two states, in pixels, behind the states that it came by."""
     drawn = run(
-        "replay layer",
+        "packing/replay/replay packing/drawing/plot_layer",
         """({ Replay, LAYERS }, { walk }) => {
             const replay = new Replay(walk, null), moved = []
             replay.go(2.5)
@@ -271,7 +271,7 @@ def test_the_path_in_force_space_ends_where_the_replay_is(run):
 
 def test_a_dot_is_taken_within_its_reach_only(run):
     found = run(
-        "layer",
+        "packing/drawing/plot_layer",
         """({ Handles }) => {
             const column = { x: [0, 1], y: [0, 1] }
             const plots = { find: () => ({ get_column: (name) => column[name] }) }
@@ -308,7 +308,7 @@ HAND = """
 def test_a_force_in_the_hand_follows_its_rail_to_its_ends(run):
     """By straight lines between the networks of the rail; at an end it says who holds it there."""
     middle, end, holding, begun = run(
-        "replay grab",
+        "packing/replay/replay packing/hand/drag_force",
         f"""({{ Replay, Grab }}, {{ walk, rail }}) => {{
             {HAND}
             Object.assign(hand, {{ contact: 0, grip: [300, 300], point: [300, 300] }})
@@ -344,7 +344,7 @@ def test_a_force_in_the_hand_follows_its_rail_to_its_ends(run):
 def test_the_point_in_force_space_stays_within_the_outline(run, target, reached):
     """Here the two normal forces are the coordinates: the network must be the point itself."""
     normal = run(
-        "replay grab",
+        "packing/replay/replay packing/hand/drag_force",
         f"""({{ Replay, Grab }}, {{ walk, fan, target }}) => {{
             {HAND}
             hand.spot.target = target
@@ -364,7 +364,7 @@ def test_the_point_in_force_space_stays_within_the_outline(run, target, reached)
 def test_who_is_new_sees_the_disks_around_what_is_to_be_dragged(run):
     """Within the packing, both lines where force space asks of two, and all of a small one."""
     views = run(
-        "near",
+        "obsolete/near",
         """({ Near }, { half }) => {
             const whole = { x: 10, y: 10, half }
             const geometry = { radius: [0.5, 1], contact: [4, 7, 9] }
@@ -394,7 +394,7 @@ def test_who_is_new_sees_the_disks_around_what_is_to_be_dragged(run):
 
 def test_a_guess_stands_on_the_axis_where_it_was_put(run):
     before, along, value, within = run(
-        "flag",
+        "learn/drawing/guess_marker",
         """({ Flag }) => {
             const flag = new Flag(), [near, far] = [[], []]
             flag.on({ d: 0, at: 300, ends: [50, 550], now: 200, zero: 100, one: 300 })

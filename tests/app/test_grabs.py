@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from visitor import wait_for
 
-from app import grabs, planes
-from app.exports import contacts, on_screen
-from app.views.messages import FROM_BROWSER, TO_BROWSER, listed
-from granforce.study import pulls
+from app.browser.messages import FROM_BROWSER, TO_BROWSER, listed
+from app.explore.tabs.export.files import contacts, on_screen
+from app.results import planes
+from app.state import pulls
+from granforce.study import pulls as study_pulls
 
 
 class Page:
@@ -49,7 +50,7 @@ def test_a_contact_that_is_taken_is_selected_and_gets_a_rail(page, state):
 
 
 def test_of_many_contacts_a_part_of_the_rail_comes_first(page, state, monkeypatch):
-    monkeypatch.setattr(pulls, "MANY", 1)
+    monkeypatch.setattr(study_pulls, "MANY", 1)
     page.hear(grab=4)
     part, rail = (message["rail"] for message in page.told if "rail" in message)
     assert not part["whole"] and rail["whole"] and set(part["values"]) < set(rail["values"])
@@ -94,7 +95,7 @@ def test_pulls_travel_with_the_link(page, state, visited):
 )
 def test_links_with_pulls_that_make_no_sense_pull_nothing(text):
     with pytest.raises(ValueError):
-        grabs.read(text)
+        pulls.read(text)
 
 
 def test_what_was_pulled_is_gone_with_another_state_on_screen(page, state):
@@ -133,11 +134,11 @@ def test_messages_that_make_no_sense_are_ignored(page, state):
 
 def test_the_pulls_of_a_page_are_limited(page, state):
     value = middle(page.hear(grab=4)["rail"])
-    for k in range(grabs.MOST_PULLS):
+    for k in range(pulls.MOST_PULLS):
         page.hear(hold=[4, (1 - 0.001 * k) * value])
-    assert len(state.hand.pulls) == grabs.MOST_PULLS and not state.work.message
+    assert len(state.hand.pulls) == pulls.MOST_PULLS and not state.work.message
     page.hear(hold=[4, 0.9 * value])
-    assert len(state.hand.pulls) == grabs.MOST_PULLS and "undo" in state.work.message
+    assert len(state.hand.pulls) == pulls.MOST_PULLS and "undo" in state.work.message
 
 
 @pytest.mark.parametrize("pair", [None, ((4, 0), (9, 0)), ((4, 0), (4, 1))])
@@ -177,8 +178,8 @@ def test_a_pulled_point_travels_with_the_link(page, state, visited):
 
 def test_a_link_keeps_a_pull_to_the_end_of_an_interval():
     """Rounded to the next digit, it would be asked for beyond the end, and refused."""
-    pulls = [(17, 2.545365301781461)]
-    assert grabs.read(grabs.spelled(pulls)) == pulls
+    given = [(17, 2.545365301781461)]
+    assert pulls.read(pulls.spelled(given)) == given
 
 
 def test_the_table_of_contacts_holds_what_was_pulled(page, state):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from visitor import wait_for
 
-from app import known
-from app.known import Statement
-from app.views.known import words
-from app.views.packing import PackingView
+from app.explore.tabs.intervals.known_forces import words
+from app.packing.view import PackingView
+from app.state import known
+from app.state.known import Statement
 from granforce.packing.importers import read_known
 
 

@@ -8,15 +8,15 @@ import pytest
 from small_store import DISKS
 from visitor import wait_for
 
-from app import live, planes
-from app.selection import select
-from app.views import plane
-from app.views.controls import Controls
-from app.views.intervals import View
-from app.views.messages import TO_BROWSER, listed
-from app.views.packing import PackingView
-from app.views.stream import Stream
-from app.work import Work
+from app.browser.messages import TO_BROWSER, listed
+from app.explore.controls import Controls
+from app.explore.tabs.force_space import force_space
+from app.explore.tabs.intervals.intervals import View
+from app.packing.replay.stream import Stream
+from app.packing.view import PackingView
+from app.results import planes, progress_feed
+from app.results.selection import select
+from app.state.page_tasks import Work
 
 
 class Browser:
@@ -101,7 +101,7 @@ def test_what_is_computed_at_once_is_never_offered_to_be_computed(state):
 def test_force_space_has_axes_of_the_states_found_so_far(state):
     """New ones when the walk has grown fourfold; those of all states and an outline at its end."""
     state.looks.param.update(tab="plane", axes="principal")
-    browser, tab = Browser(state), plane.View(state)
+    browser, tab = Browser(state), force_space.View(state)
     wait_for(state)
     state.ask(asked(0.36, 400), at_once=True)
     browser.run(lambda: state.growing)
@@ -124,13 +124,15 @@ def test_force_space_has_axes_of_the_states_found_so_far(state):
 
 def test_force_space_of_a_chosen_contact_needs_no_states_for_its_axes(state):
     state.looks.tab = "plane"
-    browser, tab = Browser(state), plane.View(state)
+    browser, tab = Browser(state), force_space.View(state)
     wait_for(state)
     tab.planes.value = "contact"
     state.ask(asked(0.37, 20_000), at_once=True)
     browser.run(lambda: state.growing)
     kept = state.plane
-    assert kept.components and len(tab.path.data["x"]) == len(live.numbers(state.seen.summary))
+    assert kept.components and len(tab.path.data["x"]) == len(
+        progress_feed.numbers(state.seen.summary)
+    )
     browser.run(lambda: state.work.fourfold > 1)
     assert state.plane is kept
     state.work.cancel()
@@ -169,7 +171,7 @@ def test_who_leaves_does_not_end_what_others_wait_for(leave, mu, visited):
     one.run(lambda: len(one.parts("states")) > 0)
     second.ask(wanted, at_once=True)
     two.run(lambda: second.growing)
-    walk = live.shared(live.Walking, wanted.parameters())
+    walk = progress_feed.shared(progress_feed.Walking, wanted.parameters())
     run, found = walk.run, len(walk.parts)
     leave(first.work)
     one.run(seconds=20)  # long before the others have what they want
@@ -198,7 +200,7 @@ def test_while_it_is_compressed_the_words_say_that_it_moves(state):
 
 def test_a_picture_on_screen_is_soon_that_which_is_computed():
     """Who paints a little faster than pictures come is not behind for long, whatever came first."""
-    seen, run, place = live.Compaction(), 0, 0
+    seen, run, place = progress_feed.Compaction(), 0, 0
     for k in range(100):
         seen.add(Glimpse(10 * 0.99**k))
     for k in range(100, 150):
@@ -260,7 +262,7 @@ def test_a_point_is_seen_to_be_compressed_and_needs_no_walk(state):
 
 
 def test_exact_bounds_are_seen_as_they_are_found(state, monkeypatch):
-    monkeypatch.setattr(live, "BOUNDS_S", 0)
+    monkeypatch.setattr(progress_feed, "BOUNDS_S", 0)
     browser = Browser(state)
     state.compute_exact()
     assert state.work.arriving is not None and not browser.player.live
@@ -289,18 +291,18 @@ class Glimpse:
 
 def test_pictures_are_kept_as_the_box_shrinks_and_as_time_goes(monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr(live.time, "perf_counter", lambda: clock[0])
-    seen = live.Compaction()
+    monkeypatch.setattr(progress_feed.time, "perf_counter", lambda: clock[0])
+    seen = progress_feed.Compaction()
     for side in (10, 9.99, 9.9, 9.9, 9.9):
         seen.add(Glimpse(side))
     assert seen.total == 2
-    clock[0] += 2 * live.EVERY_S
+    clock[0] += 2 * progress_feed.EVERY_S
     seen.add(Glimpse(9.9))
     assert seen.total == 3
 
 
 def test_who_is_far_behind_leaves_pictures_out_and_misses_none_of_the_newest():
-    seen = live.Compaction()
+    seen = progress_feed.Compaction()
     for k in range(200):
         seen.add(Glimpse(10 * 0.99**k))
     run, place, sides = 0, 0, []
@@ -317,8 +319,8 @@ def test_who_is_far_behind_leaves_pictures_out_and_misses_none_of_the_newest():
 
 
 def test_old_pictures_are_dropped_beyond_a_limit():
-    grains = int(live.PICTURE_BYTES / 8 / 12)  # of which eight pictures fit
-    seen = live.Compaction()
+    grains = int(progress_feed.PICTURE_BYTES / 8 / 12)  # of which eight pictures fit
+    seen = progress_feed.Compaction()
     for k in range(50):
         seen.add(Glimpse(10 * 0.99**k, grains))
     _, place, picture = seen.after(0, 0)
@@ -326,14 +328,14 @@ def test_old_pictures_are_dropped_beyond_a_limit():
 
 
 def test_of_many_states_as_many_are_sent_as_a_page_can_hold():
-    ten = int(live.FRAME_BYTES / 8 / 10)  # contacts, of which ten states fit
-    numbers = live.numbers({"states": 95, "contacts": ten})
+    ten = int(progress_feed.FRAME_BYTES / 8 / 10)  # contacts, of which ten states fit
+    numbers = progress_feed.numbers({"states": 95, "contacts": ten})
     assert numbers[0] == 0 and numbers[1] == 1 and np.ptp(np.diff(numbers[1:])) == 0
     assert len(numbers) <= 11 and numbers[-1] <= 95
 
 
 def test_readers_may_come_from_any_thread():
-    seen, stop = live.Compaction(), threading.Event()
+    seen, stop = progress_feed.Compaction(), threading.Event()
 
     def read():
         run = place = 0

@@ -20,7 +20,7 @@ from serving import (
 )
 from small_store import KEPT
 
-from app import geometry
+from app.results import geometry
 
 WATCH = """e => {
     const {hand} = e.scene, {live} = hand.player, {hear} = live

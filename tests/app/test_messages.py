@@ -2,44 +2,45 @@
 
 import inspect
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app import page
-from app.grabs import Hand
-from app.known import Knowledge
-from app.views import (
-    address,
-    dropper,
-    friction,
-    glimpse,
-    handover,
-    known,
-    load,
-    mine,
-    number,
-    player,
-    progress,
-    small,
-    stream,
-    tour,
-)  # fmt: skip
-from app.views.messages import FROM_BROWSER, TO_BROWSER, Array, fits, listed
-from app.views.scripts import Scripted, module
+from app.browser.bundle import APP, Scripted, module
+from app.browser.messages import FROM_BROWSER, TO_BROWSER, Array, fits, listed
+from app.explore import friction_slider, page_address
+from app.explore.tabs.intervals import known_forces
+from app.explore.tabs.push import load_slider
+from app.explore.tabs.your_packing import my_computations
+from app.learn import small_scene
+from app.obsolete import glimpse, tour
+from app.packing import player
+from app.packing.replay import stream
+from app.state.known import Knowledge
+from app.state.pulls import Hand
+from app.widgets import file_buttons, file_drop, number, progress
 
 COMPONENTS = {
     kind.__name__: kind
     for kind in (
-        address.Address, dropper.Dropper, friction.FrictionSlider, glimpse.Glimpses,
-        handover.Handover, known.Known, load.LoadSlider,
-        mine.Mine, number.NumberField, player.Player, progress.Progress, small.Small, tour.Tour,
+        page_address.Address, file_drop.Dropper, friction_slider.FrictionSlider, glimpse.Glimpses,
+        file_buttons.Handover, known_forces.Known, load_slider.LoadSlider,
+        my_computations.Mine, number.NumberField, player.Player, progress.Progress,
+        small_scene.Small,
+        tour.Tour,
     )
 }  # fmt: skip
 # What a player's message is handed on to.
 PARTS = {"hand": Hand.heard, "known": Knowledge.heard, "live": stream.Stream.heard}
 # A call that tells the server something, up to the literal that it begins with.
 TELLING = re.compile(r"(?:\bask\(model, view, |\btell\(|\bsend_msg\()(?=\{|\w+ \? \{)")
+
+
+def script_of(kind):
+    """The path of a component's script."""
+    return Path(inspect.getfile(kind)).with_suffix(".js")
 
 
 def names(shape):
@@ -97,7 +98,7 @@ def sent(text):
 
 @pytest.mark.parametrize("name", COMPONENTS)
 def test_a_script_sends_what_is_listed_and_nothing_else(name):
-    script = inspect.getmodule(COMPONENTS[name]).__name__.rsplit(".", 1)[-1]
+    script = script_of(COMPONENTS[name])
     expected = {names(shape) for shape in FROM_BROWSER[name]}
     if name != "Player":
         assert sent(module(script)) == expected
@@ -107,7 +108,7 @@ def test_a_script_sends_what_is_listed_and_nothing_else(name):
     whole = {one for one in expected if parts.isdisjoint(name for name, _ in one)}
     inside = {part for one in expected - whole for _, part in one}
     handed = {frozenset({(name, None)}) for name in parts}
-    assert sent(module("player")) == whole | inside | handed
+    assert sent(module(APP / "packing/player.js")) == whole | inside | handed
 
 
 @pytest.mark.parametrize("name", COMPONENTS)
@@ -124,7 +125,7 @@ def test_what_is_listed_is_handled(name):
             if name == "Player" and isinstance(part, dict):
                 (first, *_) = part
                 assert f'"{first}"' in inspect.getsource(PARTS[field]), first
-    script = module(COMPONENTS[name].__module__.rsplit(".", 1)[-1])
+    script = module(script_of(COMPONENTS[name]))
     told = {field for shape in TO_BROWSER.get(name, ()) for field in fields(shape)}
     for field in told - {"settled"}:  # which says no more than that it came
         assert re.search(rf"\b{field}\b", script), field

@@ -4,9 +4,9 @@ import pytest
 from small_store import DISKS
 from visitor import wait_for
 
-from app import mine, names, uploads
-from app.selection import select
-from app.views.mine import Mine
+from app.explore.tabs.your_packing.my_computations import Mine
+from app.results import entry_labels, my_results, uploads
+from app.results.selection import select
 from granforce.records import InputError
 
 
@@ -38,7 +38,7 @@ def test_computations_are_listed_named_opened_and_deleted(computed):
         view.hear({"delete": row["entry"]})
         wait_for(state)
     assert not view.rows and not list(state.library.own)  # nothing of it is left
-    assert names.names(state.library.own) == {}
+    assert entry_labels.names(state.library.own) == {}
     assert state.replay is not None and state.work.message == ""  # what is on screen stays there
 
 
@@ -51,9 +51,9 @@ def test_what_is_not_in_the_list_is_left_alone(computed):
         view.hear({"delete": entry})
         view.hear({"call": [entry, "mine"]})
         wait_for(state)
-    assert sorted(state.library.own) == before and names.names(state.library.own) == {}
+    assert sorted(state.library.own) == before and entry_labels.names(state.library.own) == {}
     with pytest.raises(InputError, match="no more"):
-        mine.delete(state.library, packing)
+        my_results.delete(state.library, packing)
 
 
 def test_an_upload_is_called_by_its_files(state):

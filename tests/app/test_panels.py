@@ -20,20 +20,22 @@ from small_store import KEPT, STATES
 from visitor import drop, press, wait_for
 
 import granforce as gf
-from app import distributions, exports, movies, perturbations, planes, standalone, studied, uploads
-from app.limits import Limits
-from app.views import export as export_view
-from app.views import labels
-from app.views import perturb as perturb_view
-from app.views import plane as plane_view
-from app.views import statistics as statistics_view
-from app.views import studied as drawn_study
-from app.views import upload as upload_view
-from app.views.controls import Controls
-from app.views.dropper import Dropper
-from app.views.glimpse import FRAMES
-from app.views.messages import TO_BROWSER, listed
-from app.views.style import lines, palettes
+from app.background.limits import Limits
+from app.browser.messages import TO_BROWSER, listed
+from app.explore.controls import Controls
+from app.explore.tabs.export import export as export_view
+from app.explore.tabs.export import files, movies, standalone
+from app.explore.tabs.force_space import force_space as plane_view
+from app.explore.tabs.friction import friction as statistics_view
+from app.explore.tabs.friction import study_figures as drawn_study
+from app.explore.tabs.push import push as perturb_view
+from app.explore.tabs.your_packing import upload as upload_view
+from app.obsolete.glimpse import FRAMES
+from app.results import distributions, planes, study_data, uploads
+from app.state import perturbations
+from app.widgets import label_places
+from app.widgets.file_drop import Dropper
+from app.widgets.plot_style import lines, palettes
 from granforce import measures
 from granforce.measures import statistics
 from granforce.packing.neighbours import find_pairs
@@ -370,7 +372,7 @@ def test_every_statistic_is_drawn_from_the_data(state, what, scale):
     if what in wanted:
         assert np.isclose(drawn, wanted[what], rtol=1e-6).any()
     assert len(drawn) > 5 and view.told.object
-    most = max(studied.hill(), key=lambda point: point[1])[0]
+    most = max(study_data.hill(), key=lambda point: point[1])[0]
     assert f"at friction {most:g}" in view.lead.object or what != "eta"
     assert view.lead.object  # what to look for
 
@@ -432,7 +434,7 @@ def test_the_peak_is_marked_and_a_tap_on_a_point_opens_such_a_packing(state):
     view = statistics_view.View(state)
     wait_for(state)
     fig = view.plots.objects[0].object
-    means = statistics.means(studied.rows("walk"), "eta1")
+    means = statistics.means(study_data.rows("walk"), "eta1")
     most = max(means, key=lambda point: point[1])
     (peak,) = fig.select(name="peak")
     assert peak.text == "↓ most here: click" and peak.x == most[0]
@@ -490,7 +492,7 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
     replay = state.replay
     state.compute_exact()
     wait_for(state, lambda: state.exact is not None)
-    table = exports.csv(exports.contacts(replay, state.exact, 3)).decode().splitlines()
+    table = files.csv(files.contacts(replay, state.exact, 3)).decode().splitlines()
     names = table[0].split(",")
     rows = np.array([line.split(",") for line in table[1:]], dtype=float)
     column = dict(zip(names, rows.T, strict=True))
@@ -509,12 +511,12 @@ def test_the_table_of_contacts_holds_what_is_on_screen(state):
 def test_datasets_come_back_with_packing_states_and_units(state, tmp_path, kind):
     states = state.library.dataset(state.cell)
     packing = state.library.packing(state.cell.params["packing"])
-    whole = exports.dataset(packing, states)
+    whole = files.dataset(packing, states)
     if kind == "netcdf":
-        again = xr.open_dataset(io.BytesIO(exports.netcdf(whole)), engine="scipy", decode_cf=False)
+        again = xr.open_dataset(io.BytesIO(files.netcdf(whole)), engine="scipy", decode_cf=False)
     else:
         path = tmp_path / "states.zarr.zip"
-        path.write_bytes(exports.zarr_zip(whole))
+        path.write_bytes(files.zarr_zip(whole))
         store = zarr.storage.ZipStore(path, mode="r")
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
@@ -527,13 +529,13 @@ def test_datasets_come_back_with_packing_states_and_units(state, tmp_path, kind)
 
 def test_the_packing_comes_back_to_the_last_bit(state):
     packing = state.library.packing(state.cell.params["packing"])
-    again = gf.load_packing(io.BytesIO(exports.npz(packing)))
+    again = gf.load_packing(io.BytesIO(files.npz(packing)))
     np.testing.assert_array_equal(again.x, packing.x)
     np.testing.assert_array_equal(again.forces, packing.forces)
 
 
 def test_parameters_name_what_is_on_screen(state):
-    told = json.loads(exports.parameters(state.cell, state.link(), {"frame": 0}))
+    told = json.loads(files.parameters(state.cell, state.link(), {"frame": 0}))
     assert told["kind"] == "walk" and told["command"].startswith("granforce walk -n 30")
     found = state.library.find("walk", told["parameters"])
     assert found.name == state.cell.name == told["entry"]
@@ -715,9 +717,9 @@ def test_labels_beside_points_collide_neither_with_each_other_nor_with_points(sp
     rng, count = np.random.default_rng(3), 30
     x, y = rng.uniform(0, span[0], count), rng.uniform(0, span[1], count)
     words = [f"{value:.{k % 4}g}" for k, value in enumerate(10 ** rng.uniform(-3, 1, count))]
-    found = labels.labels(x, y, words, span)
-    (wide, high), side = labels.LETTER, labels.POINT
-    room = 0.9 * np.array(labels.SMALLEST) / span  # pixels for each unit
+    found = label_places.labels(x, y, words, span)
+    (wide, high), side = label_places.LETTER, label_places.POINT
+    room = 0.9 * np.array(label_places.SMALLEST) / span  # pixels for each unit
 
     def box(k):
         left, top = room[0] * found["x"][k] + found["right"][k], -room[1] * found["y"][k]

@@ -7,11 +7,11 @@ from packing.test_solved import mat
 from visitor import drop, wait_for
 
 import granforce as gf
-from app import photoelastic, uploads
-from app.views import chains
-from app.views.controls import Controls
-from app.views.packing import PackingView
-from app.views.upload import View
+from app.explore.controls import Controls
+from app.explore.tabs.your_packing import frame_picture
+from app.explore.tabs.your_packing.upload import View
+from app.packing.view import PackingView
+from app.results import photoelastic_frames, uploads
 from granforce.forces.build import ensemble
 from granforce.packing.importers import read_pegs
 from granforce.records import InputError
@@ -64,7 +64,7 @@ def test_missing_contacts_are_filled_in_and_told(state):
     task, found = state.work.task(), []
     given = uploads.added({}, new)
     assert not uploads.missing(given)
-    task.start(photoelastic.infer(given, mu=0.3), found.append)
+    task.start(photoelastic_frames.infer(given, mu=0.3), found.append)
     wait_for(state)
     assert not task.message
     (one,) = found
@@ -74,7 +74,7 @@ def test_missing_contacts_are_filled_in_and_told(state):
     unmeasured = np.isnan(one.measured).any(axis=1) & ~one.added
     assert unmeasured.sum() <= one.report["negative_normal_forces"]
     assert np.all(one.inferred[:, 0] >= -1e-9)
-    text = " ".join(photoelastic.account(one.report))
+    text = " ".join(photoelastic_frames.account(one.report))
     assert f"{one.report['candidates']} pairs" in text and "different forces" in text
     # Nearer to the truth than what was measured.
     unit = one.report["mean_measured_normal_force"]
@@ -135,7 +135,7 @@ def test_the_picture_shows_measured_inferred_and_differences(state):
 
 def test_widths_and_lengths_have_scales():
     frame = made(60, missing=0.1, noise=0.05)
-    picture, layers = chains.network(frame)
+    picture, layers = frame_picture.network(frame)
     told = [text for one in picture.renderers for text in one.data_source.data.get("text", [])]
     assert len(told) == 5 and f"{frame.report['mean_measured_normal_force']:.3g}" in told[3]
     bar, sample = (
@@ -188,12 +188,12 @@ def made(n, **options):
     """A Frame as it comes of files."""
     new, _ = files(n=n, **options)
     found = read_pegs(*(uploads.opened(*one) for one in new), mu=0.3)
-    return photoelastic.frame_of(series.infer_frame(found, states=8), "files", (1,))
+    return photoelastic_frames.frame_of(series.infer_frame(found, states=8), "files", (1,))
 
 
 def test_all_that_was_found_is_one_table():
     frame = made(60, missing=0.2, noise=0.1)
-    lines = photoelastic.table(frame).decode().splitlines()
+    lines = photoelastic_frames.table(frame).decode().splitlines()
     head = [line for line in lines if line.startswith("#")]
     rows = lines[len(head) :]
     assert sum("region" in line and "±" in line and "xx" in line for line in head) == 9

@@ -5,7 +5,7 @@ import pytest
 from serving import free_port, painted, picture, searched, serve
 
 import granforce as gf
-from app import scenes
+from app.learn.model import small_scenes
 
 # Scenes, and windows in which they are opened.
 FITTING = {
@@ -283,8 +283,10 @@ def test_what_falls_is_proved_by_a_motion(look):
     page = look("?scene=pyramid&mu=0.2")
     until(page, "small.body.empty && small.now.fall")
     motion = np.reshape(ask(page, "[...small.now.fall]"), (-1, 3))
-    packing = scenes.packing_of("pyramid", 0.2)
-    np.testing.assert_allclose(motion, np.reshape(scenes.falling(packing), (-1, 3)), atol=1e-9)
+    packing = small_scenes.packing_of("pyramid", 0.2)
+    np.testing.assert_allclose(
+        motion, np.reshape(small_scenes.falling(packing), (-1, 3)), atol=1e-9
+    )
     assert "Nothing balances" in says(page)
     assert "free" not in desk(page).locator(".count b").inner_text()
     # Least μ of the pyramid: tan 15°, see tests of the scenes; the page offers the next hundredth.

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import granforce as gf
-from app import scenes
-from app.jobs import Task
-from app.views.small import Small
+from app.background.jobs import Task
+from app.learn.model import small_scenes
+from app.learn.small_scene import Small
 from granforce.records import InputError
 from granforce.study import hulls
 
@@ -30,22 +30,22 @@ PYRAMID = "1,1,1;3,1,1;2,2.732050807569,1|0,0,8,0"
     ],
 )
 def test_links_name_a_scene(query, scene, mu, step):
-    asked = scenes.asked(query)
+    asked = small_scenes.asked(query)
     assert (asked.scene, asked.mu, asked.step) == (scene, mu, step)
     assert "scene" not in asked.query
-    assert not asked.dark and scenes.asked(f"{query or '?scene=groove'}&dark=1").dark
+    assert not asked.dark and small_scenes.asked(f"{query or '?scene=groove'}&dark=1").dark
 
 
 def test_every_scene_of_the_library_is_on_the_list():
-    listed = [name for name, _ in scenes.titles()]
-    assert listed[0] == scenes.FIRST and set(listed) >= {"many", "own", "column"}
+    listed = [name for name, _ in small_scenes.titles()]
+    assert listed[0] == small_scenes.FIRST and set(listed) >= {"many", "own", "column"}
 
 
 @pytest.mark.parametrize(
     "name", ["groove", "box", "pyramid", "press", "leaning", "solid", "column", "thirteen"]
 )
 def test_forces_less_equations_is_free(name):
-    drawn = scenes.drawn(name)
+    drawn = small_scenes.drawn(name)
     count = len(drawn["i"])
     assert 2 * count - drawn["equations"] == drawn["h"] == gf.ensemble(gf.scene(name)).dimension
     assert len(drawn["names"]) == count
@@ -63,7 +63,7 @@ def test_a_hull_holds_all_networks_and_nothing_else():
 
 
 def test_a_built_scene_is_that_of_the_library():
-    built, made = scenes.own(PYRAMID, 0.4), gf.scene("pyramid", 0.4)
+    built, made = small_scenes.own(PYRAMID, 0.4), gf.scene("pyramid", 0.4)
     assert len(built.contacts.i) == len(made.contacts.i)
     low, high = gf.body(gf.ensemble(built)).intervals
     expected = gf.body(gf.ensemble(made)).intervals
@@ -72,49 +72,51 @@ def test_a_built_scene_is_that_of_the_library():
 
 
 def test_a_built_scene_is_saved_and_opened_by_the_library():
-    file = scenes.file_of(scenes.own(PYRAMID, 0.4))
+    file = small_scenes.file_of(small_scenes.own(PYRAMID, 0.4))
     packing = gf.load_packing(io.BytesIO(file))
     assert gf.ensemble(packing).admits(packing.forces)
     # Where nothing balances, the disks are kept, and the library says why.
-    empty = gf.load_packing(io.BytesIO(scenes.file_of(scenes.own(PYRAMID, 0.1))))
+    empty = gf.load_packing(io.BytesIO(small_scenes.file_of(small_scenes.own(PYRAMID, 0.1))))
     with pytest.raises(gf.NotJammedError):
         gf.ensemble(empty)
 
 
 def test_walls_of_a_built_scene_press():
-    built, made = scenes.own(UNDER_PRESS, 0.4), gf.scene("press", 0.4)
+    built, made = small_scenes.own(UNDER_PRESS, 0.4), gf.scene("press", 0.4)
     assert not built.load[:3].any() and built.load[3].tolist() == [0, -3.2, 0]  # as it is long
     expected = gf.body(gf.ensemble(made)).intervals
     for end, exact in zip(gf.body(gf.ensemble(built)).intervals, expected, strict=True):
         np.testing.assert_allclose(end, 3.2 * exact, atol=1e-9)
-    drawn = scenes.drawn(scenes.OWN, 0.4, UNDER_PRESS)
+    drawn = small_scenes.drawn(small_scenes.OWN, 0.4, UNDER_PRESS)
     assert (drawn["h"], drawn["equations"], len(drawn["i"])) == (1, 11, 6)
     assert drawn["names"][-1] == "disk 3 at the press"
 
 
 def test_a_scene_under_a_press_is_saved_and_opened_by_the_library():
-    packing = gf.load_packing(io.BytesIO(scenes.file_of(scenes.own(UNDER_PRESS, 0.4))))
+    packing = gf.load_packing(io.BytesIO(small_scenes.file_of(small_scenes.own(UNDER_PRESS, 0.4))))
     S = gf.ensemble(packing)
     assert S.admits(packing.forces) and S.dimension == 1
     assert packing.info["pressing"] == [1]
 
 
 def test_where_no_wall_presses_yet_nothing_is_said_of_forces():
-    drawn = scenes.drawn(scenes.OWN, 0.4, UNDER_PRESS[:-1])
+    drawn = small_scenes.drawn(small_scenes.OWN, 0.4, UNDER_PRESS[:-1])
     assert "b" not in drawn and drawn["idle"]
-    alone = scenes.drawn(scenes.OWN, 0.4, "1,5,1|0,0,8,0")  # a weight that falls is no such scene
-    assert not alone["idle"] and scenes.falling(scenes.own("1,5,1|0,0,8,0", 0.4))[1] < 0
+    alone = small_scenes.drawn(
+        small_scenes.OWN, 0.4, "1,5,1|0,0,8,0"
+    )  # a weight that falls is no such scene
+    assert not alone["idle"] and small_scenes.falling(small_scenes.own("1,5,1|0,0,8,0", 0.4))[1] < 0
 
 
 def test_a_press_that_is_not_borne_gives_way():
-    motion = scenes.falling(scenes.own(UNDER_PRESS, 0.2)).reshape(-1, 3)
+    motion = small_scenes.falling(small_scenes.own(UNDER_PRESS, 0.2)).reshape(-1, 3)
     assert len(motion) == 4 and motion[3, 1] < 0
 
 
 def test_a_column_has_an_exact_outline():
     packing, S = gf.scene("column"), gf.ensemble(gf.scene("column"))
     plane = [0, 2 * 9 + 1]  # f_n of the first contact, f_t of the tenth
-    found = scenes.measured(packing, None, plane)
+    found = small_scenes.measured(packing, None, plane)
     axes = np.zeros((2, len(S.index), 2))
     axes.reshape(2, -1)[[0, 1], plane] = 1
     outline = gf.outline(S, axes, tolerance=1e-4)
@@ -125,19 +127,21 @@ def test_a_column_has_an_exact_outline():
 
 
 def test_what_has_no_end_has_neither_ends_nor_outline():
-    assert scenes.measured(scenes.packing_of("column", 2.0), None, [0, 2]) == {"endless": True}
+    assert small_scenes.measured(small_scenes.packing_of("column", 2.0), None, [0, 2]) == {
+        "endless": True
+    }
 
 
 @pytest.mark.parametrize("plane", [[0], [0, 40], [0, 0.5], ["a", 1], None])
 def test_a_plane_that_is_not_there_is_refused(plane):
     with pytest.raises(InputError):
-        scenes.measured(gf.scene("column"), None, plane)
+        small_scenes.measured(gf.scene("column"), None, plane)
 
 
 def test_a_disk_in_the_air_falls_and_the_others_stay():
-    motion = scenes.falling(scenes.own("1,1,1;3,1,1;2,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
+    motion = small_scenes.falling(small_scenes.own("1,1,1;3,1,1;2,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
     assert motion[2, 1] < 0 and np.abs(motion[:2]).max() < 1e-9
-    alone = scenes.falling(scenes.own("1,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
+    alone = small_scenes.falling(small_scenes.own("1,5,1|0,0,8,0", 0.5)).reshape(-1, 3)
     assert alone[0, 1] < 0
 
 
@@ -150,13 +154,13 @@ def test_a_disk_in_the_air_falls_and_the_others_stay():
 )
 def test_what_cannot_be_built_is_refused(text):
     with pytest.raises(InputError):
-        scenes.own(text)
+        small_scenes.own(text)
 
 
 @pytest.fixture
 def page():
     """The page of the column of disks, and the list of what it is told."""
-    view = Small(scenes.asked("?scene=column"), Task(), 10)
+    view = Small(small_scenes.asked("?scene=column"), Task(), 10)
     told = []
     view.tell = told.append
     _at_rest(view)

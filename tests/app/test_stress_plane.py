@@ -5,8 +5,8 @@ import pytest
 from visitor import wait_for
 
 import granforce as gf
-from app import planes
-from app.views.plane import View
+from app.explore.tabs.force_space.force_space import View
+from app.results import planes
 
 
 def test_states_lie_in_the_plane_where_their_stress_says(state):

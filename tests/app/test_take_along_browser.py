@@ -10,7 +10,7 @@ from PIL import Image
 from serving import PATIENCE, column, painted, picture, scene, searched
 from small_store import KEPT, ROOT, STATES
 
-from app import movies
+from app.explore.tabs.export import movies
 
 # What was taken along, to be looked at; ignored by git.
 ARTEFACTS = ROOT / "artefacts" / "along"

@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 from serving import how_it_is_made, scene, until
 
-from app.views.small import FIRST_STEPS
+from app.learn.small_scene import FIRST_STEPS
 from granforce.glossary import TERMS
 
 STEPS = 6

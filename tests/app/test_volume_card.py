@@ -3,7 +3,7 @@
 import pytest
 from visitor import wait_for
 
-from app.views.volume import Volume
+from app.explore.volume import Volume
 
 
 @pytest.fixture

@@ -53,7 +53,7 @@ def installed(tmp_path_factory):
 @pytest.mark.slow
 def test_the_wheel_holds_the_finished_results(installed, tmp_path):
     code = (
-        "import granforce, granforce.app.data as data\n"
+        "import granforce, granforce.app.results.library as data\n"
         f"found = data.Library(cache={str(tmp_path / 'cache')!r})\n"
         "print(granforce.__file__, found.notes, [cell.mu for cell in found.cells()])\n"
     )

@@ -5,10 +5,10 @@ from html import unescape
 
 from small_store import ROOT
 
-from app.looks import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
-from app.selection import KINDS, SOLVERS
-from app.views import hints
-from app.views.summary import TILES
+from app.explore.results_line import TILES
+from app.results.selection import KINDS, SOLVERS
+from app.state.view_settings import COLOURS, FIGURES, PLANES, PUSHES, SCALES, SORTS, WIDTHS
+from app.widgets import hints
 from granforce import glossary, notebook
 from granforce.glossary import TERMS
 

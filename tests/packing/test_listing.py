@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from frames import file, frame
 
-from app.photoelastic import account
+from app.results.photoelastic_frames import account
 from granforce.cli.parser import main
 from granforce.packing.importers import read_pegs
 from granforce.packing.importers.boundary import boundary

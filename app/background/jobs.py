@@ -1,0 +1,384 @@
+"""Work off the event loop: threads run it, the page asks now and then how far it is.
+
+The kernels release the interpreter lock, so a thread keeps neither the page nor others waiting.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import param
+
+from granforce.records import Cancelled, InputError
+from granforce.system import cancelling
+
+from .gc_pauses import settle
+from .limits import LIMITS
+from .turns import Later, Turn, turn_of
+
+ESTIMATED = 2.0  # s of a stage from which on its end can be told
+LONGEST_LINE = 500  # characters of what a page tells about an error
+LONG = 3.0  # s after which a job is a long one
+_ASK = 0.2  # s between two looks at what nobody tells
+WAITING = "waiting for a free processor"  # stage of a job that has not begun
+
+_log = logging.getLogger(__name__)
+
+
+class Visitor(NamedTuple):
+    """For whom a job works; the pages of one address have their share together."""
+
+    address: str
+    page: str
+
+
+class Pool:
+    """Threads that run jobs; they end with the server, whatever the jobs are doing.
+
+    Of jobs that wait, those come first whose visitor has the fewest under way. While all threads
+    are held by long jobs, who has none under way does not wait for them: `extra` more threads are
+    for their jobs, which all together slow each other down instead.
+    """
+
+    def __init__(
+        self, workers: int, name: str, *, extra: int = 0, seconds: float | None = None
+    ) -> None:
+        """seconds: after which a job is ended, None: never."""
+        self.seconds = seconds
+        self._workers, self._extra = workers, extra
+        self._waiting: list[Job] = []
+        self._running: list[tuple[Job, float]] = []  # and since when
+        self._changed = threading.Condition()
+        for k in range(workers + extra):
+            # Not concurrent.futures: its threads would keep a server that is to end waiting.
+            threading.Thread(target=self._serve, name=f"{name}-{k}", daemon=True).start()
+
+    def submit(self, job: Job) -> None:
+        """Have job.run() called when a thread is free."""
+        with self._changed:
+            if not job.ended:
+                self._waiting.append(job)
+                self._changed.notify_all()
+
+    def _serve(self) -> None:
+        while True:
+            with self._changed:
+                while (job := self._next()) is None:
+                    # What is long by then, or may be tried again, nobody tells.
+                    self._changed.wait(_ASK if self._waiting else None)
+                running = job, time.monotonic()
+                self._running.append(running)
+            try:
+                job.run()
+                settle()
+            except BaseException:  # a thread that ends is missing to all visitors from then on
+                _log.exception("a job failed outside its work")
+            finally:
+                with self._changed:
+                    self._running.remove(running)
+                    self._changed.notify_all()
+                del job, running  # or the thread would keep it until the next
+
+    def _next(self) -> Job | None:
+        """The job to be run now, taken from those that wait; None: none of them yet."""
+        now = time.monotonic()
+        self._waiting = [job for job in self._waiting if not job.ended]
+        ready = [job for job in self._waiting if job.not_before <= now]
+        if not ready or len(self._running) >= self._workers + self._extra:
+            return None
+        job = min(ready, key=self._under_way)  # of several the one that came first
+        if len(self._running) >= self._workers:
+            of_address, of_page = self._under_way(job)
+            long = sum(now - since > LONG for _, since in self._running)
+            # One place is left to those of another address, however many pages one has.
+            if long < self._workers or of_page or of_address > self._workers:
+                return None
+        self._waiting.remove(job)
+        return job
+
+    def _under_way(self, job: Job) -> tuple[int, int]:
+        """How many jobs of its visitor's address, and of its page, are run just now."""
+        if job.visitor is None:
+            return 0, 0
+        others = [other.visitor for other, _ in self._running if other.visitor is not None]
+        of_address = sum(other.address == job.visitor.address for other in others)
+        return of_address, sum(other == job.visitor for other in others)
+
+
+# All users together: more would only slow each other down.
+computing = Pool(
+    LIMITS.computations,
+    "granforce-compute",
+    extra=LIMITS.computations if LIMITS.shared else 0,
+    seconds=LIMITS.seconds,
+)
+# What only reads stores must not wait for a computation to end.
+reading = Pool(2, "granforce-read")
+
+
+@dataclass(frozen=True)
+class Work:
+    """Work for a Job that will take turns: `wants` names them, so that others wait for it."""
+
+    run: Callable[[Job], Any]
+    wants: tuple[Any, ...]
+
+    def __call__(self, job: Job) -> Any:
+        """Do it."""
+        return self.run(job)
+
+
+class Job:
+    """One piece of work under way. Fields are written by its thread and read by the page.
+
+    work(job) returns the result; once it sets `job.keeps`, `stop` ends it with what it has so far.
+    It may give `job.tell` as progress callback and set `job.stage` to
+    say what it is doing. All of it ends soon after `cancel`, unless other jobs want what it makes.
+    Raising Later it is called again. Where it takes turns it is a Work, which names them.
+    """
+
+    def __init__(
+        self,
+        work: Callable[[Job], Any],
+        pool: Pool = computing,
+        on_end: Callable[[], object] | None = None,
+        visitor: Visitor | None = None,
+    ) -> None:
+        """on_end(): called from another thread when the job has ended.
+
+        visitor: for whom it works; None: for itself.
+        """
+        self.stage = WAITING
+        self.visitor = visitor
+        self.not_before = 0.0  # when it may be run (again), as time.monotonic
+        self._until = math.inf  # when it is ended
+        self.fraction: float | None = None  # done, 0 … 1; None where unknown
+        self.seconds_left: float | None = None  # of this stage
+        self.error = ""
+        self.so_far: Any = None  # what of its result is there already, if the work says so
+        self.result: Any = None
+        self._work: Callable[[Job], Any] | None = work
+        self._pool, self._on_end = pool, on_end
+        self._begun = time.perf_counter()
+        self._cancel, self._ended = threading.Event(), threading.Event()
+        self.keeps = False  # whether what it has so far is a result
+        self._stop = threading.Event()
+        self.turns: list[Turn] = []  # that it has just now
+        self._wants = [turn_of(named) for named in (work.wants if isinstance(work, Work) else ())]
+        for turn in self._wants:
+            turn.join(self)
+        self._taken = threading.Lock()  # by the thread that runs it, or by whoever cancels it first
+        pool.submit(self)
+
+    def begin(self, stage: str) -> None:
+        """Enter a stage; its time left is counted from here."""
+        self.stage, self._begun = stage, time.perf_counter()
+        self.seconds_left = None
+
+    def tell(
+        self, done: float, total: float | None, *, part: tuple[float, float] = (0.0, 1.0)
+    ) -> None:
+        """Progress of the stage; part: where on the whole bar the stage begins and ends."""
+        if total is None:
+            self.fraction = self.seconds_left = None
+            return
+        begin, end = part
+        self.fraction = begin + (end - begin) * min(1.0, done / total)
+        spent = time.perf_counter() - self._begun
+        known = 0 < done <= total and spent > ESTIMATED
+        self.seconds_left = spent / done * (total - done) if known else None
+
+    def cancel(self) -> None:
+        """Ask it to end: at once if it has not begun, else within a second once it is unwanted."""
+        self._cancel.set()
+        if self._taken.acquire(blocking=False):
+            self._end()
+
+    def stop(self) -> None:
+        """Ask it to end with the result that it has so far, unless other jobs want more."""
+        self._stop.set()
+
+    def enough(self) -> bool:
+        """Whether what it has so far is all that is wanted; from then on it is no cancelling."""
+        return self._stop.is_set() and not any(turn.wanted(self) for turn in list(self.turns))
+
+    def cancelled(self) -> bool:
+        """Whether it was asked to end."""
+        return self._cancel.is_set()
+
+    def unwanted(self) -> bool:
+        """Whether it was asked to end, and no other job needs what it is making just now."""
+        return self.cancelled() and not any(turn.wanted(self) for turn in list(self.turns))
+
+    def _ends(self) -> bool:
+        """Whether its work is to end: nobody wants it, or it takes too long."""
+        return self.unwanted() or time.monotonic() > self._until
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has ended, one way or another."""
+        return self._ended.is_set()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Whether it ends in time, in s; for tests and scripts."""
+        return self._ended.wait(timeout)
+
+    def run(self) -> None:
+        """Do the work, unless cancelled before; called by a thread of the pool."""
+        if not self._taken.acquire(blocking=False):
+            return
+        if self.stage == WAITING:
+            self.begin("starting")
+        try:
+            work = self._work
+            if work is not None and not self.cancelled():
+                self._until = time.monotonic() + (self._pool.seconds or math.inf)
+                with cancelling.watched(self._ends):
+                    self.result = work(self)
+        except Later:
+            self.not_before = time.monotonic() + _ASK  # meanwhile others have the thread
+            self._taken.release()
+            self._pool.submit(self)
+            if self.cancelled():  # meanwhile: it need not come to its turn
+                self.cancel()
+            return
+        except Cancelled:
+            if not self.cancelled():
+                self.error = (
+                    f"this took longer than the {self._pool.seconds:g} s that a computation may "
+                    "take on this server: ask for less, or compute it on a machine of your own "
+                    "(Copy CLI command)"
+                )
+        except BaseException as error:  # told on the page, or nobody would see it
+            self.error = told(error)
+        self._end()
+
+    def _end(self) -> None:
+        self._work = None  # what it refers to may be large
+        self._ended.set()
+        on_end, self._on_end = self._on_end, None
+        try:
+            if on_end is not None:
+                on_end()
+        except Exception:
+            _log.exception("the end of a job could not be told")
+
+
+def told(error: BaseException) -> str:
+    """What went wrong, in one line for the page."""
+    line = " ".join(str(error).split())[:LONGEST_LINE]
+    if isinstance(error, InputError):
+        return line
+    return f"the computation failed: {type(error).__name__}: {line}"
+
+
+@contextmanager
+def as_one(*parts: param.Parameterized) -> Iterator[None]:
+    """What is set of these parts is told when all of it is there; the last part tells first."""
+    with ExitStack() as stack:
+        for part in parts:
+            stack.enter_context(param.parameterized.batch_call_watchers(part))
+        yield
+
+
+class Task(param.Parameterized):
+    """One kind of work as a view sees it: at most one job at a time, a later one replaces it.
+
+    Jobs run in threads, but the parameters change only within `poll`, on the page's own thread.
+    """
+
+    running = param.Boolean()
+    stage = param.String(doc="what the job is doing")
+    fraction = param.Number(default=None, allow_None=True, doc="part done, None if unknown")
+    seconds_left = param.Number(default=None, allow_None=True)
+    dismissed = param.Boolean(doc="told when the visitor wants no more of it; never stays True")
+    keeps = param.Boolean(doc="whether what the job has so far would be a result")
+    message = param.String(doc="one line about what went wrong, or empty")
+
+    def __init__(
+        self,
+        pool: Pool = computing,
+        wake: Callable[[Callable[[], object]], object] | None = None,
+        visitor: Visitor | None = None,
+        **params: Any,
+    ) -> None:
+        """wake(function): call a function soon on the page's thread; without it, poll yourself."""
+        super().__init__(**params)  # type: ignore[no-untyped-call]  # param says no types
+        self._pool, self._wake, self._visitor = pool, wake, visitor
+        self.job: Job | None = None  # the one that is under way
+        self._done: Callable[[Any], object] | None = None
+        self._closed = False
+
+    def start(
+        self, work: Callable[[Job], Any], done: Callable[[Any], object] | None = None
+    ) -> None:
+        """Begin work(job), as for Job; done(result) follows within `poll` unless it failed.
+
+        Nothing begins once the task is closed.
+        """
+        self.cancel()
+        if self._closed:
+            return
+        on_end = None if self._wake is None else partial(self._wake, self.poll)
+        self.job, self._done = Job(work, self._pool, on_end, self._visitor), done
+        self.param.update(
+            running=True, stage=self.job.stage, fraction=None, seconds_left=None, keeps=False,
+            message="",
+        )  # fmt: skip
+
+    def poll(self) -> None:
+        """Take over how far the job is; when it has ended, its result."""
+        job = self.job
+        if job is None:
+            return
+        if not job.ended and job.cancelled() and not job.unwanted():
+            self.job = self._done = None  # it goes on for others
+            self.param.update(running=False, message="")
+            return
+        if not job.ended:
+            self.param.update(
+                stage="cancelling …" if job.cancelled() else job.stage,
+                fraction=job.fraction,
+                seconds_left=job.seconds_left,
+                keeps=job.keeps and not job.cancelled(),
+            )
+            return
+        done, self.job, self._done = self._done, None, None
+        # Told as one: at no moment is the work over and its result not yet there.
+        with as_one(self):
+            self.param.update(running=False, message=job.error)
+            if done is not None and not job.error and not job.cancelled():
+                try:
+                    done(job.result)
+                except Exception as error:
+                    _log.exception("a result could not be shown")
+                    self.message = told(error)
+
+    def cancel(self) -> None:
+        """Ask the job to end; its result is dropped."""
+        if self.job is not None:
+            self.job.cancel()
+
+    def dismiss(self) -> None:
+        """Cancel, as the visitor wishes; those who know what was there before bring it back."""
+        self.cancel()
+        self.dismissed = True
+        self.dismissed = False
+
+    def stop(self) -> None:
+        """Ask the job to end with the result that it has so far."""
+        if self.job is not None and self.job.keeps:
+            self.job.stop()
+
+    def close(self) -> None:
+        """End the job, and begin no other: nobody is there any more."""
+        self._closed = True
+        self.cancel()

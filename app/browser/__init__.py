@@ -1,0 +1,1 @@
+"""How scripts are joined and talk to the server."""

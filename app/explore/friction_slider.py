@@ -1,0 +1,32 @@
+"""Slider for the friction coefficient."""
+
+from collections.abc import Callable
+from typing import Any
+
+import param
+
+from ..browser.bundle import Scripted
+from ..browser.messages import Message
+from ..results.library import LEAST_PLACE
+
+MOST_PLACE = 1.0  # log10 of the largest μ on the slider; larger ones can be typed
+
+
+class FrictionSlider(Scripted):
+    """μ on a logarithmic scale; jumps to values in `stored`; see friction.js."""
+
+    mu = param.Number(default=0.1)
+    hill = param.List(default=[], doc="[(μ, η)] to be drawn along it")
+    stored = param.List(default=[], doc="values of μ that need no computing")
+    least = param.Number(default=LEAST_PLACE, constant=True, doc="stands for μ = 0")
+    most = param.Number(default=MOST_PLACE, constant=True)
+    on_narrow = param.Boolean(doc="whether it is for narrow pages, else for all others")
+
+    def __init__(self, on_typed: Callable[[str], object], **params: Any) -> None:
+        """on_typed(text): what to do with a value that was typed, sensible or not."""
+        super().__init__(**params)
+        self._on_typed = on_typed
+
+    def _heard(self, message: Message) -> None:
+        self._on_typed(message["typed"])
+        self.tell({"settled": True})

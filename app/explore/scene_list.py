@@ -1,0 +1,21 @@
+"""The list of scenes, first of the controls of large packings."""
+
+from typing import Any
+
+import param
+
+from granforce.packing.scenes import SCENES
+
+from ..browser.bundle import Scripted
+from ..learn.model import small_scenes
+
+
+class SceneList(Scripted):
+    """Names of all scenes; choosing one opens it; see scenelist.js."""
+
+    titles = param.List(doc="[name, title] of every scene")
+    shown = param.String(default=small_scenes.MANY)
+    usual = param.Number(doc="μ of the page as it opens, which is not taken along")
+
+    def __init__(self, **params: Any) -> None:
+        super().__init__(titles=small_scenes.titles(), usual=SCENES[small_scenes.MANY].mu, **params)

@@ -1,0 +1,39 @@
+"""Packing and plots on screen as one figure, for print."""
+
+from typing import Any
+
+import panel as pn
+
+from ....packing.captions import caption, stem
+from ....state.app_state import AppState
+from ....widgets.file_buttons import Handover
+from ....widgets.number import NumberField
+from ....widgets.parts import LATER, folded_away, note
+
+TITLE = "Save as one figure"
+FILES = {"": {"svg": "SVG, packing and plots", "pdf": "PDF, by printing"}}
+WIDTH_MM = 170  # of a page's two columns
+HELP = """
+As they are seen now, as lines and letters. From 120 mm on the plots are beside the packing.
+"""
+
+
+def panel(state: AppState) -> Any:
+    """The width, and a button for each kind of file; the browser makes them, see figure.js."""
+
+    def refuse(line: str) -> None:
+        state.work.message = line
+
+    def asked(kind: str) -> None:
+        if state.replay is None:
+            return buttons.rest()
+        name = f"{stem(state.cell.selection)}_figure.{kind}"
+        buttons.hand_over_picture(name, caption(state), width.value)
+
+    buttons = Handover(asked, files=FILES, margin=(4, 10, -8, 10))
+    width = NumberField(
+        refuse, label="Width, mm", value=WIDTH_MM, start=40, end=2000, step=5, width=150,
+        margin=(0, 10, 4, 10),
+    )  # fmt: skip
+    inside = pn.Column(note(HELP), width, buttons, sizing_mode="stretch_width")
+    return pn.Column(folded_away(TITLE, inside), styles=LATER, sizing_mode="stretch_width")

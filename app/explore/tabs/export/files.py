@@ -1,0 +1,164 @@
+"""What is on screen as files, made in memory: table, dataset, packing, parameters."""
+
+import io
+import json
+import zipfile
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce.packing import importers
+from granforce.records import Packing
+from granforce.study.entries import encoded
+from granforce.study.keys import canonical
+from granforce.study.schema import packing_dataset
+
+from ....results.library import Cell
+from ....results.replays import Replay
+from ....results.selection import command
+from ....state.pulls import Held
+
+Columns = dict[str, np.ndarray]
+
+# The contact dimension of a packing's own arrays; that of the states holds the backbone only.
+PACKING_CONTACTS = "packing_contact"
+
+
+class File(NamedTuple):
+    """A file to hand over."""
+
+    name: str
+    mime: str
+    content: bytes
+
+
+def contacts(
+    replay: Replay, exact: xr.Dataset | None, frame: int, held: Held | None = None
+) -> Columns:
+    """One row a contact of the backbone, forces in the packing's unit: {name: array}.
+
+    On screen is the state of this frame, or the network that pulls have led to.
+    """
+    scale = replay.force_scale
+    normal, tangential = replay.normal[frame], replay.tangential[frame]
+    if held is not None:
+        normal, tangential = held.forces.T
+    first = np.unique(replay.links.contact, return_index=True)[1]
+    columns = {
+        "contact": replay.backbone,
+        "i": replay.links.i[first],
+        "j": replay.links.j[first],
+        "f_n_original": replay.normal[0] * scale,
+        "f_t_original": replay.tangential[0] * scale,
+        "f_n": normal * scale,
+        "f_t": tangential * scale,
+    }
+    for k, part in enumerate(("f_n", "f_t")):
+        columns[f"{part}_low"] = replay.low[:, k] * scale
+        columns[f"{part}_high"] = replay.high[:, k] * scale
+    if exact is not None and np.array_equal(exact["backbone"].values, replay.backbone):
+        for k, part in enumerate(("f_n", "f_t")):
+            columns[f"{part}_min"] = exact["low"].values[:, k]
+            columns[f"{part}_max"] = exact["high"].values[:, k]
+    return columns
+
+
+# What the columns of the table of contacts hold.
+COLUMNS = {
+    "contact": "number of the contact in the packing",
+    "i": "number of the first grain; the normal n points from i to j",
+    "j": "number of the second grain",
+    "f_n_original": "normal force that the packing came to rest with, force",
+    "f_t_original": "tangential force with it, along t = (-n_y, n_x), force",
+    "f_n": "normal force in the network on screen, force",
+    "f_t": "tangential force in the network on screen, force",
+    "f_n_low": "smallest normal force of all states, force",
+    "f_n_high": "largest normal force of all states, force",
+    "f_t_low": "smallest tangential force of all states, force",
+    "f_t_high": "largest tangential force of all states, force",
+    "f_n_min": "least possible normal force (exact), force",
+    "f_n_max": "largest possible normal force (exact), force",
+    "f_t_min": "least possible tangential force (exact), force",
+    "f_t_max": "largest possible tangential force (exact), force",
+}
+
+
+def on_screen(replay: Replay, frame: int, held: Held | None) -> str:
+    """Which network is on screen, in words."""
+    if held is not None:
+        return "Network: pulled by hand"
+    return f"Network {replay.number[frame]}" if frame else "Network as packed"
+
+
+def explained(columns: Iterable[str], replay: Replay, *titles: str) -> str:
+    """Lines, each after a #, that tell what a table holds and in which units."""
+    unit = (
+        f"Forces are in the packing's own unit (pressure times length): mean normal force "
+        f"{replay.force_scale:.9g}. Lengths are in the packing's unit."
+    )
+    lines = [*titles, unit, *(f"{name}: {COLUMNS[name]}" for name in columns)]
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def csv(columns: Columns, head: str = "") -> bytes:
+    """Columns {name: array} as a table below the head; whole numbers stay whole."""
+    file = io.StringIO()
+    file.write(head)
+    whole = [np.issubdtype(values.dtype, np.integer) for values in columns.values()]
+    np.savetxt(
+        file,
+        np.column_stack(list(columns.values())),
+        fmt=["%d" if w else "%.9g" for w in whole],
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+    )
+    return file.getvalue().encode()
+
+
+def dataset(packing: Packing, states: xr.Dataset, exact: xr.Dataset | None = None) -> xr.Dataset:
+    """Packing, states and, where known, exact intervals (exact_low, exact_high) in one dataset."""
+    geometry = packing_dataset(packing)
+    geometry = geometry.rename({"contact": PACKING_CONTACTS})
+    parts = [states.copy(), geometry.drop_attrs(deep=False)]
+    if exact is not None and np.array_equal(exact["backbone"].values, states["backbone"].values):
+        names = {"low": "exact_low", "high": "exact_high", "eta3": "exact_eta3"}
+        parts.append(exact[list(names)].rename(names))
+    whole = xr.merge(parts, combine_attrs="override", join="exact", compat="no_conflicts")
+    return whole.assign_attrs(states.attrs)
+
+
+def netcdf(whole: xr.Dataset) -> bytes:
+    """A dataset as NetCDF 3."""
+    return bytes(whole.to_netcdf(engine="scipy"))
+
+
+def zarr_zip(whole: xr.Dataset) -> bytes:
+    """A dataset as a zipped Zarr group, which zarr.storage.ZipStore opens."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        for name, content in sorted(encoded(whole).items()):
+            archive.writestr(name, content.to_bytes())
+    return file.getvalue()
+
+
+def npz(packing: Packing) -> bytes:
+    """A packing as NPZ, to be read by `granforce` and load_packing."""
+    file = io.BytesIO()
+    importers.save_packing(packing, file)
+    return file.getvalue()
+
+
+def parameters(cell: Cell, link: str, view: Mapping[str, Any]) -> bytes:
+    """All that names what is on screen, as JSON: parameters, link, command, view."""
+    told = {
+        "kind": cell.kind,
+        "entry": cell.name,
+        "parameters": json.loads(canonical(cell.params)),
+        "link": f"?{link}",
+        "command": command(cell.selection),
+        "view": view,
+    }
+    return json.dumps(told, indent=1, ensure_ascii=False).encode()

@@ -1,0 +1,156 @@
+"""The page as one file: packing, player, intervals and force space, without a server or network."""
+
+import base64
+import json
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from bokeh.document import Document
+from bokeh.embed import components
+from bokeh.resources import Resources
+
+from granforce.types import Floats
+
+from ....browser.bundle import Scripted, module
+from ....packing.player import Player, frames
+from ....packing.view import exact_intervals, full_extent, legend
+from ....results import planes
+from ....results.library import Cell, Library
+from ....results.replays import Replay, evenly
+from ....state.links import View
+from ....widgets.plot_style import palettes
+from ... import explanation
+from . import still
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+FRAME_BYTES = 4.5e6  # of forces; of more states so many are left out evenly
+
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+body {{ margin: 0; font-family: Helvetica, Arial, sans-serif; color: #18191d; background: #fff; }}
+main {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 440px), 1fr));
+  gap: 0 18px; align-items: start; max-width: 1700px; margin: 0 auto; padding: 0 8px 24px; }}
+h1 {{ font-size: 19px; margin: 12px 16px 4px; }}
+footer {{ padding: 10px 16px 30px; font-size: 13px; line-height: 1.5; }}
+code {{ overflow-wrap: anywhere; white-space: pre-wrap; }}
+p {{ max-width: 68ch; font-size: 14px; line-height: 1.5; }}
+</style>
+{bokeh}
+</head><body>
+<h1>{title}</h1>
+<main><div><div id="player"></div>{words}</div><div>{plots}</div></main>
+<footer>Made with granforce. The same networks in a terminal: <code>{command}</code><br>
+This view on a server of granforce: <code>?{link}</code><br>{left_out}</footer>
+{script}
+<script type="module">
+{code}
+begin({given}, {style})
+</script>
+</body></html>
+"""
+
+
+def html(
+    library: Library,
+    cell: Cell,
+    replay: Replay,
+    exact: xr.Dataset | None,
+    shown: Mapping[str, Any] = NOTHING,
+    *,
+    view: View,
+    link: str,
+    command: str,
+    source: str,
+    outlined: planes.Outlined | None = None,
+) -> bytes:
+    """The file's bytes. view: parameters of AppState by name; outlined: planes.Outlined or None.
+
+    exact: under what is known; shown: loads, gone, measured and pins, as the player has them.
+    """
+    intervals = exact_intervals(exact, replay)
+    kept, acceptance = thinned(replay)
+    plane = planes.principal(kept)
+    figures = still.figures(library, kept, exact, plane, outlined, view)
+    # In a document of their own: else Bokeh adds what a page that is served just then has its
+    # browser do.
+    bare = Document()
+    for figure in figures:
+        bare.add_root(figure)
+    script, plots = components(figures)
+    frame = min(view["frame"], len(kept.normal) - 1)
+    between = view["between"]
+    if len(kept.normal) < len(replay.normal):
+        frame, between = 0, None
+    same = ("contact", "colour", "thickness", "full", "stretch", "overlay", "scale")
+    own = set(Player.param) - set(Scripted.param)
+    given = {name: Player.param[name].default for name in own}
+    given |= {name: view[name] for name in same}
+    given |= shown
+    given |= {
+        "walk": frames(kept) | {"acceptance": acceptance},
+        "exact": intervals,
+        "most": full_extent(replay, intervals, view["full"]),
+        "palettes": palettes(False),
+        "lead": explanation.first(replay.summary),
+        "legend": legend(still.at_rest(library, replay, exact, view, loads=given["loads"])),
+        "source": source,
+        "frame": frame,
+        "between": between,
+        "tab": "intervals",
+    }
+    left = len(replay.normal) - len(kept.normal)
+    text = PAGE.format(
+        title=escape(f"Force space: {source}"),
+        bokeh=Resources(mode="inline", components=["bokeh"]).render(),
+        words=explanation.more(replay),
+        plots="".join(plots),
+        script=script,
+        command=escape(command),
+        link=escape(link),
+        left_out=f"{left} of the networks are left out, evenly, to keep this file small."
+        if left
+        else "",
+        style=_script("".join(Player._stylesheets)),
+        given=_script({name: _plain(value) for name, value in given.items()}),
+        code=module(Path(__file__).with_suffix(".js")),
+    )
+    return text.encode()
+
+
+def thinned(replay: Replay) -> tuple[Replay, Floats]:
+    """A Replay of at most FRAME_BYTES, and the acceptance of its frames."""
+    count, contacts = replay.normal.shape
+    whole, pick = frames(replay)["acceptance"], evenly(count, contacts, FRAME_BYTES)
+    if len(pick) == count:
+        return replay, whole
+    rows: dict[str, Any] = {
+        name: np.ascontiguousarray(getattr(replay, name)[pick])
+        for name in ("normal", "tangential", "number", "distance", "residual", "attempts")
+    }
+    growth = {name: values[pick] for name, values in replay.growth.items()}
+    return replay._replace(**rows, growth=growth), whole[pick]
+
+
+def _plain(value: Any) -> Any:
+    """Arrays as base64 with their type, all else as JSON takes it."""
+    if isinstance(value, dict):
+        return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, np.ndarray):
+        whole = np.issubdtype(value.dtype, np.integer) or value.dtype == bool
+        packed = np.ascontiguousarray(value, dtype="<i4" if whole else "<f4")
+        kind = "Int32Array" if whole else "Float32Array"
+        return {"array": kind, "data": base64.b64encode(packed.tobytes()).decode()}
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _script(value: Any) -> str:
+    """JSON that can stand in a script."""
+    return json.dumps(value, ensure_ascii=False).replace("</", "<\\/")

@@ -1,0 +1,54 @@
+"""The plots beside the packing as they are, for a file: bound to no page."""
+
+import numpy as np
+import xarray as xr
+from bokeh.plotting import figure as Figure
+from param.parameterized import discard_events
+
+from granforce.types import Floats
+
+from ....results.library import Library
+from ....results.planes import Outlined, Plane
+from ....results.replays import Replay
+from ....state.app_state import AppState
+from ....state.links import View
+from ....state.view_settings import Looks
+from ..force_space import force_space
+from ..intervals import intervals
+
+
+def at_rest(
+    library: Library,
+    replay: Replay,
+    exact: xr.Dataset | None,
+    view: View,
+    tab: str = "",
+    loads: Floats | None = None,
+) -> AppState:
+    """A state that shows a replay by day, where nothing is computed, pulled or known."""
+    state = AppState(library, query=None)
+    here = view | {"dark": False, "between": None, "tab": tab}
+    with discard_events(state):
+        replay = replay._replace(inviting=-1)  # nothing can be dragged
+        state.param.update(replay=replay, seen=replay, exact=exact, loads=loads)
+    with discard_events(state.looks):
+        state.looks.param.update({name: here[name] for name in Looks.param if name in here})
+    return state
+
+
+def figures(
+    library: Library,
+    replay: Replay,
+    exact: xr.Dataset | None,
+    chosen: Plane,
+    outlined: Outlined | None,
+    view: View,
+) -> tuple[Figure, Figure, Figure]:
+    """Bokeh figures of intervals, of η as it grows, and of the principal plane `chosen`."""
+    bars = intervals.View(at_rest(library, replay, exact, view, "intervals"))
+    space = force_space.View(at_rest(library, replay, exact, view))
+    space._show(replay, chosen)
+    if outlined is not None and np.array_equal(outlined.plane.axes, chosen.axes):
+        space._outlined(replay, outlined)
+    space.figure.sizing_mode = "scale_width"
+    return bars.figure, bars.growth_figure, space.figure

@@ -1,0 +1,71 @@
+"""What the shadow of S on a plane shows, in words."""
+
+import numpy as np
+
+from granforce.types import Floats
+
+from ....results import planes
+from ....results.planes import Outlined, Plane
+from ....results.replays import Replay
+from ....widgets.hints import term
+
+MANY = 10  # dimensions, from which on the middle of a body holds nearly all its volume
+MOSTLY = 0.75  # part of the dots in the inner half, from which on they keep to the middle
+
+CROWDED = (
+    ": to get far out, many forces have to change together, which hardly ever happens by chance"
+)
+HELP = (
+    "A line that is clicked in the packing becomes the green one. Shown is the shadow "
+    f"({term('principal', 'projection')}) that {term('s')} casts on a plane, not a section: the "
+    f"shaded {term('outline')} holds all of it."
+)
+COMPUTED = (
+    " Outline: {found.programs} linear programs, one for each direction, in {found.seconds:.1f} s; "
+    "it is known to {found.gap:.1g} of the mean force. Halfway is the outline shrunk "
+    "to half its lengths about its middle."
+)
+
+
+def finding(found: Outlined, replay: Replay, others: Floats, called: str) -> str:
+    """How many of the states, and of others (k, 2) so called, keep to the middle of S, as HTML."""
+    path = found.plane.path[1:]
+    inner = planes.inner_share(path, found.outer)
+    many = "All" if inner == 1 else f"{min(inner, 0.99):.0%}"
+    words = f"{_drawn(replay)} <b>{many} of them lie less than halfway from the middle of the "
+    words += "blue shape to its edge</b> (dotted)"
+    if len(others):
+        share = planes.inner_share(others, found.outer)
+        words += f", and {share:.0%} of the {len(others)} {called}"
+    crowded = replay.summary["dimension"] >= MANY and inner > MOSTLY
+    return words + (CROWDED if crowded else "") + "."
+
+
+def computed(found: Outlined, replay: Replay) -> str:
+    """What is drawn, how much of the outline the states reach, and how that was computed."""
+    path = found.plane.path[1:]
+    part = np.ptp(path, axis=0) / np.ptp(found.outer, axis=0)
+    area = planes.area(path) / planes.area(found.outer)
+    named = [replay.backbone[contact] for contact in found.plane.pair]
+    which = " Green: contact {}; violet: contact {}.".format(*named) if named else ""
+    share = (
+        f" The {len(path)} dots span {part[0]:.0%} of its width, "
+        f"{part[1]:.0%} of its height, and fill {area:.1%} of its area"
+        f"{_variance(found.plane)}."
+    )
+    return HELP + which + share + COMPUTED.format(found=found)
+
+
+def _drawn(replay: Replay) -> str:
+    """How many networks the dots are, in a sentence."""
+    kept, states = replay.summary["kept"], replay.summary["states"]
+    some = f"{kept} of the {states} networks, about every {round(states / kept)}th"
+    return f"The dots are {some if kept < states else f'all {kept} networks'}."
+
+
+def _variance(plane: Plane) -> str:
+    """How much of the states' scatter goes along the axes, where that was asked of them."""
+    if not np.isfinite(plane.share).all():
+        return ""
+    across, up = plane.share
+    return f", and {across:.0%} of their variance goes across, {up:.0%} upwards"

@@ -1,0 +1,16 @@
+"""All contacts as a table, to be opened; it follows the network on screen, see contacts.js."""
+
+import param
+
+from ....browser.bundle import Scripted
+from ....state.view_settings import Looks
+
+
+class Contacts(Scripted):
+    """Number, disks, forces and their bounds of each contact; sorted, searched and filtered."""
+
+    dark = param.Boolean()
+
+    def __init__(self, looks: Looks) -> None:
+        super().__init__(sizing_mode="stretch_width", dark=looks.dark)
+        looks.param.watch(lambda event: self.param.update(dark=event.new), "dark")

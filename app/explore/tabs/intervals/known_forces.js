@@ -1,0 +1,40 @@
+// What is known, as chips; what it leaves open, in words; and which contact would be worth measuring.
+
+import { ask } from "../../../browser/send.js"
+import { button, made } from "../../../browser/dom.js"
+
+export function render({ model, view }) {
+  const root = document.createElement("div")
+  root.className = "known"
+  root.innerHTML = `
+    <div class="chips"></div><div class="words" role="status"></div>
+    <button type="button" class="soft next">Which force to measure next?</button><ol class="ranked"></ol>`
+  const [chips, words, next, ranked] = root.children
+  const tell = (message) => ask(model, view, message)
+
+  function chip([contact, text]) {
+    const it = made("span", { className: "chip" })
+    const look = { className: "release", title: "let it go", ariaLabel: `let go: ${text}` }
+    it.append(
+      button(text, () => tell({ choose: contact }), { title: "find it in the packing" }),
+      button("×", () => tell({ release: contact }), look),
+    )
+    return it
+  }
+
+  function row([contact, text]) {
+    const it = document.createElement("li")
+    it.append(button(text, () => tell({ choose: contact })))
+    return it
+  }
+
+  const shown = {
+    chips: () => chips.replaceChildren(...model.chips.map(chip)),
+    words: () => { words.innerHTML = model.words },
+    ranked: () => ranked.replaceChildren(...model.ranked.map(row)),
+    asking: () => { next.disabled = model.asking },
+  }
+  next.addEventListener("click", () => tell({ next: true }))
+  for (const [name, show] of Object.entries(shown)) { model.on(name, show); show() }
+  return root
+}

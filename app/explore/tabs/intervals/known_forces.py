@@ -1,0 +1,110 @@
+"""What is known above the intervals: chips, what it leaves open, which measurement comes next."""
+
+from typing import Any
+
+import numpy as np
+import param
+
+from granforce.types import Integers
+
+from ....browser.bundle import Scripted
+from ....browser.messages import Message
+from ....state.app_state import AppState
+from ....state.known import Knowledge, Ranked
+from ....widgets.hints import term
+
+STRONGEST = 5  # contacts that are named whose interval has shrunk most
+ASK = (
+    "Is a force known, say measured? Hold it (button Hold, or H): the other intervals can only "
+    "shrink."
+)
+
+
+class Known(Scripted):
+    """Chips of what is known; see known.js. Contacts are positions in the backbone."""
+
+    chips = param.List(doc="pairs (contact, words)")
+    words = param.String(doc="what it leaves open, HTML")
+    ranked = param.List(doc="pairs (contact, words), the best to measure first")
+    asking = param.Boolean(doc="whether the best to measure are being looked for")
+
+    def __init__(self, state: AppState, **params: Any) -> None:
+        super().__init__(sizing_mode="stretch_width", margin=0, **params)
+        self._state = state
+        state.param.watch(self._show, "seen")
+        state.looks.param.watch(self._show, "contact")
+        state.knowledge.param.watch(self._show, ["known", "narrowed", "ranked"])
+        for task in (state.knowledge.task, state.knowledge.ranking):
+            task.param.watch(self._show, "running")
+        self._show()
+
+    def _heard(self, message: Message) -> None:
+        knowledge = self._state.knowledge
+        match message:
+            case {"release": int(contact)}:
+                knowledge.release(contact)
+            case {"next": True}:
+                knowledge.rank()
+            case {"choose": int(contact)} if 0 <= contact < len(self._state.replay.backbone):
+                self._state.looks.contact = contact
+
+    def _show(self, *events: Any) -> None:
+        state = self._state
+        if state.replay is None:
+            return
+        number, knowledge = state.replay.backbone, state.knowledge
+        best = knowledge.ranked
+        self.param.update(
+            visible=not state.growing
+            and state.replay.summary["dimension"] > 0
+            and (state.looks.contact is not None or bool(knowledge.known)),
+            chips=[[one.contact, one.words(number[one.contact])] for one in knowledge.known],
+            words=words(knowledge, number),
+            ranked=[] if best is None else _ranks(best, number),
+            asking=knowledge.ranking.running,
+        )
+
+
+def words(knowledge: Knowledge, number: Integers) -> str:
+    """What is known leaves so much open, as HTML."""
+    narrowed, known = knowledge.narrowed, tuple(knowledge.known)
+    if not known:
+        return ASK
+    if narrowed is None or narrowed.known != known:
+        working = knowledge.task.running
+        return "What it leaves open is being computed …" if working else "Not computed: cancelled."
+    if narrowed.left:
+        return f"Exact bounds are arriving, the strongest change first: {1 - narrowed.left:.0%}."
+    (h, less), (mean, left) = narrowed.dimension, narrowed.mean
+    free = f"<b>{h} → {less}</b>" if less < h else f"stay <b>{h}</b> (an error bar fixes no number)"
+    told = (
+        f"{term('h', 'Free dimensions')} {free}; a contact's {term('exact', 'possible')} fₙ spans "
+        f"<b>{mean:.3f} → {left:.3f} × the mean force</b> on average ({_change(mean, left)}); "
+        f"{narrowed.carrying} of {len(narrowed.shortened)} contacts "
+        f"{term('carrying', 'carry for certain')}."
+    )
+    short = narrowed.shortened
+    order = [c for c in np.argsort(-short)[:STRONGEST] if short[c] > 0.005]
+    if order:
+        most = ", ".join(f"{number[c]} (by {short[c]:.2f})" for c in order)
+        told += f" Shortened most: contacts {most}."
+    return told + " The networks that play are of all of S; pulls keep what is known."
+
+
+def _ranks(best: Ranked, number: Integers) -> list[list[Any]]:
+    rows = zip(best.contacts.tolist(), best.after, best.expected, strict=True)
+    return [
+        [c, f"contact {number[c]}: {_worth(best.before, after, expected)}"]
+        for c, after, expected in rows
+    ]
+
+
+def _worth(before: float, after: float, expected: float) -> str:
+    """What knowing a contact would tell."""
+    if np.isnan(after) or np.isnan(before):
+        return f"errors about {expected:.1%} smaller, by the networks"
+    return f"mean interval {before:.3f} → {after:.3f} ({_change(before, after)})"
+
+
+def _change(before: float, after: float) -> str:
+    return f"{100 * (after / before - 1):+.0f} %".replace("-", "−") if before > 0 else "–"

@@ -1,0 +1,134 @@
+// Slider for the push on a contact. Where it is moved, arrows in the packing grow and the network follows
+// (pushed.js); it stops where the disks set off, which is not told before, but can be guessed on its scale.
+
+import { ask } from "../../../browser/send.js"
+
+const STEPS = 400 // of the slider
+const RISE_S = 5 // from nothing to the end, by the button
+const ROOM = 1.25 // of the scale beyond its end, where it ends beyond the scale
+const TICKS = 8 // numbers on the scale, about
+const WAITS = 0.2 // of the scale, where a guess waits
+const THUMB = 8 // px from the slider's ends to where its thumb stands for them
+
+export function render({ model, view }) {
+  const root = document.createElement("div")
+  root.className = "load"
+  root.innerHTML = `<label>push <span class="rail"><input type="range" min="0" value="0" aria-label="push, in mean forces">
+      <span class="scale"></span></span></label>
+    <span class="told"><output></output> × mean force<b></b></span>
+    <button type="button" class="soft">Let the push grow</button>`
+  const part = (name) => root.querySelector(name), range = part("input"), told = part("output"), run = part("button"), line = part(".scale")
+  const player = () => view.model.document.get_model_by_name("player")?.player
+  const known = () => model.path.values?.length > 0, end = () => (known() ? model.path.values.at(-1) : Infinity)
+  let load = 0, guess = null, asked = false, gave = false, rises = 0, rising = 0, by = null, shows = false // by: whom the load is shown by
+
+  function find() {
+    if (known() || asked) return
+    asked = true
+    ask(model, view, { push: true })
+  }
+
+  function set(value) {
+    load = Math.min(value, end())
+    if (load > 0) find()
+    show()
+    if (load < end() || gave) return
+    gave = true
+    ask(model, view, { gave: true })
+  }
+
+  /** Where another network came into view than that which is pushed, nothing is pushed any more. */
+  function look() {
+    if (shows || !(load > 0 && known()) || (by.held && player().replay?.held === by.held)) return
+    by.end()
+    load = rising = 0
+    show()
+  }
+
+  function show() {
+    const there = load >= end(), said = there ? `: something moves${guess === null ? "" : ` (you guessed ${guess.toFixed(1)})`}` : ""
+    range.value = load
+    told.textContent = load.toFixed(2)
+    part("b").textContent = said
+    range.setAttribute("aria-valuetext", `${told.textContent} mean forces${said}`)
+    run.disabled = model.contact === null || rising > 0
+    player()?.listeners.add(look)
+    by = player()?.pushed
+    shows = true
+    by?.take(model.path, load, load / Number(range.max))
+    shows = false
+  }
+
+  /** Another contact, or other networks. */
+  function anew() {
+    load = rising = 0
+    asked = gave = false
+    guess = null
+    scale()
+  }
+
+  function scale() {
+    range.max = known() ? Math.max(model.most, ROOM * end()) : model.most
+    range.step = range.max / STEPS
+    range.disabled = model.contact === null
+    drawScale()
+    set(load)
+  }
+
+  const along = (value) => `calc(${THUMB}px + (100% - ${2 * THUMB}px) * ${value / range.max})`
+  const mark = (kind, value, words) => `<span class="${kind}" style="left:${along(value)}">${words}</span>`
+
+  /** Numbers, and a guess, which waits at the left. */
+  function drawScale() {
+    const most = Number(range.max), step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find((size) => most / size <= TICKS) ?? most
+    let drawn = ""
+    for (let k = 0; k * step <= most * (1 + 1e-9); k++) drawn += mark("tick", k * step, Number((k * step).toPrecision(3)))
+    const words = guess === null ? "your guess: drag me" : `your guess ${guess.toFixed(1)}`
+    line.innerHTML = drawn + mark(guess === null ? "guess waits" : "guess", guess ?? WAITS * most, `▲ <i>${words}</i>`)
+  }
+
+  function put(event) {
+    const { left, width } = line.getBoundingClientRect()
+    guess = Math.min(1, Math.max(0, (event.clientX - left - THUMB) / (width - 2 * THUMB))) * range.max
+    drawScale()
+  }
+
+  /** By itself, as soon as it is known how far. */
+  function rise() {
+    load = 0
+    const way = ++rises
+    rising = way
+    find()
+    let before = null
+    const step = (now) => {
+      if (way !== rising) return
+      if (!root.isConnected || !player()?.pushable) return void (rising = 0)
+      if (known()) {
+        set(load + ((before === null ? 0 : now - before) / 1000 / RISE_S) * end())
+        before = now
+        if (load >= end()) { rising = 0; by?.leave(); return show() }
+      }
+      requestAnimationFrame(step)
+    }
+    requestAnimationFrame(step)
+    show()
+  }
+
+  range.addEventListener("input", () => { rising = 0; set(Number(range.value)) })
+  range.addEventListener("change", () => by?.leave())
+  run.addEventListener("click", rise)
+  line.addEventListener("pointerdown", (event) => { line.setPointerCapture(event.pointerId); put(event) })
+  line.addEventListener("pointermove", (event) => { if (line.hasPointerCapture(event.pointerId)) put(event) })
+  line.addEventListener("click", (event) => event.preventDefault()) // the label would hand it to the slider
+  model.on("remove", () => player()?.listeners.delete(look))
+  model.on("contact", anew)
+  model.on("most", scale)
+  model.on("path", () => {
+    if (!known()) return anew() // of another packing
+    asked = true
+    scale()
+  })
+  model.on("running", () => { if (!model.running && !known()) { asked = false; rising = 0; show() } })
+  scale()
+  return root
+}

@@ -1,0 +1,29 @@
+"""Slider for the push on a contact: the network follows it in the packing until something moves."""
+
+from collections.abc import Callable
+
+import param
+
+from ....browser.bundle import Scripted
+from ....browser.messages import Message
+
+
+class LoadSlider(Scripted):
+    """How hard two disks are pushed apart, in ⟨f_n⟩, as far as disks hold; see load.js."""
+
+    contact = param.Integer(default=None, allow_None=True, doc="the one that is pushed")
+    path = param.Dict(default={}, doc="networks under growing loads, see perturb.path; {} unknown")
+    most = param.Number(default=1.0, doc="end of the scale while it is not known what they hold")
+    running = param.Boolean(doc="whether it is being found out")
+
+    def __init__(self, pushed: Callable[[], object], gave: Callable[[], object]) -> None:
+        """pushed(): it was moved where no path is known; gave(): it has come to the end of it."""
+        super().__init__(sizing_mode="stretch_width", margin=(4, 10))
+        self._pushed, self._gave = pushed, gave
+
+    def _heard(self, message: Message) -> None:
+        match message:
+            case {"push": True}:
+                self._pushed()
+            case {"gave": True}:
+                self._gave()

@@ -1,0 +1,176 @@
+"""The picture of a photoelastic frame: grains, force chains with their errors, marks and scales."""
+
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColorBar, ColumnDataSource, LinearColorMapper, Title
+from bokeh.plotting import figure as Figure
+
+from ....results.geometry import FULL_DEVIATION
+from ....results.photoelastic_frames import Frame
+from ....widgets.parts import figure
+from ....widgets.plot_style import (
+    BLUE,
+    EDGE,
+    GREY,
+    ORANGE,
+    SERIES,
+    corner,
+    hover,
+    legend_above,
+    ramp,
+)
+
+WORDS = {
+    "inferred": "inferred; width: fₙ, pale: one standard error more",
+    "measured": "measured; width: fₙ",
+    "deviation": "width: inferred fₙ; colour: its difference",
+}
+STRONG = 0.995  # quantile of f_n from which on chains are as wide as they get
+WIDEST = 0.5  # that width, in mean radii
+FAINT = 0.01  # of that width, below which nothing is drawn
+AMBER = "#e69f00"  # suspects: a warning
+SCALE = "scale"  # tag of what is a scale
+QUIET = "#808080"  # scales, read by day and by night
+SAMPLES = (0.5, 1.0, 2.0)  # ⟨f_n⟩, of the scale of widths
+Layers = dict[str, list[Any]]  # {one of WORDS: renderers}
+STRIP = 0.08  # height of a line of scales below the grains, in widths of the frame
+
+
+def network(frame: Frame, **options: Any) -> tuple[Figure, Layers]:
+    """Figure of the frame, and {one of WORDS: renderers} of what it may show; options: of it."""
+    name, title = f"frame{frame.report['frame']}", frame.source.split(": ")[-1]
+    fig = figure(
+        name, f"{title}, frame {frame.report['frame']}",
+        "x (unit of the file)", "y (unit of the file)", match_aspect=True, aspect_ratio=0.85,
+        sizing_mode="scale_width", **options,
+    )  # fmt: skip
+    fig.name = "photoelastic_network"
+    fig.title.text_font_size = "11px"
+    _draw_grains(fig, frame)
+    layers: Layers = {name: [] for name in WORDS}
+    normal, measured = frame.inferred[:, 0], frame.measured[:, 0]
+    strong = max(np.quantile(normal, STRONG), 1e-9)
+    wide = WIDEST * frame.r.mean() / strong
+
+    def chains(layer: str, force: Any, chosen: Any, more: Any = 0.0, **options: Any) -> Any:
+        width = wide * (np.clip(np.nan_to_num(force), 0.0, strong) + more)
+        drawn = fig.rect(
+            "x", "y", "length", "width", "angle", line_color=None,
+            source=ColumnDataSource(_along(frame, force, width, chosen)), **options,
+        )  # fmt: skip
+        layers[layer].append(drawn)
+        return drawn
+
+    listed, error = ~frame.added, frame.error[:, 0]
+    for chosen, colour in ((listed, BLUE), (frame.added, ORANGE)):
+        chains("inferred", normal, chosen, error, color=colour, fill_alpha=0.35)
+    tips = [
+        chains("inferred", normal, listed, color=BLUE, legend_label="listed"),
+        chains("inferred", normal, frame.added, color=ORANGE, legend_label="added"),
+        chains("measured", measured, listed, color=BLUE),
+    ]
+    colours = LinearColorMapper(
+        palette=ramp(BLUE, GREY, ORANGE), low=-FULL_DEVIATION, high=FULL_DEVIATION
+    )
+    off = {"field": "off", "transform": colours}
+    tips.append(chains("deviation", normal, np.isfinite(measured), color=off))
+    rows = ("contact", "@contact"), ("fₙ", "@f{0.00} ± @error{0.00}"), ("off by", "@off{0.0} σ")
+    fig.add_tools(hover(tips, *rows))
+    _mark(fig, frame)
+    _draw_scales(fig, frame, wide)
+    legend_above(fig, 3)
+    corner(fig, WORDS["inferred"])
+    next(one for one in fig.above if isinstance(one, Title)).name = "shown"
+    bar = ColorBar(
+        color_mapper=colours, height=10, title="inferred less measured fₙ, in its σ",
+        title_text_font_style="normal",
+    )  # fmt: skip
+    fig.add_layout(bar, "below")
+    layers["deviation"].append(bar)
+    return fig, layers
+
+
+def dress(fig: Figure, layers: Layers, shown: str, small: bool = False) -> None:
+    """Show one of WORDS in a figure of `network`; small: without what another beside it tells."""
+    for name, drawn in layers.items():
+        for one in drawn:
+            one.visible = name == shown
+    fig.select_one({"name": "shown"}).text = shown if small else WORDS[shown]
+    scales = fig.select({"tags": [SCALE]})
+    for one in (fig.title, fig.yaxis[0], fig.legend[0], *scales):
+        one.visible = not small
+    fig.min_border_left = 5 if small else 56
+
+
+def _along(frame: Frame, force: Any, width: Any, chosen: Any) -> dict[str, Any]:
+    """Columns of the chosen contacts, as rectangles of these widths (N_c,)."""
+    seen = chosen & (width > FAINT * WIDEST * frame.r.mean())
+    here = np.flatnonzero(seen & np.isfinite(frame.lines).all(axis=(1, 2)))
+    x, y = frame.lines[here].mean(axis=1).T
+    away = frame.lines[here, 1] - frame.lines[here, 0]
+    return {
+        "x": x, "y": y, "length": np.hypot(*away.T), "angle": np.arctan2(*away.T[::-1]),
+        "width": width[here], "contact": here, "f": np.nan_to_num(force[here]),
+        "off": np.nan_to_num(frame.deviation[here, 0]), "error": frame.error[here, 0],
+    }  # fmt: skip
+
+
+def _draw_grains(fig: Figure, frame: Frame) -> None:
+    x, y = frame.x.T
+    kinds = (
+        ("disks", ~(frame.at_wall | frame.left_open), EDGE, 0.18),
+        ("at a wall", frame.at_wall, EDGE, 0.5),
+        ("left open", frame.left_open, SERIES[1], 0.9),
+    )
+    for label, chosen, colour, alpha in kinds:
+        if chosen.any():
+            fig.circle(
+                x[chosen], y[chosen], radius=frame.r[chosen], fill_color=colour,
+                fill_alpha=alpha, line_color=colour, line_alpha=0.5, legend_label=label,
+            )  # fmt: skip
+
+
+def _mark(fig: Figure, frame: Frame) -> None:
+    """Suspects, contacts that carry for certain, and what was mended."""
+    middle = frame.lines.mean(axis=1)
+    for label, places, marker, colour in (
+        ("suspect", middle[frame.suspects], "triangle", AMBER),
+        ("certain", middle[frame.certain], "circle", SERIES[2]),
+        ("mended", frame.found, "x", AMBER),
+    ):
+        if len(places):
+            fig.scatter(
+                *places.T, marker=marker, size=6, line_color=colour, fill_color=None,
+                line_width=1.5, legend_label=label,
+            )  # fmt: skip
+
+
+def _draw_scales(fig: Figure, frame: Frame, wide: float) -> None:
+    """Below the grains: how wide a force is, and how long a length; they zoom with the picture."""
+    r = frame.r[:, None]
+    (left, bottom), (right, _) = (frame.x - r).min(axis=0), (frame.x + r).max(axis=0)
+    across = right - left
+    before = len(fig.renderers)
+    words = {"text_baseline": "middle", "text_font_size": "11px", "text_color": QUIET}
+    unit = frame.report["mean_measured_normal_force"]
+    at, y = left + across * np.array([0.0, 0.23, 0.46]), bottom - STRIP * across
+    fig.rect(
+        at + 0.04 * across, np.full(3, y), np.full(3, 0.08 * across), wide * np.array(SAMPLES),
+        color=QUIET, name="width_scale",
+    )  # fmt: skip
+    told = [f"{force:g}" for force in SAMPLES[:-1]] + [f"{SAMPLES[-1]:g} ⟨fₙ⟩"]
+    fig.text(at + 0.1 * across, np.full(3, y), told, **words)
+    y -= STRIP * across
+    fig.text([left], [y], [f"⟨fₙ⟩ = {unit:.3g} (unit of the file)"], **words)
+    length, y = _round_length(0.25 * across), y - STRIP * across
+    fig.segment([left], [y], [left + length], [y], color=QUIET, line_width=3, name="length_scale")
+    fig.text([left + length + 0.015 * across], [y], [f"{length:g} (unit of the file)"], **words)
+    for one in fig.renderers[before:]:
+        one.tags = [SCALE]
+
+
+def _round_length(most: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, … (or their tenths, …) up to this."""
+    power = 10.0 ** np.floor(np.log10(most))
+    return float(max(k * power for k in (1, 2, 5) if k * power <= most))

@@ -1,0 +1,44 @@
+// What was computed here: a name to be typed, what it is, when, how large; to be opened or deleted.
+
+import { ask } from "../../../browser/send.js"
+import { button, made } from "../../../browser/dom.js"
+import { plain } from "../../../browser/to_object.js"
+
+export function render({ model, view }) {
+  const root = document.createElement("details")
+  root.innerHTML = `<summary>My computations</summary><p class="told"></p><table><tbody></tbody></table>`
+  const told = root.querySelector(".told"), body = root.querySelector("tbody")
+  const size = (megabytes) => `${megabytes < 10 ? megabytes.toFixed(1) : Math.round(megabytes)} MB`
+
+  /** Only a second click deletes. */
+  function remove(entry, it) {
+    if (it.dataset.sure) return ask(model, view, { delete: entry })
+    it.dataset.sure = "yes"
+    it.textContent = "Delete for good?"
+  }
+
+  function line({ entry, name, what, when, megabytes, here }) {
+    const row = document.createElement("tr"), look = { className: "soft" }
+    const field = made("input", { value: name, placeholder: "name it", ariaLabel: `name of ${what}`, maxLength: 80 })
+    field.addEventListener("change", () => ask(model, view, { call: [entry, field.value] }))
+    const words = made("span", { textContent: what })
+    const last = here ? ["on screen"] : [button("Open", () => ask(model, view, { open: entry }), look)]
+    last.push(" ", button("Delete", (it) => remove(entry, it), look))
+    const parts = [[field, words], [new Date(when).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })],
+      [size(megabytes)], last]
+    for (const part of parts) row.insertCell().append(...part)
+    return row
+  }
+
+  function show() {
+    const rows = model.rows.map(plain), all = rows.reduce((sum, { megabytes }) => sum + megabytes, 0)
+    told.textContent = rows.length
+      ? `${rows.length} computed here, ${size(all)} with their packings. They stay until you delete them.`
+      : "Nothing yet: another friction, number of disks or seed is computed and kept here."
+    body.replaceChildren(...rows.map(line))
+  }
+
+  model.on("rows", show)
+  show()
+  return root
+}

@@ -1,0 +1,235 @@
+"""A photoelastic frame: measured against inferred forces, the network, and an honest account."""
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import panel as pn
+import panel_material_ui as pmui
+from bokeh.models import ColumnDataSource
+from bokeh.plotting import figure as Figure
+
+from granforce.records import InputError
+
+from ....background.jobs import Task
+from ....results import photoelastic_frames
+from ....results.photoelastic_frames import Frame
+from ....results.uploads import Files
+from ....widgets.file_buttons import Handover
+from ....widgets.parts import PRIMARY, choice, figure, note, saving, together
+from ....widgets.plot_style import BLUE, ORANGE, corner, hover, legend_above
+from ..export.files import File
+from . import frame_picture
+
+COMPONENTS = (("fₙ", BLUE), ("fₜ", ORANGE))
+SHOWN = {
+    "inferred": "Inferred",
+    "measured": "Measured",
+    "beside": "Both",
+    "deviation": "Difference in σ",
+}
+SAVED = "photoelastic_saved"  # of the picture that the buttons save
+TOLD = 12  # contacts that are listed
+PLAYED_MS = 700  # a frame of a series
+WIDE = {"sizing_mode": "stretch_width", "margin": 0}
+HALF = WIDE | {"styles": {"flex": "1 1 240px"}, "min_width": 240}  # of two, where they fit
+
+
+class Frames:
+    """What there is to see of the frames in the files that were dropped, one at a time."""
+
+    def __init__(
+        self,
+        first: Frame,
+        files: Files,
+        task: Task,
+        on_open: Callable[[Frame], object],
+        **options: Any,
+    ) -> None:
+        """on_open(frame): the frame is wanted as a packing; options: of
+        `photoelastic_frames.infer`.
+        """
+        self.files, self.task, self.options = files, task, options
+        self.known = {first.report["frame"]: first}
+        self.frame, self.playing = first, 0
+        self.choice = choice(SHOWN, "inferred")
+        self.choice.param.watch(lambda event: together(self._dress), "value")
+        self.pictures = pn.Row(styles={"flex-wrap": "wrap"}, **WIDE)
+        self.save = Handover(
+            self._hand_over, files={"This frame": {"table": "All contacts (CSV)"}}, margin=(4, 10)
+        )
+        self.open = pmui.Button(label="Open as a packing", margin=(4, 10), **PRIMARY)
+        self.open.on_click(lambda event: on_open(self.frame))
+        self.player = pn.widgets.DiscretePlayer(
+            label="frame", options=list(first.numbers), value=first.report["frame"],
+            interval=PLAYED_MS, loop_policy="loop", visible=len(first.numbers) > 1,
+            show_loop_controls=False, **WIDE,
+        )  # fmt: skip
+        self.player.param.watch(lambda event: self._turn(event.new), "value")
+        self.found, self.listed, self.stresses = note(), note(), note()
+        self.compared = pn.pane.Bokeh(**WIDE)
+        self._fill(first)
+
+    def panel(self) -> list[Any]:
+        """All of it, from above."""
+        return [
+            self.player,
+            self.found,
+            self.choice,
+            self.pictures,
+            pn.FlexBox(*saving(SAVED), self.open, **WIDE),
+            note(OPENED),
+            self.listed,
+            self.compared,
+            self.stresses,
+            self.save,
+        ]
+
+    def _turn(self, number: int) -> None:
+        """Another frame: as it is known, or inferred first, while the player waits."""
+        if number in self.known:
+            self._show(self.known[number])
+        elif not self.task.running:
+            self.playing = self.player.direction
+            self.player.pause()
+            work = photoelastic_frames.infer(self.files, number=number, **self.options)
+            self.task.start(work, self._came)
+
+    def _came(self, frame: Frame) -> None:
+        self.known[frame.report["frame"]] = frame
+        self._show(frame)
+        if self.player.value not in self.known:  # turned on in the meantime
+            self._turn(self.player.value)
+        else:
+            self.player.direction = self.playing
+
+    def _show(self, frame: Frame) -> None:
+        together(self._fill, frame=frame)
+
+    def _fill(self, frame: Frame) -> None:
+        self.frame = frame
+        told = "".join(
+            f"<p style='margin:5px 0'>{html.escape(line)}</p>"
+            for line in photoelastic_frames.account(frame.report)
+        )
+        head = f"<p><b>{html.escape(frame.source)}</b>, frame {frame.report['frame']}</p>"
+        self.picture, self.layers = frame_picture.network(frame, tags=[SAVED])
+        self.pictures[:] = self._panes()
+        self.found.object = head + told + found(frame.report)
+        self.listed.object = listed(frame)
+        self.compared.object = compared(frame)
+        self.stresses.object = stresses(frame)
+
+    def _panes(self) -> list[Any]:
+        """What is chosen, in one picture or, side by side, in two: dressed before they are seen."""
+        shown, one = self.choice.value, self.picture
+        both = shown == "beside"
+        frame_picture.dress(one, self.layers, "inferred" if both else shown, small=both)
+        old: Any = self.pictures[0] if len(self.pictures) else None
+        first = pn.pane.Bokeh(one, **HALF) if old is None or old.object is not one else old
+        if not both:
+            return [first]
+        other, layers = frame_picture.network(self.frame, x_range=one.x_range, y_range=one.y_range)
+        frame_picture.dress(other, layers, "measured", small=True)
+        return [first, pn.pane.Bokeh(other, **HALF)]
+
+    def _dress(self) -> None:
+        self.pictures[:] = self._panes()
+
+    def _hand_over(self, key: str) -> None:
+        name = f"frame{self.frame.report['frame']}.csv"
+        try:
+            self.save.hand_over(File(name, "text/csv", photoelastic_frames.table(self.frame)))
+        except InputError:
+            self.save.rest()
+
+
+OPENED = """
+As a packing the frame is the packing of this page: its inferred forces, and what walls do in them
+to the disks held fixed. Then intervals, pulls and outlines tell what else balance would allow.
+"""
+
+
+def found(report: dict[str, Any]) -> str:
+    """What was found, kind by kind and line by line, folded up."""
+    if not report["findings"]:
+        return ""
+    lines = "".join(f"<li>{html.escape(line)}</li>" for line in report["findings"])
+    return f"<details><summary>Line by line</summary><ul>{lines}</ul></details>"
+
+
+def compared(frame: Frame) -> Figure:
+    """Figure of inferred against measured forces, of the contacts that were measured."""
+    fig = figure("photoelastic_forces", None, "measured / ⟨fₙ⟩", "inferred / ⟨fₙ⟩", height=340)
+    seen = np.isfinite(frame.measured).all(axis=1)
+    drawn, ends = [], [0.0]
+    for part, (label, colour) in enumerate(COMPONENTS):
+        x, y, error = (
+            values[seen, part] for values in (frame.measured, frame.inferred, frame.error)
+        )
+        ends += [x.min(initial=0), x.max(initial=0), y.min(initial=0), y.max(initial=0)]
+        source = ColumnDataSource(
+            {"x": x, "y": y, "low": y - error, "high": y + error, "contact": np.flatnonzero(seen)},
+            name=f"photoelastic_{'nt'[part]}",
+        )
+        fig.segment("x", "low", "x", "high", source=source, color=colour, alpha=0.2)
+        drawn.append(
+            fig.scatter(
+                "x", "y", source=source, size=4, alpha=0.5, color=colour, legend_label=label
+            )
+        )
+    ends = [min(ends), max(ends)]
+    fig.line(ends, ends, color="#888888", line_dash="dashed", legend_label="as measured")
+    fig.add_tools(hover(drawn, ("measured", "@x{0.00}"), ("inferred", "@y{0.00}")))
+    legend_above(fig)
+    corner(fig, "inferred: in balance, within friction")
+    return fig
+
+
+def listed(frame: Frame) -> str:
+    """Suspects and certain contacts as sentences."""
+
+    def named(c: int) -> str:
+        one, two = frame.ids[frame.ends[c]]
+        return f"{one:g}–{two:g}" if two >= 0 else f"{one:g}–wall"
+
+    suspects = [
+        f"{named(c)} ({np.nanmax(np.abs(frame.deviation[c])):.1f} σ)" for c in frame.suspects[:TOLD]
+    ]
+    certain = [
+        f"{named(c)} ({frame.inferred[c, 0]:.2f} ± {frame.error[c, 0]:.2f} ⟨fₙ⟩)"
+        for c in frame.certain[:TOLD]
+    ]
+    told = []
+    for count, words, some in (
+        (len(frame.suspects), "Measured contacts beyond 3 σ", suspects),
+        (
+            len(frame.certain),
+            "Contacts that were not measured and carry for certain, by 2 σ",
+            certain,
+        ),
+    ):
+        more = ", …" if count > len(some) else ""
+        told.append(f"<p>{words} ({count}){': ' if some else ''}{', '.join(some)}{more}.</p>")
+    return "".join(told)
+
+
+def stresses(frame: Frame) -> str:
+    """The stress by region as a table, the top of the picture above."""
+    side = round(len(frame.stress) ** 0.5)
+    rows = []
+    for b in reversed(range(side)):
+        cells = []
+        for a in range(side):
+            k = a * side + b
+            lines = (
+                f"{name} {value:.2f} ± {error:.2f}"
+                for name, value, error in zip(
+                    ("σₓₓ", "σᵧᵧ", "σₓᵧ"), frame.stress[k], frame.stress_error[k], strict=True
+                )
+            )
+            cells.append(f"<td>{'<br>'.join(lines)}</td>")
+        rows.append(f"<tr>{''.join(cells)}</tr>")
+    head = "Stress by region, in the mean pressure (y grows upwards in the picture)"
+    return f"<table class='claims'><caption>{head}</caption>{''.join(rows)}</table>"

@@ -1,0 +1,193 @@
+"""Bring your own packing: drop its files, see what it is, and look at it like any other."""
+
+import html
+from typing import Any
+
+import panel as pn
+import panel_material_ui as pmui
+
+from granforce.records import InputError, brief, friction, make_cell, positive
+
+from ....background.limits import LIMITS
+from ....results import photoelastic_frames, uploads
+from ....results.selection import Selection
+from ....state.app_state import AppState
+from ....widgets.file_drop import Dropper
+from ....widgets.parts import PRIMARY, by_words, note
+from ....widgets.progress import Progress
+from ....widgets.select import Select
+from . import photoelastic as measured
+from .my_computations import Mine
+
+STATES = 200  # of the walk that is made at once
+HELP = """
+<b>NPZ</b> as written by <code>granforce pack --out</code> or <code>granforce import --out</code>;
+<b>LAMMPS</b>: a <code>dump custom</code> of the particles and a <code>dump local</code> of the
+contacts; <b>tables</b> (CSV): disks with columns x, y, r, and, if there are any, contacts with
+columns i, j and fn, ft; <b>photoelastic frames</b>, as PeGS writes them: positions (frame, id, x,
+y, r, flag at a wall) and an adjacency list (frame, id, id, fₜ, fₙ), or a <code>_solved.mat</code>
+of PeGS 2, for which the nearest forces in balance are found. The files are read in memory; only a
+packing is kept, in the cache; a frame is not, unless it is opened as one.
+"""
+REPORT = """
+<table style="border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums">{}</table>
+"""
+ROW = '<tr><td style="padding:2px 18px 2px 0;opacity:.75">{}</td><td><b>{}</b></td></tr>'
+WALLS = {
+    "": "as listed",
+    "box": "a box",
+    "annulus": "an annulus",
+    "circle": "a circle",
+    "open": "left open",
+}
+SMALL = {"size": "small", "width": 150, "margin": (4, 8)}
+
+
+class View:
+    """Drop files, see the report; the packing is then on the page."""
+
+    name = "upload"
+
+    def __init__(self, state: AppState) -> None:
+        self.state = state
+        self.files: uploads.Files = {}
+        self.task = state.work.task(told=False)
+        self.dropper = Dropper(
+            self._dropped,
+            self._refuse,
+            label="Drop the files of a packing here, or click to choose them",
+            most=LIMITS.upload * 10**6,
+            sizing_mode="stretch_width",
+            margin=(8, 10),
+        )
+        self.mu = pmui.TextInput(label="Friction μ", value="0.3", **SMALL)
+        self.box = pmui.TextInput(label="Box L_x, L_y, tilt", placeholder="open", **SMALL)
+        self.pressure = pmui.TextInput(label="Pressure", value="1", **SMALL)
+        self.walls = Select(label="Walls", options=by_words(WALLS), width=150, margin=(4, 8))
+        self.reverse = pmui.Switch(label="Tangential forces reversed", margin=(8, 8))
+        self.read = pmui.Button(label="Read", margin=(8, 8), **PRIMARY)
+        self.error = pmui.Alert(severity="error", visible=False, sizing_mode="stretch_width")
+        self.waiting = pmui.Alert(severity="info", visible=False, sizing_mode="stretch_width")
+        self.report = note()
+        self.frame = pn.Column(sizing_mode="stretch_width")
+        self.read.on_click(lambda event: self._read())
+        self.task.param.watch(lambda event: self._refuse(event.new), "message")
+        self._ask()
+
+    def panel(self) -> pn.Column:
+        """Where to drop, what is asked, and what came."""
+        return pn.Column(
+            self.dropper,
+            pn.FlexBox(
+                *(self.mu, self.box, self.pressure, self.walls, self.reverse, self.read),
+                sizing_mode="stretch_width",
+            ),
+            Progress(self.task),
+            self.error,
+            self.waiting,
+            self.report,
+            self.frame,
+            note(HELP),
+            # On a server for all it would show all theirs.
+            *([] if LIMITS.shared else [Mine(self.state)]),
+            sizing_mode="stretch_width",
+        )
+
+    def _ask(self) -> None:
+        """Show the fields that the files at hand need."""
+        kind = uploads.family(self.files) if self.files else None
+        self.mu.visible = kind in ("lammps", "table", "pegs", "solved")
+        self.reverse.visible = self.walls.visible = kind in ("pegs", "solved")
+        self.box.visible = self.pressure.visible = kind == "table"
+        self.read.visible = self.mu.visible and not uploads.missing(self.files)
+
+    def _dropped(self, new: list[tuple[str, bytes]]) -> None:
+        self._refuse("")
+        self._clear()  # what was dropped before
+        try:
+            self.files = uploads.added(self.files, new)
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        self._ask()
+        absent = [uploads.WORDS[part] for part in uploads.missing(self.files)]
+        self.waiting.param.update(
+            title=f"Now drop the {' and the '.join(absent)}." if absent else "",
+            visible=bool(absent),
+        )
+        if not absent:
+            self._read()
+
+    def _read(self) -> None:
+        self._refuse("")
+        try:
+            options = self._options()
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        if uploads.family(self.files) in ("pegs", "solved"):
+            self._clear()
+            self.task.start(photoelastic_frames.infer(self.files, **options), self._compare)
+            return
+        self.task.start(uploads.bring(self.state.library, self.files, **options), self._show)
+
+    def _options(self) -> dict[str, Any]:
+        kind = uploads.family(self.files)
+        options: dict[str, Any] = (
+            {} if kind == "npz" else {"mu": friction(self.mu.value_input or self.mu.value)}
+        )
+        if kind in ("pegs", "solved"):
+            options |= {"reverse": self.reverse.value, "walls": self.walls.value or None}
+        if kind == "table":
+            sides = (self.box.value_input or self.box.value).replace(",", " ").split()
+            if len(sides) not in (0, 2, 3):
+                raise InputError(
+                    "give two sides of the box, such as 30, 30, and its tilt, if it has one; or "
+                    "nothing if it is open"
+                )
+            options["box"] = [positive(side, "a side of the box") for side in sides[:2]] or None
+            options["tilt"] = (
+                make_cell(options["box"], _number(sides[2])).tilt if sides[2:] else 0.0
+            )
+            options["pressure"] = positive(self.pressure.value, "the pressure")
+        return options
+
+    def _show(
+        self, brought: uploads.Brought, frame: photoelastic_frames.Frame | None = None
+    ) -> None:
+        """Report, and put the packing on the page; its walk is computed at once."""
+        rows = "".join(ROW.format(*map(html.escape, row)) for row in uploads.told(brought.report))
+        self.report.object = f"<p>{html.escape(brought.source)}</p>" + REPORT.format(rows)
+        self.state.measured = frame and photoelastic_frames.measured(frame, brought.params)
+        mu = brought.params["mu"]
+        self.state.ask(Selection(brought.params, mu, states=STATES), at_once=True)
+
+    def _compare(self, frame: photoelastic_frames.Frame) -> None:
+        """Measured beside inferred forces."""
+        options = self._options()
+        shown = measured.Frames(frame, dict(self.files), self.task, self.open, **options)
+        self.frame[:] = shown.panel()
+
+    def open(self, frame: photoelastic_frames.Frame) -> None:
+        """Put a frame on the page, as a packing like any other."""
+        if self.task.running:
+            return
+        packing, source = frame.packing, f"{frame.source}, frame {frame.report['frame']}"
+        self.task.start(
+            uploads.keep(self.state.library, packing, source),
+            lambda brought: self._show(brought, frame),
+        )
+
+    def _clear(self) -> None:
+        self.report.object = ""
+        self.frame[:] = []
+
+    def _refuse(self, line: str) -> None:
+        self.error.param.update(title=line, visible=bool(line))
+
+
+def _number(tilt: str) -> float:
+    try:
+        return float(tilt)
+    except ValueError:
+        raise InputError(f"the tilt must be a number, got {brief(tilt)}") from None

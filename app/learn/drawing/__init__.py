@@ -1,0 +1,1 @@
+"""Pictures of small scenes and their S."""

@@ -1,0 +1,64 @@
+// The exact intervals of all normal forces in a small scene, and where each force is in its own. What
+// has not changed is not touched, and nothing that moves is laid out anew: a frame is to be cheap.
+
+import { forceName, number } from "../model/sentences.js"
+
+const SEEN = 0.03 // part of the rail: how wide a bar is at least, to be seen beside the mark of the force
+
+export class Bars {
+  constructor(host) { this.host = host; this.rows = [] }
+
+  /**
+   * ends: [least, largest] of each contact, known otherwise where S is not drawn whole; fresh: nothing was
+   * dragged yet, and what there is to find out is not told.
+   */
+  draw(body, lit, ends, fresh) {
+    this.host.hidden = body.empty
+    if (body.empty) return
+    if (this.rows.length !== body.count) this.begin(body.count)
+    const F = body.forces(), both = this.rows.map((_, c) => (body.whole ? this.exact(body)[c] : ends?.[c] ?? [NaN, NaN]))
+    const finite = [...both.flat().filter(Number.isFinite), ...F.filter((_, k) => k % 2 === 0)]
+    const most = Math.max(...finite, 1e-9) * 1.1, at = (v) => Number(((100 * Math.min(v, most)) / most).toFixed(2))
+    this.rows.forEach((row, c) => {
+      const [low, high] = both[c], value = F[2 * c]
+      row.tell("class", lit.has(c) ? "lit" : "")
+      row.tell("label", forceName(body.scene, 2 * c))
+      const wide = high - low < 1e-9 * body.scaleOf() ? 0 : Math.max(SEEN, (at(high) - at(low)) / 100)
+      row.tell("span", Number.isNaN(low) ? "scaleX(0)" : `translateX(${at(low)}%) scaleX(${wide})`)
+      row.tell("dot", `translateX(${at(value)}%)`)
+      row.tell("value", `${number(value)}${fresh && wide ? "" : range(low, high, body.scaleOf())}`)
+    })
+  }
+
+  /** Intervals of a body that is drawn whole, until it is cut anew. */
+  exact(body) {
+    if (this.corners !== body.corners) {
+      this.corners = body.corners
+      this.known = Array.from({ length: body.count }, (_, c) => body.interval(2 * c))
+    }
+    return this.known
+  }
+
+  begin(count) {
+    this.host.innerHTML = Array.from({ length: count }, (_, c) => `
+      <div role="listitem" data-contact="${c}"><span class="label"></span><span class="rail"><i class="span"></i><i class="dot"></i></span><span class="value"></span></div>`).join("")
+    this.rows = [...this.host.children].map((row) => {
+      const told = {}, part = (name) => row.querySelector(`.${name}`)
+      const tells = {
+        class: (text) => { row.className = text },
+        label: (text) => { part("label").textContent = part("label").title = text },
+        value: (text) => { part("value").textContent = text },
+        span: (text) => { part("span").style.transform = text },
+        dot: (text) => { part("dot").style.transform = text },
+      }
+      return { tell: (what, text) => { if (told[what] !== text) tells[what]((told[what] = text)) } }
+    })
+  }
+}
+
+/** Between which values a force may lie, in words. */
+function range(low, high, scale) {
+  if (Number.isNaN(low)) return ""
+  if (high - low < 1e-9 * scale) return " (fixed)"
+  return Number.isFinite(high) ? ` (possible ${number(low)} to ${number(high)})` : ` (${number(low)} or more)`
+}

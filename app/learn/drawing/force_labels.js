@@ -1,0 +1,71 @@
+// What stands beside the forces of a small scene: their values, and of a single disk their names.
+
+import { distance } from "../model/polytope.js"
+import { number } from "../model/sentences.js"
+
+export const ASIDE = 9 // px of friction from a wall, which would lie over it
+
+/** Beside the forces that S is drawn by: their values, on the side of each that is more free. */
+export function drawValues(arrows, F) {
+  const { context: g, body, look } = arrows
+  g.font = "bold 12px sans-serif"
+  g.textAlign = "center"
+  g.textBaseline = "middle"
+  for (const [force, colour] of look.axes ?? []) {
+    const text = `${force % 2 ? "tangential" : "normal"} ${number(F[force])}`, wide = g.measureText(text).width / 2 + 3
+    const ends = arrows.ends().filter(({ contact }) => contact === force >> 1), { at, across } = ends[0]
+    const inward = ends.reduce((sum, end) => sum.map((v, k) => v + end.inward[k]), [0, 0]) // 0 between two disks
+    const out = wide * Math.abs(across[0]) + 13, along = Math.max(0.3 * body.scene.r[ends[0].disk] * arrows.unit, wide + 4) // clear of a wall
+    const [x, y] = arrows.px(...at).map((v, k) => v + along * [inward[0], -inward[1]][k])
+    const places = [1, -1].map((side) => [x + side * out * across[0], y - side * out * across[1]])
+    const room = places.map((place) => Math.min(...arrows.shafts.map(([a, b]) => distance(a, b, ...place))))
+    const [px, py] = places[room[1] > room[0] + 4 ? 1 : 0]
+    g.lineWidth = 3
+    g.strokeStyle = look.fill
+    g.strokeText(text, px, py)
+    g.fillStyle = colour
+    g.fillText(text, px, py)
+    arrows.shafts.push([[px - wide, py], [px + wide, py]]) // no number of a disk there
+  }
+}
+
+/** Beside the only disk: what each wall does, in numbers, and the weight. */
+export function drawNames(arrows, F) {
+  const { context: g, body, look } = arrows, { scene } = body
+  g.font = "13px sans-serif"
+  g.textBaseline = "middle"
+  const write = (x, y, lines, align) => {
+    g.textAlign = align
+    lines.forEach((line, k) => {
+      g.fillStyle = k ? look.cold : look.ink
+      g.fillText(line, x, y + 17 * (k - (lines.length - 1) / 2))
+    })
+  }
+  for (const { contact, at, inward, across } of arrows.ends()) {
+    const [px, py] = arrows.px(...at), [n, t] = [F[2 * contact], F[2 * contact + 1]], [ux, uy] = [-inward[0], inward[1]]
+    const along = [t * across[0], t * across[1]], slanted = Math.min(...across.map(Math.abs)) > 0.1 ? " the wall" : "", way = Math.abs(t) < 5e-4 ? "" : Math.abs(along[1]) > Math.abs(along[0]) - 1e-9 ? `, ${along[1] > 0 ? "up" : "down"}${slanted}` : along[0] > 0 ? ", right" : ", left"
+    const rubs = ["friction", `${number(Math.abs(t))}${way}`], x = px + 22 * ux, room = ux > 0 ? arrows.easel.wide - x : x
+    const fits = (line) => g.measureText(line).width < room - 4
+    const both = fits(rubs.join(" ")) ? [rubs.join(" ")] : rubs
+    const name = ["force from the ", ""].map((before) => scene.names[contact].replace("at the ", before)).find(fits) ?? ""
+    const lines = [name, `normal force ${number(n)}`, ...both]
+    write(x, py + 34 * uy, lines, Math.abs(ux) < 0.3 ? "center" : ux > 0 ? "left" : "right")
+  }
+  const load = Math.hypot(body.load[0], body.load[1]), [cx, cy] = arrows.px(scene.x[0], scene.x[1])
+  if (load > 1e-9) write(cx, cy - 13, [`${load === Math.hypot(scene.load[0], scene.load[1]) ? "weight" : "weight and push"} ${Number(load.toPrecision(3))}`], "center")
+  drawParts(arrows, arrows.ends()[0], F)
+}
+
+/** Of one force, which of its arrows is which. */
+function drawParts(arrows, { contact, at, inward, across }, F) {
+  const { context: g, look } = arrows, [px, py] = arrows.px(...at), unit = arrows.unit * arrows.forceUnit
+  const tip = (way, long) => [px + way[0] * long * unit, py - way[1] * long * unit]
+  const [nx, ny] = tip(inward, F[2 * contact]), [tx, ty] = tip(across, F[2 * contact + 1]), right = inward[0] > 0
+  g.font = "12px sans-serif"
+  g.fillStyle = look.cold
+  g.textAlign = right ? "right" : "left"
+  g.fillText("normal", nx + (right ? -3 : 3), ny - 9)
+  if (Math.abs(F[2 * contact + 1]) * unit < 12) return
+  g.textAlign = right ? "left" : "right"
+  g.fillText("friction", tx + ASIDE * inward[0] + (right ? 6 : -6), ty - ASIDE * inward[1] + 8)
+}

@@ -1,0 +1,140 @@
+// S where it is a line: with what stops it at its ends; and axes of forces, below S and beside it.
+
+import { line } from "../../browser/canvas_paths.js"
+import { forceName, number } from "../model/sentences.js"
+
+const UNKNOWN = 56 // pixels beyond what was found of a line, where a question mark stands: clear of the number
+const TICKS = 70 // pixels between two numbers of an axis, at least
+
+/** The line, with what stops it at its ends; in fog only what was found of it. */
+export function drawSegment(space) {
+  const { context: g, body, look, easel } = space
+  const whole = body.corners.map(({ u }) => space.px(space.flat(u))), y0 = whole[0][1]
+  const known = space.fog ? space.been.reached(space, whole) : whole.map((at) => ({ at, found: true })), ends = known.map(({ at }) => at)
+  const index = axisForce(body, look.contact)
+  if (index !== null) drawAxis(space, index, space.fog ? y0 : Math.min(easel.high - 46, y0 + 80)) // in fog the dot is on it
+  g.strokeStyle = look.cold
+  g.lineWidth = 7
+  g.lineCap = "butt"
+  line(g, ends[0], ends[1] ?? ends[0])
+  known.forEach(({ at, found }, k) => { if (!found && !look.fresh) space.write(at[0] + (at[0] < whole[k][0] ? UNKNOWN : -UNKNOWN), y0, "?", look.edge, 22) })
+  const [a, b] = [ends[0], ends.at(-1)]
+  if (Math.abs(b[0] - a[0]) > 160) space.write(0.8 * a[0] + 0.2 * b[0], y0 + 24, "S", look.cold, 22)
+  g.font = "13px sans-serif"
+  let before = null // words of the other end
+  for (const side of ends.length > 1 ? body.sides : []) {
+    if (!known[side.corners[0]].found) continue
+    const [x, y] = ends[side.corners[0]], lit = space.lit(side), words = side.cap ? "no end this way" : space.told("words", side)
+    const text = g.measureText(words).width > 0.45 * easel.wide ? words.replace(/, | (?=and (?:at|between) )/, "\n") : words
+    const wide = Math.max(...text.split("\n").map((part) => g.measureText(part).width)), high = text.includes("\n") ? 40 : 30
+    const close = before && Math.abs(before.x - x) < (before.wide + wide) / 2 + 12
+    if (side.cap) space.drawOn([x, y], 7)
+    else { g.fillStyle = lit ? look.hand : look.cold; g.fillRect(x - 3, y - 13, 6, 26) }
+    const above = y - high - (close ? 34 : 0)
+    space.write(x, above, text, lit ? look.hand : look.ink)
+    const middle = Math.min(Math.max(x, wide / 2 + 5), easel.wide - wide / 2 - 5) // as written
+    space.free([middle, above], wide, 16 * text.split("\n").length)
+    space.labels.push({ side, x, y, reach: 30 })
+    before = { x, wide }
+  }
+}
+
+/** The axis of a force with its least, present and largest value: across S, at y below it, or up (d = 1), at x beside it. */
+export function drawAxis(space, index, at, d = 0) {
+  const { context: g, body, look, easel } = space
+  const ends = d ? [easel.high - space.floor, 10] : [24 + space.aside, easel.wide - 24]
+  const value = (u) => body.axes.reduce((sum, axis, k) => sum + u[k] * axis[index], body.origin[index])
+  // A line is drawn by its own length: how much the force changes by a step along it.
+  const [zero, slope] = space.over ? [0, 1] : [body.origin[index], value(space.moving(body.u, 1, 0)) - value(body.u)]
+  const place = (v) => space.px(d ? [0, (v - zero) / slope] : [(v - zero) / slope, 0])[d]
+  const pixels = Math.abs(place(1) - place(0)), step = nice((d ? 0.6 : 1) * TICKS / pixels)
+  const told = look.fresh || space.fog ? [] : extremes(space, value, d) // once something was dragged: they are there to be found
+  const marked = [...told.map((end) => ({ ...end, colour: look.cold })), { v: value(body.u), place: space.px(space.flat(body.u)), colour: look.hand }]
+    .map((mark) => ({ ...mark, x: mark.place[d] }))
+  const own = look.axes?.get(index) // the colour that its arrows have
+  const stroke = (x, from, to) => (d ? line(g, [from, x], [to, x]) : line(g, [x, from], [x, to]))
+  const write = (x, text, colour, size) => (d ? space.write(at - 7, x, text, colour, size, "right") : space.write(x, at + 14, text, colour, size))
+  const goal = space.goal !== undefined && index === 2 * space.read.at(-1) ? place(space.goal) : NaN
+  const beside = (x, text, colour) => {
+    const left = goal > x && goal < x + 50 // or the goal's line would run through it
+    return d ? space.write(at + 6, x - 9, text, colour, 12, "left") : space.write(left ? x - 5 : x + 5, at - 10, text, colour, 12, left ? "right" : "left")
+  }
+  g.strokeStyle = own ?? look.edge
+  g.lineWidth = 1
+  const least = index % 2 ? ends[0] : (d ? Math.min : Math.max)(ends[0], place(0)) // no normal force is below 0
+  line(g, ...[slope > 0 ? least : ends[0], ends[1]].map((x) => (d ? [at, x] : [x, at])))
+  const free = (x, k) => marked.slice(0, k).every((other) => Math.abs(other.x - x) > (d ? 16 : 40))
+  const ticks = [], [first, last] = ends.map((x) => (x - place(0)) / (place(1) - place(0)) / step).sort((a, b) => a - b)
+  for (let k = Math.ceil(index % 2 ? first : Math.max(first, 0)); k <= last; k++) {
+    const x = place(k * step)
+    stroke(x, at - 4, at + 4)
+    ticks.push([x, String(Number((k * step).toPrecision(6)))])
+  }
+  for (const [x, text] of ticks) write(x, text, look.ink, 11)
+  if (index === 2 * space.read.at(-1)) space.flag.on({ d, at, ends, now: place(value(body.u)), zero: place(0), one: place(1) })
+  if (goal > Math.min(...ends) && goal < Math.max(...ends)) drawGoal(space, goal, at, d)
+  g.lineWidth = 1
+  g.setLineDash([2, 4])
+  for (const { x, place: there, colour } of marked) {
+    g.strokeStyle = colour
+    stroke(x, there[1 - d], at)
+  }
+  g.setLineDash([])
+  marked.forEach(({ v, x, colour }, k) => { if (free(x, k)) beside(x, number(v), colour) })
+  const { r, load } = body.scene, one = r.length === 1 && Math.abs(Math.hypot(load[0], load[1]) - 1) < 1e-9
+  const unit = one ? " (weight of the disk = 1)" : ""
+  const name = forceName(body.scene, index) + unit, words = slope > 0 ? `${name} →` : `← ${name}`
+  nameAxis(space, words, own ?? look.ink, d ? null : at + 33)
+}
+
+/** Least and largest value of a force in S, with their places, but where S has no end; none until they are known. */
+function extremes(space, value, d) {
+  const { body, outline } = space, shadow = outline.stale ? [] : space.corners().map((p) => ({ v: p[d], place: space.px(p) }))
+  const all = body.whole ? body.corners.map(({ u, cap }) => ({ v: value(u), place: space.px(space.flat(u)), cap })) : shadow
+  all.sort((a, b) => a.v - b.v)
+  return all.length ? [all[0], all.at(-1)].filter(({ cap }) => !cap) : []
+}
+
+/** What the force on an axis is to pass: a line across S, with its number. */
+function drawGoal(space, x, at, d) {
+  const { context: g, body, look, easel } = space, far = d ? easel.wide - 16 : space.px(space.flat(body.u))[1] - 52
+  g.strokeStyle = look.hand
+  g.lineWidth = 1.2
+  g.setLineDash([6, 5])
+  line(g, ...[at, far].map((end) => (d ? [end, x] : [x, end])))
+  g.setLineDash([])
+  const [px, py] = d ? [far - 46, x - 12] : [x, far - 10]
+  space.write(px, py, `goal: below ${space.goal}`, look.hand, 13)
+  for (const place of [[px, py], d ? [far, x] : [x, far + 30]]) space.free(place, 60, 24)
+}
+
+/** The name of an axis: below it, at y, or along the left edge. */
+function nameAxis(space, words, colour, y) {
+  const { context: g, easel: { wide, high } } = space
+  if (y !== null) return space.write((wide + space.aside) / 2, y, words, colour)
+  g.save()
+  g.translate(14, (high - space.floor) / 2)
+  g.rotate(-Math.PI / 2)
+  g.font = "13px sans-serif"
+  const short = g.measureText(words).width > high - space.floor ? words.replace(/\w+ force (on )?/, "") : words
+  space.write(0, 0, short, colour, 13, "middle")
+  g.restore()
+}
+
+/** Which way a line is drawn: the force on its axis becomes larger to the right. */
+export function signOf(body) { return body.h === 1 ? Math.sign(body.axes[0][axisForce(body, null)]) || 1 : 1 }
+
+/** Of a line, the force on its axis: that of this contact if it changes, else the one that changes most. */
+export function axisForce(body, contact) {
+  const axis = body.axes[0], most = (part) => {
+    const size = Array.from({ length: body.count }, (_, c) => Math.abs(axis[2 * c + part])), c = size.findIndex((v) => v > 0.999 * Math.max(...size)) // the first of equals
+    return size[c] > 1e-9 ? 2 * c + part : null
+  }
+  return contact !== null && Math.abs(axis[2 * contact]) > 1e-9 ? 2 * contact : most(0) ?? most(1)
+}
+
+/** The least of 1, 2, 5, 10, … times a power of ten that is not below this. */
+function nice(least) {
+  const ten = 10 ** Math.floor(Math.log10(least))
+  return ten * ([1, 2, 5].find((k) => k * ten >= least) ?? 10)
+}

@@ -1,0 +1,397 @@
+// The small scene itself: disks, walls, the force on each disk at each contact as an arrow within its
+// cone, and, for a disk that is looked at, its forces put one after the other: they close.
+
+import { distance, dot } from "../model/polytope.js"
+import { Easel } from "./layered_canvas.js"
+import { ASIDE, drawNames, drawValues } from "./force_labels.js"
+import { circle, line } from "../../browser/canvas_paths.js"
+
+const CLEAR = 11 // px from a disk's number to the nearest arrow, if there is such a place
+const NUMBERS = [0, ...Array.from({ length: 12 }, (_, k) => k + 1)] // places for it: the middle, and around it
+const QUIET = 0.5 // opacity of forces that are not spoken of yet
+const NAMED = 3 // disks, and contacts of a single one, up to which the parts of forces are drawn that numbers tell
+
+/** Whether a scene is so much higher than wide that it needs a picture like that. */
+export function tall({ name, x, box }) {
+  const extent = (k) => { const all = x.filter((_, n) => n % 2 === k); return Math.max(...all) - Math.min(...all) }
+  return name !== "own" && !box[0] && extent(1) > 4 * extent(0) && extent(0) > 0
+}
+
+export class Arrows {
+  constructor(root, told, ratio) {
+    this.told = told // told(what, …): of a hand on it
+    this.canvas = root
+    this.easel = new Easel(root, ratio)
+    this.hover = null
+    this.held = null
+    const at = (event) => this.easel.at(event)
+    root.addEventListener("pointermove", (event) => this.moved(...at(event)))
+    root.addEventListener("pointerleave", () => { if (!this.held) { this.hover = null; told("hover", null) } })
+    root.addEventListener("pointerdown", (event) => this.grabbed(...at(event), event))
+    for (const name of ["pointerup", "pointercancel"]) root.addEventListener(name, () => { this.held = null; told("release") })
+  }
+
+  get context() { return this.easel.g }
+
+  /** Fit disks and walls into the canvas. */
+  fit(body, same = false) {
+    this.body = body
+    this.easel.measure()
+    const mean = body.sumAt(body.u) / body.count
+    const size = (body.scene.box[0] ? Math.min : Math.max)(...body.scene.r) // many arrows are short ones
+    this.forceUnit = (0.75 * size) / (Math.max(Math.abs(mean), 1e-6) || 1)
+    if (same) return // where it is built, nothing moves but what the hand moves
+    const { scene } = body, { x, r, walls, box } = scene
+    const xs = [], ys = []
+    for (let g = 0; g < r.length; g++) {
+      xs.push(x[2 * g] - r[g], x[2 * g] + r[g])
+      ys.push(x[2 * g + 1] - r[g], x[2 * g + 1] + r[g])
+    }
+    for (let k = 0; k < walls.length; k += 2) { xs.push(walls[k]); ys.push(walls[k + 1]) }
+    for (const { from } of this.pressing()) { xs.push(from[0]); ys.push(from[1]) }
+    if (box[0]) { xs.splice(0, Infinity, 0, box[0]); ys.splice(0, Infinity, 0, box[1]) }
+    const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)]
+    const { wide: width, high: height } = this.easel
+    const rooms = [0.1, tall(scene) ? 0.02 : box[0] ? 0.12 : 0.1]
+    const [across, up] = [right - left, high - low].map((size, k) => size * (1 + 2 * rooms[k]))
+    this.unit = Math.min(width / across, height / up)
+    this.unit = Math.min(this.unit, 0.27 * Math.min(width, height) / Math.max(...r))
+    this.x0 = width / 2 - (this.unit * (left + right)) / 2
+    this.y0 = height / 2 + (this.unit * (low + high)) / 2
+  }
+
+  /** What is in the middle of the canvas. */
+  get middle() { return this.back(this.easel.wide / 2, this.easel.high / 2) }
+
+  px(x, y) { return [this.x0 + this.unit * x, this.y0 - this.unit * y] }
+  back(px, py) { return [(px - this.x0) / this.unit, (this.y0 - py) / this.unit] }
+
+  /** Arrows of walls that press, three a wall: {from, force of length 1}. */
+  pressing() {
+    const { walls, pressing, press, r } = this.body.scene, long = 0.8 * Math.max(...r)
+    return [...pressing].flatMap((wall, k) => {
+      const [ax, ay, bx, by] = walls.slice(4 * wall, 4 * wall + 4), size = Math.hypot(press[2 * k], press[2 * k + 1])
+      const force = [press[2 * k] / size, press[2 * k + 1] / size]
+      return [0.2, 0.5, 0.8].map((s) => ({ from: [ax + s * (bx - ax) - long * force[0], ay + s * (by - ay) - long * force[1]], force }))
+    })
+  }
+
+  /** Both ends of every contact: {contact, disk, at, inward: force on the disk of f_n = 1, across}. */
+  ends() {
+    const { scene } = this.body, disks = scene.r.length, found = []
+    if (this.endsOf === scene) return this.found
+    Object.assign(this, { endsOf: scene, found, places: [] })
+    for (let c = 0; c < scene.i.length; c++) {
+      const [nx, ny] = [scene.normal[2 * c], scene.normal[2 * c + 1]]
+      for (const [disk, sign, arm] of [[scene.i[c], -1, scene.arm_i[c]], [scene.j[c], 1, scene.arm_j[c]]]) {
+        if (disk >= disks) continue
+        const at = [scene.x[2 * disk] - sign * arm * nx, scene.x[2 * disk + 1] - sign * arm * ny]
+        found.push({ contact: c, disk, at, inward: [sign * nx, sign * ny], across: [-sign * ny, sign * nx] })
+      }
+      const [one, other] = found.slice(-2)
+      if (!scene.box[0] || Math.hypot(one.at[0] - other.at[0], one.at[1] - other.at[1]) < 1e-6) continue
+      Object.assign(one, { copy: other.at }) // where it is seen on a copy of its disk
+      Object.assign(other, { copy: one.at })
+    }
+    return found
+  }
+
+  draw(look) {
+    const { body } = this
+    this.look = look
+    this.easel.measure()
+    this.shafts = [] // of arrows, where no number is to be
+    const wall = look.wall ?? []
+    this.easel.begin(look.paper, [body.scene, this.unit, this.x0, this.y0, look.disk, wall.join()], () => {
+      this.drawWalls(wall)
+      this.drawDisks()
+    })
+    const F = body.empty ? null : body.forces()
+    if (F) for (const end of this.ends()) this.drawEnd(end, F)
+    if (look.fall) this.drawFall(look.fall)
+    this.drawLoads()
+    if (F) drawValues(this, F)
+    if (body.scene.r.length > 1) this.drawNumbers()
+    else if (F && body.count <= NAMED) drawNames(this, F)
+    if (look.cursor) this.drawCursor(this.px(...look.cursor))
+    if (F && look.disk !== null && look.disk < body.scene.r.length) this.drawPolygon(look.disk, F)
+  }
+
+  /** more: a wall that is being drawn. */
+  drawWalls(more) {
+    const { context: g, body, look } = this, { box } = body.scene, walls = [...body.scene.walls, ...more]
+    g.strokeStyle = look.ink
+    g.lineWidth = 3
+    g.lineCap = g.lineJoin = "round"
+    g.beginPath()
+    for (let k = 0; k < walls.length; k += 4) {
+      g.moveTo(...this.px(walls[k], walls[k + 1]))
+      g.lineTo(...this.px(walls[k + 2], walls[k + 3]))
+    }
+    g.stroke()
+    if (!box[0]) return
+    g.setLineDash([5, 5])
+    g.lineWidth = 1
+    const [left, top] = this.px(0, box[1])
+    g.strokeRect(left, top, box[0] * this.unit, box[1] * this.unit)
+    g.setLineDash([])
+  }
+
+  /** Where the keyboard's hand is. */
+  drawCursor([x, y]) {
+    const { context: g, look } = this
+    g.strokeStyle = look.hand
+    g.lineWidth = 2
+    for (const [dx, dy] of [[9, 0], [0, 9]]) line(g, [x - dx, y - dy], [x + dx, y + dy])
+  }
+
+  drawDisks() {
+    const { context: g, body, look } = this, { x, r } = body.scene, copies = this.copies()
+    const own = Array.from(r, (_, disk) => ({ disk, at: this.px(x[2 * disk], x[2 * disk + 1]) }))
+    for (const [k, { disk, at }] of [...own, ...copies].entries()) {
+      circle(g, at, r[disk] * this.unit)
+      g.globalAlpha = k < own.length ? 1 : 0.3
+      g.fillStyle = look.disk === disk ? look.lit : look.fill
+      g.fill()
+      g.strokeStyle = look.edge
+      g.lineWidth = 1.5
+      g.stroke()
+    }
+    this.beginNumbers()
+    g.globalAlpha = 0.35
+    for (const { disk, at } of copies) g.fillText(String(disk + 1), ...at)
+    g.globalAlpha = 1
+  }
+
+  /** Copies of the disks of a periodic scene that are in sight. */
+  copies() {
+    const { x, r, box } = this.body.scene, { wide, high } = this.easel, found = []
+    if (!box[0]) return found
+    for (let disk = 0; disk < r.length; disk++) {
+      for (const a of [-1, 0, 1]) for (const b of [-1, 0, 1]) {
+        const at = this.px(x[2 * disk] + a * box[0], x[2 * disk + 1] + b * box[1]), R = r[disk] * this.unit
+        if ((a || b) && at[0] > -R && at[1] > -R && at[0] < wide + R && at[1] < high + R) found.push({ disk, at })
+      }
+    }
+    return found
+  }
+
+  beginNumbers() {
+    const { context: g, look } = this
+    g.fillStyle = look.ink
+    g.font = "12px sans-serif"
+    g.textAlign = "center"
+    g.textBaseline = "middle"
+  }
+
+  /** Numbers of the disks, each clear of all arrows where there is room, and where it was if that still is. */
+  drawNumbers() {
+    const { context: g, body } = this, { r } = body.scene
+    this.ends() // a new scene forgets the places of the one before
+    this.beginNumbers()
+    for (let d = 0; d < r.length; d++) {
+      const clear = (k) => { const at = this.numberAt(d, k); return Math.min(...this.shafts.map(([a, b]) => distance(a, b, ...at))) }
+      if (clear((this.places[d] ??= 1)) < CLEAR) {
+        const room = NUMBERS.map(clear)
+        this.places[d] = room.indexOf(Math.max(...room))
+      }
+      g.fillText(String(d + 1), ...this.numberAt(d, this.places[d]))
+    }
+  }
+
+  /** Place k of a disk's number: 0 its middle, else around that. */
+  numberAt(d, k) {
+    const { x, r } = this.body.scene, [px, py] = this.px(x[2 * d], x[2 * d + 1])
+    const R = k ? 0.72 * r[d] * this.unit : 0, angle = (k * Math.PI) / 6 + 3.4
+    return [px + R * Math.cos(angle), py + R * Math.sin(angle)]
+  }
+
+  drawEnd({ contact, disk, at, inward, across, copy }, F) {
+    const { context: g, body, look } = this, { mu } = body
+    const [normal, tangential] = [F[2 * contact], F[2 * contact + 1]]
+    const [px, py] = this.px(...at), lit = look.contacts.has(contact), long = this.unit * body.scene.r[disk] * 0.62
+    const slides = body.slides(normal, tangential)
+    // The cone: where the force on the disk may point.
+    const wide = Math.atan(mu), middle = Math.atan2(-inward[1], inward[0])
+    if (lit || slides || !body.crowded) {
+      g.beginPath()
+      g.moveTo(px, py)
+      g.arc(px, py, long, middle - wide, middle + wide)
+      g.closePath()
+      g.fillStyle = lit ? look.coneLit : slides ? look.coneFull : look.cone
+      g.fill()
+      if (mu < 0.01) { g.strokeStyle = look.coneLit; g.lineWidth = 1; g.stroke() }
+    }
+    if (normal < 1e-9) {
+      circle(g, [px, py], 4)
+      g.strokeStyle = look.warm
+      g.lineWidth = 1.5
+      g.stroke()
+      return
+    }
+    const force = [0, 1].map((k) => normal * inward[k] + tangential * across[k])
+    const own = this.axisColour(contact), named = body.scene.r.length === 1 && body.count <= NAMED
+    const apart = own && body.scene.r.length <= NAMED // the part that its number tells, by itself
+    if (named) {
+      g.globalAlpha = 0.45
+      this.arrow(px, py, inward.map((v) => v * normal), look.cold, 1.5)
+      g.globalAlpha = 1
+      this.arrow(px + ASIDE * inward[0], py - ASIDE * inward[1], across.map((v) => v * tangential), look.cold, 3)
+    }
+    g.globalAlpha = look.fresh && body.crowded && !own && !lit ? QUIET : 1 // at first only those that are plotted count
+    const colour = lit ? look.hand : slides ? look.warm : (!apart && own) || look.cold, thick = lit || (own && !apart) ? 3.5 : 2.5
+    this.arrow(px, py, force, colour, thick)
+    if (apart) this.arrow(px, py, inward.map((v) => v * normal), own, 3.5)
+    g.globalAlpha *= 0.35
+    if (copy) this.arrow(...this.px(...copy), force, colour, thick)
+    g.globalAlpha = 1
+  }
+
+  /** The colour of a contact whose force S is drawn by. */
+  axisColour(contact) { return this.look.axes?.get(2 * contact) ?? this.look.axes?.get(2 * contact + 1) }
+
+  arrow(px, py, force, colour, thick) {
+    const { context: g } = this, unit = this.unit * this.forceUnit
+    let [dx, dy] = [force[0] * unit, -force[1] * unit], size = Math.hypot(dx, dy)
+    const most = 0.45 * Math.min(this.easel.wide, this.easel.high)
+    if (size < 1.5) return
+    const cut = size > most
+    if (cut) { dx *= most / size; dy *= most / size; size = most }
+    const head = Math.min(11, 0.5 * size + 2), [ux, uy] = [dx / size, dy / size]
+    this.shafts.push([[px, py], [px + dx, py + dy]])
+    g.strokeStyle = g.fillStyle = colour
+    g.lineWidth = thick
+    g.lineCap = "butt"
+    if (cut) g.setLineDash([8, 4])
+    line(g, [px, py], [px + dx - head * 0.8 * ux, py + dy - head * 0.8 * uy])
+    g.setLineDash([])
+    g.beginPath()
+    g.moveTo(px + dx, py + dy)
+    g.lineTo(px + dx - head * ux - 0.45 * head * uy, py + dy - head * uy + 0.45 * head * ux)
+    g.lineTo(px + dx - head * ux + 0.45 * head * uy, py + dy - head * uy - 0.45 * head * ux)
+    g.fill()
+  }
+
+  /** Weights, and what the visitor added. */
+  drawLoads() {
+    const { body, look } = this, { x, r } = body.scene
+    for (let d = 0; d < r.length; d++) {
+      const load = [body.load[3 * d], body.load[3 * d + 1]]
+      if (Math.hypot(...load) > 1e-9) this.arrow(...this.px(x[2 * d], x[2 * d + 1]), load, look.weight, 2.5)
+    }
+    const long = (0.72 * Math.max(...r)) / this.forceUnit
+    for (const { from, force } of this.pressing()) this.arrow(...this.px(...from), force.map((v) => v * long), look.weight, 2.5)
+  }
+
+  drawFall(motion) {
+    const { body, look, context: g } = this, { x, r, walls, pressing } = body.scene
+    pressing.forEach((wall, k) => {
+      const at = 3 * (r.length + k), big = (0.9 * Math.max(...r)) / this.forceUnit
+      const middle = [0, 1].map((d) => (walls[4 * wall + d] + walls[4 * wall + 2 + d]) / 2)
+      this.arrow(...this.px(...middle), [motion[at] * big, motion[at + 1] * big], look.warm, 4)
+    })
+    for (let d = 0; d < r.length; d++) {
+      const [vx, vy, spin] = [motion[3 * d], motion[3 * d + 1], motion[3 * d + 2]]
+      const [px, py] = this.px(x[2 * d], x[2 * d + 1]), big = 0.9 * r[d] / this.forceUnit
+      this.arrow(px, py, [vx * big, vy * big], look.warm, 4)
+      if (Math.abs(spin) < 0.05) continue
+      const R = 0.55 * r[d] * this.unit, turn = Math.max(-2.5, Math.min(2.5, 2 * spin))
+      g.strokeStyle = look.warm
+      g.lineWidth = 2.5
+      g.beginPath()
+      g.arc(px, py, R, -Math.PI / 2, -Math.PI / 2 - turn, turn > 0)
+      g.stroke()
+      const end = -Math.PI / 2 - turn, sign = Math.sign(turn), tip = [px + R * Math.cos(end), py + R * Math.sin(end)]
+      const ahead = [sign * Math.sin(end), -sign * Math.cos(end)] // along the circle
+      g.fillStyle = look.warm
+      g.beginPath()
+      g.moveTo(tip[0] + 9 * ahead[0], tip[1] + 9 * ahead[1])
+      for (const side of [5, -5]) g.lineTo(tip[0] + side * ahead[1], tip[1] - side * ahead[0])
+      g.fill()
+    }
+  }
+
+  /** The forces on one disk, weight first, put one after the other: they come back to the start. */
+  drawPolygon(disk, F) {
+    const { context: g, body, look } = this, forces = [[body.load[3 * disk], body.load[3 * disk + 1], look.weight]]
+    for (const { contact, disk: own, inward, across } of this.ends()) {
+      if (own !== disk || F[2 * contact] < 1e-9) continue
+      const [n, t] = [F[2 * contact], F[2 * contact + 1]]
+      forces.push([n * inward[0] + t * across[0], n * inward[1] + t * across[1], look.contacts.has(contact) ? look.hand : look.cold])
+    }
+    let [sx, sy] = [0, 0], corners = [[0, 0]]
+    for (const [x, y] of forces) corners.push([(sx += x), (sy += y)])
+    const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), side = Math.min(150, 0.32 * this.easel.wide)
+    const span = Math.max(Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys), 1e-9)
+    const unit = (side - 34) / span, left = this.easel.wide - side - 8, top = 8
+    g.fillStyle = look.paper
+    g.strokeStyle = look.edge
+    g.lineWidth = 1
+    g.beginPath()
+    g.roundRect(left, top, side, side + 18, 6)
+    g.fill()
+    g.stroke()
+    g.fillStyle = look.ink
+    g.font = "11px sans-serif"
+    g.textAlign = "center"
+    g.textBaseline = "alphabetic"
+    g.fillText(body.scene.r.length > 1 ? `forces on disk ${disk + 1} close` : "its forces close: balance", left + side / 2, top + side + 12)
+    const x0 = left + 17 - unit * Math.min(...xs) + ((side - 34) - unit * (Math.max(...xs) - Math.min(...xs))) / 2
+    const y0 = top + 17 + unit * Math.max(...ys) + ((side - 34) - unit * (Math.max(...ys) - Math.min(...ys))) / 2
+    const own = this.unit * this.forceUnit
+    forces.forEach(([x, y, colour], k) => {
+      this.arrow(x0 + unit * corners[k][0], y0 - unit * corners[k][1], [(x * unit) / own, (y * unit) / own], colour, 2)
+    })
+  }
+
+  // The hand
+
+  find(px, py) {
+    const { body } = this, { x, r } = body.scene
+    if (!body.empty) {
+      const F = body.forces(), unit = this.unit * this.forceUnit
+      let best = null, least = 26
+      for (const end of this.ends()) {
+        const [ax, ay] = this.px(...end.at), [n, t] = [F[2 * end.contact], F[2 * end.contact + 1]]
+        const tip = [ax + unit * (n * end.inward[0] + t * end.across[0]), ay - unit * (n * end.inward[1] + t * end.across[1])]
+        const far = Math.min(Math.hypot(px - tip[0], py - tip[1]), Math.hypot(px - ax, py - ay) * 1.2)
+        if (far < least) { least = far; best = { ...end, grip: [tip[0] - px, tip[1] - py] } }
+      }
+      if (best) return best
+    }
+    for (let d = 0; d < r.length; d++) {
+      const [cx, cy] = this.px(x[2 * d], x[2 * d + 1])
+      if (Math.hypot(px - cx, py - cy) < r[d] * this.unit) return { disk: d, loose: true }
+    }
+    return null
+  }
+
+  grabbed(px, py, event) {
+    const found = this.find(px, py)
+    if (this.told("press", { found, at: this.back(px, py) })) {
+      this.held = { taken: true }
+      this.canvas.setPointerCapture(event.pointerId)
+      return
+    }
+    this.told("select", found)
+    if (!found || found.loose) return
+    this.held = found
+    this.canvas.setPointerCapture(event.pointerId)
+    event.preventDefault()
+  }
+
+  moved(px, py) {
+    if (this.held?.taken) return this.told("carry", { at: this.back(px, py) })
+    if (this.held) return this.pull(px, py)
+    const found = this.find(px, py)
+    this.canvas.style.cursor = found && !found.loose ? "grab" : "default"
+    this.told("hover", found)
+  }
+
+  pull(px, py) {
+    const { contact, at, inward, across, grip } = this.held, [ax, ay] = this.px(...at)
+    const unit = this.unit * this.forceUnit
+    const force = [(px + grip[0] - ax) / unit, -(py + grip[1] - ay) / unit]
+    this.told("pull", { contact, normal: dot(force, inward), tangential: dot(force, across) })
+  }
+}

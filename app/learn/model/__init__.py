@@ -1,0 +1,1 @@
+"""S of a small scene."""

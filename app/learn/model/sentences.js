@@ -1,0 +1,168 @@
+// What the page of a small scene says: what stops S at a side, what is counted, what is on screen, in a sentence.
+
+import { OPENS } from "./polytope.js"
+
+export const number = (v) => (Math.abs(v) < 5e-4 ? "0" : v.toFixed(Math.abs(v) < 10 ? 3 : 1))
+const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`
+const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ")
+
+const FREE = "There is more than one because friction may be anything up to μ times the normal force."
+const BOTH = "at the left wall and at the right wall"
+// A disk between two walls cannot slide down both: what is so is that friction does all it can.
+const AT_BOTH = {
+  "about to slide up": "friction pushes the disk down\nas hard as it can",
+  "about to slide down": "friction pushes the disk up\nas hard as it can",
+}
+
+/** A force in words: 2 c for the normal one of contact c, 2 c + 1 for the tangential one. */
+export function forceName({ names }, index) {
+  const place = names[index >> 1]
+  return `${index % 2 ? "tangential" : "normal"} force ${place.startsWith("disk") ? "on " : ""}${place}`
+}
+
+/** What happens at a side of S, in words: which contacts are about to slide or to open there. */
+export function stopping({ scene }, side) {
+  const kinds = new Map()
+  for (const [contact, what] of side.stops) {
+    const [, disk, place] = scene.names[contact].match(/^(disk \d+ )?(.*)$/)
+    const verb = `${disk ?? ""}${what === OPENS ? "would lose contact" : `about to slide${way(scene, contact, what)}`}`
+    kinds.set(verb, [...(kinds.get(verb) ?? []), place])
+  }
+  return [...kinds].map(([verb, places]) => {
+    const where = places.join(" and ")
+    return where !== BOTH ? `${verb} ${where}` : AT_BOTH[verb] ?? `${verb} at both walls`
+  }).join(", ")
+}
+
+/** Where a disk is about to slide: against the friction on it; of two disks, which way round each other. */
+function way(scene, contact, what) {
+  if (scene.j[contact] < scene.r.length) return what > 0 ? " clockwise" : " anticlockwise"
+  const [x, y] = [-what * scene.normal[2 * contact + 1], what * scene.normal[2 * contact]]
+  return Math.abs(y) > 0.3 ? (y > 0 ? " up" : " down") : x > 0 ? " right" : " left"
+}
+
+/** What is drawn of the disks, in this scene. */
+export function legend(body) {
+  const { scene, h, empty, load } = body
+  if (empty && !scene.idle) return "orange: the motion in which they give way; grey: weight and other loads"
+  const pulled = load.some((v, k) => k < 3 * scene.r.length && v), pressed = scene.pressing.length > 0
+  const weights = Array.from(scene.r, (_, d) => Math.hypot(load[3 * d], load[3 * d + 1]))
+  const each = weights.every((w) => Math.abs(w - weights[0]) < 1e-9) ? ` ${Number(weights[0].toPrecision(3))}${weights.length > 1 ? " each" : ""}` : ""
+  const loads = [pulled ? `weight${each}` : "", pressed ? "the press" : ""].filter(Boolean).join(", ")
+  const parts = scene.r.length < 4 ? "normal parts, " : ""
+  const axes = h === 2 || h > 3 ? `; green, violet: ${parts}plotted on the right` : ""
+  const heads = scene.r.length > 2 ? " (equal and opposite between two disks)" : ""
+  return `blue: contact forces${heads}${axes}${body.crowded ? "" : "; wedge: where a force may point"}${loads ? `; grey: ${loads}` : ""}${slips(body) ? "; orange: friction at its limit" : ""}`
+}
+
+/** Whether friction is at its limit at some contact. */
+function slips(body) {
+  const F = body.forces()
+  return Array.from(body.scene.i).some((_, c) => F[2 * c] > 1e-9 && body.slides(F[2 * c], F[2 * c + 1]))
+}
+
+/** Forces less equations, as HTML; in fog, what is free is what the hand moves; where S is empty, that no solution is allowed. */
+export function counted({ h, count, scene, empty, consistent, whole, corners }, fog) {
+  const equations = scene.equations ?? 0, [sum, why] = equationsOf(scene)
+  const forces = plural(count, "contact") + ", each with a normal and a tangential component"
+  if (empty && !scene.idle) {
+    const none = consistent ? "none of their solutions is allowed" : "they have no solution"
+    const because = consistent ? "; in every solution some contact would have to pull, or its tangential force to exceed μ × its normal force" : ""
+    return `<b>${2 * count} unknown force components, ${equations} equations: ${none}</b> <span>(${forces}${because})</span>`
+  }
+  const point = h && whole && corners.length === 1 ? `, but the wedges leave ${h > 1 ? "them" : "it"} no room` : ""
+  const free = h === 1 ? "number" : "numbers", dot = fog ? `: the red dot's position${h > 2 ? `, and ${h - 2} more` : ""}` : ""
+  const told = `<b>${2 * count} unknown force components − ${equations} equations = ${h} free ${free}${point || dot}</b>`
+  return scene.box[0] ? `${told} <details><summary>Why ${equations}?</summary>${sum}${why} (${forces}).</details>` : `${told} <span>(${forces}; ${sum}${why})</span>`
+}
+
+/** The sum that gives the number of equations, and what its parts are. */
+function equationsOf({ grains, r, pressing, box, equations }) {
+  const disks = [...(grains ?? [])].filter((grain) => grain < r.length).length, walls = 2 * pressing.length
+  const whole = box[0] ? 3 * disks - 1 : 3 * disks + walls
+  const said = `no net force sideways, none up or down, and no turning${disks > 1 ? ", for each disk" : ""}`
+  if (whole !== equations) return [said, ""]
+  if (box[0]) return [`${disks} disks × 3 − 2 + 1 = ${whole} equations: `, `three for each disk, less two that follow from the others, plus one for the pressure`]
+  return [`${plural(disks, "disk")} × 3${walls ? ` + ${walls}` : ""} = ${whole} equations: `, said + (walls ? "; and two of the wall that presses" : "")]
+}
+
+/** What the bars below show; empty where there are none. */
+export function barred({ empty, h, scene }) {
+  return empty || !h || scene.idle ? "" : "The range of each normal force (pale), and its value now (red):"
+}
+
+/** What is special about a scene, besides its forces; empty for most, and where the sentence over it says so. */
+export function special({ scene }, fog) {
+  if (!scene.box[0] || fog) return ""
+  const touched = new Set([...scene.i, ...scene.j])
+  const loose = Array.from(scene.r, (_, k) => k).filter((k) => !touched.has(k)).map((k) => k + 1)
+  const rattles = loose.length ? ` Disk ${listed(loose)} ${loose.length > 1 ? "are" : "is"} loose: no disk presses on ${loose.length > 1 ? "them" : "it"}, so that ${loose.length > 1 ? "they take" : "it takes"} no part.` : ""
+  return `${scene.r.length} disks squeezed from all sides by pressure ${Number(scene.pressure.toPrecision(3))}, without gravity. The dashed square repeats in all directions; pale disks are copies.${rattles}`
+}
+
+/** What the picture of S is. */
+export function pictured(body, { filled: dotted, fog }) {
+  const { h, whole, empty, corners, scene } = body, S = `S: every way to hold the ${scene.r.length > 1 ? "disks" : "disk"} (here:`
+  if (scene.idle) return "S: not before something presses"
+  if (empty) return "S: empty"
+  if (!h || (whole && corners.length === 1)) return `${S} a single point)`
+  if (fog && h < 3) return h < 2 ? "the red dot goes only as far as friction allows" : "the red dot goes only where friction allows: find the edge"
+  if (fog && h > 3) return "one pair of green and violet forces: drag to find the limits"
+  return h > 3 ? `shadow (projection) of S onto two of the forces${dotted ? "; dots: random points, rarely near its edge" : ""}`
+    : `${S} ${["", "a line)", "a polygon); axes: normal parts of the green and the violet force", "a body; drag beside the point to turn it)"][h]}`
+}
+
+/** The sentence over a scene. */
+export function sentence(body, mu, now) {
+  const { h, scene } = body, several = scene.r.length > 1
+  if (scene.idle) return "Nothing presses on these disks yet: choose “Make a wall press”, then click a wall."
+  if ([...scene.pressing].some((_, k) => !scene.j.includes(scene.r.length + k))) return "A wall presses on no disk, and nothing holds it: put a disk against it."
+  if (body.empty) return falling(body, mu, now)
+  if (!h) return "Everything is determined: there is one set of forces, and mechanics finds it."
+  if (body.whole && body.corners.length === 1) {
+    return mu ? "S is one point: of all forces in balance, only these stay in their wedges. Everything is determined."
+      : "Without friction S is one point: everything is determined. Open the wedges with the slider."
+  }
+  if (!body.bounded) {
+    const jammed = several ? "the disks have jammed themselves" : "the disk has jammed itself"
+    const filled = now.filled ? " As S is infinite, evenly spread random points are impossible." : ""
+    return `S has no end${h > 1 ? " in some direction" : ""}: ${jammed}, and the forces may be as large as you like. The wedges are so wide that ${several ? "some disks can be pressed" : "the walls can press it"} from opposite sides, as hard as you like: such forces cancel, and can be added to any that hold.${filled}`
+  }
+  if (h > 3 && now.fog && scene.box[0]) return `${scene.r.length} disks under pressure ${Number(scene.pressure.toPrecision(3))}, without gravity; the dashed square repeats endlessly (pale disks are copies). Drag the red dot: it sets the green and violet forces, and the others change as little as they must. Friction is at most μ times the normal force, and disks cannot pull: that sets limits.`
+  if (h > 3 && now.fresh) return `${h} numbers are free; the red dot sets the green and violet forces. Drag it: the others change as little as they must to keep every disk in balance. Friction is at most μ times the normal force, and disks cannot pull: that sets limits.`
+  if (h > 3) return `Every point of S (the set of all solutions) is one set of forces that holds them. S has ${h} dimensions, so the plot shows its shadow: only the green and the violet force. Wherever you drag the red dot in it, the other forces change just enough to keep every disk in balance.`
+  const fixed = scene.names.filter((_, c) => { const [low, high] = body.interval(2 * c); return high - low < 1e-9 * body.scaleOf() }).length
+  const determined = fixed ? ` ${fixed} of the ${body.count} normal forces cannot change.` : ""
+  const opens = body.sides.some(({ stops }) => stops.some(([, what]) => what === OPENS))
+  const limit = `${["", "an end", "a side", "a face"][h]}: there, a contact is about to slip${opens ? " or open" : ""}`
+  const every = `Every point of the blue ${["", "line", "polygon", "body"][h]} S (the set of all solutions) is one set of forces that holds the same ${several ? "disks" : "disk"} at rest.`
+  const grips = gripped(body) ? " Here friction points down the walls, as if the disk had been pressed in; it can point up, too." : ""
+  const wedged = several && wedges(body) ? " Wedged between the walls, disks can press with more than their weight." : ""
+  if (now.fog) return `Each position of the red dot is one set of forces that holds the same ${several ? "disks" : "disk"} at rest. ${FREE}${grips}${wedged}`
+  if (now.fresh) return `${every} ${FREE}` // the rest once something was touched
+  return `${every} Drag the point to ${limit}. Or drag an arrow.${determined}${grips}${wedged}`
+}
+
+/** Whether a normal force can be more than all disks weigh. */
+function wedges(body) {
+  const { load, r } = body.scene, weight = Array.from(r).reduce((sum, _, d) => sum + Math.hypot(load[3 * d], load[3 * d + 1]), 0)
+  return weight > 0 && Array.from({ length: body.count }, (_, c) => body.interval(2 * c)[1]).some((most) => most > 1.5 * weight)
+}
+
+/** Whether friction on a disk between two walls, and nothing else, points down at both, as it can only there. */
+function gripped(body) {
+  const { scene } = body, F = body.forces(), between = body.sides.find((side) => stopping(body, side) === AT_BOTH["about to slide up"])
+  return between?.stops.every(([c]) => -F[2 * c + 1] * scene.normal[2 * c] < -1e-9)
+}
+
+/** Why S is empty: which disks and walls give way in the motion that proves it, and which friction would do. */
+function falling({ scene: { r, pressing, load: own }, load }, mu, { fall, enough }) {
+  const moving = fall ? Array.from({ length: fall.length / 3 }, (_, k) => k).filter((k) => Math.hypot(...fall.slice(3 * k, 3 * k + 3)) > 0.05) : []
+  const disks = moving.filter((k) => k < r.length).map((k) => k + 1), pressed = disks.length < moving.length
+  const which = [disks.length ? `disk${disks.length > 1 ? "s" : ""} ${listed(disks)}` : "", pressed ? "the wall that presses" : ""].filter(Boolean).join(" and ")
+  const pushed = load.some((v, k) => v !== own[k]) ? " and the push" : ""
+  const loads = pressing.length ? "the press does" : `the weights${pushed} do`
+  const why = moving.length ? ` The orange arrows show how ${which} give${moving.length > 1 ? "" : "s"} way. In this motion ${loads} work, and no contact force that friction allows can stop it.` : ""
+  const mended = enough ? ` With friction of at least μ = ${enough} it would hold.` : ""
+  return `Nothing balances at μ = ${Number(mu.toPrecision(4))}: S is empty.${mended}${why}`
+}

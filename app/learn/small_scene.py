@@ -1,0 +1,149 @@
+"""A small scene and the whole of its S: drawn, cut and pulled in the browser; see small.js."""
+
+import base64
+from typing import Any
+
+import param
+
+from granforce.packing import scenes as made
+from granforce.records import InputError, NotJammedError, UndecidedError
+
+from ..background.jobs import Job, Task
+from ..browser.bundle import Scripted
+from ..browser.messages import Message
+from .model import small_scenes
+
+# Title, text, and what the scene shows, of the steps of the tour before those of large packings.
+FIRST_STEPS = (
+    (
+        "One disk, two walls",
+        "A disk of weight 1 lies in a groove. Each wall presses on it and rubs: four forces. But "
+        "there are only three equations: no net force sideways, none up or down, no turning. One "
+        "number stays free: how hard the walls squeeze the disk. Squeezed hard, it would pop up if "
+        "friction did not hold it down.",
+        {"scene": "groove", "mu": 0.5},
+    ),
+    (
+        "Every way to hold it, at once",
+        "The line is S: each of its points is one set of forces that holds the disk. Drag the "
+        "point, or an arrow: the forces change and stay in balance. S ends where a force meets the "
+        "edge of its wedge, the friction cone: there the disk is about to slide.",
+        {"scene": "groove", "mu": 0.5},
+    ),
+    (
+        "What friction does",
+        "Drag the friction μ. At μ = 0 the wedges are closed, and S is one point. More friction "
+        "opens the wedges, and S grows. At μ = 1, as steep as the walls, it has no end any more: "
+        "the disk has jammed itself.",
+        {"scene": "groove", "mu": 0.8, "see": "strip"},
+    ),
+    (
+        "More disks, more free numbers",
+        "Thirteen disks pressed together from all sides leave eight numbers free: S has eight "
+        "dimensions, of which only a shadow can be drawn, on two of the forces. Drag the point, or "
+        "an arrow: all forces follow. Next: 400 disks, with hundreds of free numbers.",
+        {"scene": "thirteen"},
+    ),
+)
+
+
+class Small(Scripted):
+    """The page of a small scene."""
+
+    scene = param.Dict(default={}, doc="see small_scenes.drawn")
+    titles = param.List(doc="[name, title] of every scene")
+    steps = param.List(doc="title, text and what is shown, of each step of the tour")
+    all = param.Integer(doc="steps of the whole tour")
+    step = param.Integer(doc="of the tour, to begin with; 0 for none")
+    note = param.String(doc="what was wrong with the link")
+    first = param.Boolean(doc="whether the page was opened without a view to show")
+    dark = param.Boolean()
+
+    def __init__(
+        self, asked: small_scenes.Asked, task: Task, all_steps: int, **params: Any
+    ) -> None:
+        """asked: small_scenes.Asked. task: a jobs.Task of the page, for slow scenes."""
+        super().__init__(
+            titles=small_scenes.titles(),
+            steps=[list(step) for step in FIRST_STEPS],
+            all=all_steps,
+            **params,
+        )
+        self._task = task
+        self._made = True  # the scene that was asked for last
+        task.param.watch(self._failed, "message")
+        self._show(asked.scene, asked.mu, asked.built)
+
+    def _show(self, name: str, mu: float | None = None, built: str = "") -> None:
+        if name == small_scenes.MANY:  # has a page of its own
+            return
+        self._made = name not in made.SCENES or not made.SCENES[name].packed
+        if not self._made:
+            self._task.start(lambda job: small_scenes.drawn(name, mu), self._put)
+            return
+        try:
+            self._put(small_scenes.drawn(name, mu, built))
+        except (InputError, NotJammedError) as error:
+            if self.scene:
+                self.tell({"error": str(error)})
+            else:  # a link that cannot be: its page begins anew, and says why
+                self.note = str(error)
+                self._show(name)
+
+    def _put(self, scene: dict[str, Any]) -> None:
+        self._task.cancel()  # what was still to be told of the scene before
+        self._made = True
+        self.scene = scene
+
+    def _failed(self, event: Any) -> None:
+        if event.new:
+            self._made = True
+            self.tell({"error": event.new})
+
+    def _heard(self, message: Message) -> None:
+        """Another scene, another μ, or a question about what is shown."""
+        try:
+            match message:
+                case {
+                    "find": what,
+                    "scene": scene,
+                    "built": built,
+                    "mu": mu,
+                    "load": load,
+                    "plane": plane,
+                }:
+                    self._find(what, scene, built, mu, load, plane)
+                case {"scene": name} if name in (*made.SCENES, small_scenes.OWN):
+                    self._show(name, message.get("mu"))
+                case {"query": query}:
+                    asked = small_scenes.asked(query)
+                    self._show(asked.scene, asked.mu, asked.built)
+                case {"built": built, "mu": mu}:
+                    self._show(small_scenes.OWN, mu, built[: small_scenes.LONGEST])
+        except (InputError, NotJammedError, UndecidedError) as error:
+            self.tell({"error": str(error)})
+
+    def _find(
+        self, what: str, scene: str, built: str, mu: float, load: list[float], plane: list[int]
+    ) -> None:
+        """Tell what is asked of a scene at this μ, under these loads.
+
+        Nothing of a scene that has been replaced, or is about to be: an answer would end the making
+        of the next.
+        """
+        if not self._made or (scene, built) != (self.scene["name"], self.scene["built"]):
+            return
+
+        def found(job: Job) -> Message:
+            packing = small_scenes.packing_of(scene, mu, built)
+            match what:
+                case "file":
+                    file = base64.b64encode(small_scenes.file_of(packing, load))
+                    return {"file": file.decode()}
+                case "fall":
+                    return {"fall": small_scenes.falling(packing, load).tolist()}
+                case _:
+                    asked = {"scene": scene, "mu": mu, "plane": plane}
+                    return {"measured": small_scenes.measured(packing, load, plane), **asked}
+
+        self._task.start(found, self.tell)

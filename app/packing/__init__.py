@@ -1,0 +1,1 @@
+"""The packing on screen and its player."""

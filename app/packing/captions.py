@@ -1,0 +1,52 @@
+"""What pictures and files say about themselves: captions, and their names."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from ..results.library import Cell
+from ..results.selection import Selection
+from ..state.app_state import AppState
+from ..state.view_settings import WIDTHS
+from .view import colour_bar, colour_words
+
+GROUND = ("#ffffff", "#121212")  # by day, by night
+NAMED = 4  # known forces that a caption names
+
+
+def caption(state: AppState) -> dict[str, Any]:
+    """What a picture says about itself: background, colour bar, scale and words."""
+    pulled, looks = bool(state.hand.pulls), state.looks
+    low, stops, high = colour_bar(state, pulled)
+    contrast = "#f2f5f9" if looks.dark else "#18191d"
+    return {
+        "background": GROUND[looks.dark],
+        "ink": contrast,
+        "bar": {"low": low, "high": high, "stops": stops},
+        "lines": [
+            f"Width: {WIDTHS[looks.thickness]}; colour: {colour_words(looks, pulled)}.",
+            origin(state.cell),
+            *known_words(state),
+            f"granforce ?{state.link()}",
+        ],
+    }
+
+
+def origin(cell: Cell) -> str:
+    """Where states come from, in all words that it takes to make them again."""
+    return f"μ = {cell.mu:g}, {cell.series}"
+
+
+def known_words(state: AppState) -> Iterator[str]:
+    """What is known, in a line of a caption; none where nothing is."""
+    number = state.replay.backbone
+    told = [one.words(number[one.contact]) for one in state.knowledge.known]
+    if told:
+        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+        yield f"Known: {'; '.join(told[:NAMED])}{more}."
+
+
+def stem(selection: Selection) -> str:
+    """Name of a file without its ending."""
+    if selection.imported:
+        return f"granforce_{selection.packing['imported'][:8]}_mu{selection.mu:g}"
+    return f"granforce_n{selection.packing['n']}_mu{selection.mu:g}_s{selection.packing['seed']}"

@@ -1,0 +1,199 @@
+// The plots beside, found in the page by name: a few numeric columns of them are rewritten in place,
+// without telling the server.
+
+import { Handles, Layer, LAYERS } from "./plot_layer.js"
+
+const OFF_SCALE = 0.005 // of the bars, which may be longer than the axis
+
+export class Plots {
+  /** hands: what takes hold of the dots of the bars, and of the point in force space. */
+  constructor(document, onData, { dots, point }) {
+    this.document = document
+    this.handles = [
+      new Handles(this, "bars", "bars", ["rank", "now"], dots),
+      new Handles(this, "path", "here", ["x", "y"], point),
+    ]
+    this.plane = {}
+    this.onData = onData
+    this.heard = new Set()
+    this.layers = {} // by the name of the source whose plot they lie on
+    this.moving = false
+    this.invites = false // whether the point in force space says that it can be dragged
+    this.colours = {}
+    this.placed = { count: 0, drawn: 0 } // states of a walk under way: in force space, and by Bokeh
+  }
+
+  /** Draw what moves on layers, or at rest have it drawn by Bokeh. */
+  move(on) {
+    this.moving = on
+    this.invite(this.invites)
+    if (on) return
+    for (const layer of Object.values(this.layers)) layer.take(false)
+    this.drawPlaced()
+  }
+
+  /** The layer of a plot, if it is on screen. */
+  layer(name) {
+    const fig = named(this.document, `${name}_figure`), known = this.layers[name]
+    if (!fig || known?.fig === fig) return known
+    return (this.layers[name] = new Layer(fig, (context, scales) => LAYERS[name](context, scales, this, this.replay)))
+  }
+
+  /** Show new contents of a source: on its layer while things move. */
+  changed(source, name) {
+    const layer = this.layer(name)
+    layer?.take(this.moving)
+    if (layer?.on) layer.paint()
+    else source.change.emit()
+  }
+
+  /** Have the point in force space say that it can be dragged: its layer does while things move. */
+  invite(on) {
+    this.invites = on
+    const tag = named(this.document, "invitation"), visible = on && !this.moving
+    if (tag && tag.visible !== visible) tag.setv({ visible }, { sync: false })
+  }
+
+  /** A source by name; new contents of it are heard from now on. */
+  find(name) {
+    const source = named(this.document, name)
+    if (source && !this.heard.has(source)) {
+      this.heard.add(source)
+      source.properties.data.change.connect(this.onData)
+    }
+    return source
+  }
+
+  /** Intervals and measures of the states passed. */
+  show(replay, scale) {
+    this.replay = replay
+    const bars = this.find("bars"), growth = this.find("growth"), { walk, seen } = replay
+    if (replay.bounds && bars && bars.data !== this.filled) this.fillBounds(replay, scale)
+    if (bars?.get_column("at")) this.showBars(bars, replay, scale)
+    if (!(growth?.get_column("state")?.length >= walk.number.length)) return
+    let most = 0
+    for (const name of ["eta1", "eta2", "eta3"]) {
+      const column = growth.get_column(name), factor = name === "eta3" ? 0.15 : 1, all = walk[name]
+      for (let k = 0; k <= seen; k++) {
+        column[k] = factor * all[k]
+        if (column[k] > most) most = column[k]
+      }
+      column.fill?.(NaN, seen + 1)
+    }
+    this.reach(most)
+    this.changed(growth, "growth")
+  }
+
+  /** The axis of η reaches as far as η, which is not known while states are being found. */
+  reach(most) {
+    const range = named(this.document, "growth_range")
+    if (most > range?.end) range.end = 1.25 * most
+  }
+
+  /** Exact bounds that are there, while others are still computed. */
+  showBounds(replay, scale) {
+    this.fillBounds(replay, scale)
+    this.find("bars")?.change.emit()
+  }
+
+  /** Where only one bound is there, the bar ends at what was seen. */
+  fillBounds({ walk, bounds }, scale) {
+    const bars = this.find("bars"), at = bars?.get_column("at")
+    if (!at) return
+    this.filled = bars.data
+    const bottom = bars.get_column("exact_low"), top = bars.get_column("exact_high"), range = []
+    for (let k = 0; k < at.length; k++) {
+      const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
+      const [low, high] = [bounds.low[c], bounds.high[c]], none = isNaN(low) && isNaN(high)
+      bottom[k] = none ? NaN : (isNaN(low) ? walk.low[c] : low) / unit
+      top[k] = none ? NaN : (isNaN(high) ? walk.high[c] : high) / unit
+      if (!none) range.push(top[k])
+    }
+    if (scale === "own") return
+    const axis = named(this.document, "bars_range"), most = range.sort((a, b) => b - a)
+    const end = 1.04 * most[Math.floor(OFF_SCALE * at.length)]
+    if (end > axis?.end) axis.end = end
+  }
+
+  showBars(bars, { walk, mixed, seen, low, high, held }, scale) {
+    const column = (name) => bars.get_column(name)
+    const at = column("at"), bottom = column("low"), top = column("high"), now = column("now")
+    for (let k = 0; k < now.length; k++) {
+      const c = at[k], unit = scale === "own" ? walk.normal[c] : 1
+      now[k] = mixed.normal[c] / unit
+      const least = seen ? low[c] / unit : now[k], most = seen ? high[c] / unit : now[k]
+      // What is on its way to a network not seen before is seen, too; what is pulled is no network found.
+      bottom[k] = held ? least : Math.min(least, now[k])
+      top[k] = held ? most : Math.max(most, now[k])
+    }
+    this.changed(bars, "bars")
+  }
+
+  /** Where a network lies in the plane on screen, or null if there is none of its contacts. */
+  projected({ normal, tangential }) {
+    const { xn, xt, yn, yt, origin } = this.plane
+    if (xn?.length !== normal.length) return null
+    let [x, y] = [-origin[0], -origin[1]]
+    for (let c = 0; c < normal.length; c++) {
+      x += xn[c] * normal[c] + xt[c] * tangential[c]
+      y += yn[c] * normal[c] + yt[c] * tangential[c]
+    }
+    return [x, y]
+  }
+
+  /** States of a walk under way go to their places in force space as they come. */
+  fill({ walk }) {
+    const path = this.find("path"), x = path?.get_column("x"), y = path?.get_column("y")
+    const { contacts, number, numbers } = walk
+    const { data } = path ?? {}, { plane } = this, { placed } = this
+    if (data !== placed.data || plane !== placed.plane || !numbers) Object.assign(placed, { data, plane, count: 0, drawn: 0 })
+    if (!numbers || x?.length !== numbers.length || plane.xn?.length !== contacts) return
+    const { x_range, y_range } = this.layer("path")?.fig ?? {}
+    let outside = placed.drawn === 0
+    for (; placed.count < number.length; placed.count++) {
+      const k = placed.count, cut = (values) => values.subarray(k * contacts, (k + 1) * contacts)
+      const [px, py] = this.projected({ normal: cut(walk.normal), tangential: cut(walk.tangential) })
+      x[k] = px
+      y[k] = py
+      if (x_range && !(px > x_range.start && px < x_range.end && py > y_range.start && py < y_range.end)) outside = true
+    }
+    if (outside || !this.moving) this.drawPlaced() // else their layer shows them meanwhile
+  }
+
+  /** Have Bokeh draw the states in force space that it has not yet drawn, and fit the axes. */
+  drawPlaced() {
+    const { placed } = this
+    if (placed.drawn === placed.count) return
+    placed.drawn = placed.count
+    this.find("path")?.change.emit()
+  }
+
+  /** Points that go along a path: sources with the tags "follows", name of the path, name of tab. */
+  follow(tabs, replay) {
+    this.replay = replay
+    if (tabs.includes("plane")) this.fill(replay)
+    const [a, b, part] = replay.spot
+    for (const model of this.document._all_models.values()) {
+      const [word, name, on] = model.tags ?? []
+      if (word !== "follows" || !tabs.includes(on)) continue
+      const path = this.find(name)
+      if (!path) continue
+      const held = name === "path" && replay.held && this.projected(replay.mixed)
+      if (held) {
+        [model.get_column("x")[0], model.get_column("y")[0]] = held
+        this.changed(model, name)
+        continue
+      }
+      for (const column of Object.keys(model.data)) {
+        const along = path.get_column(column)
+        if (along) model.get_column(column)[0] = (1 - part) * along[a] + part * along[b]
+      }
+      this.changed(model, name)
+    }
+  }
+}
+
+/** The model of a name: of several the newest, while a plot goes from one place to another. */
+function named(page, name) {
+  return [...page._all_models.values()].findLast((model) => model.name === name) ?? null
+}

@@ -1,0 +1,178 @@
+// How the forces look: width, colour and marks of each contact's chain, as the model asks for them.
+
+import { plain } from "../../browser/to_object.js"
+
+export const CARRYING = 1e-6 // in ⟨fₙ⟩; less is not drawn
+const MARKED = 0.1 // of the contacts, as in Fig. 5 of the paper
+const THIN = 0.15 // of its width, a chain that a filter leaves out
+const DIM = 0.35 // chains under the marks of Fig. 5
+
+export class Look {
+  /** quiet: whether colours wait for the first pull, which explains them. */
+  constructor(model, walk, quiet = false) {
+    this.model = model
+    this.walk = walk
+    this.scales = plain(model.scales)
+    this.only = null // 1 for each contact that a filter leaves, or null
+    this.before = null // fₙ before the pull whose changes are coloured
+    this.quiet = quiet
+    this.plain = false // whether colours would give something away, see difference.js
+    this.style = { width: new Float32Array(walk.contacts), bin: new Int16Array(walk.contacts) }
+    this.strong = largest(walk.normal.subarray(0, walk.contacts))
+    this.measure()
+  }
+
+  /** ΔFₙ: of exact intervals where known, else of all states. */
+  measure() {
+    const { model, walk } = this, exact = plain(model.exact ?? {})
+    this.exact = exact.low?.length === walk.contacts ? exact : null
+    const { low, high } = this.exact ?? walk
+    this.extent = high.map((value, c) => value - low[c])
+    this.loose = largest(this.extent)
+    this.loads = model.loads?.length === walk.contacts ? model.loads : null
+    this.mostLoad = Math.max(...(this.loads ?? [1]))
+    const measured = plain(model.measured ?? {})
+    this.measured = measured.normal?.length === walk.contacts ? measured : null
+    this.gone = model.gone?.length === walk.contacts ? model.gone : null // of ΔFₙ, by what is known
+  }
+
+  /** The style of these forces, for the scene. */
+  of(mixed) {
+    const { model, style } = this, { thickness, reference, most, palettes, full, stretch } = model
+    const colour = this.before ? "pulled" : model.colour
+    // A model is slow to ask.
+    this.asked = { thickness, colour, pinned: reference * this.walk.contacts, most, full: full ?? this.scales.change }
+    this.asked.load = full ?? this.mostLoad
+    const unit = this.scales.width * (stretch ?? 1)
+    for (let c = 0; c < style.width.length; c++) {
+      const value = this.thickness(c, mixed)
+      style.width[c] = value > CARRYING ? unit * value * (this.only?.[c] === 0 ? THIN : 1) : 0
+    }
+    const told = !this.plain && (this.before || !this.quiet) && (colour !== "mobilised" || this.walk.mu > 0) && (colour !== "known" || this.gone) &&
+      (colour !== "deviation" || this.measured)
+    const { change, neutral } = palettes, plain = this.quiet ? change[change.length >> 1] : neutral
+    style.colours = told ? palettes[this.before ? "change" : colour] : [plain]
+    const last = style.colours.length - 1
+    for (let c = 0; c < style.bin.length; c++) {
+      style.bin[c] = told ? Math.round(last * Math.max(0, Math.min(1, this.shade(c, mixed)))) : 0
+    }
+    style.alpha = model.overlay ? DIM : 1
+    style.strong = model.overlay ? this.strong : null
+    style.loose = model.overlay ? this.loose : null
+    return style
+  }
+
+  /** fₙ of the pinned state. */
+  pinned(c) { return this.walk.normal[this.asked.pinned + c] }
+
+  /** What the width shows, in ⟨fₙ⟩. */
+  thickness(c, { normal }) {
+    const { thickness } = this.asked
+    if (thickness === "extent") return this.extent[c]
+    if (thickness === "load" && this.loads) return this.loads[c]
+    if (thickness === "known" && this.gone) return this.gone[c]
+    if (thickness === "measured" && this.measured) return this.measured.normal[c] || 0
+    return thickness === "difference" ? Math.abs(normal[c] - this.pinned(c)) : normal[c]
+  }
+
+  /** Place on the scale of colours, 0 … 1. */
+  shade(c, { normal, tangential }) {
+    const { colour, most } = this.asked
+    if (colour === "mobilised") return 0.5 + (this.mobilised(normal[c], tangential[c]) ?? 0) / 2
+    if (colour === "extent") return most > 0 ? this.extent[c] / most : 0
+    if (colour === "deviation") return 0.5 + (this.measured.off[c] || 0) / (2 * this.scales.deviation)
+    if (colour === "known") return this.gone[c] / Math.max(this.gone[c] + this.extent[c], CARRYING)
+    if (colour === "load") return this.loads ? this.loads[c] / this.asked.load : 0.5
+    if (colour === "pulled") return 0.5 + (normal[c] - this.before[c]) / (2 * this.asked.full)
+    if (colour === "change") return 0.5 + (normal[c] - this.walk.normal[c]) / (2 * this.asked.full)
+    return 0.5 + 0.5 * Math.sign(normal[c] - this.pinned(c))
+  }
+
+  /** fₜ/(μ fₙ), or null where it means nothing. */
+  mobilised(normal, tangential) {
+    return this.walk.mu > 0 && normal > CARRYING ? tangential / (this.walk.mu * normal) : null
+  }
+
+  // What is told of the one under the pointer: rows of name and value
+
+  contact(k, { mixed, seen, low, high }) {
+    const { walk, exact } = this, c = walk.contact[k]
+    const n = mixed.normal[c], t = mixed.tangential[c]
+    const told = (from, to) => `${from.toFixed(3)} … ${to.toFixed(3)}`
+    const rows = [
+      ["contact", `${walk.backbone[c]} (disks ${walk.i[k]} – ${walk.j[k]})`],
+      ["normal force fₙ, mean = 1", n.toFixed(3)],
+      ["tangential force fₜ", t.toFixed(3)],
+      ["fₜ/(μ fₙ)", this.mobilised(n, t)?.toFixed(2) ?? "–"],
+      ["force as packed", walk.normal[c].toFixed(3)],
+    ]
+    if (seen) rows.push(["fₙ seen", told(low[c], high[c])])
+    if (exact && !this.quiet) rows.push(["fₙ possible", told(exact.low[c], exact.high[c])])
+    return rows
+  }
+
+  grain(k, { mixed }) {
+    const { walk } = this, grain = walk.grain[k]
+    const rows = [
+      ["disk", `${grain}${walk.kind[k] % 2 ? " (rattler)" : ""}`],
+      ["radius", walk.r[k].toFixed(3)],
+      ["contacts", walk.touching[k]],
+    ]
+    const { pressure, shear, angle } = this.stressOn(grain, mixed)
+    if (!(pressure > 0)) return rows
+    const degrees = Math.round((angle * 180) / Math.PI)
+    return [...rows,
+      ["pressure / mean", (pressure / this.meanPressure(mixed)).toFixed(2)],
+      ["shear / pressure", `${(shear / pressure).toFixed(2)}, pressed most at ${degrees}°`],
+    ]
+  }
+
+  /** What presses on a grain: {normal direction outwards nx, ny, force on it fx, fy} of each contact. */
+  forcesOn(grain, { normal, tangential }) {
+    const { walk } = this, { i, j, contact, x0, y0, x1, y1 } = walk, found = [], seen = new Set()
+    for (let k = 0; k < contact.length; k++) {
+      if ((i[k] !== grain && j[k] !== grain) || seen.has(contact[k])) continue
+      seen.add(contact[k])
+      const c = contact[k], far = Math.hypot(x1[k] - x0[k], y1[k] - y0[k]), out = i[k] === grain ? 1 : -1
+      const nx = (x1[k] - x0[k]) / far, ny = (y1[k] - y0[k]) / far, n = normal[c], t = tangential[c]
+      // The normal points from i to j, and the force acts on j; t = (−n_y, n_x).
+      found.push({
+        nx: out * nx, ny: out * ny, fx: -out * (n * nx - t * ny), fy: -out * (n * ny + t * nx),
+      })
+    }
+    return found
+  }
+
+  /** Stress on a grain, σ = (1/πr²) Σ r n F, compression positive: its mean principal stress, half the
+   * difference of the two, and the direction of the larger, −90° … 90°. */
+  stressOn(grain, mixed) {
+    let xx = 0, yy = 0, xy = 0
+    for (const { nx, ny, fx, fy } of this.forcesOn(grain, mixed)) {
+      xx -= nx * fx
+      yy -= ny * fy
+      xy -= (nx * fy + ny * fx) / 2
+    }
+    const unit = 1 / (Math.PI * this.walk.radius[grain]), shear = unit * Math.hypot((xx - yy) / 2, xy)
+    return { pressure: (unit * (xx + yy)) / 2, shear, angle: Math.atan2(2 * xy, xx - yy) / 2 }
+  }
+
+  /** Mean pressure of the grains, each by its area. */
+  meanPressure({ normal }) {
+    const { walk } = this, { i, j, contact, radius } = walk, seen = new Set()
+    let virial = 0
+    for (let k = 0; k < contact.length; k++) {
+      if (seen.has(contact[k])) continue
+      seen.add(contact[k])
+      virial += normal[contact[k]] * (radius[i[k]] + radius[j[k]])
+    }
+    return virial / (2 * Math.PI * radius.reduce((sum, r) => sum + r * r, 0))
+  }
+}
+
+/** Which of the values are among the largest, MARKED of them: 1 or 0 each. */
+function largest(values) {
+  const order = Array.from(values.keys()).sort((a, b) => values[b] - values[a] || a - b)
+  const marked = new Uint8Array(values.length)
+  for (const c of order.slice(0, Math.max(1, Math.round(MARKED * values.length)))) marked[c] = 1
+  return marked
+}

@@ -1,0 +1,111 @@
+// Marks of what is known: a pin on each contact that is held, open where it has an error bar;
+// numbers on those that would be worth measuring, the best first; and where a contact is pushed, arrows.
+
+import { arrow, circle } from "../../browser/canvas_paths.js"
+import { plain } from "../../browser/to_object.js"
+
+const PIN = 17 // px, its height
+const ARROW_PX = 10, GROWN_PX = 100 // beyond the edge of the disk that is pushed: at least, and more at most
+const COPY = 0.35 // opacity of the arrows at a periodic copy
+const SPOT = 0.22 // largest radii, of its stand-in in pictures to take along
+
+export class Pins {
+  constructor(player) {
+    this.player = player
+    this.model = player.model
+  }
+
+  get pins() { return plain(this.model.pins ?? {}) }
+
+  /** Whether the force of a contact is known. */
+  has(contact) { return [...(this.pins.contacts ?? [])].includes(contact) }
+
+  draw(context, scene) {
+    const { contacts = [], exact = [], ranked = [] } = this.pins
+    if (this.player.pushable && !scene.frozen) this.push(context, scene)
+    if (!contacts.length && !ranked.length) return
+    const held = new Map(), rank = new Map(), { ratio } = scene
+    for (let k = 0; k < contacts.length; k++) held.set(contacts[k], exact[k])
+    for (let k = 0; k < ranked.length; k++) rank.set(ranked[k], k + 1)
+    context.save()
+    context.setTransform(ratio, 0, 0, ratio, 0, 0)
+    for (const { contact: c, middle } of scene.segments((c) => held.has(c) || rank.has(c))) {
+      const place = scene.toPixel(...middle)
+      if (held.has(c)) this.pin(context, scene.palette, place, held.get(c))
+      else this.badge(context, scene.palette, place, rank.get(c))
+    }
+    context.restore()
+  }
+
+  /** The two forces that push the disks of a contact apart, the selected one or the one that is pointed out;
+   * faintly at its periodic copies. */
+  push(context, scene) {
+    const { geometry, ratio, palette, scale } = scene, { replay, pushed } = this.player
+    const contact = scene.selected ?? replay.walk.contact[replay.walk.inviting] ?? -1
+    const first = geometry.contact.indexOf(contact), arrow_px = ARROW_PX + GROWN_PX * pushed.part
+    if (scene.selected === null) scene.drawSelected(contact)
+    context.save()
+    context.setTransform(ratio, 0, 0, ratio, 0, 0)
+    context.lineCap = context.lineJoin = "round"
+    for (const { k, ...ends } of scene.segments((each) => each === contact)) {
+      const a = scene.toPixel(...ends.a), b = scene.toPixel(...ends.b)
+      const far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, u = [(b[0] - a[0]) / far, (b[1] - a[1]) / far]
+      context.globalAlpha = k === first ? 1 : COPY
+      context.beginPath()
+      for (const [from, grain, way] of [[a, geometry.i[k], -1], [b, geometry.j[k], 1]]) {
+        const long = way * (scale * geometry.radius[grain] + arrow_px)
+        arrow(context, from, from.map((v, d) => v + long * u[d]), 12, 0.7)
+      }
+      for (const [width, colour] of [[9, palette.halo], [4, palette.selected]]) {
+        context.lineWidth = width
+        context.strokeStyle = colour
+        context.stroke()
+      }
+    }
+    context.restore()
+  }
+
+  /** In a picture to take along: a spot on each contact that is known, open with an error bar. */
+  onSheet(sheet, scene) {
+    const { contacts = [], exact = [] } = this.pins, { known, halo } = scene.palette
+    for (const [n, held] of [...contacts].entries()) {
+      for (const { middle } of scene.segments((contact) => contact === held)) {
+        circle(sheet, middle, SPOT)
+        sheet.strokeStyle = known
+        sheet.lineWidth = SPOT / 2
+        sheet.stroke()
+        sheet.fillStyle = exact[n] ? known : halo
+        sheet.fill()
+      }
+    }
+  }
+
+  pin(context, { known, halo }, [x, y], exact) {
+    const r = PIN / 3, top = y - PIN + r
+    context.beginPath()
+    context.arc(x, top, r, 0.85 * Math.PI, 0.15 * Math.PI)
+    context.lineTo(x, y)
+    context.closePath()
+    context.lineWidth = 4
+    context.strokeStyle = halo
+    context.stroke()
+    context.lineWidth = 2
+    context.strokeStyle = context.fillStyle = known
+    context.stroke()
+    if (!exact) context.fillStyle = halo
+    context.fill()
+  }
+
+  badge(context, { known, halo }, [x, y], number) {
+    circle(context, [x, y], 9)
+    context.fillStyle = halo
+    context.fill()
+    context.lineWidth = 2
+    context.strokeStyle = context.fillStyle = known
+    context.stroke()
+    context.font = "bold 11px sans-serif"
+    context.textAlign = "center"
+    context.textBaseline = "middle"
+    context.fillText(number, x, y + 0.5)
+  }
+}

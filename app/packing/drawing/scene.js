@@ -1,0 +1,428 @@
+// The packing on canvases: disks, chains and marks on top of each other, so that a frame repaints
+// chains only. One unit of length is the same number of pixels in x and y by construction.
+
+import { made } from "../../browser/dom.js"
+import { arrow, circle, line } from "../../browser/canvas_paths.js"
+import { listen } from "../hand/pointing.js"
+import { PIXELS, Sheet } from "./svg_context.js"
+
+export const LEAST = 0.1 // px; thinner chains are not drawn
+const FEW = 2500 // chains drawn one by one, with round ends; more are gathered in classes
+const FINE = 16 // colours; of more, every second serves where chains are gathered
+const GRAB = 6 // px from a chain that still mean it
+const ZOOM = [0.02, 4] // least and largest part of the whole view
+const ARROW = 1.3 // of the largest force on a disk, in largest radii
+const AXIS = [0.3, 7] // width of a line whose force is an axis of force space, in largest radii, and px at most
+const MARK = 0.24 // radius of the marks of Fig. 5, in largest radii
+
+export class Scene {
+  constructor(onSelect) {
+    this.root = made("div", { className: "scene", tabIndex: 0, role: "img", ariaLabel: "packing with its force chains" })
+    const layer = () => this.root.appendChild(document.createElement("canvas")).getContext("2d")
+    this.disks = layer()
+    this.chains = layer()
+    this.marks = layer()
+    this.tip = this.root.appendChild(made("div", { className: "tip" }))
+    this.root.scene = this
+    this.onSelect = onSelect
+    this.size = 0
+    this.painted = 0
+    this.counts = { segments: 0, drawn: 0, outside: 0, thin: 0 }
+    this.selected = null
+    this.pair = [] // contacts whose forces are the axes of force space, across and up
+    this.pointed = -1 // the disk under the pointer, whose forces are drawn
+    this.frozen = false // whether what is drawn moves by itself and cannot be pointed at
+    this.offset = null
+    this.mixed = null
+    listen(this)
+  }
+
+  // Geometry and view
+
+  show(geometry) {
+    this.pointed = -1
+    const moved = !this.geometry || `${geometry.window}` !== `${this.geometry.window}`
+    this.geometry = geometry
+    const { x0 } = geometry
+    this.width = new Float32Array(x0.length)
+    this.bin = new Int16Array(x0.length)
+    if (moved) this.reset(false)
+  }
+
+  /** The view of all of it. */
+  get whole() {
+    const [left, right, bottom, top] = this.geometry.window
+    return { x: (left + right) / 2, y: (bottom + top) / 2, half: (right - left) / 2 }
+  }
+
+  reset(paint = true) {
+    this.view = this.whole
+    if (paint) this.changed()
+  }
+
+  /** px of the layout per unit of length, along x and y alike. */
+  get scale() { return this.size / (2 * this.view.half) }
+
+  toPixel(x, y) {
+    const { scale, view, size } = this
+    return [size / 2 + (x - view.x) * scale, size / 2 - (y - view.y) * scale]
+  }
+
+  toPlace(px, py) {
+    const { scale, view, size } = this
+    return [view.x + (px - size / 2) / scale, view.y - (py - size / 2) / scale]
+  }
+
+  resize() {
+    const size = this.root.clientWidth, ratio = window.devicePixelRatio || 1
+    if (!size || (size === this.size && ratio === this.ratio)) return
+    this.size = size
+    this.finer(size * ratio)
+  }
+
+  /** Draw with so many pixels a side, however many of them are seen; `resize` takes it back. */
+  finer(pixels) {
+    this.ratio = pixels / this.size
+    for (const { canvas } of [this.disks, this.chains, this.marks]) canvas.width = canvas.height = Math.round(pixels)
+    if (this.geometry) this.changed()
+  }
+
+  /** After pan, zoom, resize or a new theme: everything, once per painted frame. */
+  changed() {
+    this.stale = true
+    if (this.asked) return
+    this.asked = requestAnimationFrame(() => {
+      this.asked = 0
+      if (this.geometry && this.size) this.repaint()
+    })
+  }
+
+  repaint() {
+    this.drawDisks()
+    this.stale = false
+    if (!this.style) return
+    this.drawChains(this.style)
+    this.onRepaint()
+  }
+
+  // Painting
+
+  begin(context) {
+    const { ratio, scale, view, size } = this
+    context.setTransform(1, 0, 0, 1, 0, 0)
+    context.clearRect(0, 0, context.canvas.width, context.canvas.height)
+    const s = ratio * scale
+    const middle = (ratio * size) / 2
+    context.setTransform(s, 0, 0, -s, middle - s * view.x, middle + s * view.y)
+  }
+
+  /** The whole packing, drawn as on screen, as the text of an SVG. */
+  picture(caption) {
+    const { disks, chains, marks, view, size, geometry } = this, sheet = new Sheet()
+    Object.assign(this, { disks: sheet, chains: sheet, marks: sheet, size: PIXELS, pointed: -1 })
+    this.reset(false)
+    this.drawDisks()
+    this.stale = false
+    this.drawChains(this.style)
+    Object.assign(this, { disks, chains, marks, view, size })
+    this.changed()
+    return sheet.svg(geometry.window, { ...caption, unit: Math.max(...geometry.radius) })
+  }
+
+  drawDisks() {
+    const { x, y, r, kind, grain } = this.geometry, { disks, view, scale } = this
+    this.begin(disks)
+    this.drawBox(disks)
+    const near = view.half
+    for (const [number, { fill, line }] of this.palette.disks.entries()) {
+      disks.beginPath()
+      for (let k = 0; k < x.length; k++) {
+        if (kind[k] !== number) continue
+        const reach = near + r[k]
+        const px = x[k] + this.shift(grain[k], 0), py = y[k] + this.shift(grain[k], 1)
+        if (Math.abs(px - view.x) > reach || Math.abs(py - view.y) > reach) continue
+        disks.moveTo(px + r[k], py)
+        disks.arc(px, py, r[k], 0, 2 * Math.PI)
+      }
+      disks.fillStyle = fill
+      disks.fill()
+      if (scale < 3) continue // outlines of disks of a few pixels would be all that is seen
+      disks.lineWidth = 0.8 / scale
+      disks.strokeStyle = line
+      disks.stroke()
+    }
+  }
+
+  drawBox(context) {
+    const { box: [width, height], tilt } = this.geometry
+    if (width < 0 || height < 0) return // open
+    context.beginPath()
+    const corners = [[0, 0], [width, 0], [width + tilt, height], [tilt, height]]
+    if (context instanceof Sheet) context.polygon(corners)
+    else {
+      for (const corner of corners) context.lineTo(...corner)
+      context.closePath()
+    }
+    context.setLineDash([4 / this.scale, 4 / this.scale])
+    context.lineWidth = 1 / this.scale
+    context.strokeStyle = this.palette.edge
+    context.stroke()
+    context.setLineDash([])
+  }
+
+  /** How far a grain is displaced at this moment of an animated displacement field. */
+  shift(grain, axis) {
+    return this.offset ? this.offset.amplitude * this.offset.field[2 * grain + axis] : 0
+  }
+
+  /** style: per contact `width` (units) and `bin` of `colours`; marks to set; alpha. */
+  drawChains(style) {
+    this.style = style
+    if (!this.size || this.stale) return this.stale && this.changed()
+    const { x0, y0, x1, y1, contact } = this.geometry
+    const { chains, view, scale, width, bin } = this
+    const least = LEAST / scale, order = this.order ??= []
+    let drawn = 0, outside = 0, thin = 0
+    for (let k = 0; k < contact.length; k++) {
+      const w = style.width[contact[k]]
+      width[k] = 0
+      if (w < least) { thin++; continue }
+      const left = view.x - view.half - w, right = view.x + view.half + w
+      const low = view.y - view.half - w, high = view.y + view.half + w
+      if ((x0[k] < left && x1[k] < left) || (x0[k] > right && x1[k] > right) ||
+          (y0[k] < low && y1[k] < low) || (y0[k] > high && y1[k] > high)) { outside++; continue }
+      width[k] = w
+      bin[k] = style.bin[contact[k]]
+      order[drawn++] = k
+    }
+    this.counts = { segments: contact.length, drawn, outside, thin }
+    this.begin(chains)
+    chains.globalAlpha = style.alpha
+    if (drawn <= FEW || chains instanceof Sheet) this.strokeEach(order, drawn, style.colours)
+    else this.strokeByClass(order, drawn, style.colours)
+    chains.globalAlpha = 1
+    this.drawMarks(style)
+    if (!this.painted++) performance.mark("packing painted") // how long opening took
+  }
+
+  ends(k) {
+    const { x0, y0, x1, y1, i, j } = this.geometry
+    return [
+      x0[k] + this.shift(i[k], 0), y0[k] + this.shift(i[k], 1),
+      x1[k] + this.shift(j[k], 0), y1[k] + this.shift(j[k], 1),
+    ]
+  }
+
+  /** Of the contacts that are chosen(contact) each segment k: both ends a and b, and its middle. */
+  *segments(chosen) {
+    const { contact } = this.geometry
+    for (let k = 0; k < contact.length; k++) {
+      if (!chosen(contact[k])) continue
+      const [xa, ya, xb, yb] = this.ends(k)
+      yield { k, contact: contact[k], a: [xa, ya], b: [xb, yb], middle: [(xa + xb) / 2, (ya + yb) / 2] }
+    }
+  }
+
+  strokeEach(order, count, colours) {
+    const { chains, width, bin } = this
+    chains.lineCap = "round"
+    for (let n = 0; n < count; n++) {
+      const k = order[n], [xa, ya, xb, yb] = this.ends(k)
+      chains.strokeStyle = colours[bin[k]]
+      chains.lineWidth = width[k]
+      chains.beginPath()
+      chains.moveTo(xa, ya)
+      chains.lineTo(xb, yb)
+      chains.stroke()
+    }
+  }
+
+  /** Many chains: one stroke for all of about the same colour and width, in half the time. */
+  strokeByClass(order, count, colours) {
+    const { chains, width, bin, scale } = this, classes = new Map()
+    const { x0, y0, x1, y1 } = this.geometry
+    for (let n = 0; n < count; n++) {
+      const k = order[n]
+      const thickness = Math.round(2 * Math.log2((width[k] * scale) / LEAST)) // half octaves
+      const colour = colours.length > FINE ? bin[k] - (bin[k] % 2) : bin[k]
+      const key = 64 * colour + thickness
+      let path = classes.get(key)
+      if (!path) classes.set(key, (path = new Path2D()))
+      if (this.offset) {
+        const [xa, ya, xb, yb] = this.ends(k)
+        path.moveTo(xa, ya)
+        path.lineTo(xb, yb)
+      } else {
+        path.moveTo(x0[k], y0[k])
+        path.lineTo(x1[k], y1[k])
+      }
+    }
+    chains.lineCap = "butt"
+    for (const [key, path] of classes) {
+      chains.strokeStyle = colours[key >> 6]
+      chains.lineWidth = (LEAST * 2 ** ((key & 63) / 2)) / scale
+      chains.stroke(path)
+    }
+  }
+
+  /** Fig. 5 of the paper: strong contacts filled, undetermined ones open; and the selected one. */
+  drawMarks(style) {
+    const { marks, scale, palette } = this
+    this.begin(marks)
+    const radius = Math.max(MARK, 2 / scale)
+    if (style.strong) {
+      for (const [chosen, filled, size] of [[style.strong, true, 0.75], [style.loose, false, 1.25]]) {
+        marks.beginPath()
+        for (const { middle: [x, y] } of this.segments((contact) => chosen[contact])) {
+          marks.moveTo(x + radius * size, y)
+          marks.arc(x, y, radius * size, 0, 2 * Math.PI)
+        }
+        marks.fillStyle = palette.strong
+        marks.strokeStyle = palette.loose
+        marks.lineWidth = Math.max(0.09, 1.2 / scale)
+        if (filled) marks.fill()
+        else marks.stroke()
+      }
+    }
+    if (this.selected !== null) this.drawSelected(this.selected)
+    this.pair.forEach((contact, k) => this.highlight(contact, k ? palette.up : palette.across))
+    if (this.pointed >= 0 && this.describe?.forces) this.drawForces(this.pointed)
+    if (marks instanceof Sheet) this.onSheet?.(marks, this)
+    else this.onMarks?.(marks, this)
+  }
+
+  /** The forces that press on a disk, each an arrow that ends where it acts. */
+  drawForces(disk) {
+    const { marks, scale, palette, geometry } = this, { x, y, r, grain, radius } = geometry
+    const forces = this.describe.forces(grain[disk])
+    const most = Math.max(...forces.map(({ fx, fy }) => Math.hypot(fx, fy)))
+    const long = ARROW * Math.max(...radius), head = Math.max(0.16, 6 / scale)
+    marks.lineWidth = Math.max(0.07, 2 / scale)
+    marks.strokeStyle = palette.strong
+    marks.lineCap = "round"
+    marks.beginPath()
+    for (const { nx, ny, fx, fy } of forces) {
+      if (!(Math.hypot(fx, fy) > 1e-3 * most)) continue
+      const ex = x[disk] + r[disk] * nx, ey = y[disk] + r[disk] * ny
+      arrow(marks, [ex - (long * fx) / most, ey - (long * fy) / most], [ex, ey], head, 0.5)
+    }
+    marks.stroke()
+  }
+
+  /** A line in the colour of its axis of force space. */
+  highlight(chosen, colour) {
+    const { marks, scale, palette } = this
+    marks.lineCap = "round"
+    for (const [more, paint] of [[3 / scale, palette.halo], [0, colour]]) {
+      marks.lineWidth = Math.max(Math.min(AXIS[0], AXIS[1] / scale), 5 / scale) + more
+      marks.strokeStyle = paint
+      for (const { a, b } of this.segments((contact) => contact === chosen)) line(marks, a, b)
+    }
+  }
+
+  drawSelected(selected) {
+    const { marks, scale, palette, geometry } = this
+    marks.strokeStyle = palette.selected
+    marks.lineCap = "round"
+    for (const { k, a, b } of this.segments((contact) => contact === selected)) {
+      marks.lineWidth = 2 / scale
+      for (const [at, grain] of [[a, geometry.i[k]], [b, geometry.j[k]]]) {
+        circle(marks, at, geometry.radius[grain])
+        marks.stroke()
+      }
+      marks.lineWidth = Math.max(0.12, 3 / scale)
+      line(marks, a, b)
+    }
+  }
+
+  // Pointer
+
+  /** Segment under a point of the layout, or −1; reach: px from a chain that still mean it. */
+  linkAt(px, py, reach = GRAB) {
+    const [x, y] = this.toPlace(px, py), { x0, y0, x1, y1, contact } = this.geometry
+    let best = -1, least = Infinity
+    for (let k = 0; k < contact.length; k++) {
+      const dx = x1[k] - x0[k], dy = y1[k] - y0[k]
+      const along = ((x - x0[k]) * dx + (y - y0[k]) * dy) / (dx * dx + dy * dy)
+      if (along < 0.05 || along > 0.95) continue // at a centre many chains meet
+      const away = Math.hypot(x - x0[k] - along * dx, y - y0[k] - along * dy)
+      if (away - this.width[k] / 2 < least) { least = away - this.width[k] / 2; best = k }
+    }
+    return least * this.scale <= reach ? best : -1
+  }
+
+  diskAt(px, py) {
+    const [a, b] = this.toPlace(px, py), { x, y, r } = this.geometry
+    for (let k = 0; k < x.length; k++) {
+      if ((a - x[k]) ** 2 + (b - y[k]) ** 2 < r[k] ** 2) return k
+    }
+    return -1
+  }
+
+  place(event) {
+    const box = this.root.getBoundingClientRect()
+    return [event.clientX - box.left, event.clientY - box.top]
+  }
+
+  /** A disk is pointed at, or none (−1). */
+  point(disk) {
+    if (disk === this.pointed) return
+    this.pointed = disk
+    if (this.style && this.geometry && !this.frozen) this.drawMarks(this.style)
+  }
+
+  /** The contact that a pointer takes in hand, or null where it moves the view.
+
+   * Where disks are so small that a chain lies under every point, the view could not be moved. */
+  takenAt(event, touch) {
+    if (!this.geometry || this.frozen || !this.hand || this.scale < GRAB) return null
+    const k = this.linkAt(...this.place(event), touch ? 3 * GRAB : GRAB)
+    if (k < 0 || (touch && this.geometry.contact[k] !== this.selected)) return null
+    return this.geometry.contact[k]
+  }
+
+  drag(fingers, id, before, now) {
+    this.tip.classList.remove("on")
+    const [dx, dy] = [now[0] - before[0], now[1] - before[1]]
+    const other = [...fingers].find(([key]) => key !== id)?.[1]
+    if (other) {
+      const apart = (p) => Math.hypot(p[0] - other[0], p[1] - other[1])
+      this.zoom(apart(before) / Math.max(1, apart(now)), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2)
+    }
+    const part = other ? 0.5 : 1
+    this.view.x -= (part * dx) / this.scale
+    this.view.y += (part * dy) / this.scale
+    this.changed()
+  }
+
+  zoom(factor, px, py) {
+    if (!this.geometry) return
+    const whole = this.whole.half
+    const before = this.toPlace(px, py)
+    this.view.half = Math.min(ZOOM[1] * whole, Math.max(ZOOM[0] * whole, this.view.half * factor))
+    const after = this.toPlace(px, py)
+    this.view.x += before[0] - after[0]
+    this.view.y += before[1] - after[1]
+    this.changed()
+  }
+
+  pick(px, py) {
+    if (!this.geometry || this.frozen) return
+    const k = this.linkAt(px, py), contact = k < 0 ? null : this.geometry.contact[k]
+    this.onSelect(contact === this.selected ? null : contact)
+  }
+
+  hover(px, py) {
+    if (!this.geometry || !this.describe || this.frozen) return this.tip.classList.remove("on")
+    const k = this.linkAt(px, py), disk = k < 0 ? this.diskAt(px, py) : -1
+    this.point(disk)
+    const rows = k >= 0 ? this.describe.contact(k) : disk >= 0 ? this.describe.grain(disk) : null
+    this.tip.classList.toggle("on", rows !== null)
+    this.root.style.cursor = k >= 0 ? "pointer" : "grab"
+    if (!rows) return
+    this.tip.innerHTML = rows.map(([name, value]) => `<i>${name}</i><b>${value}</b>`).join("")
+    const right = px > this.size / 2, low = py > this.size / 2
+    this.tip.style.inset = `${low ? "auto" : `${py + 14}px`} ${right ? `${this.size - px + 14}px` : "auto"} ` +
+      `${low ? `${this.size - py + 14}px` : "auto"} ${right ? "auto" : `${px + 14}px`}`
+  }
+}

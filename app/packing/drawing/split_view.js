@@ -1,0 +1,148 @@
+// Two networks side by side: the pinned state beside the one on screen, in the same view, or another
+// packing that is played along with it. The pinned state is drawn anew only where the view, the look
+// or the pinned state changes.
+
+import { Look } from "./chain_style.js"
+import { made } from "../../browser/dom.js"
+import { plain } from "../../browser/to_object.js"
+import { Replay } from "../replay/replay.js"
+import { Scene } from "./scene.js"
+
+export class Split {
+  constructor(player) {
+    this.player = player
+    const { scene, model } = player
+    const twin = new Scene((contact) => { if (!this.other) model.contact = contact })
+    this.twin = twin
+    this.other = null // the Replay of another packing
+    Object.assign(twin.root, { className: "twin", ariaLabel: "the network beside" })
+    this.through = new Through(scene, twin)
+    Object.defineProperty(twin, "view", {
+      get: () => (this.other ? this.through : scene.view),
+      set: (view) => { scene.view = view },
+    })
+    twin.changed = () => scene.changed()
+    twin.reset = (paint = true) => { if (paint) scene.reset() }
+    twin.onRepaint = () => {}
+    this.captions = [twin, scene].map(({ root }) => root.appendChild(made("div", { className: "caption" })))
+    player.buttons.scenes.prepend(twin.root)
+  }
+
+  get on() {
+    const { model, replay, live } = this.player
+    return Boolean(model.split && replay && (this.other || !live.moves))
+  }
+
+  /** Another packing has come, or is gone. */
+  take() {
+    const walk = plain(this.player.model.twin)
+    this.other = walk.contacts ? new Replay(walk) : null
+    this.twin.geometry = null
+    this.show()
+  }
+
+  /** Take over what is beside, and how it looks. */
+  show() {
+    const { on, player, other } = this, { model, buttons } = player
+    buttons.tellSplit(Boolean(model.split), on)
+    if (!on) return
+    this.tell()
+    if (other) this.showOther()
+    else this.showPinned()
+    this.paint()
+  }
+
+  tell() {
+    const { captions, player, other } = this, { live, replay: { walk } } = player
+    const frame = this.pinned, of = ({ mu }) => `μ = ${Number(mu.toPrecision(4))}`
+    if (other) {
+      captions[0].textContent = `${of(other.walk)}: ${other.place}`
+      captions[1].textContent = live.moves ? "being compressed" : of(walk)
+    } else {
+      captions[0].textContent = frame ? `pinned: network ${walk.number[frame]}` : "pinned: as packed"
+      captions[1].textContent = "now"
+    }
+  }
+
+  get pinned() { return Math.min(this.player.model.reference, this.player.replay.walk.number.length - 1) }
+
+  showPinned() {
+    const { model, replay } = this.player, { walk } = replay, { contacts } = walk
+    const from = this.pinned * contacts, cut = (values) => values.slice(from, from + contacts)
+    const mixed = { normal: cut(walk.normal), tangential: cut(walk.tangential) }
+    this.dress(model, walk, { ...replay, mixed, seen: 0 })
+  }
+
+  showOther() {
+    const { model } = this.player, { walk } = this.other
+    this.other.go(this.along)
+    const own = { exact: walk.exact, loads: null, reference: 0 }
+    this.dress(new Proxy(own, { get: (mine, name) => (name in mine ? mine[name] : model[name]) }), walk, this.other)
+  }
+
+  /** Have the twin show a network of a walk, as the model asks. */
+  dress(model, walk, shown) {
+    const { twin, player } = this
+    if (twin.geometry !== walk) {
+      this.look = new Look(model, walk)
+      twin.show(walk)
+    }
+    const { look } = this
+    look.plain = player.difference.on
+    look.measure()
+    twin.palette = player.scene.palette
+    twin.describe = { contact: (k) => look.contact(k, shown), grain: (k) => look.grain(k, shown) }
+    twin.style = look.of(shown.mixed)
+  }
+
+  /** Where another packing's walk is as far as the one that plays, by the numbers of its states. */
+  get along() {
+    const { walk, spot: [a, b, part] } = this.player.replay, { number } = this.other.walk
+    const reached = (1 - part) * walk.number[a] + part * walk.number[b]
+    const k = number.findLastIndex((other) => other <= reached)
+    return k + 1 < number.length ? k + (reached - number[k]) / (number[k + 1] - number[k]) : k
+  }
+
+  /** The player has gone on: another packing does, too. */
+  step() {
+    const { other, on, twin } = this
+    if (!other || !on || !twin.style) return
+    other.go(this.along)
+    this.tell()
+    twin.drawChains(this.look.of(other.mixed))
+  }
+
+  /** After the view, or what is selected, has changed. */
+  paint() {
+    const { twin, on, player, other } = this
+    if (!on || !twin.style) return
+    twin.selected = other ? null : player.scene.selected
+    twin.pair = other ? [] : player.scene.pair
+    twin.resize()
+    if (!twin.size) return
+    twin.drawDisks()
+    twin.stale = false
+    twin.drawChains(twin.style)
+  }
+}
+
+/** The view of one scene as seen in another, whose packing has a box of its own: whole is whole. */
+class Through {
+  constructor(scene, twin) { Object.assign(this, { scene, twin }) }
+
+  /** A packing that moves is seen whole, and so is what is beside it. */
+  get from() { return this.scene.frozen ? this.scene.whole : this.scene.view }
+
+  get ratio() { return this.twin.whole.half / this.scene.whole.half }
+
+  of(axis) { return this.twin.whole[axis] + (this.from[axis] - this.scene.whole[axis]) * this.ratio }
+
+  back(axis, value) { this.from[axis] = this.scene.whole[axis] + (value - this.twin.whole[axis]) / this.ratio }
+
+  get x() { return this.of("x") }
+  set x(value) { this.back("x", value) }
+  get y() { return this.of("y") }
+  set y(value) { this.back("y", value) }
+  get half() { return this.from.half * this.ratio }
+  set half(value) { this.from.half = value / this.ratio }
+}

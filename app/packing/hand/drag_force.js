@@ -1,0 +1,358 @@
+// A force in the hand. A contact that is dragged follows between its exact bounds, along a rail of
+// networks that the server made; between two of them the straight line is shown, which is admissible
+// too. Let go, and it stays: the next pull starts there.
+
+import { CARRYING } from "../drawing/chain_style.js"
+import { circle, line } from "../../browser/canvas_paths.js"
+import { plain } from "../../browser/to_object.js"
+import { PointHand } from "./drag_point.js"
+import { networkAt } from "../replay/replay.js"
+
+const RAIL = 190 // px, the longest
+const EDGE = 14 // px between a rail and the edge of the picture
+const AT_END = 2e-3 // of a rail, within which the hand is at its end
+const FINDING = "Finding how far it can be pulled …"
+export const UNCHOSEN = "Select a contact first: click it, or press N for the next one."
+const KNOWN = "This force is held: release it (press H) before it is pulled."
+const NUMBER_LINE = 14 // px, height of a line of numbers beside it
+const NUDGE = 1 / 40 // of a rail, by a key
+const REST = 600 // ms after the last key until the force is let go
+const LINGER = 1000 // ms for which its rail is seen after it was let go
+
+export class Grab {
+  /** tell(message): to the server. */
+  constructor(player, tell) {
+    this.player = player
+    this.tell = (hand) => tell({ hand })
+    this.rail = this.contact = this.value = this.before = null
+    this.moved = this.flung = false // whether it was, and whether it was let go before its rail was there
+    this.lingers = 0
+    this.frames = 0
+    this.spot = new PointHand(this)
+    this.tell({ anew: true })
+  }
+
+  get replay() { return this.player.replay }
+
+  /** Whether a contact is in the hand. */
+  get active() { return this.contact !== null || this.spot.active }
+
+  // The hand
+
+  /** Take a contact; place: how far along its rail a pointer is, given the rail. */
+  take(contact, place) {
+    const { player } = this
+    if (!this.begin()) return
+    this.contact = contact
+    this.moved = this.flung = false
+    this.place = place
+    player.scene.selected = contact
+    player.scene.tip.classList.remove("on")
+    this.tell({ grab: contact }) // the server selects it, too
+    player.paint()
+  }
+
+  /** Come to rest at a network that has a name; whether there is one to take hold of. */
+  begin() {
+    const { player } = this
+    if (!this.replay || player.live.moves || player.grows || this.spot.active) return false
+    player.follows = false
+    player.took = true
+    if (player.playing) player.play(false)
+    if (this.replay.position % 1) player.show(Math.round(this.replay.position))
+    this.settle()
+    player.plots.move(true)
+    const told = player.buttons.part("said")
+    if (told.textContent !== FINDING) this.said = told.textContent
+    told.textContent = FINDING
+    return true
+  }
+
+  /** The hand has moved. */
+  move(place) {
+    this.moved = true
+    this.place = place ?? this.place
+    if (this.rail && this.contact !== null) this.set(this.place(this.rail))
+  }
+
+  /** Let go: the force stays. */
+  leave() {
+    const { contact, rail, value } = this
+    if (contact === null) return
+    clearTimeout(this.resting)
+    this.flung = !rail && this.moved
+    if (this.flung) return // followed once its rail is there
+    this.contact = null
+    if (rail && Math.abs(value - this.begun) > 1e-6 * (rail.upper - rail.lower)) {
+      this.tell({ hold: [contact, value] })
+    }
+    if (rail) this.linger()
+    this.still()
+  }
+
+  /** Nothing is in the hand any more. */
+  still() {
+    this.unsay()
+    this.player.later.offer()
+    this.player.plots.move(false)
+    this.player.paint()
+    this.player.paintPlots()
+  }
+
+  /** What the rail said can be read for a while after the force was let go. */
+  linger() {
+    clearTimeout(this.lingers)
+    this.lingers = setTimeout(() => { this.lingers = 0; this.player.repaint() }, LINGER)
+  }
+
+  /** Where nothing came to be pulled, tell what was told before. */
+  unsay() {
+    const told = this.player.buttons.part("said")
+    if (told.textContent === FINDING) told.textContent = this.said
+  }
+
+  /** A key moves the force of the selected contact. */
+  nudge(sign) {
+    const { contact } = this.player.model
+    if (contact === null || contact === undefined) return this.player.say(UNCHOSEN, true)
+    if (this.player.pins.has(contact)) return this.player.say(KNOWN, true)
+    this.grip = null
+    if (this.contact !== contact) {
+      this.steps = 0
+      this.take(contact, (rail) => this.begun + this.steps * NUDGE * (rail.upper - rail.lower))
+    }
+    this.steps += sign
+    this.move()
+    clearTimeout(this.resting)
+    this.resting = setTimeout(() => this.rest(), REST)
+  }
+
+  rest() {
+    if (this.rail) this.leave()
+    else if (this.contact !== null) this.resting = setTimeout(() => this.rest(), REST)
+  }
+
+  /** Back to the states: nothing is pulled any more. */
+  free() {
+    if (this.active) this.player.plots.move(false)
+    this.contact = null
+    this.spot.drop()
+    if (!this.replay?.held) return
+    this.tell({ free: true })
+    this.forget()
+  }
+
+  forget() {
+    if (this.replay) this.replay.held = null
+    this.player.pushed.end()
+    this.settle()
+    this.player.tellHeld(false)
+    this.player.say("")
+    this.player.again()
+  }
+
+  settle() {
+    clearTimeout(this.lingers)
+    this.lingers = 0
+    this.rail = this.value = null
+    if (this.player.look) this.player.look.before = this.replay?.held ? this.before : null
+  }
+
+  // What the server made
+
+  hear({ rail, fan, held }) {
+    if (rail !== undefined) this.ride(rail && plain(rail))
+    if (fan !== undefined) this.spot.spread(fan && plain(fan))
+    const pushed = !held && this.player.pushed.held // which came after what is no longer pulled
+    if (held !== undefined && !this.active && !pushed) this.keep(held && plain(held))
+  }
+
+  ride(rail) {
+    if (!rail) { this.contact = null; this.unsay(); this.player.plots.move(false); return this.player.again() }
+    if (rail.contact !== this.contact) return
+    const { mixed } = this.replay, more = this.rail !== null // the ends, of a rail that was there in part
+    this.rail = rail
+    if (more) return this.arrived()
+    this.begun = mixed.normal[this.contact]
+    this.remember()
+    this.slid = mixed.tangential.map((t, c) => Math.abs(t) >= 0.999 * this.replay.walk.mu * mixed.normal[c])
+    this.arrived()
+  }
+
+  /** The hand goes on along a rail that has come; one that let go before stays where it was going. */
+  arrived() {
+    this.move()
+    if (this.flung && this.rail.whole) this.leave()
+  }
+
+  /** Changes are coloured against the network on screen. */
+  remember() { this.before = this.player.look.before = this.replay.mixed.normal.slice() }
+
+  /** The network that the pulls have led to. */
+  keep(held) {
+    const { player, replay } = this
+    if (!replay) return
+    if (!held) return this.forget()
+    if (held.normal.length !== replay.walk.contacts) return
+    const from = replay.frame * replay.walk.contacts
+    this.before ??= replay.walk.normal.slice(from, from + replay.walk.contacts)
+    replay.held = held
+    player.look.before = this.before
+    if (held.pull.length > 2) this.spot.describe(...held.pull.slice(1))
+    else this.describe(...held.pull)
+    player.tellHeld(true)
+    player.again()
+  }
+
+  /** The network of this value, by straight lines between those of the rail. */
+  set(value) {
+    const { rail } = this, { values } = rail
+    this.value = Math.max(values[0], Math.min(values[values.length - 1], value))
+    this.describe(this.contact, this.value)
+    this.show(networkAt(rail, this.value))
+  }
+
+  /** Put a network on screen with the next painted frame. */
+  show(held) {
+    const { replay, player } = this
+    replay.held = held
+    player.tellHeld(true)
+    if (this.asked) return
+    this.asked = requestAnimationFrame(() => {
+      this.asked = 0
+      this.frames++
+      if (this.replay === replay && replay.held) player.repaintHeld()
+    })
+  }
+
+  /** −1 or 1 where the hand is at the lower or upper end of the rail, else 0. */
+  get end() {
+    if (!this.rail) return 0
+    const { lower, upper } = this.rail, near = AT_END * (upper - lower)
+    return this.value >= upper - near ? 1 : this.value <= lower + near ? -1 : 0
+  }
+
+  /** Contacts that opened, and that slide, at the end where the hand is. */
+  get holding() {
+    const { rail, end, before, slid } = this, size = this.replay.walk.contacts
+    const from = end > 0 ? size : 0
+    const opened = [], sliding = []
+    for (let c = 0; end && c < size; c++) {
+      if (rail.opened[from + c] && before[c] > CARRYING) opened.push(c)
+      if (rail.sliding[from + c] && !slid[c]) sliding.push(c)
+    }
+    return { opened, sliding }
+  }
+
+  describe(contact, value) {
+    const { walk } = this.replay, { rail, end } = this
+    const possible = rail ? ` (possible ${rail.lower.toFixed(3)} to ${rail.upper.toFixed(3)})` : ""
+    let words = `Contact ${walk.backbone[contact]} pulled to ${value.toFixed(3)}${possible} × the mean force`
+    if (rail && end) {
+      const { opened, sliding } = this.holding
+      words += `, its ${end > 0 ? "largest" : "least"}: held there by ${opened.length} contacts that opened ` +
+        `and ${sliding.length} that came to slide`
+    } else words += "; orange carries more than before, blue less"
+    this.player.say(words)
+  }
+
+  // In the intervals
+
+  /** Take a contact by its dot: it follows a pointer at this height, in the units of the plot. */
+  takeInBars(contact, value) {
+    this.height = value
+    this.grip = null
+    this.take(contact, () => this.heightOf(contact))
+  }
+
+  moveInBars(value) {
+    this.height = value
+    this.move()
+  }
+
+  heightOf(contact) {
+    return this.player.model.scale === "own" ? this.height * this.replay.walk.normal[contact] : this.height
+  }
+
+  // In the packing
+
+  /** Take the contact under a point of the scene, on a rail that goes upwards through the point. */
+  takeInScene(contact, px, py) {
+    this.point = [px, py]
+    this.grip = [px, py]
+    this.take(contact, () => this.valueAt(this.point[1]))
+  }
+
+  moveInScene(px, py) {
+    this.point = [px, py]
+    this.move()
+  }
+
+  /** Ends of the rail on the scene, px from above. */
+  ends() {
+    const { rail, begun, grip } = this, { size } = this.player.scene
+    const part = (begun - rail.lower) / (rail.upper - rail.lower || 1)
+    const room = Math.min((grip[1] - EDGE) / (1 - part || 1e-9), (size - EDGE - grip[1]) / (part || 1e-9))
+    const length = Math.max(60, Math.min(RAIL, room))
+    return [grip[1] + part * length, grip[1] - (1 - part) * length]
+  }
+
+  valueAt(py) {
+    const { lower, upper } = this.rail, [bottom, top] = this.ends()
+    return lower + ((bottom - py) / (bottom - top)) * (upper - lower)
+  }
+
+  /** Rail, handle and what holds it, on the canvas of marks. */
+  draw(context, scene) {
+    if (this.contact === null && !this.lingers) return
+    const { palette, ratio } = scene
+    const { opened, sliding } = this.rail ? this.holding : { opened: [], sliding: [] }
+    this.drawHolding(context, scene, opened, true)
+    this.drawHolding(context, scene, sliding, false)
+    if (!this.grip) return
+    context.setTransform(ratio, 0, 0, ratio, 0, 0)
+    context.strokeStyle = context.fillStyle = palette.selected
+    context.lineCap = "round"
+    const [x, y] = this.grip
+    if (this.rail) {
+      const [bottom, top] = this.ends(), { lower, upper } = this.rail
+      const at = bottom - ((this.value - lower) / (upper - lower || 1)) * (bottom - top)
+      for (const [width, colour] of [[9, palette.halo], [3, palette.selected]]) {
+        context.lineWidth = width
+        context.strokeStyle = colour
+        line(context, [x, bottom], [x, top])
+      }
+      context.lineWidth = 2
+      for (const end of [bottom, top, y]) line(context, [x - 7, end], [x + 7, end])
+      context.font = "12px sans-serif"
+      context.textBaseline = "middle"
+      const side = x > scene.size - 70 ? -1 : 1
+      context.textAlign = side > 0 ? "left" : "right"
+      const ends = [[lower, bottom], [upper, top]].filter(([, py]) => Math.abs(py - at) > NUMBER_LINE)
+      for (const [value, py] of [...ends, [this.value, at]]) {
+        context.lineWidth = 4
+        context.strokeStyle = palette.halo
+        context.strokeText(value.toFixed(2), x + 16 * side, py)
+        context.fillText(value.toFixed(2), x + 16 * side, py)
+      }
+      circle(context, [x, at], 8)
+      context.fill()
+    } else circle(context, [x, y], 8)
+    context.lineWidth = 2
+    context.stroke()
+  }
+
+  /** Contacts at a limit: open ones ring-shaped, sliding ones as squares. */
+  drawHolding(context, scene, contacts, opened) {
+    if (!contacts.length) return
+    const chosen = new Set(contacts), { scale, palette } = scene, r = 4.5 / scale
+    context.beginPath()
+    for (const { middle: [x, y] } of scene.segments((contact) => chosen.has(contact))) {
+      if (opened) { context.moveTo(x + r, y); context.arc(x, y, r, 0, 2 * Math.PI) }
+      else context.rect(x - r / 2, y - r / 2, r, r)
+    }
+    context.lineWidth = 1.6 / scale
+    context.strokeStyle = palette.selected
+    context.stroke()
+  }
+}

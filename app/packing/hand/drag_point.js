@@ -1,0 +1,170 @@
+// The point in force space in the hand: it goes where the hand goes inside the outline, and the
+// network with it. The server sends networks at corners all around (a fan); the triangle between two
+// of them and the network that was taken is shown, and all of it is admissible, since S is convex.
+
+import { FORCES } from "../replay/live.js"
+
+const SWEEP_MS = 7000 // from the network on screen to both ends of S along an axis, and back
+const SWEPT = "From one end of S to the other and back: orange carries more than before, blue less"
+const STILL = matchMedia("(prefers-reduced-motion: reduce)")
+
+export class PointHand {
+  constructor(hand) {
+    this.hand = hand
+    this.drop()
+  }
+
+  get active() { return this.target !== null }
+
+  drop() {
+    this.target = this.fan = this.from = null
+    this.flung = false // whether it was let go before its networks were there
+    this.axis = this.was = null // along which it goes by itself, and what was on screen before
+  }
+
+  // The hand
+
+  take(x, y) {
+    this.halt()
+    if (!this.hand.begin()) return
+    this.target = [x, y]
+    this.hand.tell({ point: true })
+  }
+
+  move(x, y) {
+    if (!this.active) return
+    this.target = [x, y]
+    if (this.fan) this.set()
+  }
+
+  leave() {
+    const { fan, at } = this
+    if (!this.active) return
+    if (!fan) return void (this.flung = true)
+    this.drop()
+    if (at) this.hand.tell({ hold_point: at })
+    this.hand.still()
+  }
+
+  // What the server made
+
+  spread(fan) {
+    const { hand } = this, { mixed, walk } = hand.replay ?? {}
+    if (!fan || !this.active || fan.normal.length !== fan.x.length * walk.contacts) {
+      if (this.active) { this.drop(); hand.still() }
+      return
+    }
+    const here = hand.player.plots.projected(mixed)
+    if (!here) return
+    this.fan = fan
+    this.at = null
+    this.from = { here, normal: mixed.normal.slice(), tangential: mixed.tangential.slice() }
+    this.from.residual = hand.replay.residual
+    hand.remember()
+    this.set()
+    if (this.axis !== null) this.go()
+    else if (this.flung) this.leave()
+  }
+
+  // By itself
+
+  /** Go once to and fro along an axis of the plane (0: across, 1: up), and back; asked again, stop. */
+  sweep(axis) {
+    const { hand } = this, again = this.axis === axis
+    this.halt()
+    if (again || !hand.begin()) return
+    const { mixed, held } = hand.replay, here = hand.player.plots.projected(mixed)
+    if (!here) return
+    Object.assign(this, { target: here, axis, was: { held, before: hand.before } })
+    hand.tell({ point: true })
+  }
+
+  go() {
+    const { fan, axis, from: { here }, hand } = this, { replay, player } = hand, { plane } = player.plots
+    const [low, high] = chord(fan, here, axis), begin = performance.now()
+    const step = (now) => {
+      if (fan !== this.fan) return
+      const part = Math.max(0, now - begin) / SWEEP_MS, swing = Math.sin(2 * Math.PI * part)
+      if (part >= 1 || replay !== hand.replay || plane !== player.plots.plane) return this.halt()
+      const along = STILL.matches ? Math.sign(swing) : swing
+      this.target = here.map((v, k) => (k === axis ? v + along * (along > 0 ? high : -low) : v))
+      this.set()
+      requestAnimationFrame(step)
+    }
+    step(begin)
+  }
+
+  /** What went by itself stops, and all is as it was before. */
+  halt() {
+    const { axis, was, hand, fan } = this
+    if (axis === null) return
+    this.drop()
+    if (!fan) return void hand.still()
+    hand.before = was.before
+    if (was.held) hand.keep(was.held)
+    else hand.forget()
+    hand.still()
+  }
+
+  /** The network at the target, or at the nearest point of the polygon. */
+  set() {
+    const { fan, from, hand } = this, { contacts } = hand.replay.walk
+    const point = inside(fan, this.target), { k, next, a, b } = triangle(fan, from.here, point)
+    const held = { normal: new Float32Array(contacts), tangential: new Float32Array(contacts) }
+    for (const name of FORCES) {
+      const out = held[name], all = fan[name], own = from[name], i = k * contacts, j = next * contacts
+      for (let c = 0; c < contacts; c++) out[c] = (1 - a - b) * own[c] + a * all[i + c] + b * all[j + c]
+    }
+    held.residual = Math.max(from.residual || 0, fan.residual[k], fan.residual[next])
+    this.at = point
+    this.describe(...point)
+    hand.show(held)
+  }
+
+  describe(x, y) {
+    if (this.axis !== null) return this.hand.player.say(SWEPT)
+    this.hand.player.say(`The point in force space pulled to ` +
+      `(${x.toFixed(2)}, ${y.toFixed(2)}), in mean forces; orange carries more than before, blue less`)
+  }
+}
+
+/** How far a polygon goes from a point within it along an axis: down to a number ≤ 0, up to one ≥ 0. */
+function chord({ x, y }, [px, py], axis) {
+  let [low, high] = [-Infinity, Infinity]
+  for (let k = 0; k < x.length; k++) {
+    const next = (k + 1) % x.length, ex = x[next] - x[k], ey = y[next] - y[k]
+    const room = Math.max(0, ex * (py - y[k]) - ey * (px - x[k])), slope = axis ? ex : -ey
+    if (slope > 0) low = Math.max(low, -room / slope)
+    if (slope < 0) high = Math.min(high, -room / slope)
+  }
+  return [low, high]
+}
+
+/** A point, or the nearest one of the polygon's edge where it lies outside (corners run left about). */
+function inside({ x, y }, [px, py]) {
+  let out = false, best = null, least = Infinity
+  for (let k = 0; k < x.length; k++) {
+    const next = (k + 1) % x.length, ex = x[next] - x[k], ey = y[next] - y[k]
+    const ax = px - x[k], ay = py - y[k]
+    if (ex * ay < ey * ax) out = true
+    const along = Math.max(0, Math.min(1, (ex * ax + ey * ay) / (ex * ex + ey * ey)))
+    const near = [x[k] + along * ex, y[k] + along * ey], away = Math.hypot(near[0] - px, near[1] - py)
+    if (away < least) { least = away; best = near }
+  }
+  return out ? best : [px, py]
+}
+
+/** In which triangle of `here` and corners k, next a point lies, and its weights there. */
+function triangle({ x, y }, [hx, hy], [px, py]) {
+  let best = { k: 0, next: 0, a: 0, b: 0 }, most = -Infinity
+  const dx = px - hx, dy = py - hy
+  for (let k = 0; k < x.length; k++) {
+    const next = (k + 1) % x.length, ax = x[k] - hx, ay = y[k] - hy, bx = x[next] - hx, by = y[next] - hy
+    const area = ax * by - ay * bx, a = (dx * by - dy * bx) / area, b = (ax * dy - ay * dx) / area
+    const short = Math.min(a, b, 1 - a - b)
+    if (short > most) { most = short; best = { k, next, a, b } }
+  }
+  const clip = (value) => Math.max(0, Math.min(1, value)), [a, b] = [clip(best.a), clip(best.b)]
+  const sum = Math.max(1, a + b)
+  return { ...best, a: a / sum, b: b / sum }
+}

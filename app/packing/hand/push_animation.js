@@ -1,0 +1,45 @@
+// A push on the two disks of a contact: arrows that grow with the load, and the network, which follows along
+// networks that the server made. Between two of them the straight line balances the load in between (S under
+// all loads is convex, too). Where the last of them is reached, disks set off.
+
+import { networkAt } from "../replay/replay.js"
+
+export class Pushed {
+  constructor(player) {
+    this.player = player
+    this.end()
+  }
+
+  /** Nothing is pushed any more. */
+  end() {
+    this.load = this.part = 0
+    this.there = false // whether disks set off
+    const { player } = this, held = this.held
+    this.held = null
+    player.sway?.take(null)
+    if (held && player.replay?.held === held) player.hand.forget()
+  }
+
+  /** path: networks under loads up to the largest one that is held; part: of the longest arrow. */
+  take(path, load, part) {
+    const { player } = this, { replay, scene } = player
+    if (!player.pushable || player.live.moves || player.grows) return
+    if (load > 0 && player.playing) player.play(false)
+    if (load > 0 && replay.held && replay.held !== this.held) player.hand.free() // what was pulled
+    Object.assign(this, { load, part, there: load > 0 && load >= (path.values?.at(-1) ?? Infinity) })
+    this.tellMotion()
+    if (!(load > 0 && path.values?.length) || path.normal.length !== path.values.length * replay.walk.contacts) {
+      if (this.held) this.end()
+      return scene.style && scene.drawMarks(scene.style)
+    }
+    if (replay.position) player.show(0)
+    player.look.before = replay.walk.normal.subarray(0, replay.walk.contacts)
+    player.hand.show((this.held = { ...networkAt(path, load), place: "pushed" }))
+  }
+
+  /** The slider was let go. */
+  leave() { if (this.there) this.player.later.offer() }
+
+  /** Disks move only where they are pushed hard enough. */
+  tellMotion() { this.player.sway.take(this.there ? this.player.model.displacement : null) }
+}

@@ -1,0 +1,453 @@
+// Replays states in the page. The frames come once; per painted frame the chains are drawn anew and
+// the plots beside follow, without telling the server.
+
+import { actions } from "./hand/actions.js"
+import { ask, knownThere } from "../browser/send.js"
+import { Buttons } from "./buttons.js"
+import { Difference } from "../obsolete/difference.js"
+import { Grab, UNCHOSEN } from "./hand/drag_force.js"
+import { Invitation } from "../obsolete/invite.js"
+import { CATCH_UP, extend, Live, roomy } from "./replay/live.js"
+import { Look } from "./drawing/chain_style.js"
+import { plain } from "../browser/to_object.js"
+import { Later } from "../obsolete/later.js"
+import { knows, remember } from "../browser/local_storage.js"
+import { Near } from "../obsolete/near.js"
+import { openMoving, shown } from "../obsolete/opening.js"
+import { Pins } from "./drawing/pins.js"
+import { Plots } from "./drawing/bokeh_plots.js"
+import { Predict } from "../obsolete/predict.js"
+import { Pushed } from "./hand/push_animation.js"
+import { Replay } from "./replay/replay.js"
+import { Scene } from "./drawing/scene.js"
+import { closeSidebar } from "../obsolete/sidebar.js"
+import { Split } from "./drawing/split_view.js"
+import { Sway } from "./drawing/displacement.js"
+
+const PLOTS_MS = 30 // the plots beside are repainted no more often than this while playing,
+const PLOTS_FRAMES = 1.5 // nor than every so many frames, where frames take long
+const CROSSING = 20 // times as long as a step takes the way between two states, to be followed by eye,
+const LONGEST_S = 6 // but no longer than this
+const OLD = 0.72 // opacity of what is of other states than those asked for, which is grey, too, and can still be read
+const NO_ERROR = "An error bar is a number from 0 on, in mean forces; 0 holds the force exactly."
+const REST_MS = 400 // that a whole step takes where a pause goes to the nearest network
+const STILL = matchMedia("(prefers-reduced-motion: reduce)")
+const WIDE = 1800 // px; from there on force space has a place of its own, see page.py
+
+class Player {
+  constructor(model, page, tell) {
+    this.model = model
+    this.scene = new Scene((contact) => { model.contact = contact })
+    this.actions = actions(this)
+    this.buttons = new Buttons(this.scene, this.actions)
+    this.plots = new Plots(page, () => this.again(), {
+      dots: {
+        take: (k, _, value) => this.hand.takeInBars(this.plots.find("bars").get_column("at")[k], value),
+        move: (_, value) => this.hand.moveInBars(value),
+        leave: () => this.hand.leave(),
+      },
+      point: {
+        take: (_, x, y) => this.hand.spot.take(x, y),
+        move: (x, y) => this.hand.spot.move(x, y),
+        leave: () => this.hand.spot.leave(),
+      },
+    })
+    this.replay = this.look = this.loaded = null
+    this.resting = null // where a pause comes to rest, while it is on its way
+    this.opens = false // whether it plays by itself, before the first gesture
+    this.took = false // whether a force was taken into the hand
+    this.playing = this.follows = false // the newest state of a walk under way
+    this.live = new Live(this, (live) => tell({ live }))
+    this.hand = this.scene.hand = new Grab(this, tell)
+    this.pins = new Pins(this)
+    this.later = new Later("network", this.buttons.part("all"), shown())
+    this.near = new Near(this)
+    this.tell = tell
+    this.listeners = new Set() // functions to be called when other numbers are on screen
+    this.invite = new Invitation(this)
+    this.scene.onMarks = (context, scene) => {
+      this.invite.place()
+      this.pins.draw(context, scene)
+      this.hand.draw(context, scene)
+      this.difference.draw(context, scene)
+    }
+    this.scene.onSheet = (sheet, scene) => this.pins.onSheet(sheet, scene)
+    this.difference = new Difference(this)
+    this.predict = new Predict(this)
+    this.split = new Split(this)
+    this.sway = new Sway(this.scene)
+    this.pushed = new Pushed(this)
+    this.scene.onRepaint = () => { this.buttons.count(); this.split.paint(); this.tellView(); this.near.draw() }
+    this.scene.describe = {
+      contact: (k) => this.look.contact(k, this.replay),
+      grain: (k) => this.look.grain(k, this.replay),
+      forces: (grain) => this.look.forcesOn(grain, this.replay.mixed),
+    }
+  }
+
+  /** Whether the tab is open in which a contact is chosen, to be pushed: what plays would distract. */
+  get pushes() { return this.model.tab === "perturb" }
+
+  /** Whether a contact is to be pushed, and there is something to be held against that. */
+  get pushable() { return this.pushes && this.model.pushing === "one" && this.replay?.walk.free > 0 }
+
+  /** What the tab that is open asks of the packing. */
+  tellTab() {
+    this.buttons.root.classList.toggle("pushes", this.pushes)
+    if (!this.pushable) this.pushed.end()
+    this.buttons.root.classList.toggle("guesses", this.invite.guesses)
+  }
+
+  /** Whether force space has been turned to, where the point is what can be dragged first. */
+  get points() { return this.model.tab === "plane" }
+
+  // What is on screen
+
+  /** Take the frames that the server sent. */
+  load() {
+    const { model, scene, playing } = this, walk = plain(model.walk)
+    if (model.walk === this.loaded || !walk.contacts) return
+    const zoom = this.loaded ? null : model.zoom // of the link that opened the page
+    this.loaded = model.walk
+    this.difference.end()
+    const view = this.live.leave(), place = this.grownInto(walk)
+    this.playing = false
+    this.replay = new Replay(walk.room ? roomy(walk) : walk, model.between)
+    this.look = new Look(model, this.replay.walk, this.later.waits)
+    this.hand.settle()
+    this.tellHeld(false)
+    this.pushed.end()
+    this.tellTab()
+    scene.mixed = this.replay.mixed
+    scene.palette = plain(plain(model.palettes).scene)
+    this.plots.colours = plain(plain(model.palettes).plots)
+    this.select()
+    this.buttons.tellTrack(this.replay)
+    this.buttons.say("")
+    this.tellAsked()
+    scene.show(this.replay.walk)
+    if (zoom) scene.view = { x: zoom[0], y: zoom[1], half: zoom[2] }
+    else scene.view = this.near.view ?? scene.view
+    this.split.show()
+    scene.resize()
+    scene.repaint()
+    this.live.glide(view)
+    this.show(place ?? (this.replay.swinging ? 0 : model.frame), false)
+    this.follows = walk.room > 0 || (this.follows && place !== null)
+    if ((playing || walk.room) && !this.pushes) requestAnimationFrame(() => this.play(true))
+    else if (this.model.predict) this.predict.ask() // of a link
+  }
+
+  /** Where a walk that is finished goes on, if it is the one that was being computed; else null. */
+  grownInto(walk) {
+    const { replay } = this
+    if (walk.room || !replay?.walk.numbers || replay.walk.contacts !== walk.contacts) return null
+    if (replay.walk.normal.subarray(0, walk.contacts).some((value, c) => value !== walk.normal[c])) return null
+    const number = replay.walk.number[replay.frame]
+    return Math.max(0, walk.number.findLastIndex((other) => other <= number))
+  }
+
+  /** More states of the walk under way. */
+  grow(states) {
+    const { replay } = this
+    if (!replay?.walk.numbers) return
+    extend(replay.walk, states)
+    if (!replay.swinging) replay.follow(null, replay.position)
+    this.buttons.tellTrack(replay)
+    this.look.measure()
+    if (!this.playing) this.paintPlots()
+  }
+
+  /** More exact bounds of the packing on screen. */
+  arrive(bounds) {
+    const { replay, plots } = this
+    if (!replay || bounds.low.length !== replay.walk.contacts || this.later.waits) return // or to be found out
+    replay.bounds = bounds
+    if (this.model.tab === "intervals") plots.showBounds(replay, this.model.scale)
+  }
+
+  /** Whether more states are to come. */
+  get grows() { return this.replay?.walk.room > 0 }
+
+  tellAsked() {
+    const { model, live } = this, { style } = document.documentElement
+    this.buttons.root.classList.toggle("moving", live.moves)
+    this.buttons.tellAsked(live.moves || this.grows ? "" : model.asked)
+    // What is beside is pale by these: told by its own style, Bokeh would lay out the whole page anew.
+    const pale = { "--still": model.asked, "--growing": model.asked && !this.grows }
+    for (const [name, old] of Object.entries(pale)) {
+      style.setProperty(name, old ? OLD : 1)
+      style.setProperty(`${name}-colours`, old ? "grayscale(1)" : "none")
+    }
+  }
+
+  select() {
+    this.buttons.tellChosen(this.scene.hand && (this.model.contact ?? null) !== null)
+    this.scene.selected = this.model.contact ?? null
+    this.scene.pair = (this.points || this.model.wide) ? this.plots.plane.pair ?? [] : []
+  }
+
+  /** What is chosen, seen. */
+  mark() {
+    if (!this.replay || this.live.moves) return
+    this.select()
+    this.scene.drawMarks(this.look.style)
+    this.split.paint()
+  }
+
+  paint() {
+    this.scene.drawChains(this.look.of(this.replay.mixed))
+    this.split.step()
+  }
+
+  paintPlots(now = performance.now()) {
+    const { model, plots, replay } = this
+    this.told = now
+    if (model.tab === "intervals") plots.show(replay, model.scale)
+    const invited = plots.invites
+    plots.invite(this.points && !this.opens && !this.took && !this.grows && replay.walk.free > 0)
+    if (plots.invites !== invited) this.mark() // what can be dragged is said above the packing, too
+    plots.follow(model.wide ? [model.tab, "plane"] : [model.tab], replay)
+    this.buttons.read(replay)
+    for (const listener of this.listeners) listener()
+  }
+
+  /** The same network, as it is to look now. */
+  repaint() { if (!this.live.moves) this.paint() }
+
+  /** Go to a position on the track and paint it; tell: the server, too. */
+  show(to, tell = true) {
+    this.replay.go(to)
+    this.paint()
+    this.paintPlots()
+    if (tell) this.model.frame = this.replay.frame
+  }
+
+  /** Where the view has come to rest, for links. */
+  tellView() {
+    const { scene, model } = this, { x, y, half } = scene.view, key = `${x},${y},${half}`
+    if (key === this.viewed || scene.frozen || this.later.waits) return
+    this.viewed = key
+    clearTimeout(this.looking)
+    this.looking = setTimeout(() => {
+      const whole = Object.values(scene.whole), now = [x, y, half]
+      const rounded = now.map((value) => Number(value.toPrecision(5)))
+      model.zoom = now.every((value, k) => Math.abs(value - whole[k]) < 1e-6) ? null : rounded
+    }, REST_MS)
+  }
+
+  /** A network that was pulled has changed. */
+  repaintHeld() {
+    this.replay.mix()
+    this.paint()
+    const now = performance.now()
+    if (now - this.told > PLOTS_MS) this.paintPlots(now)
+    else this.buttons.read(this.replay)
+  }
+
+  /** Whether a network is on screen that was pulled: the legend says so, too. */
+  tellHeld(held) {
+    if (held) this.difference.end()
+    this.buttons.tellHeld(held)
+    if (this.pulled !== held) this.model.pulled = this.pulled = held // a model is slow to ask
+  }
+
+  /** Networks without colour, where it would give something away, or as they were. */
+  dress(plain) {
+    this.look.plain = plain
+    this.again()
+  }
+
+  again() {
+    this.split.show()
+    if (this.replay && !this.playing && !this.live.moves) this.show(this.replay.position, false)
+  }
+
+  // Playing
+
+  play(on) {
+    const { replay, model } = this
+    this.playing = on && replay !== null
+    this.plots.move(this.playing)
+    this.buttons.tellPlaying(this.playing)
+    if (!replay) return
+    this.resting = null
+    if (this.playing) this.say("")
+    else {
+      this.settle(replay)
+      model.frame = replay.frame
+      this.paintPlots()
+      this.mark()
+      return
+    }
+    if (replay.atEnd && !replay.swinging) this.show(0, false)
+    this.direction = 1
+    this.before = performance.now()
+    requestAnimationFrame((now) => this.tick(now))
+  }
+
+  /** What rests is a network that has a name: the nearest one, but between two that are compared. */
+  settle(replay) {
+    if (replay.held || replay.swinging || !(replay.position % 1)) return
+    replay.go(Math.round(replay.position))
+    this.paint()
+  }
+
+  /** Pause: playing ends at the nearest network, to which it goes over. */
+  pause(replay) {
+    if (replay.held || replay.swinging || STILL.matches) return this.play(false)
+    this.resting = Math.round(replay.position)
+    this.buttons.tellPlaying(false)
+  }
+
+  /** One step of the way to where it comes to rest; whether it is there. */
+  rest(replay, took) {
+    const way = this.resting - replay.position, step = (took / REST_MS) * Math.sign(way)
+    if (Math.abs(way) <= Math.abs(step)) { this.play(false); return true }
+    replay.go(replay.position + step)
+    return false
+  }
+
+  tick(now) {
+    if (!this.playing || !this.scene.root.isConnected) return
+    const { replay } = this, took = Math.max(0, now - this.before)
+    const behind = this.follows ? (replay.last - replay.position) / CATCH_UP : 0
+    const speed = Math.max(this.buttons.speed, behind)
+    const steps = (took / 1000) * (replay.swinging ? Math.max(speed / CROSSING, 1 / LONGEST_S) : speed)
+    this.before = now
+    if (this.resting !== null) {
+      if (this.rest(replay, took)) return
+      this.paint()
+      return void requestAnimationFrame((next) => this.tick(next))
+    }
+    if (this.grows && replay.atEnd && !replay.swinging) return void requestAnimationFrame((next) => this.tick(next))
+    replay.go(replay.position + this.direction * steps)
+    if (replay.swinging && (replay.atEnd || replay.position <= 0)) this.direction = replay.atEnd ? -1 : 1
+    this.paint()
+    if (now - this.told > Math.max(PLOTS_MS, PLOTS_FRAMES * took)) this.paintPlots(now)
+    if (!replay.swinging && replay.atEnd && !this.grows) {
+      this.play(false)
+      this.show(replay.last)
+    } else requestAnimationFrame((next) => this.tick(next))
+  }
+
+  /** Select the next contact, the one with the largest force on screen first. */
+  choose({ mixed: { normal } }, sign) {
+    const { model } = this, order = Array.from(normal.keys()).sort((a, b) => normal[b] - normal[a] || a - b)
+    const at = order.indexOf(model.contact ?? -1), { length } = order
+    model.contact = order[at < 0 ? (sign > 0 ? 0 : length - 1) : (at + sign + length) % length]
+    const row = this.scene.geometry.contact.indexOf(model.contact)
+    const told = this.look.contact(row, this.replay).map((pair) => pair.join(" "))
+    this.say(told.join("; "))
+  }
+
+  /** One line beside the number of the network; refused: until something else is done. */
+  say(words, refused = false) {
+    this.refused = refused
+    this.buttons.say(words)
+  }
+
+  /** Something was done. */
+  recover() { if (this.refused) this.say("") }
+
+  /** Take the selected contact's force for known, as it is on screen; known, let it go. */
+  hold({ mixed }) {
+    const { contact } = this.model, { error } = this.buttons
+    if (contact === null || contact === undefined) return this.say(UNCHOSEN, true)
+    if (this.grows || !this.scene.hand) return
+    const known = this.pins.has(contact)
+    if (!known && Number.isNaN(error)) return this.say(NO_ERROR, true)
+    this.tell({ known: known ? { release: contact } : { hold: [contact, mixed.normal[contact], error] } })
+  }
+
+  /** Begin or end going to and fro between the pinned state and this one. */
+  between({ swinging, frame, last }) {
+    const { model } = this, here = frame || last
+    if (swinging) { model.between = null; return }
+    model.between = [model.reference === here ? 0 : model.reference, here]
+    this.play(true)
+  }
+
+  // What the server tells
+
+  /** What is done when a parameter of the model has changed. */
+  changes() {
+    const { model, scene, buttons } = this
+    const loaded = (action) => () => { if (this.replay && !this.live.moves) action(this.replay) }
+    return {
+      tab: loaded((replay) => { if (this.pushes && this.playing && this.resting === null) this.pause(replay) }),
+      lead: () => { buttons.part("lead").innerHTML = model.lead },
+      legend: () => { buttons.part("legend").innerHTML = model.legend },
+      source: () => { buttons.part("source").textContent = model.source; buttons.say("") },
+      asked: () => this.tellAsked(),
+      live: () => { if (!model.live && this.live.moves) { this.loaded = null; this.load() } },
+      busy: () => buttons.root.classList.toggle("busy", model.busy),
+      walk: () => this.load(),
+      displacement: () => this.pushed.tellMotion(),
+      twin: () => this.split.take(),
+      exact: loaded((replay) => { replay.bounds = null; this.look.measure(); this.again() }),
+      plane: () => { this.plots.plane = plain(model.plane); this.mark(); this.near.show(); this.again() },
+      loads: loaded(() => { this.look.measure(); this.again() }),
+      measured: loaded(() => { this.look.measure(); this.again() }),
+      gone: loaded(() => { this.look.measure(); this.again() }),
+      between: loaded((replay) => this.retrack(replay)),
+      predict: loaded(() => this.predict.ask()),
+      guess: () => {
+        document.documentElement.style.setProperty("--hill", model.guess ? "hidden" : "visible") // which gives it away
+        if (!model.guess) remember("guess")
+      },
+      frame: loaded((replay) => {
+        if (!this.playing && !replay.swinging && model.frame !== replay.frame) this.show(model.frame, false)
+      }),
+      palettes: loaded(() => { scene.palette = plain(model.palettes).scene; scene.changed(); this.again() }),
+      pins: loaded(() => { this.recover(); scene.drawMarks(this.look.style) }),
+      contact: loaded(() => { this.recover(); this.difference.guess(model.contact); this.predict.guess(model.contact); this.mark() }),
+    }
+  }
+
+  retrack(replay) {
+    const { frame } = replay
+    replay.follow(this.model.between)
+    this.buttons.tellTrack(replay)
+    this.show(replay.swinging ? 0 : frame)
+  }
+}
+
+export function render({ model, view }) {
+  const page = view.model.document, tell = (message) => ask(model, view, message)
+  const player = new Player(model, page, tell), changes = player.changes()
+  knownThere(page)
+  view.model.data.player = player
+  view.model.data.scene = player.scene // for those who find the model by its name
+  for (const [name, follow] of Object.entries(changes)) model.on(name, follow)
+  const looks = ["most", "colour", "thickness", "full", "stretch", "overlay", "reference", "split", "scale", "tab", "views", "wide"]
+  model.on(looks, () => player.again())
+  model.on(["tab", "wide", "figure", "pushing", "guess"], () => { // and what invites, in other words
+    if (!player.replay || player.live.moves) return
+    player.tellTab()
+    player.near.show()
+    player.again()
+    player.mark()
+  })
+  const observer = new ResizeObserver(() => player.scene.resize())
+  observer.observe(player.scene.root)
+  model.on("msg:custom", (message) => {
+    const news = plain(message)
+    if (news.number === undefined) player.hand.hear(news)
+    else player.live.hear(news)
+  })
+  const wide = matchMedia(`(min-width: ${WIDE}px)`), tellWidth = () => tell({ wide: wide.matches })
+  wide.addEventListener("change", tellWidth)
+  if (wide.matches !== model.wide) tellWidth()
+  model.on("remove", () => {
+    wide.removeEventListener("change", tellWidth)
+    observer.disconnect(); player.buttons.remove(); player.live.remove(); for (const handle of player.plots.handles) handle.remove() })
+  for (const name of ["lead", "legend", "source", "busy", "asked", "plane", "twin", "walk", "displacement"]) changes[name]()
+  model.fresh = player.later.waits
+  player.buttons.root.classList.toggle("first", model.fresh)
+  player.later.listeners.push(() => { model.fresh = false; player.buttons.root.classList.remove("first") })
+  if (!knows("guess") && !new URLSearchParams(location.search).has("tour")) model.guess = true
+  openMoving(player)
+  closeSidebar(page, view)
+  return player.buttons.root
+}

@@ -1,0 +1,119 @@
+"""The player: draws the packing and replays states in the browser; no server work per frame."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import param
+
+from granforce.types import Floats
+
+from ..browser.bundle import Scripted
+from ..browser.messages import Message
+from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION
+from ..results.replays import Replay
+from ..state.view_settings import Seen
+
+SCALES = {"width": CHAIN_WIDTH, "change": FULL_CHANGE, "deviation": FULL_DEVIATION}
+
+
+class Player(Scripted, Seen):
+    """Packing on canvases, with buttons, scrub slider and live numbers.
+
+    Its script is of parts: what is replayed (replay.js), how it looks (look.js), where it is drawn
+    (scene.js, or sheet.js for a file), its buttons (buttons.js), the plots beside (plots.js, and
+    layer.js for what moves in them), and player.js, which plays; live.js shows what is still being
+    computed, grab.js pulls single contacts, point.js the point in force space; split.js shows two
+    networks, or two packings, and pins.js marks the contacts that are known.
+
+    The frames are shipped once, in `walk`. Plots beside it are found in the page by their names;
+    any ColumnDataSource with the tags ["follows", NAME, TAB] has its single row moved along the
+    columns of the source called NAME, one row of which belongs to each frame, while TAB is visible.
+    """
+
+    walk = param.Dict(default={}, doc="geometry and frames of a Replay, see `frames`")
+    goal = param.Number(default=0.0, doc="what the first force is to pass, in ⟨f_n⟩; 0: not known")
+    exact = param.Dict(default={}, doc="low, high (N_c,) of exact intervals of f_n in ⟨f_n⟩")
+    loads = param.Array(default=None, doc="(N_c,) limit loads in ⟨f_n⟩, where colour or width ask")
+    gone = param.Array(default=None, doc="(N_c,) of ΔF_n in ⟨f_n⟩ by what is known, or None")
+    measured = param.Dict(default={}, doc="of a frame, see packing.measured")
+    most = param.Number(default=0.0, doc="ΔF_n in ⟨f_n⟩ at which its colour is full")
+    pins = param.Dict(default={}, doc="contacts that are known, and to measure; see packing.pins")
+    plane = param.Dict(default={}, doc="of force space on screen, see packing.projection")
+    palettes = param.Dict(default={}, doc="colours, see style.palettes")
+    scales = param.Dict(default=SCALES, doc="width and full colours of chains, see look.js")
+    live = param.Boolean(doc="whether something is being computed that can be seen")
+    asked = param.String(doc="what was asked for and is not on screen, in words")
+    lead = param.String(doc="HTML: the question, and what is seen, in sentences")
+    legend = param.String(doc="HTML: what colour and width show")
+    source = param.String(doc="where the states come from, in words")
+    busy = param.Boolean()
+    pulled = param.Boolean(doc="whether a network is on screen that was pulled; told by the page")
+    twin = param.Dict(default={}, doc="its frames, as `walk`, with its `exact`")
+    zoom = param.List(default=None, allow_None=True, doc="x, y, half width of what is seen; or all")
+    between = param.List(default=None, allow_None=True)
+    displacement = param.Array(default=None, doc="flat (2N,) displacements of the grains")
+
+    def __init__(self, **params: Any) -> None:
+        super().__init__(**params)
+        # Who hears of "tab", "hand", "known", "wide" and "live", each called with what is told.
+        self.hears: dict[str, Callable[[Any], object]] = {}
+
+    def _heard(self, message: Message) -> None:
+        for name, part in message.items():
+            if name in self.hears:
+                self.hears[name](part)
+
+
+def frames(replay: Replay, room: int = 0) -> dict[str, Any]:
+    """What the player needs of a Replay: flat arrays, frame after frame, and the geometry.
+
+    room: frames that it grows to while it is being computed.
+    """
+    disks, links = replay.disks, replay.links
+    whole = {"contact", "i", "j"}
+    radius = np.zeros(replay.summary["n"])
+    radius[disks.grain] = disks.r
+    return {
+        "normal": replay.normal.ravel(),
+        "tangential": replay.tangential.ravel(),
+        "contacts": replay.normal.shape[1],
+        "room": room,
+        "number": replay.number.astype(np.int32),
+        "distance": replay.distance.astype(np.float32),
+        "residual": replay.residual.astype(np.float32),
+        "acceptance": _acceptance(replay.attempts).astype(np.float32),
+        **{name: values.astype(np.float32) for name, values in replay.growth.items()},
+        "low": np.ascontiguousarray(replay.low[:, 0]),
+        "high": np.ascontiguousarray(replay.high[:, 0]),
+        "backbone": replay.backbone.astype(np.int32),
+        "mu": replay.summary["mu"],
+        "free": replay.summary["dimension"],
+        "states": replay.summary["states"],
+        "box": [float(side) if np.isfinite(side) else -1.0 for side in replay.box],
+        "tilt": replay.tilt,
+        "window": list(replay.window),
+        "inviting": replay.inviting,
+        "typical": replay.typical,
+        "x": disks.x,
+        "y": disks.y,
+        "r": disks.r,
+        "grain": disks.grain.astype(np.int32),
+        "touching": disks.contacts.astype(np.int32),
+        # rows of style's disk colours: whole, rattler, image, image of a rattler
+        "kind": (2 * disks.image + (disks.contacts == 0)).astype(np.int8),
+        "radius": radius,
+        **{
+            name: values.astype(np.int32) if name in whole else values
+            for name, values in links._asdict().items()
+        },
+    }
+
+
+def _acceptance(attempts: Floats) -> Floats:
+    """Accepted states per attempt (F,) up to each frame; NaN for the original."""
+    tried = np.append(np.nan, np.cumsum(attempts[1:]))
+    # Where nothing was tried, since all forces are determined, nothing was accepted either.
+    return np.divide(
+        np.arange(len(attempts)), tried, out=np.full(len(attempts), np.nan), where=tried > 0
+    )

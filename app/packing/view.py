@@ -1,0 +1,286 @@
+"""The packing: the player, what it shares with the server, and the legend."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granforce.types import Floats
+
+from ..explore import explanation
+from ..results import planes, progress_feed
+from ..results.geometry import CHAIN_WIDTH, FULL_CHANGE, FULL_DEVIATION, nearly
+from ..results.planes import Plane
+from ..results.replays import Replay
+from ..state.app_state import AppState
+from ..state.known import Knowledge
+from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS, Looks, Seen
+from ..widgets.plot_style import BLUE, GREY, ORANGE, palettes
+from .player import Player, frames
+
+# Both ways.
+SHARED = ("contact", "frame", "reference", "split", "beside", "predict", "colour", "guess", "fresh")
+SEEN = sorted(set(Seen.param) - {"name"})
+
+Bounds = dict[str, Any]  # {"low", "high": (N_c,) float32 f_n in ⟨f_n⟩}; empty where not known
+
+SATURATION = 0.98  # quantile of ΔF_n at which its colour is full
+
+LARGE = 4.0  # ⟨f_n⟩, up to which widths are shown: few forces are larger
+LEGEND = """
+<span tabindex="0" data-term="{colour_term}">colour: {colour}; {bar}</span>
+<span tabindex="0" data-term="{width_term}">width: {width}, up to
+ <svg width="40" height="12"><polygon points="0,5.5 40,{low:.1f} 40,{high:.1f} 0,6.5"
+  fill="currentColor" fill-opacity="0.65"/></svg>
+ {shown:.3g} × mean force</span>
+<span class="loose" tabindex="0" data-term="rattler">pale disks: loose, no force on them</span>
+{marks}
+"""
+JAMMING = """
+<span tabindex="0" data-term="fn">width: normal force fₙ of current contacts</span>
+<span tabindex="0" data-term="mobilisation">colour: mobilisation fₜ/(μ fₙ)</span>
+<span>pale disks: touch nothing; dashed: the box, which shrinks; disks outside
+ are periodic copies</span>
+"""
+BAR = (
+    """{low} <span class="scale" style="background:linear-gradient(90deg,{stops})"></span> {high}"""
+)
+# What the legend says in place of the words to choose by.
+DEFINED = {"change": "stronger or weaker than as packed"}
+DOT = """<svg width="12" height="12">
+ <circle cx="6" cy="6" r="4" fill="{fill}" stroke="{line}" stroke-width="1.5"/></svg> {text}"""
+
+
+class PackingView:
+    """Disks, chains, their legend, and the player's buttons: the view `player`."""
+
+    def __init__(self, state: AppState) -> None:
+        self.state = state
+        self.looks = looks = state.looks
+        self.player = Player(
+            name="player",  # by which others in the page find it
+            sizing_mode="stretch_width",
+            palettes=palettes(looks.dark),
+            zoom=None if looks.zoom is None else list(looks.zoom),
+            **{name: getattr(looks, name) for name in SEEN},
+            source=state.source,
+            busy=state.work.busy,
+        )
+        for name in SHARED:
+            self.player.param.watch(lambda event: looks.param.update({event.name: event.new}), name)
+        self._shown = None
+        for name in ("between", "zoom"):
+            self.player.param.watch(self._go, name)
+        self.player.param.watch(self._explain, "pulled")
+        looks.param.watch(self._follow, SEEN)
+        state.param.watch(self._follow, ["source", "loads"])
+        state.work.param.watch(self._follow, "busy")
+        state.param.watch(self._show, ["seen", "exact", "measured"])
+        state.knowledge.param.watch(self._show, "narrowed")
+        looks.param.watch(self._show, ["between", "full"])
+        state.param.watch(self._pin, "replay")
+        state.knowledge.param.watch(self._pin, ["known", "ranked"])
+        state.param.watch(self._displace, "displacement")
+        state.besides.param.watch(self._accompany, "twin")
+        dress = self.player.param.update
+        state.param.watch(lambda event: dress(plane=projection(event.new)), "plane")
+        looks.param.watch(lambda event: dress(palettes=palettes(event.new)), "dark")
+        looks.param.watch(
+            self._explain,
+            ["colour", "thickness", "full", "stretch", "overlay", "dark", "tab", "fresh"],
+        )
+        state.param.watch(self._explain, ["seen", "exact", "loads"])
+        state.knowledge.param.watch(self._explain, "narrowed")
+        state.hand.param.watch(self._explain, "pulls")
+        state.work.param.watch(self._explain, "moving")
+        self._show()
+        self._accompany()
+        self._pin()
+        self._explain()
+
+    def _go(self, event: Any) -> None:
+        """To and fro, or to another part of the picture: browsers have lists for tuples."""
+        self.looks.param.update({event.name: None if event.new is None else tuple(event.new)})
+
+    def _follow(self, *events: Any) -> None:
+        self.player.param.update({event.name: event.new for event in events})
+
+    def _show(self, *events: Any) -> None:
+        """What belongs together comes in one message."""
+        state, looks, replay = self.state, self.looks, self.state.seen
+        if replay is None:
+            return
+        exact = exact_intervals(state.possible, replay)
+        changes = {
+            "exact": exact,
+            "goal": goal(replay, exact),
+            "gone": gone(state.knowledge, replay),
+            "measured": measured(state, replay),
+            "most": full_extent(replay, exact, looks.full),
+            "between": None if looks.between is None else list(looks.between),
+        }
+        if self._shown is not replay:
+            self._shown = replay
+            room = len(progress_feed.numbers(replay.summary)) if state.growing else 0
+            changes["walk"] = frames(replay, room)
+        self.player.param.update(changes)
+
+    def _accompany(self, *events: Any) -> None:
+        """Another packing, beside the one on screen."""
+        twin = self.state.besides.twin
+        if twin is None:
+            self.player.twin = {}
+        else:
+            exact = exact_intervals(twin.exact, twin.replay)
+            self.player.twin = frames(twin.replay) | {"exact": exact}
+
+    def _pin(self, *events: Any) -> None:
+        self.player.pins = pins(self.state.knowledge)
+
+    def _displace(self, event: Any) -> None:
+        field = event.new
+        flat = None if field is None else np.ascontiguousarray(field, dtype=np.float64).ravel()
+        self.player.displacement = flat
+
+    def _explain(self, *events: Any) -> None:
+        pulled = self.player.pulled or bool(self.state.hand.pulls)
+        self.player.param.update(
+            legend=JAMMING if self.state.work.moving else legend(self.state, pulled),
+            lead=explanation.lead(self.state),
+        )
+
+
+def pins(knowledge: Knowledge) -> dict[str, list[Any]]:
+    """Contacts that are known, whether exactly, and those to measure next, the best first."""
+    return {
+        "contacts": [one.contact for one in knowledge.known],
+        "exact": [not one.error for one in knowledge.known],
+        "ranked": [] if knowledge.ranked is None else knowledge.ranked.contacts.tolist(),
+    }
+
+
+def projection(plane: Plane | None) -> dict[str, Any]:
+    """A planes.Plane as the player takes it: axes of f_n and f_t, and what to take away."""
+    if plane is None:
+        return {}
+    axes = plane.axes.astype(np.float32)
+    names = {"xn": (0, 0), "xt": (0, 1), "yn": (1, 0), "yt": (1, 1)}
+    columns = {name: np.ascontiguousarray(axes[k, :, part]) for name, (k, part) in names.items()}
+    origin = [float(value) for value in plane.origin]
+    told = {"origin": origin, "pair": plane.pair, "goal": plane.goal, "seen": planes.seen(plane)}
+    return columns | told
+
+
+def exact_intervals(dataset: xr.Dataset | None, replay: Replay) -> Bounds:
+    """Exact intervals of f_n in ⟨f_n⟩, for the contacts on screen."""
+    if dataset is None or not np.array_equal(dataset["backbone"].values, replay.backbone):
+        return {}
+    return {
+        name: (dataset[name].values[:, 0] / replay.force_scale).astype(np.float32)
+        for name in ("low", "high")
+    }
+
+
+def goal(replay: Replay, exact: Bounds) -> float:
+    """What the force of the line to be dragged first shall pass, in ⟨f_n⟩; 0 unless known."""
+    contact = replay.invited
+    return 0.0 if contact is None or not exact else nearly(exact["high"][contact])
+
+
+def gone(knowledge: Knowledge, replay: Replay) -> Any:
+    """Of ΔF_n (N_c,), by what is known, in ⟨f_n⟩; or None while nothing is."""
+    narrowed = knowledge.narrowed
+    if narrowed is None or len(narrowed.gone) != len(replay.backbone):
+        return None
+    return narrowed.gone.astype(np.float32)
+
+
+def measured(state: AppState, replay: Replay) -> dict[str, Any]:
+    """Of an opened frame the measured f_n in ⟨f_n⟩ and how far off it is in σ; {} for others."""
+    found = state.measured
+    if found is None or state.selection is None or state.selection.packing != found.packing:
+        return {}
+    normal, off = found.force[replay.backbone] / replay.force_scale, found.off[replay.backbone]
+    return {"normal": normal.astype(np.float32), "off": off.astype(np.float32)}
+
+
+def normal_extent(replay: Replay, exact: Bounds) -> Any:
+    """ΔF_n (N_c,) in ⟨f_n⟩: exact where known, else of all states."""
+    if exact:
+        return exact["high"] - exact["low"]
+    return replay.high[:, 0] - replay.low[:, 0]
+
+
+def full_extent(replay: Replay, exact: Bounds, asked: float | None = None) -> float:
+    """ΔF_n in ⟨f_n⟩ at which its colour is full, where no other was asked for."""
+    if asked is not None:
+        return asked
+    extent = normal_extent(replay, exact)
+    return float(np.quantile(extent, SATURATION)) if len(extent) else 0.0
+
+
+def colour_bar(state: AppState, pulled: bool) -> tuple[str, list[str], str]:
+    """What the ends of the scale of colours mean, and its colours: (low, [stops], high)."""
+    diverging = [BLUE, GREY, ORANGE]
+    looks = state.looks
+    full = looks.full or FULL_CHANGE
+    change = f"−{full:.3g}", diverging, f"+{full:.3g} × mean force (grey: none)"
+    if pulled:
+        return change
+    most = full_extent(state.seen, exact_intervals(state.possible, state.seen), looks.full)
+    return {
+        "mobilised": ("slips one way −1", diverging, "1 the other way"),
+        "extent": ("0", list(palettes(looks.dark)["extent"][::8]), f"{most:.2f} × the mean force"),
+        "load": ("0", list(palettes(looks.dark)["load"][::8]), _largest(state.loads, looks.full)),
+        "change": change,
+        "deviation": (f"{FULL_DEVIATION:g} σ less", diverging, f"{FULL_DEVIATION:g} σ more"),
+        "known": ("0", list(palettes(looks.dark)["known"][::8]), "1"),
+        "sign": ("less", [f"{BLUE} 50%", f"{ORANGE} 50%"], "more"),
+    }[looks.colour]
+
+
+def colour_words(looks: Looks, pulled: bool) -> str:
+    """What colours mean just now."""
+    return "change by what was pulled" if pulled else COLOURS[looks.colour]
+
+
+def _largest(loads: Floats | None, full: float | None) -> str:
+    if loads is None:
+        return "(being computed)"
+    return f"{full or loads.max(initial=0):.2f} × the mean force"
+
+
+def legend(state: AppState, pulled: bool = False) -> str:
+    """What width and colour mean just now, as HTML."""
+    looks, replay = state.looks, state.seen
+    if replay is None:
+        return ""
+    low, stops, high = colour_bar(state, pulled)
+    bar = BAR.format(low=low, stops=",".join(stops), high=high)
+    if looks.colour == "mobilised" and not pulled and replay.summary["mu"] == 0:
+        bar = "(none at μ = 0)"
+    if looks.colour == "known" and not pulled and state.knowledge.narrowed is None:
+        bar = "(nothing is known: select a contact and press H)"
+    widest = 2 / (CHAIN_WIDTH * looks.stretch)  # as wide as the legend is high
+    shown = min(widest, LARGE)
+    told = colour_words(looks, pulled)
+    if pulled and looks.tab == "perturb" and not state.hand.pulls:
+        told = "change by the push"
+    return LEGEND.format(
+        width=WIDTHS[looks.thickness],
+        shown=shown,
+        high=6 + 6 * shown / widest,
+        low=6 - 6 * shown / widest,
+        width_term=EXPLAINED[looks.thickness],
+        colour_term=EXPLAINED[looks.colour],
+        colour=DEFINED.get("" if pulled else looks.colour, told),
+        bar=bar,
+        marks=_marks(looks.dark) if looks.overlay else "",
+    )
+
+
+def _marks(dark: bool) -> str:
+    colours = palettes(dark)["scene"]
+    strong = DOT.format(fill=colours["strong"], line="none", text="tenth with largest fₙ")
+    loose = DOT.format(fill="none", line=colours["loose"], text="tenth with largest ΔFₙ")
+    return f'<span tabindex="0" data-term="overlay">{strong}{loose}</span>'

@@ -1,0 +1,177 @@
+"""What the page computes on demand, as work for jobs.Task; all goes through study and the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import xarray as xr
+
+from granforce.records import InputError, NotJammedError
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.cells import Kind
+from granforce.study.keys import Parameters
+
+from ..background.jobs import Job, Work
+from ..background.turns import in_turn
+from . import progress_feed
+from .library import SOURCES, Cell, Library, Shown
+from .replays import first_replay
+from .selection import Selection
+
+# A compaction's part of the bar; it never seems to be at its end.
+PACKING_SHARE, NEARLY = 0.5, 0.95
+
+
+def found_or_made(
+    library: Library, job: Job, stage: str, kind: Kind, params: Parameters, **options: Any
+) -> xr.Dataset:
+    """The dataset of a kind and parameters from a store, or computed in this stage.
+
+    options: as the kind's compute takes them.
+    """
+    found = library.stored(kind, params)
+    if found is None:
+        with in_turn(job, kind.name, params):
+            library.lend_packing(params["packing"])
+            job.begin(stage)
+            found, _ = study.get(library.own, kind, params, progress=job.tell, **options)
+    return found
+
+
+def states(library: Library, selection: Selection) -> Work:
+    """Work that finds or computes the states of a Selection; results in their Shown."""
+
+    kind, params = SOURCES[selection.kind], selection.parameters()
+
+    def work(job: Job) -> Shown:
+        with in_turn(job, selection.kind, params):
+            cell = library.find(selection.kind, params)
+            if cell is None:
+                _make_packing(job, library, selection.packing)
+                job.begin("finding which contacts carry")
+                with _told_of_friction(selection):
+                    dataset, _ = study.get(
+                        library.own,
+                        kind,
+                        params,
+                        progress=lambda done, total: _counted(job, done, total),
+                        **_watched(job, selection, params),
+                    )
+                cell = library.find(selection.kind, kind.reached(params, dataset))
+            if cell is None:
+                raise InputError("these states were removed from the cache; ask for them again")
+        return library.shown(cell)
+
+    return Work(work, wants=((selection.kind, params), ("packing", selection.packing)))
+
+
+@contextmanager
+def _told_of_friction(selection: Selection) -> Iterator[None]:
+    """Where no forces balance, say so of a friction smaller than that of the packing."""
+    try:
+        yield
+    except NotJammedError as error:
+        own = selection.packing["mu"]
+        if selection.mu >= own:
+            raise
+        raise InputError(
+            f"no forces hold this packing at μ = {selection.mu:g}: it was made at μ = {own:g}, "
+            "and needs some of that friction; try a larger μ"
+        ) from error
+
+
+def _watched(job: Job, selection: Selection, params: Parameters) -> dict[str, Any]:
+    """Options of the computation of states that have it seen, and stopped, by who follows it."""
+    if selection.kind != "walk":
+        return {}
+    walking = progress_feed.shared(progress_feed.Walking, params)
+
+    def begun(S: Any) -> None:
+        job.begin("looking for the first state")
+        walking.restart(first_replay(S, params["states"]))
+
+    def add(found: Any) -> None:
+        job.keeps = True
+        walking.add(found)
+
+    return {"begun": begun, "watch": add, "enough": job.enough}
+
+
+def exact(library: Library, shown: Shown) -> Work:
+    """Work that computes the exact intervals beside what is shown; results in a new Shown."""
+    params = shown.cell.selection.intervals
+
+    def work(job: Job) -> Shown:
+        replay = shown.replay
+        bounding = progress_feed.shared(progress_feed.Bounding, params)
+        try:
+            dataset = found_or_made(
+                library, job, "exact intervals, the widest first", kinds.INTERVALS, params,
+                begun=bounding.restart, watch=bounding.add,
+                widths=replay.high[:, 0] - replay.low[:, 0],
+            )  # fmt: skip
+        finally:
+            bounding.forget()
+        found = Shown(shown.cell, shown.replay, dataset)
+        library.keep_in_memory(found)
+        return found
+
+    return Work(work, wants=((kinds.INTERVALS.name, params),))
+
+
+# Standard error of ln V on the page: its width is then known to a part in a thousand.
+VOLUME_ERROR = 0.1
+
+
+def _volume_parameters(cell: Cell) -> Parameters:
+    selection = cell.selection
+    return kinds.VOLUME.parameters(selection.packing, VOLUME_ERROR, mu=selection.mu)
+
+
+def known_volume(library: Library, cell: Cell) -> Callable[[Job], tuple[Cell, xr.Dataset | None]]:
+    """Work that looks for the volume of S of a cell's packing: (cell, dataset or None)."""
+    return lambda job: (cell, library.stored(kinds.VOLUME, _volume_parameters(cell)))
+
+
+def volume(library: Library, cell: Cell) -> Work:
+    """Work that measures the volume of S of a cell's packing; results in (cell, dataset)."""
+    params = _volume_parameters(cell)
+
+    def work(job: Job) -> tuple[Cell, xr.Dataset]:
+        return cell, found_or_made(library, job, "volume of S", kinds.VOLUME, params)
+
+    return Work(work, wants=((kinds.VOLUME.name, params),))
+
+
+def _make_packing(job: Job, library: Library, packing: Parameters) -> None:
+    library.lend_packing(packing)
+    if "imported" in packing:
+        return
+    with in_turn(job, "packing", packing):
+        _compact(job, library, packing)
+
+
+def _compact(job: Job, library: Library, packing: Parameters) -> None:
+    steps = library.expected_steps(packing["n"], packing["mu"])
+
+    def tell(step: float, _: float | None) -> None:
+        if steps:
+            job.tell(min(step, NEARLY * steps), steps, part=(0, PACKING_SHARE))
+
+    job.begin("compressing")
+    seen = progress_feed.shared(progress_feed.Compaction, packing)
+    seen.restart()
+
+    def look(glimpse: Any) -> None:
+        job.stage = f"compressing, step {glimpse.step}"  # the rest is told beside the picture
+        seen.add(glimpse)
+
+    study.get(library.own, kinds.PACKING, packing, progress=tell, watch=look)
+
+
+def _counted(job: Job, done: float, total: float | None) -> None:
+    job.stage = f"{done} of {total} states"
+    job.tell(done, total, part=(PACKING_SHARE, 1))

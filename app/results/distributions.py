@@ -1,0 +1,95 @@
+"""What the states in the stores say together: measures and extents against μ, as plain arrays."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from granforce.study import kinds
+from granforce.study.bounds import UNDETERMINED
+from granforce.study.cells import entry_name
+from granforce.study.store import Store
+from granforce.types import Floats
+
+from .library import Cell, Library, readable
+from .selection import Selection, unusual
+
+MEASURES = ("eta1", "eta2", "eta3", "coordination", "dimension", "packing_fraction")
+CORRELATIONS = ("correlation", "correlation_low", "correlation_high")
+KEPT = 1000  # rows in memory, for all visitors: some 10 kB each
+MOST_CURVES = 5  # of a distribution in one plot
+
+Row = dict[str, Any]
+
+_rows: OrderedDict[tuple[str, str], Row] = OrderedDict()
+_lock = threading.Lock()
+
+
+def alike(cells: Iterable[Cell], cell: Cell) -> list[Cell]:
+    """Cells of other packings and μ made like this one: seed and friction may differ."""
+    kin = _kin(cell.selection)
+    return [other for other in cells if _kin(other.selection) == kin]
+
+
+def _kin(selection: Selection) -> tuple[Any, ...]:
+    """What is the same for all cells of one statistic."""
+    made = selection.packing
+    packing = {name: made.get(name) for name in ("imported", "n")}
+    packing |= {} if selection.imported else unusual(made)
+    own_mu = None if selection.same_mu else selection.packing["mu"]
+    relax = selection.relax if selection.kind == "walk" else ""
+    return packing, own_mu, selection.kind, relax, selection.states
+
+
+def rows(cells: Iterable[Cell]) -> list[Row]:
+    """One dict a cell: mu, seed, measures, correlations, `normal` and `extent` (N_c,) in ⟨f_n⟩."""
+    return [_row(cell.store, cell.name, cell.selection) for cell in cells]
+
+
+def exact_rows(library: Library, cells: Iterable[Cell]) -> list[Row]:
+    """The same from exact intervals, of those packings whose intervals a store has."""
+    found = []
+    for cell in cells:
+        for store in library.stores:
+            name = entry_name(store, kinds.INTERVALS, cell.selection.intervals)
+            if name in store:
+                found.append(_row(store, name, cell.selection))
+                break
+    return found
+
+
+def _row(store: Store, name: str, selection: Selection) -> Row:
+    key = str(store.path), name
+    with _lock:
+        if key in _rows:
+            _rows.move_to_end(key)
+            return _rows[key]
+    with readable(store, name) as dataset:  # but for the states, most of it
+        scale = dataset["force_scale"].item()
+        row: Row = {"mu": selection.mu, "seed": selection.packing.get("seed")}
+        row |= {k: dataset[k].item() for k in (*MEASURES, *CORRELATIONS) if k in dataset}
+        low, high = dataset["low"].values[:, 0], dataset["high"].values[:, 0]
+        row |= {"normal": dataset["original"].values[:, 0] / scale, "extent": (high - low) / scale}
+    with _lock:
+        _rows[key] = row
+        while len(_rows) > KEPT:
+            _rows.popitem(last=False)
+    return row
+
+
+def groups(found: Iterable[Row], mu: float, most: int = MOST_CURVES) -> dict[float, list[Floats]]:
+    """{μ: extents of the packings with it}: of this μ and some others, spread over all there are.
+
+    Packings whose forces are determined are left out.
+    """
+    by_mu: dict[float, list[Floats]] = {}
+    for row in found:
+        if row["extent"].max(initial=0) > UNDETERMINED:
+            by_mu.setdefault(row["mu"], []).append(row["extent"])
+    others = sorted(value for value in by_mu if value != mu)
+    most -= mu in by_mu
+    pick = np.unique(np.linspace(0, len(others) - 1, min(most, len(others))).round().astype(int))
+    chosen = sorted({others[k] for k in pick} | ({mu} & set(by_mu)))
+    return {value: by_mu[value] for value in chosen}

@@ -1,0 +1,287 @@
+"""What the app shows, as plain arrays: no widgets, no plots.
+
+The only module of the app, with those that compute for single tabs, that knows stores and studies.
+"""
+
+import json
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce.records import InputError, Packing
+from granforce.study import cells as study
+from granforce.study import kinds
+from granforce.study.keys import Parameters
+from granforce.study.schema import dataset_packing
+from granforce.study.store import Store, open_store
+
+from .entry_labels import names
+from .replays import Replay, make_replay
+from .selection import Selection, selected, series
+
+# Environment variable naming a store of precomputed results to open instead of data/start.zarr.
+SHIPPED_VARIABLE = "GRANFORCE_DATA"
+SHIPPED = Path(__file__).resolve().parents[2] / "data" / "start.zarr"
+
+# Where states come from.
+SOURCES = {name: kind for name, kind in kinds.KINDS.items() if kind.holds_states}
+
+OPENING_MU = 0.1  # where forces are least determined, and most is to be seen
+SHOWN_KEPT = 16  # cells in memory, for all visitors
+STEPS_GROW = 0.3  # steps of a compaction ~ n to this power: 325 at 400 disks, 475 at 1600
+
+
+class Cell(NamedTuple):
+    """States that a store holds: what they are, what they are called, where they are."""
+
+    selection: Selection
+    series: str  # everything but μ, in words; cells of one series form one η(μ)
+    params: Parameters  # as its kind names it
+    store: Store  # the store that holds them
+    name: str  # of the entry
+
+    @property
+    def mu(self) -> float:
+        """Friction coefficient of the ensemble."""
+        return self.selection.mu
+
+    @property
+    def kind(self) -> str:
+        """Kind of the entry: walk or uniform."""
+        return self.selection.kind
+
+
+class Shown(NamedTuple):
+    """All that the page needs of one cell."""
+
+    cell: Cell
+    replay: Replay
+    exact: xr.Dataset | None  # of exact intervals, or None where no store has them
+
+
+class Library:
+    """The stores side by side: precomputed results, read-only, and the user's own cache.
+
+    Shared by all visitors; its methods may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        shipped: str | Path | None = None,
+        cache: str | Path | None = None,
+        kept: int = SHOWN_KEPT,
+    ) -> None:
+        """shipped, cache: folders; by default $GRANFORCE_DATA or data/start.zarr, and the cache.
+
+        kept: cells in memory.
+        """
+        self.notes: list[str] = []  # one line for each store that cannot be used
+        shipped = shipped or os.environ.get(SHIPPED_VARIABLE) or SHIPPED
+        self.shipped = self._open(shipped, readonly=True)
+        self.cache = self._open(cache, readonly=False)
+        self.catalogue: list[Cell] = []  # as last read
+        self._known: dict[tuple[Path, str], Cell | None] = {}  # of entries, which never change
+        self._damaged: set[tuple[Path, str]] = set()  # the same of those that could not be read
+        self._rows: dict[str, dict[str, Any]] = {}
+        self._shown: OrderedDict[str, Shown] = OrderedDict()
+        self._kept, self._lock = kept, threading.Lock()
+
+    def _open(self, path: str | Path | None, readonly: bool) -> Store | None:
+        try:
+            return open_store(path, readonly=readonly)
+        except InputError as error:
+            self.notes.append(str(error))
+            return None
+
+    @property
+    def stores(self) -> list[Store]:
+        """The stores that could be opened; what both hold is taken from the first."""
+        return [store for store in (self.shipped, self.cache) if store is not None]
+
+    @property
+    def own(self) -> Store:
+        """The cache, where what is computed is kept; InputError without one."""
+        if self.cache is None:
+            raise InputError("no cache folder can be written, so nothing can be computed")
+        return self.cache
+
+    def cells(self) -> list[Cell]:
+        """All states of the current algorithms, by series and μ; also kept as `catalogue`."""
+        found: dict[str, Cell] = {}
+        for store in self.stores:
+            for name in store:
+                key = store.path, name
+                if key not in self._known:
+                    self._known[key] = self._cell(store, name)
+                cell = self._known[key]
+                if cell is not None and key not in self._damaged:
+                    found.setdefault(name, cell)
+        self.catalogue = sorted(found.values(), key=lambda cell: (cell.series, cell.mu))
+        return self.catalogue
+
+    def find(self, kind: str, params: Parameters) -> Cell | None:
+        """The cell of these parameters, or None."""
+        for store in self.stores:
+            name = study.entry_name(store, SOURCES[kind], params)
+            if (store.path, name) in self._damaged:
+                if study.load(store, SOURCES[kind], params) is None:
+                    continue
+                self._damaged.discard((store.path, name))  # it was computed anew
+            if name in store:
+                return self._cell(store, name)
+        return None
+
+    def series(self, selection: Selection, parameters: Parameters | None = None) -> str:
+        """Everything but μ, in words; an upload is called by its files."""
+        known = names(self.cache) if selection.imported and self.cache is not None else {}
+        return series(selection, parameters, known.get(selection.packing.get("imported", "")))
+
+    def _cell(self, store: Store, name: str) -> Cell | None:
+        """The Cell of an entry; None where it holds no states of the current algorithms."""
+        entry = store.entry(name) if name.rpartition("-")[0] in SOURCES else None
+        if entry is None or not study.is_current(SOURCES[entry.kind], entry):
+            return None
+        selection = selected(entry.kind, entry.params)
+        called = self.series(selection, entry.params)
+        return Cell(selection, called, entry.params, store, name)
+
+    def dataset(self, cell: Cell) -> xr.Dataset:
+        """The dataset of one cell; InputError if it is damaged, and then it is no longer listed."""
+        found = study.load(cell.store, SOURCES[cell.kind], cell.params)
+        if found is None:
+            self._damaged.add((cell.store.path, cell.name))
+            raise _damage(cell.store, cell.name)
+        return found
+
+    def shown(self, cell: Cell) -> Shown:
+        """Shown of one cell; the last few are kept. InputError if its packing is nowhere."""
+        found = self.shown_in_memory(cell)
+        if found is None:
+            packing = self.packing(cell.params["packing"])
+            replay = make_replay(packing, self.dataset(cell), cell.mu)
+            found = Shown(cell, replay, self.exact(cell.selection))
+            self.keep_in_memory(found)
+        return found
+
+    def shown_in_memory(self, cell: Cell) -> Shown | None:
+        """Shown of one cell if it is one of the last, or None: takes no time."""
+        with self._lock:
+            if cell.name in self._shown:
+                self._shown.move_to_end(cell.name)
+            return self._shown.get(cell.name)
+
+    def keep_in_memory(self, shown: Shown) -> None:
+        """Make this the newest of those kept."""
+        with self._lock:
+            self._shown[shown.cell.name] = shown
+            while len(self._shown) > self._kept:
+                self._shown.popitem(last=False)
+
+    def packing(self, params: Parameters) -> Packing:
+        """The packing of these parameters from the first store that has it. InputError if none."""
+        found = self.stored(kinds.PACKING, params)
+        if found is not None:
+            return dataset_packing(found)
+        raise InputError("the packing of these states is in no store that is open here")
+
+    def table(self, cells: Sequence[Cell]) -> list[dict[str, Any]]:
+        """One row of measures for each cell, as study.row with the ensemble's μ."""
+        for cell in cells:
+            if cell.name not in self._rows:
+                row = study.row(cell.params, self.dataset(cell), True)
+                self._rows[cell.name] = row | {"mu": cell.mu}
+        return [self._rows[cell.name] for cell in cells]
+
+    def exact(self, selection: Selection) -> xr.Dataset | None:
+        """The exact intervals of a selection's packing at its μ as a dataset, or None."""
+        return self.stored(kinds.INTERVALS, selection.intervals)
+
+    def stored(self, kind: study.Kind, params: Parameters) -> xr.Dataset | None:
+        """The dataset of this kind and parameters from the first store that has it, or None."""
+        for store in self.stores:
+            found = study.load(store, kind, params)
+            if found is not None:
+                return found
+        return None
+
+    def lend_packing(self, params: Parameters) -> None:
+        """Copy a packing that only the shipped store has to the cache: it need not be made anew."""
+        own = self.own
+        if self.shipped is not None:
+            found = study.load(self.shipped, kinds.PACKING, params)
+            if found is not None:
+                kinds.keep_packing(own, params, dataset_packing(found))
+
+    def expected_steps(self, n: int, mu: float) -> float | None:
+        """Compaction steps of n grains, from the stored packing nearest in n, then μ; or None."""
+        known = []
+        for store in self.stores:
+            for entry in study.entries(store, kinds.PACKING):
+                if "n" not in entry.params:
+                    continue  # it was imported
+                larger = n / entry.params["n"]
+                away = abs(np.log((entry.params["mu"] + 1e-3) / (mu + 1e-3)))
+                known.append((abs(np.log(larger)), away, entry.name, store, larger))
+        if not known:
+            return None
+        *_, name, store, larger = min(known, key=lambda found: found[:3])
+        with suppress(InputError), readable(store, name) as found:
+            steps = json.loads(found.attrs["info"]).get("steps")
+            return steps and steps * larger**STEPS_GROW
+        return None
+
+
+@contextmanager
+def readable(store: Store, name: str) -> Iterator[xr.Dataset]:
+    """The dataset of an entry, to be read as needed; InputError where it turns out damaged."""
+    try:
+        yield store[name]
+    except Exception as error:  # what damage raises depends on codec, zarr and xarray
+        raise _damage(store, name) from error
+
+
+def _damage(store: Store, name: str) -> InputError:
+    if not (store.path / name).exists():
+        return InputError(f"entry {name} in {store.path} was removed meanwhile; compute it anew")
+    return InputError(f"entry {name} in {store.path} is damaged; compute it anew, or remove it")
+
+
+def nearest_cell(cells: Sequence[Cell], mu: float) -> Cell:
+    """Of these cells the one whose μ is nearest, on the logarithmic scale of the slider."""
+    return min(cells, key=lambda cell: abs(place(cell.mu) - place(mu)))
+
+
+def cell_of(cells: Sequence[Cell], wanted: Selection | None) -> Cell | None:
+    """The cell of the wanted Selection, or None."""
+    return next((c for c in cells if wanted is not None and c.selection.names(wanted)), None)
+
+
+def best_cell(cells: Sequence[Cell], wanted: Selection | None = None) -> Cell | None:
+    """The cell of the wanted Selection, or the one most worth opening with; None without cells."""
+    found = cell_of(cells, wanted)
+    if found is not None or not cells:
+        return found
+    names = [cell.series for cell in cells]
+    fullest = max(dict.fromkeys(names), key=names.count)
+    return nearest_cell([cell for cell in cells if cell.series == fullest], OPENING_MU)
+
+
+def with_states(cells: Sequence[Cell], wanted: Selection) -> Selection:
+    """The wanted Selection with the largest number of states that a cell has; or as it was."""
+    found = [c.selection for c in cells if c.selection._replace(states=wanted.states).names(wanted)]
+    return max(found, key=lambda selection: selection.states, default=wanted)
+
+
+LEAST_PLACE = -3.5  # stands for μ = 0
+
+
+def place(mu: float) -> float:
+    """log10 μ, and LEAST_PLACE for what is below."""
+    return max(LEAST_PLACE, np.log10(mu)) if mu > 0 else LEAST_PLACE

@@ -1,0 +1,61 @@
+"""What is in the cache: computations by name, time and size, to be opened or deleted."""
+
+from typing import Any
+
+from granforce.records import InputError
+from granforce.study.keys import Parameters, canonical
+from granforce.study.store import Entry
+
+from .entry_labels import call, names
+from .library import SOURCES, Library
+
+
+def rows(library: Library) -> list[dict[str, Any]]:
+    """One dict for each computation in the cache, the newest first: entry, name, what, when, MB."""
+    store = library.own
+    known, entries = names(store), store.entries()
+    cells = [cell for cell in library.cells() if cell.store is store]
+    made = {entry.name: entry for entry in entries}
+    return sorted(
+        (
+            {
+                "entry": cell.name,
+                "name": known.get(cell.name, ""),
+                "what": f"μ = {cell.mu:g}, {cell.series}",
+                "when": made[cell.name].created,
+                "megabytes": sum(e.bytes for e in entries if _belongs(e, made[cell.name])) / 1e6,
+            }
+            for cell in cells
+            if cell.name in made
+        ),
+        key=lambda row: row["when"],
+        reverse=True,
+    )
+
+
+def delete(library: Library, name: str) -> None:
+    """Delete a computation from the cache, and its packing with all that is known of it alone."""
+    store = library.own
+    entry = store.entry(name)
+    if entry is None or entry.kind not in SOURCES:
+        raise InputError("that computation is in the cache no more")
+    store.remove(name)
+    packing, others = canonical(_packing(entry)), store.entries()
+    same = [other for other in others if canonical(_packing(other)) == packing]
+    if not any(other.kind in SOURCES for other in same):
+        store.remove(*(other.name for other in same))
+    call(store, name, "")
+
+
+def _packing(entry: Entry) -> Parameters:
+    """The packing that an entry is, or is of."""
+    packing: Parameters = entry.params
+    return packing if entry.kind == "packing" else packing.get("packing", {})
+
+
+def _belongs(other: Entry, entry: Entry) -> bool:
+    """Whether an entry is this one of states, or what is known beside it."""
+    if other.kind in SOURCES:
+        return other.name == entry.name
+    same = canonical(_packing(other)) == canonical(_packing(entry))
+    return same and (other.kind == "packing" or other.params.get("mu") == entry.params["mu"])

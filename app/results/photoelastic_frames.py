@@ -1,0 +1,248 @@
+"""Photoelastic frames that a visitor brings: measured beside inferred forces, as plain arrays."""
+
+import json
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce.packing.importers.listing import plain
+from granforce.packing.importers.network import alone
+from granforce.packing.importers.pegs import open_frames, read_pegs
+from granforce.packing.importers.repair import KINDS
+from granforce.records import Packing
+from granforce.study import series
+from granforce.study.keys import Parameters
+from granforce.study.schema import dataset_packing
+
+from ..background.jobs import Job
+from ..background.limits import LIMITS
+from ..explore.tabs.export import files
+from . import uploads
+
+DRAWS = 80  # for error bars on the page
+CERTAIN = 2.0  # standard errors above 0 from which on a contact is told to carry for certain
+
+
+class Frame(NamedTuple):
+    """A frame and the admissible network that its measurement speaks for; forces in ⟨f_n⟩."""
+
+    source: str  # which files it came from, in words
+    report: dict[str, Any]  # of importers.read_pegs
+    numbers: tuple[Any, ...]  # of all frames in the files
+    packing: Packing  # of the grains alone, under what walls do to them in the inferred network
+    x: np.ndarray  # (N, 2) centres of the grains
+    r: np.ndarray  # (N,) radii
+    ids: np.ndarray  # (N + walls,) their names
+    ends: np.ndarray  # (N_c, 2) grains of each contact; N and above: a wall
+    lines: np.ndarray  # (N_c, 2, 2) where a contact is drawn from and to
+    measured: np.ndarray  # (N_c, 2) f_n, f_t; NaN where they were not
+    inferred: np.ndarray  # (N_c, 2)
+    error: np.ndarray  # (N_c, 2) standard errors of the inferred forces
+    deviation: np.ndarray  # (N_c, 2) inferred less measured, in its σ
+    added: np.ndarray  # (N_c,) bool, contacts that were not listed
+    suspects: np.ndarray  # contacts beyond 3 σ, the farthest first
+    certain: np.ndarray  # contacts that were not measured and carry for certain, strongest first
+    at_wall: np.ndarray  # (N,) bool, grains at walls
+    left_open: np.ndarray  # (N,) bool, other grains whose balance had to be left open
+    found: np.ndarray  # (k, 2) where something was mended
+    region: np.ndarray  # (N_c,) number of the region that a contact lies in, see `series.regions`
+    stress: np.ndarray  # (9, 3) xx, yy, xy by region, over the mean pressure
+    stress_error: np.ndarray  # (9, 3)
+
+
+class Measured(NamedTuple):
+    """What was measured in a frame that was opened as a packing, for its contacts (N_c,)."""
+
+    packing: Parameters  # that name it
+    force: np.ndarray  # f_n in the packing's unit; NaN where it was not measured
+    off: np.ndarray  # inferred less measured f_n in σ, NaN likewise
+
+
+def measured(frame: Frame, packing: Parameters) -> Measured:
+    """What was measured of the contacts between the grains of a frame."""
+    between = (frame.ends < len(frame.r)).all(axis=1)
+    unit = frame.report["mean_measured_normal_force"]
+    return Measured(packing, unit * frame.measured[between, 0], frame.deviation[between, 0])
+
+
+def infer(
+    files: uploads.Files,
+    *,
+    mu: float,
+    reverse: bool = False,
+    walls: Any = None,
+    number: int | None = None,
+) -> Callable[[Job], Frame]:
+    """Work, for jobs.Task, that reads a frame and finds its likeliest network with errors; a Frame.
+
+    files: {role: (name, content)}; mu, reverse, walls: as for `importers.read_pegs`; number: of
+    the frame.
+    """
+
+    def work(job: Job) -> Frame:
+        LIMITS.check(mu=mu)
+        job.begin("looking for forces that balance the disks, near the measured ones")
+        roles = uploads.FAMILIES[uploads.family(files)][1]
+        frames = open_frames(*(uploads.opened(*files[part]) for part in roles))
+        found = read_pegs(
+            frames, frame=number, mu=mu, reverse=reverse, walls=walls, most_grains=LIMITS.n
+        )
+        job.begin("measuring the likeliest network again and again, for error bars")
+        dataset = series.infer_frame(found, states=DRAWS)
+        names = " and ".join(name for name, _ in files.values())
+        return frame_of(dataset, names, tuple(map(plain, frames.frames.tolist())))
+
+    return work
+
+
+def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame:
+    """The Frame of a dataset of `series.infer_frame`."""
+    told = json.loads(dataset.attrs["account"])
+    report, walls = told["report"], len(told["walls"])
+    unit, count = report["mean_measured_normal_force"], dataset.sizes["grain"] - walls
+    of = {name: dataset[name].values for name in dataset.data_vars}
+    i, j = of["contact_i"], of["contact_j"]
+    away = np.where(j < count, of["length"], of["arm_i"])[:, None] * of["normal"]
+    begin = of["x"][i]
+    inner = i < count  # not a load cell
+    certain = inner & np.isnan(of["measured"][:, 0])
+    certain &= of["inferred"][:, 0] > CERTAIN * of["standard_error"][:, 0]
+    order = np.argsort(-of["inferred"][:, 0], kind="stable")
+    left_open, at_wall = np.zeros((2, count + walls), dtype=bool)
+    left_open[told["left_open"]] = True
+    at_wall[told["at_wall"]] = True
+    mended = [one for one in told["findings"] if KINDS[one["kind"]][2]]
+    places = np.array([[one["x"], one["y"]] for one in mended]).reshape(-1, 2)
+    pressure = np.abs(of["regional_stress"][:, :2].mean()) or 1.0
+    return Frame(
+        source=f"{uploads.FAMILIES['pegs'][0]}: {names}",
+        report=report,
+        numbers=numbers,
+        packing=alone(dataset_packing(dataset), count, of["inferred"], walls=0),
+        x=of["x"][:count],
+        r=of["r"][:count],
+        ids=of["grain_id"],
+        ends=np.column_stack([i, j]),
+        lines=np.where(inner[:, None, None], np.stack([begin, begin + away], axis=1), np.nan),
+        measured=of["measured"] / unit,
+        inferred=of["inferred"] / unit,
+        error=of["standard_error"] / unit,
+        deviation=of["deviation"],
+        added=of["added"].astype(bool),
+        suspects=of["suspect"],
+        certain=order[certain[order]],
+        at_wall=at_wall[:count] & ~left_open[:count],
+        left_open=left_open[:count],
+        found=places[np.isfinite(places).all(axis=1)],
+        region=series.regions(begin + of["arm_i"][:, None] * of["normal"], of["x"][:count])[0],
+        stress=of["regional_stress"] / pressure,
+        stress_error=of["regional_stress_error"] / pressure,
+    )
+
+
+def table(frame: Frame) -> bytes:
+    """All that was found as one CSV (bytes): a row for each contact, with names, measured and
+    inferred forces, errors, marks and region; above them the stress of each region."""
+    suspect, certain = np.zeros((2, len(frame.ends)), dtype=int)
+    suspect[frame.suspects], certain[frame.certain] = 1, 1
+    one, two = frame.ids[frame.ends].T
+    x, y = frame.lines.mean(axis=1).T
+    columns = {"contact": np.arange(len(one)), "id1": one, "id2": two, "x": x, "y": y}
+    for name, values in (
+        ("measured", frame.measured), ("inferred", frame.inferred), ("error", frame.error),
+        ("sigmas_off", frame.deviation),
+    ):  # fmt: skip
+        columns |= {f"{name}_f_{part}": values[:, k] for k, part in enumerate("nt")}
+    columns |= {"added": frame.added.astype(int), "suspect": suspect, "certain": certain}
+    columns |= {"region": frame.region}
+    unit = frame.report["mean_measured_normal_force"]
+    head = [
+        f"{frame.source}, frame {frame.report['frame']}",
+        f"forces in their mean measured normal force, {unit:.9g}; f_t along (-n_y, n_x)",
+        "id2 below 0: a wall; added: not listed; suspect: beyond 3 sigma; certain: not measured, "
+        "and inferred above 2 standard errors",
+        "stress by region over the mean pressure, ± standard error; regions column by column:",
+    ]
+    for k, (values, errors) in enumerate(zip(frame.stress, frame.stress_error, strict=True)):
+        parts = zip(("xx", "yy", "xy"), values, errors, strict=True)
+        told = (f"{part} {value:.4g} ± {error:.2g}" for part, value, error in parts)
+        head.append(f"region {k}: {', '.join(told)}")
+    return files.csv(columns, "".join(f"# {line}\n" for line in head))
+
+
+def account(report: dict[str, Any]) -> Iterator[str]:
+    """What was found, what was done, and what that leaves open: sentences with the numbers."""
+    count = report.get
+    if "names" in report:
+        yield f"Beware: {report['names']}."
+    if "flags_ignored" in report:
+        yield (
+            f"Beware: {report['flags_ignored']} disks are flagged as touching a wall, too many to "
+            "be true. The flags are ignored; disks at the boundary of the frame count as those at "
+            "walls."
+        )
+    yield (
+        f"Listed are {count('contacts_listed')} contacts of {count('grains')} disks. "
+        f"{_walls(report)}"
+    )
+    mended = [f"{words} ({report[kind]})" for kind, (words, _, spoils) in KINDS.items()
+              if spoils and report[kind]]  # fmt: skip
+    if mended:
+        yield f"Mended, and marked by crosses: {'; '.join(mended)}."
+    for key, words in DOUBTS:
+        if report[key]:
+            yield f"{report[key]} {words}"
+    if report["unbalance_saved_if_tangential_forces_were_reversed"] > REVERSED:
+        yield (
+            "If all tangential forces had the other sign, disks would be nearer to balance: "
+            "programs differ there, try the switch."
+        )
+    yield (
+        f"On the listed contacts alone, no admissible forces balance "
+        f"{count('unbalanced_on_listed_contacts')} of the inner disks. {count('candidates')} "
+        "pairs that are about as near joined as contacts that were not measured."
+    )
+    yield _left(report)
+    yield (
+        "The admissible network nearest to the measurement differs from it by "
+        f"{count('mean_change_of_f_n'):.2f} ⟨fₙ⟩ in fₙ and {count('mean_change_of_f_t'):.2f} ⟨fₙ⟩ "
+        f"in fₜ on average; {count('candidates_that_carry')} of the added contacts carry in it. "
+        "It is one of many: what was not measured may be otherwise. The standard error of "
+        f"{count('error'):.2f} ⟨fₙ⟩ was not measured either: it is the one that explains how far "
+        "the measured forces are from balance."
+    )
+
+
+def _walls(report: dict[str, Any]) -> str:
+    at = f"{report['grains_at_walls']} disks are at walls"
+    if report["walls"] == "open":
+        return (
+            f"{at}: what a wall does to them was not measured, so their balance is not asked for."
+        )
+    return (
+        f"{at}: the directions of {report['wall_contacts']} contacts with the walls are known, so "
+        "that the forces there are inferred like all others."
+    )
+
+
+DOUBTS = (
+    ("listed_twice_with_other_forces", "contacts are listed twice with different forces: the mean "
+     "was taken, the difference counts as an error."),
+    ("beyond_friction", "measured tangential forces are larger than friction allows at this μ."),
+)  # fmt: skip
+REVERSED = 0.05  # part of the unbalance, from which on the sign of f_t is doubted
+NAMED = 12  # disks that are named
+
+
+def _left(report: dict[str, Any]) -> str:
+    names = report["left_open"]
+    if not names:
+        return "With them every inner disk is balanced: apart from the walls nothing was left open."
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return (
+        f"With them {len(names)} inner disks still cannot be balanced, by "
+        f"{report['unbalance']:.2g} ⟨fₙ⟩ in sum: their balance was left open "
+        f"(disks {', '.join(map(str, names[:NAMED]))}{more})."
+    )

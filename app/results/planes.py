@@ -1,0 +1,284 @@
+"""Force space seen in a plane: where states of a Replay lie in it, and the outline of S there."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy.spatial import ConvexHull, QhullError
+
+from granforce import measures
+from granforce.records import InputError
+from granforce.study import kinds
+from granforce.study.keys import Parameters
+from granforce.study.stresses import stress_axes
+from granforce.types import Floats
+
+from ..background.jobs import Job
+from .compute import found_or_made
+from .geometry import nearly
+from .library import Cell, Library
+from .replays import Replay
+from .selection import Selection
+
+# Two (position in the backbone, 0 for f_n or 1 for f_t), or none.
+Components = tuple[tuple[int, int], ...]
+
+
+class Plane(NamedTuple):
+    """Two axes of force space, and where states lie in their plane. Forces are in ⟨f_n⟩."""
+
+    components: Components  # two (position in the backbone, 0 or 1), or empty for principal axes
+    axes: Floats  # (2, N_c, 2)
+    origin: Floats  # (2,) of the plane's coordinates
+    share: Floats  # (2,) of the variance of the states, NaN for components
+    path: Any  # (F, 2) float32: the original network, then the states shown
+    kind: str = ""  # STRESS where the axes are those of stresses
+    goal: float = 0.0  # of a pair: what a visitor is asked to bring the force across to; 0: nothing
+
+    @property
+    def pair(self) -> list[int]:
+        """Two contacts, of whose forces each axis is one; none for other planes."""
+        contacts = [contact for contact, _ in self.components]
+        return contacts if len(set(contacts)) == 2 else []
+
+
+STRESS = "stress"
+PAIR = "green", "violet"  # lines of the contacts whose forces are the axes, across and up
+
+
+class Outlined(NamedTuple):
+    """The outline of S in a Plane, between polygons inside and outside."""
+
+    plane: Plane
+    inner: Floats  # (k, 2) corners
+    outer: Floats  # (m, 2)
+    gap: float  # largest distance between them
+    programs: int  # linear programs it took
+    seconds: float
+
+
+def principal(replay: Replay, states: Any = None) -> Plane:
+    """The Plane of the two directions along which states (k, N_c, 2), by default those shown, vary
+    most.
+    """
+    states = _frames(replay)[1:] if states is None else states.astype(np.float64)
+    axes, share = measures.principal_axes(states)
+    return _plane(replay, (), axes, measures.mean_network(states), share)
+
+
+def components(replay: Replay, first: Sequence[int], second: Sequence[int]) -> Plane:
+    """The Plane of two components (position in the backbone, 0 for f_n or 1 for f_t).
+
+    InputError for a contact that is not there, or one component named twice.
+    """
+    (a, part), (b, other) = first, second
+    chosen = (a, part), (b, other)
+    count = replay.normal.shape[1]
+    for contact, component in chosen:
+        if not 0 <= contact < count or component not in (0, 1):
+            raise InputError(f"contacts are counted from 0 to {count - 1}, got {contact}")
+    if first == second:
+        raise InputError("choose two different components")
+    axes = np.zeros((2, count, 2))
+    for k, place in enumerate(chosen):
+        axes[(k, *place)] = 1.0
+    return _plane(replay, chosen, axes, np.zeros(axes.shape[1:]), np.full(2, np.nan))
+
+
+def strong_pair(replay: Replay) -> tuple[int, int]:
+    """Two contacts, positions in the backbone: the strongest as packed, and the strongest of those
+    that no disk has in common with it (where there are none, the second). InputError for fewer.
+    """
+    if replay.normal.shape[1] < 2:
+        raise InputError("there are no two contacts to be compared")
+    strong = np.argsort(-replay.normal[0], kind="stable")
+    disks = np.zeros((len(strong), 2), dtype=int)
+    disks[replay.links.contact] = np.column_stack([replay.links.i, replay.links.j])
+    apart = ~np.isin(disks[strong], disks[strong[0]]).any(axis=1)
+    other = strong[apart][0] if apart.any() else strong[1]
+    return int(strong[0]), int(other)
+
+
+def stress(library: Library, selection: Selection, replay: Replay) -> Plane:
+    """The Plane of stresses: (σ_xx − σ_yy)/2P and σ_xy/P. InputError without a pressure."""
+    axes = stress_axes(library.packing(selection.packing), selection.mu)
+    none = np.zeros(axes.shape[1:])
+    return _plane(replay, (), axes, none, np.full(2, np.nan))._replace(kind=STRESS)
+
+
+def _frames(replay: Replay) -> Floats:
+    return np.stack([replay.normal, replay.tangential], axis=2).astype(np.float64)
+
+
+def _plane(
+    replay: Replay, chosen: Components, axes: Floats, centre: Floats, share: Floats
+) -> Plane:
+    path = np.tensordot(_frames(replay) - centre, axes, ((1, 2), (1, 2)))
+    origin = np.tensordot(axes, centre, ((1, 2), (0, 1)))
+    return Plane(chosen, axes, origin, share, path.astype(np.float32))
+
+
+def seen(plane: Plane) -> float:
+    """Beyond which value across no state lies, in tenths."""
+    return math.ceil(10 * float(plane.path[:, 0].max())) / 10
+
+
+def labels(replay: Replay, plane: Plane) -> tuple[str, ...]:
+    """Titles of the two axes, in words."""
+    if plane.pair:  # whose lines have colours
+        return tuple(f"normal force at the {colour} line (mean force = 1)" for colour in PAIR)
+    if plane.components:
+        return tuple(
+            f"{'normal force fₙ' if component == 0 else 'tangential force fₜ'} of contact "
+            f"{replay.backbone[contact]} (mean force = 1)"
+            for contact, component in plane.components
+        )
+    if plane.kind == STRESS:
+        return "pressed more across than up: (σₓₓ − σᵧᵧ) / 2P", "sheared: σₓᵧ / P"
+    return (
+        "the direction in which networks differ most (mean force = 1)",
+        "the second such direction",
+    )
+
+
+def name(plane: Plane) -> str:
+    """What a link calls a Plane."""
+    if not plane.components:
+        return "s" if plane.kind == STRESS else "p"
+    return "-".join(f"{contact}{'nt'[part]}" for contact, part in plane.components)
+
+
+def read(text: str) -> Components:
+    """The components () or ((contact, part), (contact, part)) of a name; ValueError for none."""
+    if text in ("p", "s"):
+        return ()
+    first, second = ((int(part[:-1]), "nt".index(part[-1:] or "?")) for part in text.split("-"))
+    return first, second
+
+
+def named(library: Library, cell: Cell, replay: Replay, text: str) -> Plane:
+    """The Plane of a name, with the axes that are kept of it."""
+    chosen = read(text)
+    if chosen:
+        return components(replay, *chosen)
+    if text == "s":
+        return stress(library, cell.selection, replay)
+    plane = principal(replay)
+    kept = library.stored(kinds.OUTLINE, _parameters(cell, replay, plane))
+    return plane if kept is None else _as_kept(replay, plane, kept)
+
+
+def beside(cells: Sequence[Cell], cell: Cell) -> Cell | None:
+    """Of these the cell of the other kind of states of the same packing and μ with most, or None.
+
+    States uniform in S beside a walk, a walk beside uniform ones.
+    """
+    own = cell.selection
+    others = [
+        other
+        for other in cells
+        if other.kind != cell.kind
+        and other.mu == cell.mu
+        and other.selection.packing == own.packing
+    ]
+    return max(others, key=lambda other: other.selection.states, default=None)
+
+
+def points(plane: Plane, replay: Replay, other: Replay) -> Floats:
+    """Where the states (k, 2) of another Replay of the same contacts lie in a Plane."""
+    if not np.array_equal(replay.backbone, other.backbone):
+        return np.empty((0, 2))
+    return np.tensordot(_frames(other)[1:], plane.axes, ((1, 2), (1, 2))) - plane.origin
+
+
+def inner_share(points: Floats, outline: npt.ArrayLike) -> float:
+    """Share of points (n, 2) within a convex polygon (k, 2) shrunk to half about its centroid."""
+    corners = halfway(outline)
+    edge, away = np.roll(corners, -1, axis=0) - corners, points[:, None] - corners
+    turn = edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0]
+    return float(np.mean(np.all(turn >= 0, axis=1) | np.all(turn <= 0, axis=1)))
+
+
+def halfway(outline: npt.ArrayLike) -> Floats:
+    """Corners (k, 2) of a convex polygon (k, 2) shrunk to half about its centroid."""
+    corners = np.asarray(outline, dtype=np.float64)
+    after = np.roll(corners, -1, axis=0)
+    slice_ = corners[:, 0] * after[:, 1] - after[:, 0] * corners[:, 1]
+    centroid = ((corners + after) * slice_[:, None]).sum(axis=0) / (3 * slice_.sum())
+    return (corners + centroid) / 2
+
+
+def area(points: npt.ArrayLike) -> float:
+    """Area of the convex hull of points (n, 2); 0 where they lie on a line."""
+    try:
+        return float(ConvexHull(points).volume)  # as it is called in any dimension
+    except QhullError:
+        return 0.0
+
+
+def outline(
+    library: Library, cell: Cell, replay: Replay, plane: Plane
+) -> Callable[[Job], Outlined]:
+    """Work, for jobs.Task, that finds or computes the outline of S in a Plane."""
+
+    def work(job: Job) -> Outlined:
+        if plane.kind == STRESS:
+            return _stresses(library, job, cell, plane)
+        params = _parameters(cell, replay, plane)
+        axes = None if plane.components else plane.axes
+        found = found_or_made(library, job, "outline of S", kinds.OUTLINE, params, axes=axes)
+        return _outlined(replay, plane, found)
+
+    return work
+
+
+def _stresses(library: Library, job: Job, cell: Cell, plane: Plane) -> Outlined:
+    """The Outlined of all stresses."""
+    params = kinds.STRESS.parameters(cell.selection.packing, mu=cell.mu)
+    found = found_or_made(library, job, "outline of all stresses", kinds.STRESS, params)
+    inner, outer = found["stress_inner"].values, found["stress_outer"].values
+    gap = found["friction_bound"].item() - found["friction"].item()
+    programs = json.loads(found.attrs["counts"])["programs"]
+    return Outlined(plane, inner, outer, gap, programs, found["seconds"].item())
+
+
+def _parameters(cell: Cell, replay: Replay, plane: Plane) -> Parameters:
+    """As a store names the outline in a Plane."""
+    selection = cell.selection
+    chosen = [[int(replay.backbone[contact]), part] for contact, part in plane.components]
+    return kinds.OUTLINE.parameters(
+        selection.packing,
+        mu=selection.mu,
+        components=chosen or None,
+        states=None if chosen else cell.params,
+    )
+
+
+def _as_kept(replay: Replay, plane: Plane, found: xr.Dataset) -> Plane:
+    """The Plane on the axes that its outline was made with."""
+    axes = found["axes"].values
+    if np.array_equal(axes, plane.axes):
+        return plane
+    centre = measures.mean_network(_frames(replay)[1:])
+    return _plane(replay, plane.components, axes, centre, plane.share)
+
+
+def _outlined(replay: Replay, plane: Plane, found: xr.Dataset) -> Outlined:
+    """The outline as kept; its axes are those it was made with, and the path follows them."""
+    plane = _as_kept(replay, plane, found)
+    if plane.pair:
+        plane = plane._replace(goal=nearly(found["outer"].values[:, 0].max()))
+    return Outlined(
+        plane,
+        inner=found["inner"].values - plane.origin,
+        outer=found["outer"].values - plane.origin,
+        gap=found["outline_gap"].item(),
+        programs=found["programs"].item(),
+        seconds=found["seconds"].item(),
+    )

@@ -1,0 +1,274 @@
+"""What is asked for, and its three spellings: words on screen, a link, a command line."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Any, NamedTuple
+from urllib.parse import parse_qsl, urlencode
+
+from granforce.records import InputError, friction
+from granforce.study import kinds
+from granforce.study.keys import Parameters
+
+from ..background.limits import Limits
+
+# Names on screen of kinds.RELAXATIONS; the first is what a new walk takes unless told otherwise.
+SOLVERS = {
+    "accelerated": "nearest admissible state",
+    "nearest": "nearest admissible state, by PIQP",
+    "gauss_seidel": "Gauss–Seidel, finished exactly",
+    "gauss_seidel_only": "paper's plain Gauss–Seidel",
+}
+KINDS = {"walk": "the paper's random walk", "uniform": "uniform in S"}
+# Command-line options of a packing, apart from N, μ and seed.
+OPTIONS = ("radii", "pressure", "dt", "box_mass", "sweeps", "accuracy", "box")
+WORDS = {"accuracy": "step-accuracy"}  # those that are called otherwise on the command line
+# Stored states take at most about this much; measures are those of all states anyway.
+KEPT_BYTES = 64e6
+# Disks times (disks, for the packing, and states), up to which states are soon there, and what a
+# state costs beside one of the first kind.
+EASY = 500_000
+_WEIGHTS = {"accelerated": 1, "uniform": 2, "nearest": 3, "gauss_seidel": 10}
+_WEIGHTS["gauss_seidel_only"] = 10
+LONGEST_REASON = 200  # characters of a message about a link, which may hold anything
+
+
+class Selection(NamedTuple):
+    """States asked for: of which packing, at which friction, from which source."""
+
+    packing: Parameters  # parameters of the packing, as kinds.PACKING names it
+    mu: float  # friction coefficient of the ensemble
+    kind: str = "walk"  # one of KINDS
+    relax: str = "accelerated"  # of the walk
+    states: int = 200
+    seed: int = 0  # of the walk or sample
+
+    @property
+    def imported(self) -> bool:
+        """Whether the packing comes from elsewhere, so that none can be made like it."""
+        return "imported" in self.packing
+
+    @property
+    def same_mu(self) -> bool:
+        """Whether packing and ensemble have the same friction."""
+        return self.packing["mu"] == self.mu
+
+    def at(self, mu: Any) -> Selection:
+        """The same at another μ; the packing's friction goes along if it was the same."""
+        mu = friction(mu)
+        if self.imported or not self.same_mu:
+            return self._replace(mu=mu)
+        made = kinds.PACKING.parameters(
+            self.packing["n"], mu, self.packing["seed"], **unusual(self.packing)
+        )
+        return self._replace(mu=mu, packing=made)
+
+    def parameters(self) -> Parameters:
+        """Parameters of the walk or sample, as its kind names it."""
+        most = int(KEPT_BYTES / (16 * 2 * self.packing.get("n", 400)))
+        common = {"mu": self.mu, "keep": None if self.states <= most else most}
+        if self.kind == "uniform":
+            return kinds.UNIFORM.parameters(self.packing, self.states, self.seed, **common)
+        return kinds.WALK.parameters(
+            self.packing, self.states, self.seed, relax=self.relax, **common
+        )
+
+    @property
+    def intervals(self) -> Parameters:
+        """Parameters of the exact intervals of its packing at its μ."""
+        return kinds.INTERVALS.parameters(self.packing, mu=self.mu)
+
+    def check(self, limits: Limits) -> None:
+        """InputError if it asks for more than these Limits allow."""
+        limits.check(states=self.states, mu=self.mu, seed=self.seed)
+        if not self.imported:
+            # The version of the algorithm names a packing, too, but nobody asks for it.
+            limits.check(**{name: self.packing[name] for name in self.packing if name != "version"})
+
+    @property
+    def dear(self) -> bool:
+        """Whether it takes more than some ten seconds, or how long is hard to tell."""
+        n = self.packing.get("n", 400)
+        weight = _WEIGHTS[self.relax if self.kind == "walk" else self.kind]
+        odd = set() if self.imported else set(unusual(self.packing)) - {"radii", "box"}
+        return bool(odd) or n * (n + weight * self.states) > EASY
+
+    def names(self, other: Selection) -> bool:
+        """Whether other is the same but for details that this kind of states does not have."""
+        return _plain(self) == _plain(other)
+
+
+def differing(asked: Selection, shown: Selection | None) -> str:
+    """What of a Selection is not as in another one (None: all of it), in words."""
+    if shown is None or asked.imported or shown.imported:
+        return f"the packing at μ = {asked.mu:g}" if asked.imported else f"μ = {asked.mu:g}"
+    words, other = [], shown.packing
+    if asked.mu != shown.mu:
+        words.append(f"μ = {asked.mu:g}")
+    if asked.packing["n"] != other["n"]:
+        words.append(f"N = {asked.packing['n']}")
+    if asked.packing["seed"] != other["seed"]:
+        words.append(f"seed {asked.packing['seed']}")
+    if not asked.same_mu and asked.packing["mu"] != other["mu"]:
+        words.append(f"packed at μ = {asked.packing['mu']:g}")
+    if asked.kind != shown.kind:
+        words.append(f"states {KINDS[asked.kind]}" if asked.kind == "uniform" else KINDS["walk"])
+    if asked.states != shown.states:
+        words.append(f"{asked.states} states")
+    if asked.kind == shown.kind == "walk" and asked.relax != shown.relax:
+        words.append(SOLVERS[asked.relax])
+    return ", ".join(words) or f"μ = {asked.mu:g}"
+
+
+def _plain(selection: Selection) -> Selection:
+    return selection if selection.kind == "walk" else selection._replace(relax="")
+
+
+def selected(kind: str, parameters: Parameters) -> Selection:
+    """The Selection that these parameters of a walk or sample belong to."""
+    packing, mu = parameters["packing"], float(parameters["mu"])
+    relax = parameters.get("relax", "accelerated")
+    return Selection(packing, mu, kind, relax, parameters["states"], parameters["seed"])
+
+
+def select(
+    n: int = 400,
+    mu: Any = 0.1,
+    packing_seed: int = 1,
+    packed_mu: float | None = None,
+    box: str = "square",
+    **others: Any,
+) -> Selection:
+    """A Selection of a packing made here; InputError for what cannot be.
+
+    packed_mu: friction during compaction, by default that of the ensemble. box: as for `pack`.
+    others: fields of Selection.
+    """
+    mu = friction(mu)
+    packed = mu if packed_mu is None else packed_mu
+    packing = kinds.PACKING.parameters(n, packed, packing_seed, box=box)
+    if packing["n"] < 3:
+        raise InputError(f"a packing needs at least 3 disks, got {n}")
+    return Selection(packing, mu, **others)
+
+
+def unusual(packing: Parameters) -> Parameters:
+    """What a packing is made with, where that is not what is usual at its μ."""
+    usual = kinds.PACKING.parameters(packing["n"], packing["mu"], packing["seed"])
+    return {name: packing[name] for name in OPTIONS if packing.get(name) != usual.get(name)}
+
+
+def series(
+    selection: Selection, parameters: Parameters | None = None, called: str | None = None
+) -> str:
+    """Everything but μ, in words: selections of one series form one η(μ).
+
+    parameters: those of the entry, where it is one; called: the files of an imported packing.
+    """
+    packing = selection.packing
+    if selection.imported:
+        words = [f"{called or 'imported'} {packing['imported'][:8]}"]
+    else:
+        words = [f"N = {packing['n']}", f"seed {packing['seed']}"]
+        words += [f"{name} {value}" for name, value in unusual(packing).items()]
+        if not selection.same_mu:
+            words.append(f"packed at μ = {packing['mu']:g}")
+    words.append(f"{selection.states} states")
+    if selection.seed != 0:
+        words.append(f"seed {selection.seed} of the states")
+    usual = {"walk": 1, "uniform": 4}[selection.kind]
+    chains = (parameters or {}).get("chains", usual)
+    if chains != usual:
+        words.append(f"{chains} chain{'s' if chains > 1 else ''}")
+    words.append(SOLVERS[selection.relax] if selection.kind == "walk" else KINDS[selection.kind])
+    return ", ".join(words)
+
+
+def brief(selection: Selection, series: str) -> str:
+    """A series in the few words that are read over its picture; the whole of an import's."""
+    if selection.imported:
+        return series
+    return f"{selection.packing['n']} disks, {selection.states} networks"
+
+
+def command(selection: Selection) -> str:
+    """The command that makes the same states in a terminal."""
+    words = ["granforce", selection.kind, *of_packing(selection), "--states", selection.states]
+    if selection.kind == "walk":
+        words += ["--walk-seed", selection.seed, "--relax", selection.relax]
+    elif selection.seed:
+        words += ["--sample-seed", selection.seed]
+    return shlex.join(str(word) for word in words)
+
+
+def of_packing(selection: Selection) -> list[Any]:
+    """Words of a command that name a selection's packing and μ."""
+    packing = selection.packing
+    if selection.imported:
+        words = ["--packing", "PACKING.npz"]
+    else:
+        words = ["-n", packing["n"], "--mu", f"{packing['mu']:.9g}", "--seed", packing["seed"]]
+        for name, value in unusual(packing).items():
+            words += [f"--{WORDS.get(name, name.replace('_', '-'))}", value]
+    if not selection.same_mu:
+        words += ["--ensemble-mu", f"{selection.mu:.9g}"]
+    return words
+
+
+def link(selection: Selection, view: dict[str, Any]) -> str:
+    """The query of an address that reopens this selection, seen as `view` {name: plain value}."""
+    packing = selection.packing
+    if selection.imported:
+        given = {"packing": packing["imported"]}
+    else:
+        given = {"n": packing["n"], "seed": packing["seed"], **unusual(packing)}
+    given["mu"] = f"{selection.mu:.9g}"
+    if not selection.same_mu:
+        given["packed"] = f"{packing['mu']:.9g}"
+    given |= {"source": selection.kind, "states": selection.states}
+    if selection.kind == "walk":
+        given["relax"] = selection.relax
+    if selection.seed:
+        given["walkseed"] = selection.seed
+    return urlencode(given | view)
+
+
+def read_link(query: str) -> tuple[Selection | None, dict[str, str]]:
+    """(Selection or None, {name: text} of everything else) of a link's query.
+
+    InputError for a selection that cannot be; a link without "mu" selects nothing.
+    """
+    given = dict(parse_qsl(query.lstrip("?")))
+    if "mu" not in given:
+        return None, given
+    try:
+        return _read_selection(given), given
+    except (ValueError, TypeError) as error:
+        raise InputError(f"this link cannot be read: {str(error)[:LONGEST_REASON]}") from None
+
+
+def _read_selection(given: dict[str, str]) -> Selection:
+    kind, relax = given.pop("source", "walk"), given.pop("relax", "accelerated")
+    if kind not in KINDS or relax not in SOLVERS:
+        raise InputError("this link names an unknown source of states")
+    mu = friction(given.pop("mu"))
+    packed = friction(given.pop("packed", mu))
+    rest = {"states": int(given.pop("states", 200)), "seed": int(given.pop("walkseed", 0))}
+    if "packing" in given:
+        packing = {"imported": given.pop("packing"), "mu": packed}
+        return Selection(packing, mu, kind, relax, **rest)
+    made = select(
+        int(given.pop("n", 400)),
+        mu,
+        int(given.pop("seed", 1)),
+        packed,
+        given.pop("box", "square"),
+        kind=kind,
+        relax=relax,
+        **rest,
+    )
+    casts = {"radii": str, "sweeps": int}
+    options = {name: casts.get(name, float)(given.pop(name)) for name in OPTIONS if name in given}
+    if ":" not in options.get("radii", ":"):
+        raise InputError("radii in a link are named distributions")
+    return made._replace(packing=made.packing | options)

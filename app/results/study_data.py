@@ -1,0 +1,79 @@
+"""The finished study that comes with the page: its numbers, and the paper's claims judged."""
+
+import json
+import math
+import statistics
+import threading
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from granforce.paper import tables
+from granforce.paper.claims.groups import outside
+from granforce.records import InputError
+
+DATA = Path(__file__).resolve().parents[2] / "data"
+# What the claims of each statistic begin with; see data/claims.json.
+ABOUT = {
+    "eta": ("η", "z "),
+    "extent": ("P(ΔF_n)", "tail of P(ΔF_n)", "S is more elongated"),
+    "correlation": ("corr(", "strong contacts"),
+    "store": ("F_crit", "α "),
+}
+
+_reading = threading.Lock()
+
+
+def study() -> tables.Table | None:
+    """The reduced study (granforce.paper.tables.Table), or None where it was not brought along."""
+    with _reading:
+        return _study()
+
+
+@cache
+def _study() -> tables.Table | None:
+    try:
+        return tables.load(DATA / "study.zarr")
+    except InputError:
+        return None
+
+
+@cache
+def claims(about: str) -> list[dict[str, Any]]:
+    """The paper's claims about one of ABOUT: dicts with statement, value, low, high, verdict.
+
+    What could not be measured is NaN, null in the file.
+    """
+    path = DATA / "claims.json"
+    if not path.exists():
+        return []
+    found = json.loads(path.read_text())["claims"]
+    return [
+        {name: math.nan if value is None else value for name, value in claim.items()}
+        for claim in found
+        if claim["statement"].startswith(ABOUT[about])
+    ]
+
+
+def rows(*parts: str) -> list[dict[str, Any]]:
+    """Rows of parts of the study at its usual number of disks; empty without a study."""
+    table = study()
+    return [] if table is None else table.part(*parts, n=table.plan["n"])
+
+
+def in_force_space(part: str) -> list[dict[str, Any]]:
+    """Rows of a part, but for the μ at which its states lie outside of S by more than its extent.
+
+    Sweeps that end early leave such networks: what they span is no indeterminacy.
+    """
+    table = study()
+    beyond = [] if table is None else outside(table, part)
+    return [row for row in rows(part) if row["mu"] not in beyond]
+
+
+def hill() -> list[tuple[float, float]]:
+    """How undetermined forces are over friction: [(μ, η2)], η2 the mean of the walks at each μ."""
+    by_mu: dict[float, list[float]] = {}
+    for row in rows("walk"):
+        by_mu.setdefault(row["mu"], []).append(row["eta2"])
+    return [(mu, statistics.fmean(found)) for mu, found in sorted(by_mu.items())]

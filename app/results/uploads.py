@@ -1,0 +1,225 @@
+"""Packings that a visitor brings, read in memory: no name of theirs becomes a path."""
+
+import io
+import re
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from granforce.packing import importers
+from granforce.records import InputError, Packing
+from granforce.study import kinds
+from granforce.study.keys import Parameters
+
+from ..background.jobs import Job
+from ..background.limits import LIMITS, Limits
+from .entry_labels import call
+from .library import Library
+
+Files = dict[str, tuple[str, bytes]]  # {role: (name, content)}
+
+# What files together make a packing; those in brackets may be missing.
+FAMILIES = {
+    "npz": ("NPZ of granforce", ("npz",), ()),
+    "lammps": ("LAMMPS dumps", ("particles", "contacts"), ()),
+    "table": ("tables", ("grains",), ("joined",)),
+    "pegs": ("photoelastic frame", ("positions", "adjacency"), ()),
+    "solved": ("photoelastic frame", ("solved",), ()),
+}
+WORDS = {
+    "npz": "packing",
+    "particles": "dump of the particles",
+    "contacts": "dump of the contacts",
+    "grains": "table of disks",
+    "joined": "table of contacts",
+    "positions": "positions of the disks",
+    "adjacency": "adjacency list with the forces",
+    "solved": "frame solved by PeGS 2",
+}
+# An archive may unpack to this many times the bytes that may be sent.
+UNPACKED = 8
+# What of a file is looked at to see whether it is photoelastic.
+LOOKED_AT, ROWS = 4000, 20
+
+
+class Brought(NamedTuple):
+    """A packing that was read and kept, and what it is."""
+
+    params: Parameters  # that name it, as kinds.PACKING names it
+    report: dict[str, Any]  # of granforce.report
+    source: str  # which files it came from, in words
+
+
+def role(name: str, content: bytes) -> str:
+    """What a file is, one of WORDS, told by its content; InputError for anything else."""
+    if content[:4] == b"PK\x03\x04":
+        return "npz"
+    if content[:2] == b"\x1f\x8b" or content[:4] == b"\x28\xb5\x2f\xfd":
+        raise InputError(f"{name}: compressed; unpack it first")
+    if content[:6] == b"MATLAB" or content[:4] == b"\x89HDF":
+        return "solved"
+    if content.lstrip()[:5] == b"ITEM:":
+        if b"ITEM: ATOMS" in content:
+            return "particles"
+        if b"ITEM: ENTRIES" in content:
+            return "contacts"
+        raise InputError(f"{name}: a LAMMPS dump without ATOMS or ENTRIES")
+    head = content.lstrip(b"\xef\xbb\xbf \t\r\n").split(b"\n", 1)[0][:2000]
+    words = head.decode("utf-8", "replace").lower().replace(";", ",").replace("\t", ",")
+    columns = {word.strip().strip('"') for word in words.split(",")}
+    if {"x", "y", "r"} <= columns:
+        return "grains"
+    if {"i", "j"} <= columns:
+        return "joined"
+    measured = _photoelastic(content)
+    if measured:
+        return measured
+    raise InputError(
+        f"{name}: neither an NPZ of granforce, nor a LAMMPS dump, nor a table with columns x, y, r "
+        "(disks) or i, j (contacts), nor a photoelastic list of positions or of forces"
+    )
+
+
+def _photoelastic(content: bytes) -> str | None:
+    """Which file of a photoelastic frame it is, or None: rows of five or six plain numbers."""
+    rows: list[list[float]] = []
+    lines = content[:LOOKED_AT].decode("utf-8", "replace").splitlines()
+    whole = lines if len(content) <= LOOKED_AT else lines[:-1]
+    for line in filter(str.strip, whole[:ROWS]):
+        try:
+            rows.append([float(field) for field in re.split(r"[;,\s]+", line.strip(" ;,\t"))])
+        except ValueError:
+            if rows:  # only the first line may have names
+                return None
+    counts = {len(row) for row in rows}
+    if counts == {6}:
+        return "positions"
+    if counts == {5}:  # the ids of two grains, or a grain and where it is
+        return "adjacency" if all(row[2].is_integer() for row in rows) else "positions"
+    return None
+
+
+def family(roles: Iterable[str]) -> str:
+    """The one of FAMILIES that these roles belong to."""
+    return next(k for k, (_, needed, more) in FAMILIES.items() if set(roles) & {*needed, *more})
+
+
+def added(files: Files, new: Iterable[tuple[str, bytes]], limits: Limits = LIMITS) -> Files:
+    """{role: (name, content)} of the files given before and new ones [(name, content), …].
+
+    A new file replaces the one with its role, and all that belong to another family.
+    Raises InputError for one that is none of WORDS, or where all together are too large.
+    """
+    for name, content in new:
+        found = role(name, content)
+        files = {k: v for k, v in files.items() if family([k]) == family([found])}
+        files[found] = (name, content)
+    size = sum(len(content) for _, content in files.values())
+    if size > limits.upload * 1e6:
+        raise InputError(f"the files have {size / 1e6:.1f} MB; at most {limits.upload} MB are read")
+    return files
+
+
+def missing(files: Files) -> list[str]:
+    """Roles that are needed besides those of the files."""
+    needed: tuple[str, ...] = FAMILIES[family(files)][1] if files else ()
+    return [part for part in needed if part not in files]
+
+
+def read(
+    files: Files,
+    *,
+    mu: float | None = None,
+    box: tuple[float, float] | None = None,
+    tilt: float = 0.0,
+    pressure: float = 1.0,
+    limits: Limits = LIMITS,
+) -> Packing:
+    """The Packing in files {role: (name, content)}.
+
+    mu: friction coefficient, which an NPZ brings along; box (L_x, L_y) or None, tilt and
+    pressure: of a table. Raises InputError, naming file and line, for what cannot be used, and
+    beyond the limits.
+    """
+    limits.check(pressure=pressure)
+    given = {part: opened(*file) for part, file in files.items()}
+    if "npz" in files:
+        unpacked = UNPACKED * limits.upload * 10**6
+        packing = importers.load_packing(given["npz"], unpacked=unpacked, most_grains=limits.n)
+    elif "particles" in files:
+        packing = importers.read_lammps(
+            given["particles"], given["contacts"], mu, most_grains=limits.n
+        )
+    else:
+        packing = importers.read_table(
+            given["grains"],
+            given.get("joined"),
+            mu=mu,
+            box=box,
+            tilt=tilt,
+            pressure=pressure,
+            most_grains=limits.n,
+        )
+    limits.check(mu=packing.mu)
+    return packing
+
+
+def opened(name: str, content: bytes) -> io.BytesIO:
+    """A file of this content; its name is for messages only."""
+    file = io.BytesIO(content)
+    file.name = name
+    return file
+
+
+def bring(library: Library, files: Files, **options: Any) -> Callable[[Job], Brought]:
+    """Work, for jobs.Task, that reads a packing, reports on it and keeps it in the cache."""
+
+    def work(job: Job) -> Brought:
+        job.begin("reading")
+        packing = read(files, **options)
+        names = " and ".join(name for name, _ in files.values())
+        return keep(library, packing, f"{FAMILIES[family(files)][0]}: {names}")(job)
+
+    return work
+
+
+def keep(library: Library, packing: Packing, source: str) -> Callable[[Job], Brought]:
+    """Work, for jobs.Task, that reports on a packing and keeps it in the cache; a Brought.
+
+    source: what it is: the names of its files, by which it is listed from then on.
+    """
+
+    def work(job: Job) -> Brought:
+        job.begin("looking for its backbone")
+        report = importers.report(packing) | {"notes": packing.info.get("notes", [])}
+        if library.cache is None:
+            raise InputError("no cache folder can be written, so nothing can be taken in")
+        params = kinds.imported_parameters(packing)
+        kinds.keep_packing(library.cache, params, packing)
+        call(library.cache, str(params["imported"]), source.partition(": ")[2])
+        return Brought(params, report, source)
+
+    return work
+
+
+def told(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """The report as rows (name, value) of texts for the page."""
+    known = ((label, report[name], form, unit) for label, name, form, unit in _ROWS)
+    rows = [(label, f"{v:{form}}{unit}") for label, v, form, unit in known if v is not None]
+    return rows + [("note", note) for note in report.get("notes", [])]
+
+
+_ROWS = (
+    ("disks", "grains", ",d", ""),
+    ("rattlers", "rattlers", ",d", ""),
+    ("contacts listed", "contacts", ",d", ""),
+    ("contacts that can carry", "backbone_contacts", ",d", ""),
+    ("coordination z", "coordination", ".3f", ""),
+    ("dimension h of S", "dimension", ",d", ""),
+    ("friction μ", "friction", "g", ""),
+    ("packing fraction φ", "packing_fraction", ".4f", ""),
+    ("pressure", "pressure", ".4g", ""),
+    ("mean normal force", "mean_normal_force", ".4g", ""),
+    ("unbalance of its forces", "residual", ".1e", " ⟨fₙ⟩"),
+    ("outside Coulomb's cones by", "violation", ".1e", " ⟨fₙ⟩"),
+    ("largest overlap", "largest_overlap", ".1e", " radii"),
+)

@@ -1,0 +1,1 @@
+"""What is selected and on screen, as parameters."""

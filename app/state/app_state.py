@@ -1,0 +1,393 @@
+"""Which states a page has selected and shows, as parameters: no widgets, no plots."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+from urllib.parse import parse_qs
+
+import numpy as np
+import param
+
+from granforce.records import InputError
+
+from ..background.jobs import Job, Visitor, as_one
+from ..background.limits import LIMITS
+from ..results.library import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
+from ..results.progress_feed import Arriving, Following
+from ..results.replays import Replay
+from ..results.selection import Selection, brief, command, link, read_link
+from . import known, perturbations
+from .comparison import Beside
+from .known import Knowledge
+from .links import OF_A_REPLAY, UNSEEN, VIEW, View, fitting, read_view, spelled
+from .page_tasks import Work
+from .pulls import Hand
+from .view_settings import Looks
+
+EXACT_FOLLOW = 1500  # contacts up to which exact intervals are computed without being asked for
+# What of Looks changes as it plays or is zoomed, not by a visitor's choice of what to see: nobody
+# goes back to the frame before, to the view of a moment ago, or to the other theme.
+PASSING = ("frame", "zoom", "dark")
+PRECOMPUTED, COMPUTED = "precomputed", "computed on this server"
+
+
+class AppState(param.Parameterized):
+    """The states selected, and the catalogue to select from.
+
+    How they are looked at is `looks`, what is being computed is `work`; these know nothing of it.
+    What is known of them is `knowledge`, what was pulled is in the `hand`, and `besides` is what is
+    seen beside them.
+    """
+
+    catalogue = param.List(doc="all cells, by series and μ")
+    selection = param.Parameter(doc="Selection asked for; not on screen while it is `missing`")
+    missing = param.Boolean(doc="whether the selection is in no store and has to be computed")
+    cell = param.Parameter(doc="the Cell on screen, or None")
+    replay = param.Parameter(doc="the Replay of the cell on screen, or None")
+    seen = param.Parameter(doc="the same, or meanwhile that of the walk under way")
+    exact = param.Parameter(doc="Dataset of exact intervals on the same contacts, or None")
+    measured = param.Parameter(doc="the photoelastic.Measured of the last frame opened, or None")
+    loads = param.Parameter(doc="limit loads (N_c,) of the contacts in ⟨f_n⟩, or None if unknown")
+    source = param.String(doc="where the states on screen come from, in words")
+    plane = param.Parameter(doc="the planes.Plane of force space on screen, or None")
+    displacement = param.Parameter(doc="(N, 2) array to animate on the packing, or None")
+
+    def __init__(
+        self,
+        library: Library,
+        wake: Callable[[Callable[[], object]], object] | None = None,
+        query: str | None = "",
+        visitor: Visitor | None = None,
+    ) -> None:
+        """wake(function): call a function soon on the page's thread; see jobs.Task.
+
+        query: of the address that opened the page; None: nothing is to be shown yet.
+        """
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        self.library, self.work = library, Work(wake, visitor)
+        self.looks = Looks()  # type: ignore[no-untyped-call]  # param says no types
+        # What was refused is told until something else is done; before those that may refuse it.
+        chosen = [name for name in VIEW if name in Looks.param and name not in PASSING]
+        self.looks.param.watch(self._forget, chosen)
+        self.knowledge, self.besides = Knowledge(self), Beside(self)
+        self.hand = Hand(self)  # which keeps what is known
+        self.parts = self.looks, self.knowledge, self.hand  # which a link names
+        self._viewed: dict[str, Any] = {
+            name: part.param[name] for name in VIEW for part in self.parts if name in part.param
+        }
+        self.param.watch(self._need_loads, "replay")
+        self.looks.param.watch(self._need_loads, ["colour", "thickness"])
+        self.work.computation.param.watch(self._bring_back, "dismissed")
+        self.param.watch(self._forget, "cell")
+        self.knowledge.param.watch(self._forget, "known")
+        self.hand.param.watch(self._forget, "pulls")
+        if query is not None:
+            self.open(query)
+
+    def _forget(self, *events: Any) -> None:
+        self.work.message = ""
+
+    # What is on screen
+
+    def open(self, query: str = "") -> None:
+        """Show what a link selects, computing it if need be, or what is best to begin with."""
+        try:
+            wanted, told = read_link(query)
+            self.work.message = ""
+        except InputError as error:
+            wanted, told = None, {}
+            self.work.message = str(error)
+        view = read_view(told, self._viewed)
+        self.looks.dark = view.get("dark", self.looks.dark)  # before there is anything to be seen
+        self._look_up(
+            wanted, self._as_new() | view, counted="states" in parse_qs(query.lstrip("?"))
+        )
+
+    def _as_new(self) -> View:
+        """What a new page shows, but for the theme: what a link does not name."""
+        return {name: self._viewed[name].default for name in VIEW if name != "dark"}
+
+    @property
+    def view(self) -> View:
+        """What a link may name, as it is on screen."""
+        return {name: getattr(parameter.owner, name) for name, parameter in self._viewed.items()}
+
+    def _look(self, view: View) -> None:
+        """See this."""
+        for part in self.parts:
+            part.param.update(**{name: view[name] for name in view if name in part.param})
+
+    @property
+    def growing(self) -> bool:
+        """Whether the Replay on screen is that of a walk under way."""
+        return self.seen is not self.replay
+
+    @property
+    def possible(self) -> Any:
+        """The exact intervals of the Replay on screen, under what is known; or None."""
+        if self.growing:
+            return None
+        narrowed = self.knowledge.narrowed
+        return self.exact if narrowed is None else narrowed.after
+
+    def refresh(self, shown: Shown | None = None) -> None:
+        """Read the catalogue anew; show what was just computed."""
+        if shown is not None:
+            self._show(shown)
+        self.work.reader.start(lambda job: self.library.cells(), self._list)
+
+    def ask(self, selection: Selection, at_once: bool = False) -> None:
+        """Select states: shown if a store has them, else `missing`, or computed at_once."""
+        self.besides.keep(selection)
+        self._ask(selection, at_once)
+
+    def _ask(self, selection: Selection, at_once: bool) -> None:
+        self.work.message = ""
+        found = cell_of(self.catalogue, selection)
+        if found is not None:
+            self.show(found)
+            return
+        try:
+            selection.check(LIMITS)
+        except InputError as error:
+            self.work.message = str(error)
+            return
+        # Told as one: nobody sees what is computed at once as missing, which would move the page.
+        with as_one(self.work, self):
+            self.param.update(selection=selection, missing=True)
+            if at_once:
+                self.compute()
+
+    def choose(self, series: str | None = None, mu: float | None = None) -> None:
+        """Show a stored series at its μ nearest to that on screen; or the one on screen at this μ.
+
+        Where that has no states there, they are asked for, and can be computed.
+        """
+        if mu is not None:
+            found = [cell for cell in self.cells() if np.isclose(cell.mu, mu, rtol=1e-3, atol=0)]
+        else:
+            cells = [cell for cell in self.catalogue if cell.series == series]
+            found = cells and [nearest_cell(cells, self.cell.mu)]
+        if found:
+            self.besides.keep(found[0].selection)
+            self.show(found[0])
+        elif mu is not None and self.cell is not None:
+            self.ask(self.cell.selection.at(mu))
+
+    def cells(self) -> list[Cell]:
+        """The cells of the series on screen, by μ."""
+        here = self.cell
+        return [c for c in self.catalogue if here is not None and c.series == here.series]
+
+    def show(self, cell: Cell) -> None:
+        """Put a cell on screen: at once if it is in memory, else when it is read."""
+        shown = self.library.shown_in_memory(cell)
+        if shown is not None:
+            self._show_and_read_ahead(shown)
+        else:
+            self.work.reader.start(lambda job: self.library.shown(cell), self._show_and_read_ahead)
+
+    def read_ahead(self) -> None:
+        """Have the cells with the nearest μ read meanwhile: they are the likeliest next."""
+        cells = self.cells()
+        if self.cell in cells:
+            here = cells.index(self.cell)
+            self.work.read_ahead(
+                partial(lambda near, job: self.library.shown(near), near)
+                for near in cells[max(here - 1, 0) : here + 2]
+                if self.library.shown_in_memory(near) is None
+            )
+
+    def _look_up(self, wanted: Selection | None, view: View, counted: bool) -> None:
+        """counted: whether so many states are wanted; else those that a store has will do."""
+        library = self.library
+
+        def meant(cells: list[Cell]) -> Selection | None:
+            return wanted if wanted is None or counted else with_states(cells, wanted)
+
+        def read(job: Job) -> tuple[list[Cell], Shown | None, str]:
+            damage = ""
+            while True:
+                cells = library.cells()
+                cell = best_cell(cells, meant(cells))
+                try:
+                    return cells, cell and library.shown(cell), damage
+                except InputError as error:
+                    if cell in library.cells():
+                        raise
+                    damage = str(error)  # the next best, then
+
+        def done(found: tuple[list[Cell], Shown | None, str]) -> None:
+            cells, shown, damage = found
+            message, asked = damage or self.work.message, meant(cells)
+            self._list(cells)
+            self._look({name: view[name] for name in view if name not in OF_A_REPLAY})
+            if shown is not None:
+                self._show(shown, view)
+            if asked is not None and (shown is None or not shown.cell.selection.names(asked)):
+                dear = LIMITS.shared and asked.dear
+                self._ask(asked, at_once=not dear)
+                if dear and self.missing:
+                    self.work.message = (
+                        "this link asks for what takes long to compute, and a link alone does not "
+                        "start that on this server: press Compute"
+                    )
+            self.work.message = self.work.message or message
+
+        wished = meant(library.catalogue)
+        at_hand = best_cell(library.catalogue, wished)
+        shown = at_hand and library.shown_in_memory(at_hand)
+        if shown and (wished is None or shown.cell.selection.names(wished)):
+            done((library.catalogue, shown, ""))  # the first picture needs no thread
+            self.refresh()
+        else:
+            self.work.reader.start(read, done)
+
+    def _list(self, cells: list[Cell]) -> None:
+        self.catalogue = list(cells)
+
+    def _show_and_read_ahead(self, shown: Shown) -> None:
+        self._show(shown)
+        self.read_ahead()
+
+    def _show(self, shown: Shown, view: View | None = None) -> None:
+        cell, replay, exact = shown
+        fresh = dict(UNSEEN)
+        if (self.replay is replay and view is None) or self._is_grown(replay):
+            fresh = {}
+        with as_one(*self.parts, self.work, self):
+            self.work.shown(cell.selection)
+            self.param.update(
+                selection=cell.selection,
+                missing=False,
+                cell=cell,
+                replay=replay,
+                seen=replay,
+                exact=exact,
+                source=self._source(cell),
+                displacement=None,
+                loads=self.loads if self.replay is replay else None,
+                plane=self.plane if self.replay is replay else None,
+            )
+            self._look(fresh | fitting(view or {}, replay))
+
+    def _source(self, cell: Cell | None = None) -> str:
+        """Where the states of a cell, by default the one on screen, come from."""
+        cell = cell or self.cell
+        if cell is None:
+            return ""
+        shipped = cell.store is self.library.shipped
+        told = brief(cell.selection, cell.series)
+        return f"μ = {cell.mu:g}, {told} ({PRECOMPUTED if shipped else COMPUTED})"
+
+    def _is_grown(self, replay: Replay) -> bool:
+        """Whether a Replay is what the walk on screen has grown into."""
+        return self.growing and np.array_equal(self.seen.normal[0], replay.normal[0])
+
+    # What is computed
+
+    def compute(self) -> None:
+        """Compute the states selected, in the background, and show them as they are found."""
+        asked = self.selection
+        if asked is None or self.work.computes(asked):
+            return
+        self.work.message = ""
+        try:
+            asked.parameters()
+        except InputError as error:
+            self.work.message = str(error)
+            return
+        with as_one(self.work, self):
+            self.seen = self.replay
+            self.work.compute(self.library, asked, self._computed)
+
+    def _computed(self, shown: Shown) -> None:
+        """Show states that were just computed; their exact intervals follow, if that is soon."""
+        self.refresh(shown)
+        if shown.replay.normal.shape[1] <= EXACT_FOLLOW and shown.replay.summary["dimension"]:
+            self.compute_exact()
+
+    def _bring_back(self, event: Any) -> None:
+        """What was on screen before something else was asked for, which is wanted no more."""
+        if event.new and self.missing and self.cell is not None:
+            self.show(self.cell)
+
+    def grow(self, replay: Replay) -> None:
+        """Put the Replay of a walk that begins on screen."""
+        asked = self.work.live.selection
+        told = brief(asked, self.library.series(asked))
+        source = f"μ = {asked.mu:g}, {told} (as they are found)"
+        with as_one(*self.parts, self.work, self):
+            self.work.param.update(fourfold=0, moving=False)
+            self.param.update(seen=replay, plane=None, source=source, displacement=None)
+            self._look(UNSEEN)
+
+    def follow(self) -> Following | Arriving | None:
+        """What is being computed, as `work` says; what was on screen is back where it ended."""
+        with as_one(*self.parts, self.work, self):
+            if self.work.live is not None and not self.work.computation.running:
+                plane = None if self.growing else self.plane
+                self.param.update(seen=self.replay, plane=plane, source=self._source())
+                self._look(UNSEEN)
+            return self.work.follow()
+
+    @property
+    def asked(self) -> str:
+        """What was asked for and is not on screen, in words; empty where there is nothing."""
+        if not self.missing or self.cell is None:
+            return ""
+        words = f"μ = {self.selection.mu:g}, {self.library.series(self.selection)}"
+        if self.work.computation.running:
+            return f"asked for: {words}"
+        return f"of μ = {self.cell.mu:g}; not computed: {words}"
+
+    def compute_exact(self) -> None:
+        """Compute the exact intervals of the packing on screen, in the background."""
+        if self.work.computation.running or self.cell is None or self.exact is not None:
+            return
+
+        def done(found: Shown) -> None:
+            if found.cell == self.cell:
+                self._show(found)
+
+        self.work.compute_exact(self.library, self.library.shown(self.cell), done)
+
+    @property
+    def exact_wanted(self) -> bool:
+        """Whether exact intervals are neither there nor under way, nor anything before them."""
+        under_way = self.work.computation.running or self.knowledge.task.running
+        return self.exact is None and not self.growing and not under_way
+
+    def _need_loads(self, *events: Any) -> None:
+        """Limit loads of all contacts are computed where colour or width show them."""
+        replay, cell = self.replay, self.cell
+        if "load" not in (self.looks.colour, self.looks.thickness) or replay is None:
+            self.work.loading.cancel()
+        elif self.loads is None and replay.summary["mu"] > 0:
+
+            def done(found: perturbations.Loads) -> None:
+                if self.replay is replay:
+                    self.loads = found.load
+
+            self.work.loading.start(perturbations.limit_loads(self.library, cell), done)
+
+    # What a link tells
+
+    @property
+    def command(self) -> str:
+        """The commands that make the states asked for, and the intervals under what is known."""
+        made, told = command(self.selection), self.knowledge.known
+        if told and self.replay is not None and not self.missing:
+            made += "\n" + known.commands(self.selection, self.replay, told)
+        return made
+
+    def link(self) -> str:
+        """The query of an address that reopens this view."""
+        if self.selection is None:
+            return ""
+        view = self.view
+        if view["beside"] == self.selection.mu:
+            # Between the choice of another μ and its states, what is beside is still on screen.
+            view["beside"] = None
+        told = {name: value for name, value in view.items() if value != self._viewed[name].default}
+        return link(self.selection, {name: spelled(name, told[name]) for name in told})

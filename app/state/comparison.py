@@ -1,0 +1,76 @@
+"""Two frictions side by side: the packing of the states on screen, made or held at another μ."""
+
+from typing import Any
+
+import param
+
+from granforce.records import InputError
+
+from ..background.limits import LIMITS
+from ..results import compute
+from ..results.library import Shown, cell_of
+from ..results.selection import Selection
+
+
+class Beside(param.Parameterized):
+    """What is seen beside the states on screen where `looks.beside` names another μ.
+
+    It is the same selection at that μ, with its own packing: `twin`. While the view is split,
+    who chooses another μ leaves there what was on screen; who pins a state or ends the split view
+    gives it up.
+    """
+
+    twin = param.Parameter(doc="the Shown of that μ, or None")
+
+    def __init__(self, state: Any) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        self.state, self.looks, self.task = state, state.looks, state.work.task()
+        state.param.watch(self._follow, ["cell", "missing"])
+        self.looks.param.watch(self._follow, ["split", "beside"])
+
+    def keep(self, wanted: Selection) -> None:
+        """Another Selection was chosen: if only μ differs, what is on screen stays beside it."""
+        state, looks = self.state, self.looks
+        if not looks.split or looks.beside is not None or state.cell is None:
+            return
+        shown = state.cell.selection
+        if shown.mu != wanted.mu and shown.at(wanted.mu).names(wanted):
+            looks.beside = shown.mu
+
+    def _follow(self, *events: Any) -> None:
+        """Have the other packing found, or computed if no store has it."""
+        state, looks = self.state, self.looks
+        came = any(event.name in ("cell", "missing") for event in events) and not state.missing
+        if not looks.split or (came and state.cell is not None and looks.beside == state.cell.mu):
+            looks.beside = None  # nothing stands beside itself
+        if looks.beside is None or state.cell is None:
+            self.task.cancel()
+            self.twin = None
+            return
+        try:
+            wanted = state.cell.selection.at(looks.beside)
+            wanted.check(LIMITS)
+        except InputError as error:
+            looks.beside, state.work.message = None, str(error)
+            return
+        if self.twin is None or not self.twin.cell.selection.names(wanted):
+            self._find(wanted)
+
+    def _find(self, wanted: Selection) -> None:
+        state, library = self.state, self.state.library
+        cell = cell_of(state.catalogue, wanted)
+        if cell is None and LIMITS.shared and wanted.dear:
+            state.looks.beside = None
+            state.work.message = (
+                f"the packing at μ = {wanted.mu:g} takes long to compute: open it by itself first"
+            )
+        elif cell is None:
+            self.task.start(compute.states(library, wanted), self._found)
+        elif (shown := library.shown_in_memory(cell)) is None:
+            self.task.start(lambda job: library.shown(cell), self._found)
+        else:
+            self.task.cancel()
+            self.twin = shown
+
+    def _found(self, shown: Shown) -> None:
+        self.twin = shown

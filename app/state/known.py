@@ -1,0 +1,387 @@
+"""What a visitor takes for known: forces held, or within error bars; what they leave open."""
+
+import math
+import shlex
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import param
+import xarray as xr
+
+from granforce.records import InputError
+from granforce.study import kinds
+from granforce.tolerances import CARRYING
+from granforce.types import Floats, Integers
+
+from ..background.jobs import Job, Task, as_one
+from ..results import compute
+from ..results.library import Cell, Library, Shown
+from ..results.replays import Replay
+from ..results.selection import Selection, of_packing
+
+Row = list[Any]  # contact, f_n from and to, f_t from and to, as `conditions` takes them
+
+MOST_KNOWN = 32  # statements that a page, or a link, may hold
+LARGEST = 1e6  # ⟨fₙ⟩
+# A force whose interval is shorter than this, in ⟨fₙ⟩, is known already.
+DETERMINED = 1e-6
+# Held forces stay so much of their interval away from its ends: at the very ends rounding decides.
+INWARD = 1e-4
+# Contacts to measure next that are listed; checked by exact bounds where there are many contacts.
+LISTED, CHECKED, FEW = 10, 3, 200
+
+
+class Statement(NamedTuple):
+    """That f_n of a contact is `value`, up to `error` either way; both in ⟨f_n⟩."""
+
+    contact: int  # position in the backbone
+    value: float
+    error: float = 0.0
+
+    def words(self, number: int) -> str:
+        """It in words, with the contact's number in the packing."""
+        bar = f" ± {self.error:.3g}" if self.error else ""
+        return f"contact {number}: fₙ = {self.value:.3f}{bar} × the mean force"
+
+
+class Narrowed(NamedTuple):
+    """Exact intervals of all contacts under what is known, beside those without."""
+
+    known: tuple[Statement, ...]
+    before: xr.Dataset  # of intervals
+    after: xr.Dataset
+    left: float = 0.0  # part of the bounds that `after` still has as before
+
+    @property
+    def dimension(self) -> tuple[int, int]:
+        """h before and after."""
+        return int(self.before["dimension"]), int(self.after["dimension"])
+
+    @property
+    def mean(self) -> tuple[float, float]:
+        """Mean interval of f_n before and after, in ⟨f_n⟩."""
+        before, after = self.extents
+        return float(before.mean()), float(after.mean())
+
+    @property
+    def extents(self) -> tuple[Floats, Floats]:
+        """Length of the intervals of f_n (N_c,), before and after, in ⟨f_n⟩."""
+        return _extent(self.before), _extent(self.after)
+
+    @property
+    def gone(self) -> Floats:
+        """(N_c,) by how much the intervals of f_n are shorter, in ⟨f_n⟩."""
+        before, after = self.extents
+        return np.maximum(before - after, 0.0)
+
+    @property
+    def shortened(self) -> Floats:
+        """The same of the contacts that are not known themselves: of those that are, 0."""
+        change = self.gone
+        change[[one.contact for one in self.known]] = 0.0
+        return change
+
+    @property
+    def carrying(self) -> int:
+        """How many contacts carry in every network that is left, by certified bounds."""
+        low, gap = (self.after[name].values for name in ("low", "interval_gap"))
+        least = low[:, 0] / self.after["force_scale"].item() - gap[:, 0, 0]
+        return int(np.sum(least > CARRYING))
+
+
+def _normal(dataset: xr.Dataset, name: str) -> Floats:
+    return dataset[name].values[:, 0] / dataset["force_scale"].item()
+
+
+def _extent(dataset: xr.Dataset) -> Floats:
+    return _normal(dataset, "high") - _normal(dataset, "low")
+
+
+class Underway:
+    """Intervals under what is known as their bounds are found: a Narrowed at any time."""
+
+    def __init__(
+        self, known: tuple[Statement, ...], before: xr.Dataset, backbone: Integers
+    ) -> None:
+        self.known, self._before, self._backbone = known, before, backbone
+        self._after, self._count = before.copy(deep=True), 0
+
+    def add(self, bound: Any) -> None:
+        """Keep a Bound."""
+        place = np.searchsorted(self._backbone, bound.contact)
+        name = "high" if bound.side else "low"
+        self._after[name].values[place, bound.component] = bound.value
+        self._count += 1
+
+    @property
+    def narrowed(self) -> Narrowed:
+        """What is known by now."""
+        left = 1 - self._count / (4 * len(self._backbone))
+        return Narrowed(self.known, self._before, self._after.copy(deep=True), max(left, 1e-3))
+
+
+class Ranked(NamedTuple):
+    """Contacts whose f_n would be worth measuring next, the best first."""
+
+    replay: Replay  # of whose packing
+    known: tuple[Statement, ...]  # that hold already
+    contacts: Integers  # (k,) positions in the backbone
+    before: float  # mean interval of f_n now, in ⟨f_n⟩
+    after: Floats  # (k,) the same once this one is known as well; NaN where not computed
+    expected: Floats  # (k,) part by which errors fall, as forces go together over the states
+
+
+class Knowledge(param.Parameterized):
+    """The statements of one page; exact intervals under them are computed in the background."""
+
+    known = param.List(doc="Statements: forces of contacts that are taken for known")
+    narrowed = param.Parameter(doc="the Narrowed that they leave open, or None")
+    ranked = param.Parameter(doc="the Ranked contacts to measure next, or None")
+
+    def __init__(self, state: Any) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        self.state, self.work = state, state.work
+        self.task, self.ranking = self.work.task(told=False), self.work.task()
+        self._followed: tuple[Any, tuple[Statement, ...]] = state.replay, ()
+        self.param.watch(self._follow, "known")
+        state.param.watch(self._follow, "replay")
+        self.task.param.watch(self._failed, "message")
+        self.task.param.watch(self._arrive, "fraction")
+        self.ranking.param.watch(lambda event: self._rank(_so_far(self.ranking)), "fraction")
+
+    def hold(self, contact: int, value: float, error: float = 0.0) -> None:
+        """Take f_n of a contact for known, in ⟨f_n⟩; a message where it cannot be."""
+        state = self.state
+        others = [one for one in self.known if one.contact != contact]
+        if state.replay is None or state.growing:
+            return
+        try:
+            if len(others) >= MOST_KNOWN:
+                raise InputError(f"{MOST_KNOWN} known forces are the most; let some go")
+            self.known = [*others, self._stated(contact, value, error)]
+            self.work.message = ""
+        except InputError as refusal:
+            self.work.message = str(refusal)
+
+    def release(self, contact: int) -> None:
+        """Take f_n of a contact for unknown again."""
+        self.known = [one for one in self.known if one.contact != contact]
+
+    def heard(self, message: dict[str, Any]) -> None:
+        """What a browser tells of the selected contact."""
+        count = 0 if self.state.replay is None else len(self.state.replay.backbone)
+        match message:
+            case {"hold": [int(contact), int() | float() as value, int() | float() as error]}:
+                if 0 <= contact < count:
+                    self.hold(int(contact), value, error)
+            case {"release": int(contact)}:
+                self.release(contact)
+
+    def compute(self) -> None:
+        """Compute the exact intervals under what is known, in the background."""
+        state = self.state
+        replay, known, cell = state.replay, tuple(self.known), state.cell
+        shown = Shown(cell, replay, state.exact)
+
+        def done(narrowed: Narrowed) -> None:
+            if state.replay is replay:
+                self._narrow(narrowed)
+
+        self.task.start(narrowing(state.library, shown, known), done)
+
+    def rank(self) -> None:
+        """Find which contact to measure next, in the background."""
+        state = self.state
+        replay, known = state.replay, tuple(self.known)
+        if replay is None or state.growing:
+            return
+        self.work.message = ""
+        self.ranking.start(ranking(state.library, state.cell, replay, known), self._rank)
+
+    def _rank(self, found: Ranked | None) -> None:
+        """Show contacts to measure next, if it is still this that is known."""
+        if found is not None and found.replay is self.state.replay:
+            self.ranked = found if found.known == tuple(self.known) else None
+
+    def _stated(self, contact: int, value: float, error: float) -> Statement:
+        """The Statement of a force, refused where what is known leaves no room for it."""
+        state = self.state
+        value, error = _number(value, "a known force"), _number(error, "an error bar")
+        number = state.replay.backbone[contact]
+        current = self._settled and tuple(self.known) == self.narrowed.known
+        others = state.exact if not self.known else self.narrowed.after if current else None
+        if others is None or error or contact in {one.contact for one in self.known}:
+            return Statement(contact, _rounded(value), _rounded(error))
+        low, high = (float(_normal(others, name)[contact]) for name in ("low", "high"))
+        width = high - low
+        if width < DETERMINED:
+            raise InputError(
+                f"fₙ of contact {number} is {low:.3f} × the mean force in every network that is "
+                "left: to hold it would tell nothing new"
+            )
+        if not low - INWARD * width <= value <= high + INWARD * width:
+            raise InputError(
+                f"fₙ of contact {number} is {value:.3f} × the mean force on screen, but what is "
+                f"known leaves {low:.3f} to {high:.3f}: pull it there first, or let another go"
+            )
+        inside = np.clip(value, low + INWARD * width, high - INWARD * width)
+        return Statement(contact, _rounded(inside))
+
+    @property
+    def _settled(self) -> bool:
+        """Whether intervals under some known forces are there, all of them."""
+        return self.narrowed is not None and not self.narrowed.left
+
+    def _follow(self, *events: Any) -> None:
+        """Intervals under what is known now; statements belong to one packing."""
+        (before, told), replay = self._followed, self.state.replay
+        self._followed = replay, tuple(self.known)
+        if before is replay and told == tuple(self.known):
+            return  # both came at once
+        self.ranked = None
+        self.ranking.cancel()
+        if before is not replay or not self.known:
+            self.narrowed = None
+        done = self.narrowed.known if self._settled else ()
+        if self.known and replay is not None and tuple(self.known) != done:
+            self.compute()
+        else:
+            self.task.cancel()
+
+    def _arrive(self, event: Any) -> None:
+        """Show the intervals that are there by now."""
+        arriving = _so_far(self.task)
+        if event.new and arriving is not None and arriving.known == tuple(self.known):
+            self._narrow(arriving.narrowed)
+
+    def _narrow(self, narrowed: Narrowed) -> None:
+        with as_one(self, self.state):
+            self.narrowed = narrowed
+            if self.state.exact is not narrowed.before:
+                self.state.exact = narrowed.before
+
+    def _failed(self, event: Any) -> None:
+        """What contradicts itself is taken back; the message says what it was."""
+        if event.new:
+            state = self.state
+            self.known = list(self.narrowed.known) if self._settled else []
+            self.work.message = f"{event.new} (here ⟨fₙ⟩ = {state.replay.force_scale:.4g})"
+
+
+def _so_far(task: Task) -> Any:
+    return task.job and task.job.so_far
+
+
+def _number(value: float, what: str) -> float:
+    if not 0 <= value < LARGEST:  # nor if it is NaN
+        raise InputError(f"{what} must lie between 0 and {LARGEST:g} ⟨fₙ⟩, got {value:g}")
+    return float(value)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.9g}")  # as links hold it
+
+
+def rows(replay: Replay, known: Iterable[Statement]) -> list[Row]:
+    """Statements as `conditions` takes them: contacts of the packing, forces."""
+    scale, number = replay.force_scale, replay.backbone
+    return [
+        [int(number[c]), (value - error) * scale, (value + error) * scale, None, None]
+        for c, value, error in known
+    ]
+
+
+def commands(selection: Selection, replay: Replay, known: Iterable[Statement]) -> str:
+    """Two lines for a terminal: what is known as a file, and the intervals under it."""
+    lines = ["contact,f_n_min,f_n_max"]
+    lines += [f"{c},{low:.12g},{high:.12g}" for c, low, high, *_ in rows(replay, known)]
+    words = ["granforce", "intervals", *of_packing(selection), "--known", "known.csv"]
+    return (
+        f"printf '%s\\n' {shlex.join(lines)} > known.csv\n{shlex.join(str(word) for word in words)}"
+    )
+
+
+def narrowing(
+    library: Library, shown: Shown, known: tuple[Statement, ...]
+) -> Callable[[Job], Narrowed]:
+    """Work, for jobs.Task, that finds the intervals under what is known; a Narrowed.
+
+    So far it is an Underway, the contacts first that may change most.
+    """
+
+    def work(job: Job) -> Narrowed:
+        whole = (shown if shown.exact is not None else compute.exact(library, shown)(job)).exact
+        assert whole is not None  # found or made
+        bounds = Underway(known, whole, shown.replay.backbone)
+        job.so_far = bounds
+        selection = shown.cell.selection
+        given: dict[str, Any] = {"mu": selection.mu, "known": rows(shown.replay, known)}
+        params = kinds.INTERVALS.parameters(selection.packing, **given)
+        stage = "exact intervals under what is known"
+        options: dict[str, Any] = {"widths": affected(shown.replay, known), "watch": bounds.add}
+        found = compute.found_or_made(library, job, stage, kinds.INTERVALS, params, **options)
+        return Narrowed(known, whole, found)
+
+    return work
+
+
+def affected(replay: Replay, known: Iterable[Statement]) -> Floats:
+    """(N_c,) how much f_n goes with what is known over the states shown; most for what is known."""
+    off = replay.normal[1:] - replay.normal[1:].mean(axis=0)
+    spread = np.maximum(off.std(axis=0), DETERMINED)
+    chosen = [one.contact for one in known]
+    score = spread * np.abs((off / spread).T @ (off[:, chosen] / spread[chosen])).max(axis=1)
+    score[chosen] = 1 + 2 * score.max()
+    return score
+
+
+def ranking(
+    library: Library, cell: Cell, replay: Replay, known: tuple[Statement, ...]
+) -> Callable[[Job], Ranked]:
+    """Work, for jobs.Task, that finds which contact to measure next; a Ranked.
+
+    So far it is their order before it is checked by exact bounds.
+    """
+
+    def ranked(contacts: Integers, expected: Floats, before: Any, after: Floats) -> Ranked:
+        place = np.searchsorted(replay.backbone, contacts)
+        return Ranked(replay, known, place, before, after, expected)
+
+    def work(job: Job) -> Ranked:
+        selection = cell.selection
+        given: dict[str, Any] = {"mu": selection.mu, "known": rows(replay, known) or None}
+        few = len(replay.backbone) <= FEW
+        params = kinds.INFORMATIVE.parameters(
+            selection.packing, check=LISTED if few else CHECKED, k=LISTED, **given
+        )
+        stage = "which measurement next"
+
+        def watch(found: Any) -> None:
+            job.so_far = ranked(*found)
+
+        found = compute.found_or_made(library, job, stage, kinds.INFORMATIVE, params, watch=watch)
+        names = "backbone", "part_expected", "mean_before", "mean_after"
+        return ranked(*(found[name].values for name in names))
+
+    return work
+
+
+def spelled(known: Iterable[Statement]) -> str:
+    """Statements as a link holds them."""
+    rows = (one if one.error else one[:2] for one in known)
+    return "~".join(":".join(f"{part:.9g}" for part in row) for row in rows)
+
+
+def read(text: str) -> list[Statement]:
+    """Statements of a link's text; ValueError for what is none."""
+    parts = [part.split(":") for part in text.split("~")[: MOST_KNOWN + 1]]
+    pairs = [(contact, rest) for contact, *rest in parts if 1 <= len(rest) <= 2]
+    known = [Statement(int(contact), *map(float, rest)) for contact, rest in pairs]
+    numbers = [number for one in known for number in one[1:]]
+    contacts = {one.contact for one in known}
+    if not len(parts) == len(known) == len(contacts) <= MOST_KNOWN:
+        raise ValueError("too many known forces, or one contact twice")
+    if min(contacts) < 0 or not all(0 <= n < LARGEST and math.isfinite(n) for n in numbers):
+        raise ValueError("forces that cannot be")
+    return known

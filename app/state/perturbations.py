@@ -1,0 +1,165 @@
+"""Local perturbations of the packing on screen, and what the stores know about those of others."""
+
+import json
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce.records import Packing
+from granforce.study import kinds
+from granforce.study.cells import entries
+from granforce.study.keys import Parameters
+from granforce.study.responses import moved_grains
+from granforce.types import Floats
+
+from ..background.jobs import Job
+from ..results.compute import found_or_made
+from ..results.distributions import Row, alike, rows
+from ..results.library import Cell, Library, readable
+from ..results.replays import Replay
+from .pulls import puller_of
+
+# Fewer contacts than this say little about the mean over all.
+ENOUGH_CONTACTS = 10
+
+
+class Loads(NamedTuple):
+    """Limit loads of all contacts, in ⟨f_n⟩."""
+
+    load: Floats  # (N_c,)
+    gap: float  # largest duality gap, ⟨f_n⟩
+    seconds: float
+
+
+class Pushed(NamedTuple):
+    """What a force pair does that pushes the grains of one contact apart. Forces in ⟨f_n⟩."""
+
+    contact: int  # position in the backbone
+    limit: float  # limit load
+    low: float  # F_crit: largest load at rest
+    high: float  # least load that was not carried
+    opened: int  # contacts that the first motion opens,
+    slid: int  # at which grains slide
+    kept: int  # and which stick
+    breach: float  # of Coulomb's law by the motion
+    loads: Floats  # (k,) from 0 to `low`
+    states: Floats  # (k, N_c, 2) networks under them, nearest to that as packed
+    residual: Floats  # (k,) of these
+    displacement: Floats  # (N, 2) first motion, rms 1; 0 for rattlers
+    distance: Floats  # (k,) of the backbone's grains from the contact, length
+    size: Floats  # (k,) |u| of those grains
+    radius: Floats  # (shells,) length
+    profile: Floats  # (shells,) mean |u|
+    exponent: float  # α of |u| ~ r^−α for this contact alone
+    fit: tuple[float, ...]  # smallest and largest r of its fit, length
+    spread: tuple[
+        float, float
+    ]  # smallest and largest α of other ranges of r; NaN where no fit is possible
+    seconds: float
+
+
+def limit_loads(library: Library, cell: Cell) -> Callable[[Job], Loads]:
+    """Work, for jobs.Task, that finds or computes the failure load of every contact."""
+
+    def work(job: Job) -> Loads:
+        params = kinds.LIMIT_LOADS.parameters(cell.selection.packing, mu=cell.selection.mu)
+        stage = "failure load of every contact"
+        found = found_or_made(library, job, stage, kinds.LIMIT_LOADS, params)
+        scale = found["force_scale"].item()
+        return Loads(
+            load=found["limit_load"].values / scale,
+            gap=found["max_gap"].item(),
+            seconds=found["seconds"].item(),
+        )
+
+    return work
+
+
+def push(library: Library, cell: Cell, replay: Replay, contact: int) -> Callable[[Job], Pushed]:
+    """Work that finds or computes what a growing force pair on one contact does."""
+
+    def work(job: Job) -> Pushed:
+        params = kinds.PERTURBATION.parameters(
+            cell.selection.packing,
+            mu=cell.selection.mu,
+            contacts=[int(replay.backbone[contact])],
+        )
+        stage = "contact dynamics under a growing load"
+        found = found_or_made(library, job, stage, kinds.PERTURBATION, params)
+        low = found["critical_low"].values[0].item()
+        job.begin("networks under smaller loads")
+        under = puller_of(library, cell, []).loaded(int(replay.backbone[contact]), low)
+        packing = library.packing(cell.selection.packing)
+        return _pushed(found, packing, contact, under)
+
+    return work
+
+
+def _pushed(found: xr.Dataset, packing: Packing, contact: int, under: Any) -> Pushed:
+    scale = found["force_scale"].item()
+
+    def force(name: str) -> float:
+        return found[name].values[0].item() / scale
+
+    def count(name: str) -> int:
+        return int(found[name].values[0])
+
+    u = found["displacement"].values[0]
+    distance, size = moved_grains(packing, found)
+    return Pushed(
+        contact=contact,
+        limit=force("limit_load"),
+        low=force("critical_low"),
+        high=force("critical_high"),
+        opened=count("opened"),
+        slid=count("slid"),
+        kept=count("kept"),
+        breach=float(found["motion_breach"].values[0]),
+        loads=under.loads / scale,
+        states=under.states / scale,
+        residual=under.residual,
+        displacement=np.nan_to_num(u),
+        distance=distance,
+        size=size,
+        radius=found["shell_radius"].values,
+        profile=found["profile"].values[0],
+        exponent=found["decay_exponent"].item(),
+        fit=tuple(json.loads(found.attrs["fit_range"])),
+        spread=_range(found["fit_exponent"].values),
+        seconds=found["contact_seconds"].values[0].item(),
+    )
+
+
+def _range(values: Floats) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+
+
+def over_store(library: Library, cells: Iterable[Cell], cell: Cell) -> list[Row]:
+    """One dict for each packing perturbed at enough contacts: as `figures.perturbation` takes them.
+
+    η2 is that of the packing's states among the cells; those of the same kind as `cell` come first.
+    """
+    measured = {}
+    for other in [*cells, *alike(cells, cell)]:
+        measured[_key(other.selection.packing, other.selection.mu)] = other
+    found = []
+    for store in library.stores:
+        for entry in entries(store, kinds.PERTURBATION):
+            states = measured.get(_key(entry.params["packing"], entry.params["mu"]))
+            if states is None:
+                continue
+            with readable(store, entry.name) as dataset:
+                if dataset.sizes["contact"] < ENOUGH_CONTACTS:
+                    continue
+                load = dataset["limit_load"].values.mean() / dataset["force_scale"].item()
+                values = {k: dataset[k].item() for k in ("critical_force", "decay_exponent")}
+            measure = {k: rows([states])[0][k] for k in ("mu", "eta2")}
+            found.append(measure | values | {"limit_load": load, "entry": entry.name})
+    return list({row["entry"]: row for row in found}.values())
+
+
+def _key(packing: Parameters, mu: float) -> tuple[Any, ...]:
+    return tuple(sorted((k, str(v)) for k, v in packing.items())), mu

@@ -1,0 +1,327 @@
+"""Forces in the visitor's hand: what was pulled where, and the networks that follow.
+
+A pull is a pair (position of a contact, its f_n in ⟨f_n⟩), or three, (name of a plane, x, y), where
+the point in force space was pulled.
+"""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import param
+
+from granforce.records import InputError
+from granforce.study.pulls import Puller
+from granforce.types import Floats
+
+from ..background.jobs import Job, reading
+from ..results import planes
+from ..results.library import Cell, Library
+from ..results.replays import Replay
+from . import known
+
+Pull = tuple[Any, ...]  # see above
+Message = dict[str, Any]  # to or from the player
+
+MOST_PULLS = 32  # that a page, or a link, may hold
+PULLERS_KEPT = 4  # for all visitors
+
+_pullers: OrderedDict[tuple[str, str], Puller] = OrderedDict()
+_lock = threading.Lock()
+
+
+class Held(NamedTuple):
+    """A network that the visitor's pulls have led to; forces in ⟨f_n⟩."""
+
+    forces: Floats  # (N_c, 2)
+    residual: float
+
+
+def puller_of(library: Library, cell: Cell, given: list[known.Row]) -> Puller:
+    """The Puller of a cell's packing; given: rows of known forces, which pulls keep."""
+    key = cell.name, str(given)
+    with _lock:
+        found = _pullers.pop(key, None)
+    if found is None:
+        found = Puller(library.packing(cell.params["packing"]), cell.mu, given or None)
+    with _lock:
+        _pullers[key] = found
+        while len(_pullers) > PULLERS_KEPT:
+            _pullers.popitem(last=False)
+    return found
+
+
+class Hand(param.Parameterized):
+    """The pulls of one page, as a stack; networks are made in the background.
+
+    What is known stays in all of them. `tell(message)`, once it is set, gets what the player shows:
+    {"held": …}, {"rail": …} of a contact and {"fan": …} of a plane.
+    """
+
+    pulls = param.List(doc="what was pulled one after the other, from the state on screen on")
+    held = param.Parameter(doc="the Held that pulls have led to, or None")
+
+    def __init__(self, state: Any) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]  # param says no types
+        self.state, self.work, self._task = state, state.work, state.work.task(reading)
+        self.tell: Callable[[Message], object] = lambda message: None
+        self._made: list[tuple[Pull, Held]] = []  # of the pulls made
+        self._base: tuple[Any, ...] | None = None  # and where from
+        self._followed: tuple[Any, ...] = self._all
+        self._task.param.watch(self._failed, "message")
+        self.param.watch(self._follow, "pulls")
+        state.param.watch(self._follow, "replay")
+        state.looks.param.watch(self._follow, "frame")
+        state.knowledge.param.watch(self._follow, "known")
+
+    def grab(self, contact: int) -> None:
+        """Select a contact and have its rail made, from the network on screen."""
+        state = self.state
+        if state.replay is None or state.growing:
+            return
+        state.looks.contact = contact
+        if contact in _held(state.knowledge.known):
+            self.work.message = (
+                f"contact {state.replay.backbone[contact]} is held: let it go (H) to pull it"
+            )
+            self.tell({"rail": None})
+        else:
+            self._work(contact)
+
+    def grab_point(self) -> None:
+        """Have the fan of the plane on screen made."""
+        if self.state.plane is not None and not self.state.growing:
+            self._work(self.state.plane)
+
+    def hold(self, pull: Pull) -> None:
+        """Let go: the pull stays."""
+        if len(self.pulls) >= MOST_PULLS:
+            self.work.message = f"{MOST_PULLS} pulls are the most; undo some (Z)"
+            return
+        self.pulls = [*self.pulls, pull]
+
+    def undo(self) -> None:
+        """Step back before the last pull."""
+        self.pulls = self.pulls[:-1]
+
+    def heard(self, message: Message) -> None:
+        """What the browser tells of the hand."""
+        count = 0 if self.state.replay is None else len(self.state.replay.backbone)
+        match message:
+            case {"grab": int(contact)} if 0 <= contact < count:
+                self.grab(int(contact))  # which may be a flag
+            case {"hold": [int(contact), int() | float() as value]}:
+                if 0 <= contact < count and np.isfinite(value):
+                    self.hold((int(contact), float(value)))
+            case {"point": True}:
+                self.grab_point()
+            case {"hold_point": [int() | float() as x, int() | float() as y]}:
+                if self.state.plane is not None and np.isfinite([x, y]).all():
+                    self.hold((planes.name(self.state.plane), float(x), float(y)))
+            case {"undo": True}:
+                self.undo()
+            case {"free": True}:
+                self.pulls = []
+            case {"anew": True} if self._made:
+                self._show(self._made)
+
+    @property
+    def _all(self) -> tuple[Any, ...]:
+        """What is followed: pulls, the Replay and its row on screen, what is known."""
+        state = self.state
+        return self.pulls, state.replay, state.looks.frame, tuple(state.knowledge.known)
+
+    def _follow(self, *events: Any) -> None:
+        """Pulls belong to one state: with another one on screen they are gone."""
+        pulls, replay, frame, known = self._followed
+        self._followed = now = self._all
+        if pulls != now[0]:
+            self._work()
+        elif pulls and (replay is not now[1] or frame != now[2]):
+            self.pulls = []
+        elif pulls and known != now[3]:
+            self._work()  # the networks that keep what is known now
+
+    def _work(self, grabbed: int | planes.Plane | None = None) -> None:
+        """Make the networks of all pulls, and the rail of a contact or the fan of a Plane."""
+        state, pulls = self.state, list(self.pulls)
+        replay, cell, frame = state.replay, state.cell, state.looks.frame
+        if replay is None or cell is None:
+            return
+        told = tuple(state.knowledge.known)
+        base = cell.name, frame, told
+        made = self._made if self._base == base else []
+        first = Held(_forces(replay, frame), float(replay.residual[frame]))
+        library = state.library
+
+        def work(job: Job) -> tuple[Any, ...]:
+            ours = puller_of(library, cell, known.rows(replay, told))
+            pulled = partial(_pulled, library, cell, replay, ours)
+            held, refusal = _networks(pulled, _held(told), made, pulls, first)
+            ready: Iterator[Message] = iter(())
+            if grabbed is not None and not refusal:
+                last = held[-1][1] if held else first
+                ready = _to_pull(ours, replay, last, grabbed)
+            return base, held, next(ready, None), ready, refusal
+
+        if pulls or grabbed is not None:
+            self._task.start(work, self._done)
+        else:
+            self._task.cancel()
+            self._made, self._base, self.held = [], base, None
+            self.tell({"held": None})
+
+    def _done(self, found: tuple[Any, ...]) -> None:
+        base, made, ready, more, refusal = found
+        self._made, self._base = made, base
+        self.held = made[-1][1] if made else None
+        if refusal:
+            self.pulls = [pull for pull, _ in made]
+            self.work.message = refusal  # which those who see the pulls go would take away
+            return
+        if ready is not None:
+            self.tell(ready)
+            if "rail" in ready and not ready["rail"]["whole"]:
+                self._task.start(lambda job: next(more), self.tell)
+        elif made:
+            self._show(made)
+
+    def _show(self, made: list[tuple[Pull, Held]]) -> None:
+        pull, held = made[-1]
+        self.tell({"held": _spelled(held) | {"pull": list(pull)}})
+
+    def _failed(self, event: Any) -> None:
+        if event.new:
+            self.work.message = event.new
+            self.tell({"rail": None, "fan": None})
+
+
+def _forces(replay: Replay, frame: int) -> Floats:
+    return np.stack([replay.normal[frame], replay.tangential[frame]], axis=1).astype(np.float64)
+
+
+def _held(told: Iterable[known.Statement]) -> dict[int, float]:
+    """{contact: f_n} of those that are held exactly."""
+    return {one.contact: one.value for one in told if not one.error}
+
+
+def _networks(
+    pulled: Callable[[Held, Pull], Held],
+    held: Mapping[int, float],
+    made: Sequence[tuple[Pull, Held]],
+    pulls: Sequence[Pull],
+    first: Held,
+) -> tuple[list[tuple[Pull, Held]], str]:
+    """The networks of all pulls, those made before included; a refusal.
+
+    pulled(network, pull): what a pull makes of it; held: {contact: f_n} in all of them.
+    """
+    kept = 0
+    while kept < min(len(made), len(pulls)) and made[kept][0] == pulls[kept]:
+        kept += 1
+    made = list(made[:kept])
+    for pull in pulls[kept:]:
+        last = made[-1][1] if made else first
+        try:
+            # A pull to where the contact was held afterwards.
+            to = (pull[0], held[pull[0]]) if pull[0] in held else pull
+            made.append((pull, pulled(last, to)))
+        except InputError as error:
+            return made, str(error)
+    return made, ""
+
+
+def _pulled(
+    library: Library, cell: Cell, replay: Replay, puller: Puller, last: Held, pull: Pull
+) -> Held:
+    """What one pull makes of the network before."""
+    scale = replay.force_scale
+    if isinstance(pull[0], str):
+        plane = planes.named(library, cell, replay, pull[0])
+        point = np.array(pull[1:]) + plane.origin
+        found = puller.mixed(puller.fan(plane.axes), plane.axes, point, last.forces * scale)
+    else:
+        found = puller.at(int(replay.backbone[pull[0]]), pull[1] * scale, last.forces * scale)
+    return Held(found[0] / scale, found[1])
+
+
+def _to_pull(
+    puller: Puller, replay: Replay, last: Held, grabbed: int | planes.Plane
+) -> Iterator[Message]:
+    """What the page needs to pull a contact, or the point in a Plane: a part may come first."""
+    scale = replay.force_scale
+    if isinstance(grabbed, planes.Plane):
+        yield {"fan": _fan(puller.fan(grabbed.axes), grabbed, scale)}
+        return
+    for rail in puller.rails(int(replay.backbone[grabbed]), last.forces * scale):
+        yield {"rail": {"contact": grabbed} | _rail(rail, scale)}
+
+
+def _spelled(held: Held) -> Message:
+    return {
+        "normal": held.forces[:, 0].astype(np.float32),
+        "tangential": held.forces[:, 1].astype(np.float32),
+        "residual": held.residual,
+    }
+
+
+def _fan(fan: Any, plane: planes.Plane, scale: float) -> Message:
+    """A Fan as the player takes it, in the coordinates of the plane on screen."""
+    points = fan.points - plane.origin
+    return {
+        "x": points[:, 0].copy(),
+        "y": points[:, 1].copy(),
+        "normal": (fan.states[..., 0] / scale).astype(np.float32).ravel(),
+        "tangential": (fan.states[..., 1] / scale).astype(np.float32).ravel(),
+        "residual": fan.residual.astype(np.float64),
+    }
+
+
+def _rail(rail: Any, scale: float) -> Message:
+    """A Rail as the player takes it: flat arrays, forces in ⟨f_n⟩."""
+    return {
+        "lower": rail.lower / scale,
+        "upper": rail.upper / scale,
+        "whole": rail.whole,
+        "values": (rail.values / scale).astype(np.float64),
+        "normal": (rail.states[..., 0] / scale).astype(np.float32).ravel(),
+        "tangential": (rail.states[..., 1] / scale).astype(np.float32).ravel(),
+        "residual": rail.residual.astype(np.float64),
+        "opened": rail.opened.astype(np.uint8).ravel(),
+        "sliding": rail.sliding.astype(np.uint8).ravel(),
+    }
+
+
+def spelled(pulls: Iterable[Pull]) -> str:
+    """Pulls as a link holds them, to all digits: an end of an interval must not round beyond it."""
+    return "~".join(":".join([str(name), *map(str, at)]) for name, *at in pulls)
+
+
+def read(text: str) -> list[Pull]:
+    """Pulls of a link's text; ValueError for what is none."""
+    pulls = [_read(*part.split(":")) for part in text.split("~")[: MOST_PULLS + 1]]
+    if len(pulls) > MOST_PULLS:
+        raise ValueError("too many pulls")
+    return pulls
+
+
+def _read(name: str, *at: str) -> Pull:
+    values = tuple(float(value) for value in at)
+    if not all(abs(value) < 1e6 for value in values):
+        raise ValueError("forces that cannot be")
+    if len(values) == 2:
+        planes.read(name)
+        return name, *values
+    (value,) = values
+    if int(name) < 0 or value < 0:
+        raise ValueError("forces that cannot be")
+    return int(name), value
+
+
+def contacts(pulls: Iterable[Pull]) -> Iterator[int]:
+    """Positions of the contacts that pulls name."""
+    for name, *_ in pulls:
+        yield from (c for c, _ in planes.read(name)) if isinstance(name, str) else (name,)

@@ -1,1 +1,0 @@
-"""One view a file: each takes the state and makes something to lay out."""

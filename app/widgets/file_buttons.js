@@ -1,0 +1,160 @@
+// Buttons that ask the server for a file and save what comes.
+
+import { ask } from "../browser/send.js"
+import { composed, plotsSeen, printFigure } from "../explore/tabs/export/figure.js"
+import { button, made } from "../browser/dom.js"
+import { plain } from "../browser/to_object.js"
+import { save } from "../browser/download.js"
+
+const RATE = 6e6 // bits a second of a movie
+const LONGEST_MS = 60000 // of a movie
+const HELD_MS = 500 // for which a movie ends with the last network; a shorter one would have no picture
+const SIDE = 900 // pixels of a movie, as of the picture whose caption it has
+const WHERE = [888, 60] // pixels in its caption, where the number of the network ends
+const SCALE = 2 // pixels of a PNG per pixel of its SVG
+
+export function render({ model, view }) {
+  const root = document.createElement("div")
+
+  const deep = (given) => (given instanceof Map || given?.constructor === Object
+    ? Object.fromEntries(Object.entries(plain(given)).map(([name, part]) => [name, deep(part)])) : given)
+
+  function offered(key, words) {
+    const act = (it) => { it.classList.add("busy"); ask(model, view, { key }) }
+    const it = button(words, act, { className: "soft" })
+    it.dataset.key = key
+    return it
+  }
+
+  function offer() {
+    root.replaceChildren()
+    for (const [heading, files] of Object.entries(plain(model.files))) {
+      const group = document.createElement("section")
+      if (heading) group.append(made("h4", { textContent: heading }))
+      for (const [key, words] of Object.entries(plain(files))) group.append(offered(key, words))
+      root.append(group)
+    }
+  }
+
+  const player = () => view.model.document.get_model_by_name("player").player
+
+  /** The packing as on screen, drawn by the player: the one place that knows how. */
+  function drawn(caption) {
+    return new Blob([player().scene.picture(caption)], { type: "image/svg+xml" })
+  }
+
+  /** A movie of what plays, from the first state to the last, or once to and fro. */
+  async function recorded(caption, button) {
+    const it = player(), { scene } = it, layers = [scene.disks, scene.chains, scene.marks]
+    const { position } = it.replay, told = await imageOf(drawn(caption)), height = told.naturalHeight - SIDE
+    const canvas = made("canvas", { width: SIDE, height: (SIDE + height) & ~1 })
+    const context = canvas.getContext("2d"), pieces = []
+    const stream = canvas.captureStream(30)
+    const recorder = new MediaRecorder(stream, { mimeType: "video/webm", videoBitsPerSecond: RATE })
+    recorder.ondataavailable = (event) => pieces.push(event.data)
+    const ended = new Promise((resolve) => { recorder.onstop = resolve })
+    const { view } = scene
+    scene.reset(false) // whole, as the scale in its caption is
+    scene.finer(SIDE)
+    it.show(0, false)
+    it.play(true)
+    recorder.start(250)
+    const begun = performance.now(), words = button?.textContent
+    let over // since when the last network is seen
+    const frame = (now) => {
+      context.fillStyle = caption.background
+      context.fillRect(0, 0, canvas.width, canvas.height)
+      for (const layer of layers) context.drawImage(layer.canvas, 0, 0)
+      context.drawImage(told, 0, SIDE, SIDE, height, 0, SIDE, SIDE, height)
+      context.fillStyle = caption.ink
+      context.font = "15px Helvetica, Arial, sans-serif"
+      context.textAlign = "right"
+      context.fillText(`network ${it.replay.place}`, WHERE[0], SIDE + WHERE[1])
+      if (button) button.textContent = `recording … ${Math.round((now - begun) / 1000)} s`
+      const swung = it.replay.swinging && it.direction > 0 && it.turned
+      if (it.replay.swinging && it.direction < 0) it.turned = true
+      if (!it.playing || swung) over ??= now
+      if ((now - over > HELD_MS && pieces.some(({ size }) => size)) || now - begun > LONGEST_MS) recorder.stop()
+      else requestAnimationFrame(frame)
+    }
+    it.turned = false
+    requestAnimationFrame(frame)
+    await ended
+    const took = performance.now() - begun
+    it.play(false)
+    scene.view = view // as it was on screen
+    scene.size = 0
+    scene.resize()
+    it.show(position)
+    if (button) button.textContent = words
+    return timed(new Blob(pieces, { type: "video/webm" }), took)
+  }
+
+  async function imageOf(svg) {
+    const image = new Image()
+    image.src = URL.createObjectURL(svg)
+    await image.decode()
+    URL.revokeObjectURL(image.src)
+    return image
+  }
+
+  async function rendered(svg) {
+    const image = await imageOf(svg)
+    const canvas = made("canvas", { width: SCALE * image.naturalWidth, height: SCALE * image.naturalHeight })
+    canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height)
+    return new Promise((resolve) => canvas.toBlob(resolve, "image/png"))
+  }
+
+  async function take(message) {
+    if (!root.isConnected) return // of an earlier rendering
+    const file = plain(message)
+    if (file.rest) return rest()
+    const caption = file.caption && deep(file.caption)
+    const button = root.querySelector(".busy")
+    let blob
+    if (file.width) return await together(file, caption)
+    if (!caption) blob = new Blob([file.content], { type: file.mime })
+    else if (file.name.endsWith(".webm")) blob = await recorded(caption, button)
+    else blob = drawn(caption)
+    if (caption && file.name.endsWith(".png")) blob = await rendered(blob)
+    save(blob, file.name)
+    rest()
+  }
+
+  /** Packing and plots as one figure, to be saved or printed. */
+  async function together({ name, width }, caption) {
+    const plots = await plotsSeen(view.model.document), packing = player().scene.picture(caption)
+    const figure = composed(packing, plots, width, caption.background)
+    if (name.endsWith(".pdf")) printFigure(figure, width)
+    else save(new Blob([figure.text], { type: "image/svg+xml" }), name)
+    rest()
+  }
+
+  function rest() {
+    for (const button of root.querySelectorAll(".busy")) button.classList.remove("busy")
+  }
+
+  model.on("files", offer)
+  model.on("msg:custom", take)
+  offer()
+  return root
+}
+
+// What a recorder writes does not say how long it is, so that players cannot wind.
+
+const INFO = [0x15, 0x49, 0xa9, 0x66], DURATION = [0x44, 0x89, 0x88] // EBML: names, and 8 bytes to come
+
+/** A WebM with its duration (ms) written into its Info; as it is where that is not found. */
+async function timed(movie, duration) {
+  const bytes = new Uint8Array(await movie.arrayBuffer())
+  const at = bytes.subarray(0, 1000).findIndex((_, k) => INFO.every((byte, n) => bytes[k + n] === byte))
+  const size = bytes[at + 4] & 0x7f // of one byte, whose highest bit says so
+  if (at < 0 || !(bytes[at + 4] & 0x80) || size === 0x7f) return movie
+  const told = new DataView(new ArrayBuffer(8)), longer = new DataView(new ArrayBuffer(8)), end = at + 5 + size
+  told.setFloat64(0, duration)
+  longer.setBigUint64(0, (1n << 56n) | BigInt(size + DURATION.length + 8)) // a size of eight bytes
+  const parts = [
+    bytes.subarray(0, at + 4), longer, bytes.subarray(at + 5, end), new Uint8Array(DURATION), told, bytes.subarray(end),
+  ]
+  return new Blob(parts, { type: movie.type })
+}

@@ -1,0 +1,53 @@
+// A place to drop files on, or to choose them by clicking. They are sent in pieces, which keeps each
+// message below the server's limit; the server keeps count of the bytes itself.
+
+import { ask } from "../browser/send.js"
+
+const PIECE = 4 * 1024 * 1024
+
+export function render({ model, view }) {
+  const root = document.createElement("label")
+  root.className = "drop"
+  root.tabIndex = 0
+  root.innerHTML = `
+    <svg viewBox="0 0 24 24" aria-hidden="true"><path d="M12 3l5 5h-3v6h-4V8H7zM4 17h16v4H4z"/></svg>
+    <span class="what"></span><small class="told" role="status"></small>
+    <input type="file" multiple hidden>`
+  const input = root.querySelector("input"), told = root.querySelector(".told")
+  const tell = (text) => { told.textContent = text }
+
+  async function send(files) {
+    const chosen = [...files], size = chosen.reduce((sum, file) => sum + file.size, 0)
+    if (!chosen.length) return
+    if (size > model.most) return tell(`${(size / 1e6).toFixed(1)} MB are too many; at most ${model.most / 1e6} MB`)
+    let sent = 0
+    ask(model, view, { begin: true })
+    for (const file of chosen) {
+      for (let at = 0; at < file.size || at === 0; at += PIECE) {
+        const data = await file.slice(at, at + PIECE).arrayBuffer()
+        ask(model, view, { name: file.name, data })
+        sent += data.byteLength
+        tell(`sending … ${Math.round((100 * sent) / Math.max(1, size))} %`)
+        await new Promise((resolve) => setTimeout(resolve))
+      }
+    }
+    ask(model, view, { end: true })
+    tell("")
+  }
+
+  input.addEventListener("change", () => { send(input.files); input.value = "" })
+  root.addEventListener("keydown", (event) => {
+    if (event.key === "Enter" || event.key === " ") { event.preventDefault(); event.stopPropagation(); input.click() }
+  })
+  for (const [name, over] of [["dragenter", true], ["dragover", true], ["dragleave", false], ["drop", false]]) {
+    root.addEventListener(name, (event) => {
+      event.preventDefault()
+      root.classList.toggle("over", over)
+      if (name === "drop") send(event.dataTransfer.files)
+    })
+  }
+  const label = () => { root.querySelector(".what").textContent = model.label }
+  model.on("label", label)
+  label()
+  return root
+}

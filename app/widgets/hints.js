@@ -1,0 +1,110 @@
+// The glossary where its words stand. Marked are elements with data-term; of widgets the words of
+// their label and of the option chosen are looked up.
+
+import { made } from "../browser/dom.js"
+import { plain } from "../browser/to_object.js"
+
+const WAIT_MS = 250 // before a hint opens under a resting pointer
+const WIDGETS = "[role=tab], button, .number, .friction, " +
+  ".choice, .MuiFormControl-root, .MuiFormControlLabel-root"
+const DEEP = 14 // levels above the pointer that may hold the word
+
+export function render({ model }) {
+  const terms = plain(model.terms), labels = plain(model.labels)
+  const tip = made("div", { className: "hint", role: "tooltip", hidden: true })
+  let waiting = 0, at = null
+
+  const words = (node, part) => node?.querySelector(part)?.textContent.trim()
+
+  /** Keys of the glossary that a widget's words stand for: its value's first, then its label's. */
+  function keysOf(node) {
+    const value = words(node, "option:checked"), label = words(node, "label, legend, .name")
+    const found = [value, label, node.textContent.trim()].map((text) => labels[text])
+    return [...new Set(found.filter(Boolean))].slice(0, 2)
+  }
+
+  /** The element that has the focus, within whatever shadow. */
+  function focused() {
+    let node = document.activeElement
+    while (node?.shadowRoot?.activeElement) node = node.shadowRoot.activeElement
+    return node
+  }
+
+  /** From an element outwards, through shadows. */
+  function outwards(node) {
+    const path = []
+    for (let k = 0; node && k < DEEP; k++) {
+      path.push(node)
+      node = node.parentNode ?? node.host
+    }
+    return path
+  }
+
+  function found(path) {
+    for (const node of path) {
+      if (!(node instanceof Element)) continue
+      if (node.dataset.term) return [node, node.dataset.term.split(" ")]
+      if (node.matches(WIDGETS)) {
+        const keys = keysOf(node)
+        if (keys.length) return [node, keys]
+      }
+    }
+    return [null, []]
+  }
+
+  function show(node, keys) {
+    at = node
+    tip.replaceChildren(...keys.filter((key) => terms[key]).map((key) => {
+      const [title, sentence] = plain(terms[key]), row = document.createElement("p")
+      row.append(made("b", { textContent: title }), ` ${sentence}`)
+      return row
+    }))
+    if (!node.ariaDescription) node.setAttribute("aria-description", tip.textContent)
+    tip.hidden = false
+    const box = node.getBoundingClientRect(), { offsetWidth: width, offsetHeight: height } = tip
+    const left = Math.max(8, Math.min(window.innerWidth - width - 8, box.left))
+    const below = box.bottom + 8 + height < window.innerHeight
+    tip.style.left = `${left}px`
+    tip.style.top = `${below ? box.bottom + 8 : Math.max(8, box.top - height - 8)}px`
+  }
+
+  function hide() {
+    clearTimeout(waiting)
+    tip.hidden = true
+    at = null
+  }
+
+  // Not pointerover and focusin: from one element to another of the same shadow they are not told here.
+
+  let under = null
+  function move(event) {
+    const path = event.composedPath()
+    if (event.pointerType === "touch" || path[0] === under) return
+    under = path[0]
+    const [node, keys] = found(path.slice(0, DEEP))
+    if (node === at && node) return
+    hide()
+    if (node) waiting = setTimeout(() => show(node, keys), WAIT_MS)
+  }
+
+  function press(event) {
+    const [node, keys] = found(event.composedPath().slice(0, DEEP))
+    if (event.pointerType !== "touch" || !node || node === at) return hide()
+    show(node, keys)
+  }
+
+  function typed(event) {
+    const node = focused()
+    if (!/^(Tab|Arrow.*)$/.test(event.key) || !node?.matches(":focus-visible")) return hide()
+    const [word, keys] = found(outwards(node))
+    if (!word) hide()
+    else if (word !== at) show(word, keys)
+  }
+
+  const heard = { pointermove: move, pointerdown: press, keyup: typed, scroll: hide }
+  for (const [name, act] of Object.entries(heard)) window.addEventListener(name, act, true)
+  model.on("remove", () => {
+    for (const [name, act] of Object.entries(heard)) window.removeEventListener(name, act, true)
+  })
+  return tip
+}

@@ -1,0 +1,67 @@
+"""What a word on the page means: told where it stands, on hover, focus and touch."""
+
+from html import escape
+
+import param
+
+from granforce.glossary import TERMS, title
+
+from ..browser.bundle import Scripted
+from ..state.view_settings import COLOURS, EXPLAINED, WIDTHS
+
+# Words on the page that are not the glossary's own: what stands there → key of the glossary.
+LABELS = {
+    "Friction μ": "mu",
+    "Disks N": "n",
+    "Seed": "seed",
+    "States": "states",
+    "Friction during packing": "packed_mu",
+    "States from": "s",
+    "Relaxation": "accelerated",
+    "Precomputed results": "store",
+    "Colour": "mobilisation",
+    "Width": "fn",
+    "Strong and undetermined contacts": "overlay",
+    "force as packed": "original",
+    "ΔFₙ of all networks": "seen",
+    "exact ΔFₙ": "exact",
+    "place as packed in its interval": "place",
+    "how much what is known shortened it": "known",
+    "mean force = 1": "mean_force",
+    "force as packed = 1": "original",
+    "Compute exact intervals": "exact",
+    "the plane in which networks differ most": "principal",
+    "both forces of one contact": "cone",
+    "the normal forces of two contacts": "pair",
+    "the stress that networks carry": "stress",
+    "How does friction matter?": "eta2",
+    "How far can single forces differ?": "extent",
+    "Are strong contacts the less determined ones?": "correlation",
+    "Which contacts are least determined?": "correlation",
+    "How many forces are large?": "fn",
+    "How hard can two touching disks be pushed apart?": "push",
+    "Which contacts bear most?": "limit_load",
+    "Are undetermined packings weaker?": "critical_force",
+    "Which force to measure next?": "informative",
+    "Push": "push",
+    "Force space": "s",
+    "How far?": "exact",
+} | {words: EXPLAINED[key] for shown in (COLOURS, WIDTHS) for key, words in shown.items()}
+
+
+def labels() -> dict[str, str]:
+    """{words on the page: key of the glossary}."""
+    return {term.word: key for key, term in TERMS.items()} | LABELS
+
+
+def term(key: str, words: str | None = None) -> str:
+    """A word of the glossary as HTML, explained where it stands; words: how it is called there."""
+    shown = escape(title(key) if words is None else words)
+    return f'<span class="term" tabindex="0" data-term="{key}">{shown}</span>'
+
+
+class Hints(Scripted):
+    """Shows a sentence beside the word pointed at, focused or touched; see hints.js."""
+
+    terms = param.Dict(default={key: [title(key), t.sentence] for key, t in TERMS.items()})
+    labels = param.Dict(default=labels())

@@ -1,0 +1,277 @@
+"""What the tabs share: they compute only while they are seen, and their plots can be saved."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import panel as pn
+import panel_material_ui as pmui
+from bokeh.document import Document
+from bokeh.models import CustomAction, CustomJS, SaveTool
+from bokeh.plotting import figure as Figure
+from panel.io import document as panel_document
+from panel.io import unlocked
+from panel.reactive import Syncable
+
+from ..browser.bundle import SHARED
+from ..state.app_state import AppState
+from ..state.view_settings import Looks
+from .plot_style import plot
+from .select import Select
+
+NOTE = {"font-size": "12.5px", "line-height": "1.45", "opacity": "0.85"}
+
+MOVES = ["moves"]  # tags of what the player draws itself while it plays
+
+# What is not seen while the tour speaks of something else; see tour.js.
+EXTRA = {"display": "var(--extra, var(--later, flex))"}
+# What is not seen before the first gesture, or before it is asked for; see later.js.
+LATER = {"display": "var(--later, flex)"}
+# Panes of HTML say themselves that they are visible, whatever is around them.
+BESIDE = {"content-visibility": "var(--beside, visible)"}
+
+PLAIN = {"textTransform": "none", "whiteSpace": "nowrap"}
+# Small buttons: what one is here for, and what else can be done.
+PRIMARY = {"color": "primary", "size": "small"}
+OUTLINED = {"variant": "outlined", "color": "default", "size": "small"}
+
+SVG_ICON = (
+    "data:image/svg+xml;utf8,<svg xmlns='http://www.w3.org/2000/svg' width='24' height='24'>"
+    "<text x='12' y='16' font-family='sans-serif' font-size='10' font-weight='bold' "
+    "text-anchor='middle' fill='gray'>SVG</text></svg>"
+)
+SAVE = """
+const view = fig.document.views_manager.find_one(fig)
+const blob = await view.export(kind).to_blob()
+const link = document.createElement("a")
+link.href = URL.createObjectURL(blob)
+link.download = `${name}.${kind}`
+link.click()
+setTimeout(() => URL.revokeObjectURL(link.href), 1000)
+"""
+SAVED = f"(async () => {{{SAVE}}})()"
+NEWEST = """
+const fig = [...button.document._all_models.values()].findLast(one => one.tags.includes(mark))
+const name = fig.toolbar.tools.find(one => one.filename).filename;
+"""
+
+# Panel builds the views of a new child before React mounts them; told of another size of the
+# window in between, Bokeh measures plots that have no layout yet, fails, and leaves all as it was.
+UNMOUNTED = """
+const view = Bokeh.Models.get("Figure").prototype.default_view.prototype
+for (const name of ["measure_layout", "after_layout"]) {
+  const usual = view[name]
+  view[name] = function () { if (this.layout != null) usual.call(this) }
+}
+"""
+
+# Where fingers scroll the page, a plot that is dragged by them would hold it fast.
+FINGERS = """
+const {prototype} = Bokeh.Models.get("Figure").prototype.default_view
+const {initialize} = prototype
+prototype.initialize = function () {
+  if (matchMedia("(pointer: coarse)").matches) this.model.toolbar.active_drag = null
+  initialize.call(this)
+}
+"""
+
+# Panel's React components listen to changes only some time after they were first drawn: what came
+# in between would never be seen.
+LATE_LISTENERS = """
+const {prototype} = Bokeh.Models.get("panel.models.esm.ReactComponent")
+const {watch} = prototype
+prototype.watch = function (view, name, changed, state) {
+  watch.call(this, view, name, changed, state)
+  if (state) changed()  // what a component draws, which costs nothing where it is the same
+}
+"""
+
+
+def mend_late_views(document: Document) -> None:
+    """Have the browser bear with what is told to it of views that it has not mounted yet.
+
+    Plots that are not on the page yet are passed over where it lays the page out, those under
+    fingers let the page scroll, and components that begin to listen take over what has changed
+    since they were drawn.
+    """
+    mended = [CustomJS(code=code) for code in (UNMOUNTED, FINGERS, LATE_LISTENERS)]
+    document.js_on_event("document_ready", *mended)
+
+
+def answer_with_lock() -> None:
+    """Have events of a browser answered while Bokeh's lock is held, as its changes are."""
+    # Panel does without it where changes told just before still wait for their turn, and answers
+    # them, too: Bokeh, through which plots are changed, refuses then, and all of it is lost.
+    Syncable._event_coroutine.lock = True  # type: ignore[attr-defined]  # a mark on it
+
+
+def send_what_waits(document: Document) -> None:
+    """Send messages that Panel keeps back although nothing holds them any more."""
+    # One of its tasks, having sent its own, takes away the mark by which the next would know that
+    # it has some to send; they would wait for the next change.
+    if document in panel_document._WRITE_MSGS:
+        panel_document._WRITE_BLOCK[document] = True
+        panel_document._dispatch_write_task(document, panel_document._dispatch_msgs, document)
+
+
+def together(function: Callable[..., object], **arguments: Any) -> None:
+    """Call a function, and send all it changes on the page as one message, in its turn."""
+    # Bokeh sends by itself what Panel does not hold, and that may overtake what waits in Panel's
+    # queue: changes of a plot would reach a browser that has not got the plot yet.
+    with unlocked():
+        function(**arguments)
+
+
+class TabView:
+    """A tab's view, which calls `update` when something watched has changed, but only on screen.
+
+    Subclasses have a `name`, that of their tab. watched: parameters of the state; looks, work: of
+    these.
+    """
+
+    name: str
+    update: Callable[[], None]
+    told: pn.pane.HTML  # where small print is
+
+    def __init__(
+        self, state: AppState, *watched: str, looks: Sequence[str] = (), work: Sequence[str] = ()
+    ) -> None:
+        self.state, self.looks = state, state.looks
+        self._stale, self.left = True, False  # whether it was taken off the page
+        state.param.watch(self._changed, [*watched])
+        self.looks.param.watch(self._changed, ["tab", "wide", *looks])
+        state.work.param.watch(self._changed, [*work])
+
+    @property
+    def visible(self) -> bool:
+        """Whether the view's tab is on screen."""
+        return not self.left and self.looks.shows(self.name)
+
+    def catch_up(self) -> None:
+        """Update if need be and if seen; to be called once when the view has been built."""
+        if self._stale and self.visible:
+            self._stale = False
+            together(self.update)
+
+    def refresh(self, *events: Any) -> None:
+        """Update, now or when next seen."""
+        self._stale = True
+        self.catch_up()
+
+    def failed(self, event: Any) -> None:
+        """Tell what went wrong in a task, the message of which is watched."""
+        if event.new:
+            self.told.object = event.new
+
+    def _changed(self, *events: Any) -> None:
+        self._stale |= any(event.name not in ("tab", "wide") for event in events)
+        self.catch_up()
+
+
+def savable(fig: Figure, name: str) -> Figure:
+    """The figure with buttons that save it as PNG and as SVG under this name."""
+    fig.add_tools(
+        SaveTool(filename=name),
+        CustomAction(
+            icon=SVG_ICON,
+            description="Save as SVG",
+            callback=CustomJS(args={"fig": fig, "name": name, "kind": "svg"}, code=SAVED),
+        ),
+    )
+    return fig
+
+
+def saving(mark: str) -> list[Any]:
+    """A button each that saves the newest figure with this tag as PNG and as SVG, for all to see.
+
+    Buttons outlive figures: a widget that leaves the page while it is still being drawn there ends
+    in an error of React's.
+    """
+    buttons = []
+    for kind in ("png", "svg"):
+        button = pmui.Button(
+            label=f"Picture ({kind.upper()})", variant="outlined", size="small", margin=(4, 5),
+            sx=PLAIN,
+        )  # fmt: skip
+        button.js_on_click(args={"button": button, "mark": mark, "kind": kind}, code=NEWEST + SAVED)
+        buttons.append(button)
+    return buttons
+
+
+def plotted(fig: Figure) -> pn.pane.Bokeh:
+    """A figure's place, as wide as there is room."""
+    return pn.pane.Bokeh(fig, sizing_mode="stretch_width", margin=0)
+
+
+def figure(name: str, title: str | None, x: str, y: str, **options: Any) -> Figure:
+    """A savable figure in the style of all others."""
+    return savable(plot(title, x, y, **options), name)
+
+
+CLAIMS = """
+.claims { border-collapse: collapse; margin-top: 10px; font-size: 12.5px; }
+.claims caption { text-align: left; padding-bottom: 4px; font-weight: 600; }
+.claims td { border-top: 1px solid rgba(128, 128, 128, 0.35); padding: 3px 12px 3px 0; }
+.claims td + td { vertical-align: top; }
+"""
+
+
+def note(text: str = "", **options: Any) -> pn.pane.HTML:
+    """Small print, as HTML."""
+    return pn.pane.HTML(
+        text, styles=NOTE, stylesheets=[SHARED, CLAIMS], sizing_mode="stretch_width",
+        margin=(2, 10, 8, 10), **options,
+    )  # fmt: skip
+
+
+def one_of_several(label: str, **options: Any) -> pmui.Button:
+    """A quiet button in a row of its kind."""
+    return pmui.Button(label=label, sx=PLAIN, margin=(4, 6), **OUTLINED, **options)
+
+
+def by_words(labels: dict[str, str]) -> dict[str, str]:
+    """Labels {value: words} as a list takes them: {words: value}."""
+    return {words: value for value, words in labels.items()}
+
+
+def choice(labels: dict[str, str], value: str) -> Any:
+    """Buttons of which one is pressed; labels {value: words}."""
+    return pmui.RadioButtonGroup(
+        options=by_words(labels),
+        value=value,
+        size="small",
+        margin=(6, 8),
+        # Capitals would make other symbols of fₙ and fₜ.
+        sx={"& .MuiToggleButton-root": PLAIN, **PLAIN},
+    )
+
+
+def question(label: str, labels: dict[str, str], looks: Looks, name: str, **options: Any) -> Select:
+    """A list under a label, of the values {value: words} of the parameter of this name."""
+    look = options or {"sizing_mode": "stretch_width", "margin": (4, 8), "max_width": 460}
+    made = Select(label=label, options=by_words(labels), value=getattr(looks, name), **look)
+    return linked(made, looks, name)
+
+
+def linked(widget: Any, looks: Looks, name: str) -> Any:
+    """A widget whose value is the parameter of this name."""
+    widget.param.watch(lambda event: looks.param.update({name: event.new}), "value")
+    looks.param.watch(lambda event: widget.param.update(value=event.new), name)
+    return widget
+
+
+def folded_away(*titled: Any) -> Any:
+    """Panels (title, panel, …) that are closed until they are opened."""
+    pairs = list(zip(titled[::2], titled[1::2], strict=True))
+    return pmui.Accordion(
+        *pairs,
+        active=[],
+        title_variant="subtitle2",
+        sx={"& .MuiAccordionSummary-root": {"minHeight": "40px !important"}},
+        margin=(8, 10),
+        sizing_mode="stretch_width",
+    )
+
+
+def folded(text: str) -> str:
+    """HTML of what only those read who want to know more."""
+    return f"<details><summary>How was this computed?</summary>{text}</details>"

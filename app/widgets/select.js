@@ -1,0 +1,27 @@
+// One of several, chosen from the browser's own list, which every keyboard and screen reader knows.
+
+import { made } from "../browser/dom.js"
+
+export function render({ model }) {
+  const root = made("fieldset", { className: "choice", role: "presentation" })
+  const legend = made("legend", { className: "name", ariaHidden: "true" }), list = document.createElement("select")
+  root.append(legend, list)
+
+  function show() {
+    const given = model.options instanceof Map ? [...model.options] : Object.entries(model.options)
+    legend.textContent = list.ariaLabel = model.label
+    list.replaceChildren(...given.map(([words, value]) => new Option(words, value)))
+    list.value = model.value
+  }
+
+  let clicked = false // and not reached by keyboard, who goes on there
+  list.addEventListener("pointerdown", () => { clicked = true })
+  list.addEventListener("keydown", () => { clicked = false })
+  list.addEventListener("change", () => {
+    model.value = list.value
+    if (clicked) list.blur() // Space and arrows mean the player again, see buttons.js
+  })
+  for (const name of ["label", "options", "value"]) model.on(name, show)
+  show()
+  return root
+}
