@@ -7,7 +7,7 @@ import param
 from ..browser.bundle import Scripted
 from ..browser.messages import Message
 from ..state.app_state import PASSING, AppState
-from ..state.links import VIEW
+from ..state.links import VIEW, key
 
 
 class Address(Scripted):
@@ -19,7 +19,8 @@ class Address(Scripted):
 
     query = param.String(doc="of the address, as the state has it")
     passing = param.List(
-        default=list(PASSING), doc="what changes the address but is not gone back to"
+        default=[key(name) for name in PASSING],
+        doc="what changes the address but is not gone back to",
     )
 
     def __init__(self, state: AppState, **params: Any) -> None:

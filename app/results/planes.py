@@ -151,7 +151,17 @@ def name(plane: Plane) -> str:
     """What a link calls a Plane."""
     if not plane.components:
         return "s" if plane.kind == STRESS else "p"
-    return "-".join(f"{contact}{'nt'[part]}" for contact, part in plane.components)
+    return _spelled(plane.components)
+
+
+def _spelled(components: Components) -> str:
+    return "-".join(f"{contact}{'nt'[part]}" for contact, part in components)
+
+
+def renumbered(name: str, number: Callable[[int], int]) -> str:
+    """The name of a plane that calls each contact by another number."""
+    found = read(name)
+    return _spelled(tuple((number(contact), part) for contact, part in found)) if found else name
 
 
 def read(text: str) -> Components:

@@ -13,13 +13,13 @@ from granforce.records import InputError
 from ..background.jobs import Job, Visitor, as_one
 from ..background.limits import LIMITS
 from ..results.library import Cell, Library, Shown, best_cell, cell_of, nearest_cell, with_states
-from ..results.progress_feed import Arriving, Following
+from ..results.progress_feed import Arriving, Following, numbers
 from ..results.replays import Replay
 from ..results.selection import Selection, brief, command, link, read_link
 from . import known, perturbations
 from .comparison import Beside
 from .known import Knowledge
-from .links import OF_A_REPLAY, UNSEEN, VIEW, View, fitting, read_view, spelled
+from .links import OF_A_REPLAY, UNSEEN, VIEW, Numbers, View, fitting, read_view, spelled
 from .page_tasks import Work
 from .pulls import Hand
 from .view_settings import Looks
@@ -390,4 +390,12 @@ class AppState(param.Parameterized):
             # Between the choice of another μ and its states, what is beside is still on screen.
             view["beside"] = None
         told = {name: value for name, value in view.items() if value != self._viewed[name].default}
-        return link(self.selection, {name: spelled(name, told[name]) for name in told})
+        return link(self.selection, spelled(told, self.numbers))
+
+    @property
+    def numbers(self) -> Numbers | None:
+        """Numbers of the contacts and networks on screen, if they are those of the selection."""
+        seen = self.seen
+        if seen is None or (self.missing and not self.growing):
+            return None
+        return Numbers(seen.backbone, numbers(seen.summary) if self.growing else seen.number)

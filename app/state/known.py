@@ -373,6 +373,11 @@ def spelled(known: Iterable[Statement]) -> str:
     return "~".join(":".join(f"{part:.9g}" for part in row) for row in rows)
 
 
+def renumbered(known: Iterable[Statement], number: Callable[[int], int]) -> list[Statement]:
+    """Statements that call each contact by another number."""
+    return [one._replace(contact=number(one.contact)) for one in known]
+
+
 def read(text: str) -> list[Statement]:
     """Statements of a link's text; ValueError for what is none."""
     parts = [part.split(":") for part in text.split("~")[: MOST_KNOWN + 1]]

@@ -1,7 +1,12 @@
 """What a link holds of the view, beside the states that it selects: how it is spelled and read."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from granforce.types import Integers
 
 from ..results.replays import Replay
 from . import known, pulls
@@ -64,9 +69,88 @@ UNSEEN: View = {"contact": None, "pair": None, "frame": 0, "reference": 0, "betw
 UNSEEN |= {"pulls": [], "known": []}
 OF_A_REPLAY = tuple(UNSEEN)
 
+Number = Callable[[int], int]
 
-def spelled(name: str, value: Any) -> Any:
-    """A parameter's value as a link holds it."""
+
+class Numbered(NamedTuple):
+    """A value of a link that names contacts and networks by their numbers."""
+
+    value: Any
+
+
+# What a link calls the parameters of UNSEEN, where contacts have their numbers in the packing and
+# networks their numbers in the walk. Under the parameters' own names, as in older links, they are
+# positions in the arrays of a Replay.
+KEYS = {
+    "contact": "select",
+    "pair": "span",
+    "pulls": "pull",
+    "known": "hold",
+    "frame": "network",
+    "reference": "pinned",
+    "between": "swing",
+}
+# value, contact, network → the value with each contact and each network translated.
+TRANSLATED: dict[str, Callable[[Any, Number, Number], Any]] = {
+    "contact": lambda value, contact, network: contact(value),
+    "pair": lambda value, contact, network: tuple(map(contact, value)),
+    "pulls": lambda value, contact, network: pulls.renumbered(value, contact),
+    "known": lambda value, contact, network: known.renumbered(value, contact),
+    "frame": lambda value, contact, network: network(value),
+    "reference": lambda value, contact, network: network(value),
+    "between": lambda value, contact, network: tuple(map(network, value)),
+}
+
+
+def key(name: str) -> str:
+    """What a link calls a parameter."""
+    return KEYS.get(name, name)
+
+
+class Numbers(NamedTuple):
+    """The numbers of what is on screen, by position."""
+
+    contacts: Integers  # (N_c,) in the packing
+    networks: Any  # (F,) in the walk
+
+    def of(self, view: View) -> View:
+        """A view whose contacts and networks have their numbers in place of positions."""
+        contacts, networks = self
+        return {
+            name: value
+            if value is None or name not in TRANSLATED
+            else TRANSLATED[name](value, lambda c: int(contacts[c]), lambda f: int(networks[f]))
+            for name, value in view.items()
+        }
+
+    def positions(self, name: str, value: Any) -> Any:
+        """A parameter's value by positions; KeyError for numbers that there are not.
+
+        A network that was not kept is the nearest one that was.
+        """
+        contacts = {int(number): k for k, number in enumerate(self.contacts)}
+
+        def row(number: int) -> int:
+            if not 0 <= number <= self.networks[-1]:
+                raise KeyError(number)
+            return int(np.argmin(np.abs(self.networks - number)))
+
+        return TRANSLATED[name](value, contacts.__getitem__, row)
+
+
+def spelled(view: View, numbers: Numbers | None) -> dict[str, Any]:
+    """These parameters as a link holds them: {key: plain value}.
+
+    numbers: of what is on screen; without them what belongs to it is left out.
+    """
+    if numbers is None:
+        view = {name: value for name, value in view.items() if name not in OF_A_REPLAY}
+    else:
+        view = numbers.of(view)
+    return {key(name): _plain(name, value) for name, value in view.items()}
+
+
+def _plain(name: str, value: Any) -> Any:
     if name in SPELLED:
         return SPELLED[name](value)
     if isinstance(value, tuple):
@@ -75,34 +159,45 @@ def spelled(name: str, value: Any) -> Any:
 
 
 def read_view(given: Mapping[str, str], parameters: Any) -> View:
-    """Those of `parameters` that a link names by its texts; what makes no sense is left out."""
-    view = {}
+    """Those of `parameters` that a link names by its texts; what makes no sense is left out.
+
+    What is named by numbers comes as a Numbered, to be read by `fitting`.
+    """
+    view: View = {}
     for name, cast in VIEW.items():
+        numbers = key(name) in given and name in KEYS
         try:
-            value = cast(given[name])
+            value = cast(given[key(name) if numbers else name])
             parameters[name]._validate(value)
         except (KeyError, ValueError):
             continue
-        view[name] = value
+        view[name] = Numbered(value) if numbers else value
     return view
 
 
 def fitting(view: View, replay: Replay) -> View:
-    """Of these rows and contacts those that a Replay has."""
+    """Of these rows and contacts those that a Replay has, as positions."""
+    numbers, found = Numbers(replay.backbone, replay.number), {}
+    for name in OF_A_REPLAY:
+        with suppress(KeyError):
+            value = view[name]
+            if isinstance(value, Numbered):
+                value = numbers.positions(name, value.value)
+            if _fits(name, value, replay):
+                found[name] = value
+    return found
+
+
+def _fits(name: str, value: Any, replay: Replay) -> bool:
+    if value is None:
+        return True
     frames, contacts = replay.normal.shape
-    sizes = dict.fromkeys(OF_A_REPLAY, frames)
-    sizes |= dict.fromkeys(("contact", "pair", "pulls", "known"), contacts)
-
-    def fits(name: str) -> bool:
-        if view[name] is None:
-            return True
-        values = view[name] if name in ("between", "pair") else (view[name],)
-        if name == "pulls":
-            values = list(pulls.contacts(view[name]))
-        if name == "known":
-            values = [one.contact for one in view[name]]
-        if name == "pair" and len(set(values)) < 2:
-            return False
-        return all(0 <= value < sizes[name] for value in values)
-
-    return {name: view[name] for name in OF_A_REPLAY if name in view and fits(name)}
+    size = contacts if name in ("contact", "pair", "pulls", "known") else frames
+    values = value if name in ("between", "pair") else (value,)
+    if name == "pulls":
+        values = list(pulls.contacts(value))
+    if name == "known":
+        values = [one.contact for one in value]
+    if name == "pair" and len(set(values)) < 2:
+        return False
+    return all(0 <= one < size for one in values)

@@ -321,6 +321,14 @@ def _read(name: str, *at: str) -> Pull:
     return int(name), value
 
 
+def renumbered(pulls: Iterable[Pull], number: Callable[[int], int]) -> list[Pull]:
+    """Pulls that call each contact by another number."""
+    return [
+        (planes.renumbered(name, number) if isinstance(name, str) else number(name), *at)
+        for name, *at in pulls
+    ]
+
+
 def contacts(pulls: Iterable[Pull]) -> Iterator[int]:
     """Positions of the contacts that pulls name."""
     for name, *_ in pulls:

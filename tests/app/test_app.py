@@ -45,7 +45,9 @@ from app.results.selection import (
 )
 from app.state import app_state, comparison, page_tasks
 from app.state.app_state import AppState
-from app.state.links import read_view
+from app.state.known import Knowledge, Statement
+from app.state.links import Numbers, fitting, read_view, spelled
+from app.state.pulls import Hand
 from app.state.view_settings import Looks
 from app.widgets.progress import Progress
 from granforce import measures
@@ -288,12 +290,51 @@ def test_the_view_travels_with_the_link(state, visited):
     assert seen.items() <= again.view.items()
 
 
-def test_views_that_make_no_sense_are_left_out(visited):
-    query = "mu=1&n=30&states=30&relax=nearest&contact=100000&frame=-2&colour=plaid&between=5"
-    state = visited(query)
+def test_a_link_names_contacts_and_networks_by_their_own_numbers():
+    pulled, held = [(2, 0.5), ("1n-3t", 0.1, 0.2)], [Statement(3, 0.25)]
+    view = {"contact": 1, "pair": (0, 2), "frame": 2, "reference": 1, "between": (0, 2)}
+    view |= {"pulls": pulled, "known": held}
+    here = SimpleNamespace(
+        backbone=np.array([2, 3, 5, 9]), number=np.array([0, 1, 21]), normal=np.zeros((3, 4))
+    )
+    given = spelled(view, Numbers(here.backbone, here.number))
+    assert given == {
+        "select": 3, "span": "2-5", "network": 21, "pinned": 1, "swing": "0-21",
+        "pull": "5:0.5~3n-9t:0.1:0.2", "hold": "9:0.25",
+    }  # fmt: skip
+    parameters = {
+        name: part.param[name] for name in view for part in (Looks, Knowledge, Hand)
+        if name in part.param
+    }  # fmt: skip
+    texts = {name: str(text) for name, text in given.items()}
+    assert fitting(read_view(texts, parameters), here) == view
+
+
+def test_older_links_name_contacts_and_networks_by_their_places(visited):
+    state = visited("mu=0.1&n=30&states=30&relax=nearest&contact=9&frame=5&pulls=4:0.5&pair=3-7")
+    looks = state.looks
+    assert (looks.contact, looks.frame, looks.pair) == (9, 5, (3, 7))
+    assert state.hand.pulls == [(4, 0.5)]
+
+
+def test_a_link_to_a_network_that_was_not_kept_opens_the_nearest(visited):
+    query = "mu=0.1&n=30&states=30&relax=nearest"
+    numbers = visited(query).replay.number
+    state = visited(f"{query}&network={numbers[5] + 1}")
+    assert state.looks.frame == 5 and numbers[6] > numbers[5] + 2
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["contact=100000&frame=-2&between=5", "select=100000&network=-2&swing=5&span=3-3",
+     "pull=100000:1&hold=100000:1&network=31", "pull=1n-2t:3&hold=x&select=x"],
+)  # fmt: skip
+def test_views_that_make_no_sense_are_left_out(names, visited):
+    state = visited(f"mu=1&n=30&states=30&relax=nearest&colour=plaid&{names}")
     assert state.cell.mu == 1 and state.work.message == ""
     looks = state.looks
     assert (looks.contact, looks.frame, looks.colour, looks.between) == (None, 0, "change", None)
+    assert (state.hand.pulls, state.knowledge.known, looks.pair) == ([], [], None)
 
 
 def test_a_page_by_night_is_dark_before_its_states_are_there(library):
