@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from experiment.test_solved import mat
 from frames import file, frame, solved
 from packing.test_dem import MU, N, mercury, yade
 from packing.test_importers import SMALL, cluster, tables
 from packing.test_mutants import small_dumps
-from packing.test_solved import mat
 from packings import packed
 
 import granforce as gf

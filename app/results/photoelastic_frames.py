@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from granforce.packing.importers.listing import plain
+from granforce.experiment.listing import plain
+from granforce.experiment.pegs import open_frames, read_pegs
+from granforce.experiment.regions import regions
+from granforce.experiment.repair import KINDS
 from granforce.packing.importers.network import alone
-from granforce.packing.importers.pegs import open_frames, read_pegs
-from granforce.packing.importers.repair import KINDS
 from granforce.records import Packing
 from granforce.study import series
 from granforce.study.keys import Parameters
@@ -29,7 +30,7 @@ class Frame(NamedTuple):
     """A frame and the admissible network that its measurement speaks for; forces in ⟨f_n⟩."""
 
     source: str  # which files it came from, in words
-    report: dict[str, Any]  # of importers.read_pegs
+    report: dict[str, Any]  # of read_pegs
     numbers: tuple[Any, ...]  # of all frames in the files
     packing: Packing  # of the grains alone, under what walls do to them in the inferred network
     x: np.ndarray  # (N, 2) centres of the grains
@@ -47,7 +48,7 @@ class Frame(NamedTuple):
     at_wall: np.ndarray  # (N,) bool, grains at walls
     left_open: np.ndarray  # (N,) bool, other grains whose balance had to be left open
     found: np.ndarray  # (k, 2) where something was mended
-    region: np.ndarray  # (N_c,) number of the region that a contact lies in, see `series.regions`
+    region: np.ndarray  # (N_c,) number of the region that a contact lies in, see `regions`
     stress: np.ndarray  # (9, 3) xx, yy, xy by region, over the mean pressure
     stress_error: np.ndarray  # (9, 3)
 
@@ -77,7 +78,7 @@ def infer(
 ) -> Callable[[Job], Frame]:
     """Work, for jobs.Task, that reads a frame and finds its likeliest network with errors; a Frame.
 
-    files: {role: (name, content)}; mu, reverse, walls: as for `importers.read_pegs`; number: of
+    files: {role: (name, content)}; mu, reverse, walls: as for `read_pegs`; number: of
     the frame.
     """
 
@@ -136,7 +137,7 @@ def frame_of(dataset: xr.Dataset, names: str, numbers: tuple[Any, ...]) -> Frame
         at_wall=at_wall[:count] & ~left_open[:count],
         left_open=left_open[:count],
         found=places[np.isfinite(places).all(axis=1)],
-        region=series.regions(begin + of["arm_i"][:, None] * of["normal"], of["x"][:count])[0],
+        region=regions(begin + of["arm_i"][:, None] * of["normal"], of["x"][:count])[0],
         stress=of["regional_stress"] / pressure,
         stress_error=of["regional_stress_error"] / pressure,
     )

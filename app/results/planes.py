@@ -15,8 +15,8 @@ from scipy.spatial import ConvexHull, QhullError
 from granforce import measures
 from granforce.records import InputError
 from granforce.study import kinds
+from granforce.study.hulls import stress_axes
 from granforce.study.keys import Parameters
-from granforce.study.stresses import stress_axes
 from granforce.types import Floats
 
 from ..background.jobs import Job

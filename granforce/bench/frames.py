@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from granforce.bench.report import note
-from granforce.explore.remeasured import remeasured
+from granforce.experiment.pegs import read_pegs
+from granforce.experiment.remeasured import remeasured
+from granforce.experiment.synthetic import synthetic_frame
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
 from granforce.packing.compaction import pack
-from granforce.packing.importers.pegs import read_pegs
-from granforce.packing.importers.synthetic import synthetic_frame
 from granforce.records import Packing
 from granforce.types import Floats, Mask
 

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from granforce.cli.asked import check_outputs, write_csv
-from granforce.packing.importers.repair import KINDS
+from granforce.experiment.frames import frames_of
+from granforce.experiment.repair import KINDS
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, whole, worker_count
 from granforce.study import series
@@ -28,7 +29,7 @@ def infer_frames(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     if not arguments.files:
         raise InputError("--frames needs a folder, *_solved.mat files, or positions and adjacency")
     worker_count(arguments.workers, "--workers")
-    frames = series.frames_of(*arguments.files, columns=options["columns"])
+    frames = frames_of(*arguments.files, columns=options["columns"])
     numbers = _chosen([frame.number for frame in frames], arguments.frames)
     frames = [frame for frame in frames if frame.number in numbers]
     if arguments.out is not None:

@@ -5,7 +5,7 @@ import json
 import xarray as xr
 
 from granforce import measures
-from granforce.explore.informative import Informative
+from granforce.experiment.informative import Informative
 from granforce.explore.intervals import Intervals, LimitLoads
 from granforce.explore.outline import Outline
 from granforce.explore.stress_outline import StressOutline

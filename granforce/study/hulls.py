@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from granforce.explore import bodies
+from granforce.explore import bodies, stress_outline
 from granforce.explore import outline as outlines
 from granforce.explore.intervals import intervals
 from granforce.forces.build import ensemble
@@ -82,3 +82,11 @@ def outline(packing: Packing, plane: Sequence[Any]) -> Floats:
     if chosen[0] == chosen[1] or not carrying.any(axis=(1, 2)).all():
         return np.empty((0, 2))
     return S.force_scale * outlines.outline(S, carrying, tolerance=_OUTLINED).inner
+
+
+def stress_axes(packing: Packing, mu: float) -> Floats:
+    """Axes (2, N_c, 2) of ((σ_xx − σ_yy)/2P, σ_xy/P) for the forces of a packing's S in ⟨f_n⟩.
+
+    Raises what `stress_outline` raises.
+    """
+    return stress_outline.stress_axes(ensemble(packing, mu))

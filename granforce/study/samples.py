@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from granforce import measures
-from granforce.explore.infer import Draws, Inference
+from granforce.experiment.infer import Draws, Inference
 from granforce.explore.random_walk import Walk
 from granforce.explore.uniform import UniformSample
 from granforce.forces.ensemble import Ensemble

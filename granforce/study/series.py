@@ -5,26 +5,25 @@ found again. Its name holds a digest of its files, so that a file that changed i
 """
 
 import hashlib
-import itertools
 import json
-import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from granforce.explore.infer import infer
-from granforce.explore.remeasured import remeasured
+from granforce.experiment.frames import Frame
+from granforce.experiment.infer import infer
+from granforce.experiment.pegs import Photoelastic, open_frames, read_pegs
+from granforce.experiment.regions import regional_stress
+from granforce.experiment.remeasured import remeasured
+from granforce.experiment.repair import KINDS
 from granforce.forces.build import ensemble
 from granforce.forces.ensemble import Ensemble
-from granforce.packing.importers.geometry import vectors
-from granforce.packing.importers.pegs import Photoelastic, open_frames, read_pegs
-from granforce.packing.importers.repair import KINDS
-from granforce.records import Contacts, InputError, friction, positive, random_seed, whole
+from granforce.records import InputError, friction, positive, random_seed, whole
 from granforce.study import entries
 from granforce.study.cells import Cell, Kind, get
 from granforce.study.keys import Parameters
@@ -36,94 +35,8 @@ from granforce.types import Floats, Integers, Progress
 
 # Draws for the error bars of a frame, and what is assumed of forces that were not measured, ⟨f_n⟩.
 STATES, UNMEASURED = 200, 1.0
-# Parts of a side of the frame in which the stress is told.
-REGIONS = 3
-# What files are, by their names.
-_POSITIONS, _CONTACTS = re.compile("position|cent(er|re)s", re.I), re.compile("adjacency", re.I)
-_TEXT = (".txt", ".csv", ".dat")
-_PACKED = (".gz", ".zst")
 # Numbers of a frame's account that are kept by frame.
 _COUNTS = (*KINDS, "grains", "contacts_listed", "candidates", "candidates_that_carry", "unbalanced")
-
-
-class Frame(NamedTuple):
-    """One frame: its files, and its number in them."""
-
-    positions: str
-    adjacency: str | None  # None: a *_solved.mat
-    number: float
-
-
-def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> list[Frame]:
-    """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
-
-    In order of their numbers. columns: of text files, as for `read_pegs`. Raises InputError where
-    there are none, or two of one number.
-    """
-    files = []
-    for path in map(expanded, paths):
-        if path.is_dir():
-            files += sorted(one for one in path.rglob("*") if one.is_file())
-        else:
-            files.append(path)
-    solved = [one for one in files if one.suffix.lower() == ".mat" and "solved" in one.name.lower()]
-    if not solved and len(paths) == 1 and files and files[0].suffix.lower() == ".mat":
-        solved = files
-    if solved:
-        pairs = [(one, None) for one in solved]
-    elif len(files) == 2 and not any(expanded(path).is_dir() for path in paths):
-        pairs = [tuple(files)]
-    else:
-        pairs = _paired(list(filter(_is_text, files)))
-    if not pairs:
-        raise InputError(
-            f"{', '.join(map(str, paths))}: no frames; wanted are *_solved.mat, or text files with "
-            "'positions' (or 'centers') and 'adjacency' in their names"
-        )
-    found = [
-        Frame(str(one), None if two is None else str(two), float(number))
-        for one, two in pairs
-        for number in _numbers(one, two, len(pairs), columns)
-    ]
-    found.sort(key=lambda frame: frame.number)
-    for one, two in itertools.pairwise(found):
-        if one.number == two.number:
-            raise InputError(f"{one.positions} and {two.positions} are both frame {one.number:g}")
-    return found
-
-
-def _is_text(path: Path) -> bool:
-    name = path.name.lower()
-    return any(name.removesuffix(end).endswith(_TEXT) for end in ("", *_PACKED))
-
-
-def _numbers(
-    one: Path, two: Path | None, count: int, columns: Mapping[str, str] | None
-) -> list[float]:
-    """Numbers of the frames in one pair of files; by the name where each file has one frame."""
-    inside = open_frames(one, two, columns=columns).frames
-    by_name = _digits(one) if count > 1 and two is not None else []
-    return [float(by_name[-1])] if by_name and len(inside) == 1 else inside.tolist()
-
-
-def _digits(path: Path) -> list[str]:
-    return [part for part in re.findall(r"\d+", path.stem) if len(part) < 16]
-
-
-def _paired(files: Sequence[Path]) -> list[tuple[Path, Path]]:
-    """Pairs (positions, contacts) that have the same number, or none, in their names."""
-    positions = [one for one in files if _POSITIONS.search(one.name)]
-    contacts = [one for one in files if _CONTACTS.search(one.name)]
-    # One file of all frames goes before those of each.
-    for choose in (lambda path: not _digits(path), _digits):
-        some = [[one for one in those if choose(one)] for those in (positions, contacts)]
-        if len(some[0]) == len(some[1]) == 1:
-            return [(some[0][0], some[1][0])]
-        by_number = [{_digits(one)[-1]: one for one in those if _digits(one)} for those in some]
-        both = sorted(set(by_number[0]) & set(by_number[1]), key=int)
-        if both:
-            return [(by_number[0][key], by_number[1][key]) for key in both]
-    return []
 
 
 def parameters(
@@ -240,34 +153,6 @@ def _on_all(found: Photoelastic, S: Ensemble, values: Floats, elsewhere: float) 
     whole_packing = np.full(found.measured.shape, elsewhere)
     whole_packing[S.index] = values
     return whole_packing
-
-
-def regional_stress(contacts: Contacts, x: Floats, grains: Any, forces: Floats) -> Floats:
-    """Stresses (…, 9, 3) xx, yy, xy in 3 × 3 parts of the frame, of forces (…, N_c, 2).
-
-    σ_ab = (1/A) Σ F_a ℓ_b over the contacts whose point lies in a part of the area A; of a contact
-    with a wall, ℓ ends at the wall. The first `grains` of the centres x are grains.
-    """
-    arm = np.where(contacts.j < grains, contacts.length, contacts.arm_i)
-    at = x[contacts.i] + contacts.arm_i[:, None] * contacts.normal
-    cell, side = regions(at, x[:grains])
-    force = vectors(forces, contacts.normal)
-    branch = arm[:, None] * contacts.normal
-    parts = np.stack([force[..., a] * branch[:, b] for a, b in ((0, 0), (1, 1), (0, 1))], axis=-1)
-    total = np.zeros((*forces.shape[:-2], REGIONS**2, 3))
-    for k in range(REGIONS**2):
-        total[..., k, :] = parts[..., cell == k, :].sum(axis=-2)
-    return total / np.prod(side)
-
-
-def regions(at: Floats, x: Floats) -> tuple[Integers, Floats]:
-    """Parts (k,) of the frame in which points (k, 2) lie, column by column, and a part's sides.
-
-    x (N, 2): centres of the grains.
-    """
-    low, high = x.min(axis=0), x.max(axis=0)
-    side = np.maximum((high - low) / REGIONS, 1e-300)
-    return np.clip(((at - low) / side).astype(int), 0, REGIONS - 1) @ [REGIONS, 1], side
 
 
 FRAME = Kind(

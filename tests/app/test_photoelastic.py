@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from experiment.test_solved import mat
 from frames import NEWTON, file, frame, solved
-from packing.test_solved import mat
 from visitor import drop, wait_for
 
 import granforce as gf
@@ -12,8 +12,8 @@ from app.explore.tabs.your_packing import frame_picture
 from app.explore.tabs.your_packing.upload import View
 from app.packing.view import PackingView
 from app.results import photoelastic_frames, uploads
+from granforce.experiment.pegs import read_pegs
 from granforce.forces.build import ensemble
-from granforce.packing.importers import read_pegs
 from granforce.records import InputError
 from granforce.study import series
 

@@ -7,7 +7,7 @@ import pytest
 
 from granforce.cli.commands.packings import READERS
 from granforce.cli.parser import main, make_parser
-from granforce.packing import importers
+from granforce.experiment.pegs import read_pegs
 
 FILES = {"help", "json", "out", "measured", "grains", "contacts"}
 # What is done with many snapshots.
@@ -32,7 +32,7 @@ def options(name):
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_options_are_arguments_of_the_reader(name):
-    reader = READERS[name] if name != "pegs" else importers.read_pegs
+    reader = READERS[name] if name != "pegs" else read_pegs
     taken = inspect.signature(reader).parameters
     assert {WORDS.get(dest, dest) for dest in options(name)} <= set(taken)
 

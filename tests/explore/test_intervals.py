@@ -9,8 +9,8 @@ from packings import lattice, packed
 from scipy import linalg, optimize
 
 from granforce.bench.exact import read_reference
+from granforce.experiment.informative import informative
 from granforce.explore import intervals as module
-from granforce.explore.informative import informative
 from granforce.explore.intervals import intervals, limit_load_bounds, limit_loads
 from granforce.forces.build import ensemble
 from granforce.forces.contact_problem import make_system

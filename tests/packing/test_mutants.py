@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from experiment.test_solved import mat, mat73
 from frames import file, frame, solved
 from mutants import refusals
 from packing.test_dem import MU, N, mercury, yade
@@ -20,17 +21,16 @@ from packing.test_simulations import (
     mercury_in_a_box,
     particles,
 )
-from packing.test_solved import mat, mat73
 from packings import packed
 
+from granforce.experiment.measurements import read_measurement
+from granforce.experiment.pegs import read_pegs
 from granforce.forces.knowledge import bounds_of
 from granforce.packing.importers import (
     load_packing,
     read_known,
     read_lammps,
-    read_measurement,
     read_mercury,
-    read_pegs,
     read_table,
     read_yade,
     save_packing,

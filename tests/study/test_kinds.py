@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from granforce.packing.importers.measurements import Measurement
+from granforce.experiment.measurements import Measurement
 from granforce.paper import tables
 from granforce.study import cells as study
 from granforce.study.kinds import KINDS, PACKING, get_packing

@@ -11,7 +11,8 @@ from full_disk import files_of
 from packings import packed
 
 from granforce.cli.parser import main
-from granforce.packing.importers import synthetic_frame
+from granforce.experiment.frames import frames_of
+from granforce.experiment.synthetic import synthetic_frame
 from granforce.records import InputError
 from granforce.study import series
 from granforce.study.store import open_store
@@ -35,7 +36,7 @@ BROKEN = "Step-0002_Adjacency.txt"
 
 
 def test_frames_are_inferred_and_found_again(tmp_path):
-    frames = series.frames_of(folder_of(tmp_path))
+    frames = frames_of(folder_of(tmp_path))
     assert [frame.number for frame in frames] == [1, 2, 3]
     dataset, failed = series.infer_series(tmp_path / "store", frames, workers=2, **OPTIONS)
     assert not failed and dataset.sizes["frame"] == 3
@@ -58,7 +59,7 @@ def refused(tmp_path_factory):
     """A folder of three frames, the second of which is refused; what two processes made of it."""
     folder = folder_of(tmp_path_factory.mktemp("frames"))
     (folder / BROKEN).write_text("2,900,901,0,1\n2,903,904,0,1\n")
-    frames = series.frames_of(folder)
+    frames = frames_of(folder)
     return folder, *series.infer_series(folder / "store", frames, workers=2, **OPTIONS)
 
 
@@ -66,7 +67,7 @@ def test_dask_workers_give_the_same_as_processes(tmp_path, refused, cluster):
     """The second frame is refused, by a worker in the same words as here."""
     folder, dataset, failed = refused
     two, missed = series.infer_series(
-        *(tmp_path / "two", series.frames_of(folder)),
+        *(tmp_path / "two", frames_of(folder)),
         scheduler=cluster.scheduler_address,
         **OPTIONS,
     )
@@ -84,7 +85,7 @@ def test_a_frame_that_is_refused_costs_only_itself(refused):
         folder_of(folder, (2,))
         seen = []
         _, failed = series.infer_series(
-            *(folder / "store", series.frames_of(folder)),
+            *(folder / "store", frames_of(folder)),
             workers=1,
             progress=lambda *p: seen.append(p),
             **OPTIONS,
@@ -103,16 +104,16 @@ def test_all_frames_of_one_pair_of_files(tmp_path):
     for name in ("p", "a"):
         text = (tmp_path / f"{name}0").read_text() + (tmp_path / f"{name}1").read_text()
         (tmp_path / f"{name}.txt").write_text(text)
-    frames = series.frames_of(tmp_path / "p.txt", tmp_path / "a.txt")
+    frames = frames_of(tmp_path / "p.txt", tmp_path / "a.txt")
     assert [frame.number for frame in frames] == [4, 9]
 
 
 def test_folders_without_frames_are_told(tmp_path):
     with pytest.raises(InputError, match="no frames"):
-        series.frames_of(tmp_path)
+        frames_of(tmp_path)
     (tmp_path / "notes.txt").write_text("nothing")
     with pytest.raises(InputError, match="no frames"):
-        series.frames_of(tmp_path)
+        frames_of(tmp_path)
 
 
 def test_by_the_command_line(away, capsys):
@@ -159,7 +160,7 @@ def test_names_of_files_of_positions_and_adjacency(tmp_path):
 
     grains, rows, _ = made.frame(20)
     write(tmp_path, grains, rows)
-    (frame,) = series.frames_of(tmp_path)
+    (frame,) = frames_of(tmp_path)
     assert frame.positions.endswith("positions.txt") and frame.number == 1
 
 

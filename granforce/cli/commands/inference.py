@@ -7,7 +7,7 @@ import numpy as np
 from granforce.cli import frames
 from granforce.cli.asked import conditions, found, write_csv
 from granforce.cli.commands.packings import flaws_and_walls, named_columns
-from granforce.packing import importers
+from granforce.experiment.measurements import read_measurement
 from granforce.records import InputError
 from granforce.study import kinds
 from granforce.system.terminal import print_report
@@ -29,7 +29,7 @@ def infer(arguments: argparse.Namespace) -> int | None:
             "give --measured FILE.csv and a packing, or files of frames with --frames all"
         )
     asked, states = conditions(arguments), 1000 if arguments.states is None else arguments.states
-    measured = importers.read_measurement(arguments.measured)
+    measured = read_measurement(arguments.measured)
     entry, _, dataset, ends = found(
         *(arguments, kinds.INFERENCE, arguments.csv),
         options={"measured": measured},

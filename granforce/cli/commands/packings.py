@@ -16,6 +16,9 @@ from granforce.cli.asked import (
     store_of,
     write_csv,
 )
+from granforce.experiment.measurements import COLUMNS as MEASURED_COLUMNS
+from granforce.experiment.pegs import read_pegs
+from granforce.experiment.walls import read_wall_force
 from granforce.packing import exporters, importers, scenes
 from granforce.packing.importers.snapshots import Snapshots
 from granforce.records import InputError, Packing, whole
@@ -97,7 +100,7 @@ def import_(arguments: argparse.Namespace) -> int | None:
 def _import_pegs(arguments: argparse.Namespace) -> None:
     """Read a photoelastic frame; report and save it, and what was measured."""
     check_outputs(arguments.measured)
-    found = importers.read_pegs(
+    found = read_pegs(
         *(arguments.grains, arguments.contacts),
         mu=arguments.mu,
         frame=arguments.frame,
@@ -110,7 +113,7 @@ def _import_pegs(arguments: argparse.Namespace) -> None:
     if arguments.measured is not None:
         values = np.concatenate([found.measured, found.sigma], axis=1).T
         columns = {"contact": np.arange(len(found.measured))}
-        columns |= dict(zip(importers.measurements.COLUMNS, values, strict=True))
+        columns |= dict(zip(MEASURED_COLUMNS, values, strict=True))
         write_csv(arguments.measured, columns)
 
 
@@ -127,9 +130,9 @@ def export(arguments: argparse.Namespace) -> None:
 
 
 def flaws_and_walls(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the options say of flaws and walls, as `importers.read_pegs` takes it."""
+    """What the options say of flaws and walls, as `read_pegs` takes it."""
     repair = True if arguments.repair is None else arguments.repair
-    forces = dict(importers.read_wall_force(text) for text in arguments.wall_force)
+    forces = dict(read_wall_force(text) for text in arguments.wall_force)
     return {
         **{name: getattr(arguments, name) for name in ("reach", "scale", "error", "reverse")},
         "repair": False if arguments.strict else repair,

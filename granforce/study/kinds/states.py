@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granforce.explore import remeasured
-from granforce.explore.carrying import carrying
-from granforce.explore.infer import infer
-from granforce.explore.informative import informative
+from granforce.experiment import remeasured
+from granforce.experiment.carrying import carrying
+from granforce.experiment.infer import infer
+from granforce.experiment.informative import informative
 from granforce.explore.random_walk import Walk, walk
 from granforce.explore.uniform import sample_uniform
 from granforce.explore.volume import volume

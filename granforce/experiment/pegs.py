@@ -15,22 +15,16 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from granforce import notebook
+from granforce.experiment import solved
+from granforce.experiment.listing import Frames, Listing, plain, read_frames
+from granforce.experiment.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
+from granforce.experiment.walls import Bodies, bodies, flagged, read_outline, wall_contacts
 from granforce.forces.build import ensemble
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
-from granforce.packing.importers import solved
 from granforce.packing.importers.geometry import OPEN, check_disks, gain_by_reversing
-from granforce.packing.importers.listing import Frames, Listing, plain, read_frames
 from granforce.packing.importers.network import WORTH_REVERSING, judged
-from granforce.packing.importers.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
 from granforce.packing.importers.text import Source, check_grains
-from granforce.packing.importers.walls import (
-    Bodies,
-    bodies,
-    flagged,
-    read_outline,
-    wall_contacts,
-)
 from granforce.records import (
     InputError,
     Packing,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from frames import file
 
-from granforce.explore.infer import infer
+from granforce.experiment.infer import infer
+from granforce.experiment.pegs import read_pegs
+from granforce.experiment.walls import Outline, read_outline, read_wall_force
 from granforce.forces.build import ensemble
-from granforce.packing.importers import read_pegs
-from granforce.packing.importers.walls import Outline, read_outline, read_wall_force
 from granforce.records import InputError
 
 SIDE = 5
@@ -78,7 +78,7 @@ def test_an_annulus_is_found_from_the_grains_at_its_walls(rng):
     inner = np.arange(80) < 30
     away = np.where(inner, 50 + r, 200 - r)
     x = [300, 400] + away[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-    from granforce.packing.importers import walls
+    from granforce.experiment import walls
 
     flag = np.where(inner, -1, 1)
     found = walls.fitted("annulus", x, r, np.ones(80, bool), flag)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from granforce.experiment.listing import Listing
+from granforce.experiment.pegs import Photoelastic
 from granforce.forces.build import ensemble
-from granforce.packing.importers.listing import Listing
-from granforce.packing.importers.pegs import Photoelastic
 from granforce.records import Contacts, InputError, Packing, positive, random_seed, whole
 from granforce.system.files import written
 from granforce.tolerances import LARGEST_UNIT

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from packings import packed, reference, two_disks
 
-from granforce.explore.carrying import carrying
-from granforce.explore.informative import informative
+from granforce.experiment.carrying import carrying
+from granforce.experiment.informative import informative
 from granforce.explore.intervals import intervals
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.build import ensemble

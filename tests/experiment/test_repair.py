@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from frames import NEWTON, PIXELS, file, frame
 
-from granforce.packing.importers import read_pegs
-from granforce.packing.importers.listing import read_frames
+from granforce.experiment.listing import read_frames
+from granforce.experiment.pegs import read_pegs
 from granforce.records import InputError
 
 CLEAN = {"mu": 0.3, "reach": 0.1, "error": 0.1 * NEWTON}

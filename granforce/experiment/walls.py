@@ -18,10 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize
 
-from granforce.packing.importers.boundary import boundary
+from granforce.experiment.boundary import boundary
+from granforce.experiment.listing import Listing
+from granforce.experiment.repair import rows_of
 from granforce.packing.importers.geometry import components
-from granforce.packing.importers.listing import Listing
-from granforce.packing.importers.repair import rows_of
 from granforce.records import Contacts, InputError, make_contacts, positive
 from granforce.types import Floats, Integers, Mask
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.explore.infer import infer
-from granforce.explore.remeasured import remeasured
+from granforce.experiment.infer import infer
+from granforce.experiment.remeasured import remeasured
 from granforce.forces.build import ensemble
 from granforce.forces.likeliest import fitted, fitted_many
 from granforce.records import InputError

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from frames import NEWTON, file, frame
 
-from granforce.explore.infer import infer
+from granforce.experiment.infer import infer
+from granforce.experiment.pegs import read_pegs
 from granforce.forces.build import ensemble
-from granforce.packing.importers import load_packing, read_pegs, save_packing
+from granforce.packing.importers import load_packing, save_packing
 from granforce.records import InputError
 
 

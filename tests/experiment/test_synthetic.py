@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from packings import packed
 
-from granforce.explore.remeasured import remeasured
+from granforce.experiment.pegs import read_pegs
+from granforce.experiment.remeasured import remeasured
+from granforce.experiment.synthetic import synthetic_frame
 from granforce.forces.build import ensemble
-from granforce.packing.importers import read_pegs, synthetic_frame
 from granforce.records import InputError
 
 

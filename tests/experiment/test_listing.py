@@ -10,11 +10,11 @@ from frames import file, frame
 
 from app.results.photoelastic_frames import account
 from granforce.cli.parser import main
-from granforce.packing.importers import read_pegs
-from granforce.packing.importers.boundary import boundary
-from granforce.packing.importers.walls import fitted, flagged
+from granforce.experiment.boundary import boundary
+from granforce.experiment.frames import frames_of
+from granforce.experiment.pegs import read_pegs
+from granforce.experiment.walls import fitted, flagged
 from granforce.records import InputError
-from granforce.study import series
 
 N = 40
 CLEAN = {"mu": 0.3, "reach": 0.1, "error": 0.001}
@@ -229,7 +229,7 @@ def test_by_the_command_line_with_compressed_files(away, made, capsys):
     assert main(f"import pegs {files} {options} --flag ignore --walls auto".split()) == 0
     out, err = capsys.readouterr()
     assert err == "" and "left, right, bottom, top" in out
-    (one,) = series.frames_of(away, columns={"i": "1", "j": "2", "fn": "3", "ft": "4"})
+    (one,) = frames_of(away, columns={"i": "1", "j": "2", "fn": "3", "ft": "4"})
     assert one.positions.endswith("positions.txt.gz")
     assert main(f"infer {files} --frames all --states 0 {options}".split()) == 0
     assert f"granforce: frame 1: {N} of {N} grains are flagged" in capsys.readouterr().err

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granforce.experiment.listing import Listing, plain
 from granforce.packing.importers.geometry import OPEN, check_disks, overlapping
-from granforce.packing.importers.listing import Listing, plain
 from granforce.records import InputError
 from granforce.types import Floats, Integers
 

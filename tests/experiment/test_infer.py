@@ -9,9 +9,9 @@ from bodies import BodyWalls, box, distance_to_marginals, simplex, worth, z_scor
 from packings import lattice, packed, reference, two_disks
 from scipy import linalg, sparse, stats
 
-from granforce.explore import infer as inference
+from granforce.experiment import infer as inference
+from granforce.experiment.infer import infer
 from granforce.explore import uniform
-from granforce.explore.infer import infer
 from granforce.explore.uniform import sample_uniform
 from granforce.forces.build import ensemble
 from granforce.forces.knowledge import Known

@@ -7,8 +7,9 @@ import pytest
 from frames import NEWTON, solved
 from scipy.io import savemat
 
+from granforce.experiment.pegs import read_pegs
 from granforce.forces.build import ensemble
-from granforce.packing.importers import load_packing, read_pegs, save_packing
+from granforce.packing.importers import load_packing, save_packing
 from granforce.records import InputError
 
 FIELDS = ("neighbours", "forces", "alphas", "betas")

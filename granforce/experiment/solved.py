@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from granforce.packing.importers.listing import Listing
-from granforce.packing.importers.matfile import read_struct
+from granforce.experiment.listing import Listing
+from granforce.experiment.matfile import read_struct
 from granforce.packing.importers.text import LARGEST, Source
 from granforce.records import InputError
 from granforce.types import Floats

@@ -18,7 +18,7 @@ import time
 import numpy as np
 import numpy.typing as npt
 
-from granforce.explore.infer import Inference, asked, judged, told
+from granforce.experiment.infer import Inference, asked, judged, told
 from granforce.explore.mixing import Mixing
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import fitted_many

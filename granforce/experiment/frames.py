@@ -1,0 +1,96 @@
+"""The frames of an experiment: which files hold them, and their numbers."""
+
+import itertools
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from granforce.experiment.pegs import open_frames
+from granforce.records import InputError
+from granforce.system.files import expanded
+
+# What files are, by their names.
+_POSITIONS, _CONTACTS = re.compile("position|cent(er|re)s", re.I), re.compile("adjacency", re.I)
+_TEXT = (".txt", ".csv", ".dat")
+_PACKED = (".gz", ".zst")
+
+
+class Frame(NamedTuple):
+    """One frame: its files, and its number in them."""
+
+    positions: str
+    adjacency: str | None  # None: a *_solved.mat
+    number: float
+
+
+def frames_of(*paths: str | Path, columns: Mapping[str, str] | None = None) -> list[Frame]:
+    """Frames of a folder, of files *_solved.mat, or of a file of positions and one of contacts.
+
+    In order of their numbers. columns: of text files, as for `read_pegs`. Raises InputError where
+    there are none, or two of one number.
+    """
+    files = []
+    for path in map(expanded, paths):
+        if path.is_dir():
+            files += sorted(one for one in path.rglob("*") if one.is_file())
+        else:
+            files.append(path)
+    solved = [one for one in files if one.suffix.lower() == ".mat" and "solved" in one.name.lower()]
+    if not solved and len(paths) == 1 and files and files[0].suffix.lower() == ".mat":
+        solved = files
+    if solved:
+        pairs = [(one, None) for one in solved]
+    elif len(files) == 2 and not any(expanded(path).is_dir() for path in paths):
+        pairs = [tuple(files)]
+    else:
+        pairs = _paired(list(filter(_is_text, files)))
+    if not pairs:
+        raise InputError(
+            f"{', '.join(map(str, paths))}: no frames; wanted are *_solved.mat, or text files with "
+            "'positions' (or 'centers') and 'adjacency' in their names"
+        )
+    found = [
+        Frame(str(one), None if two is None else str(two), float(number))
+        for one, two in pairs
+        for number in _numbers(one, two, len(pairs), columns)
+    ]
+    found.sort(key=lambda frame: frame.number)
+    for one, two in itertools.pairwise(found):
+        if one.number == two.number:
+            raise InputError(f"{one.positions} and {two.positions} are both frame {one.number:g}")
+    return found
+
+
+def _is_text(path: Path) -> bool:
+    name = path.name.lower()
+    return any(name.removesuffix(end).endswith(_TEXT) for end in ("", *_PACKED))
+
+
+def _numbers(
+    one: Path, two: Path | None, count: int, columns: Mapping[str, str] | None
+) -> list[float]:
+    """Numbers of the frames in one pair of files; by the name where each file has one frame."""
+    inside = open_frames(one, two, columns=columns).frames
+    by_name = _digits(one) if count > 1 and two is not None else []
+    return [float(by_name[-1])] if by_name and len(inside) == 1 else inside.tolist()
+
+
+def _digits(path: Path) -> list[str]:
+    return [part for part in re.findall(r"\d+", path.stem) if len(part) < 16]
+
+
+def _paired(files: Sequence[Path]) -> list[tuple[Path, Path]]:
+    """Pairs (positions, contacts) that have the same number, or none, in their names."""
+    positions = [one for one in files if _POSITIONS.search(one.name)]
+    contacts = [one for one in files if _CONTACTS.search(one.name)]
+    # One file of all frames goes before those of each.
+    for choose in (lambda path: not _digits(path), _digits):
+        some = [[one for one in those if choose(one)] for those in (positions, contacts)]
+        if len(some[0]) == len(some[1]) == 1:
+            return [(some[0][0], some[1][0])]
+        by_number = [{_digits(one)[-1]: one for one in those if _digits(one)} for those in some]
+        both = sorted(set(by_number[0]) & set(by_number[1]), key=int)
+        if both:
+            return [(by_number[0][key], by_number[1][key]) for key in both]
+    return []
