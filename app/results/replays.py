@@ -37,6 +37,7 @@ class Replay(NamedTuple):
     low: Any  # (N_c, 2) float32 smallest f_n, f_t of all states, shown or not
     high: Any  # (N_c, 2) float32 largest
     order: Integers  # (N_c,) contacts by original f_n, ascending
+    sampling: measures.Sampling  # of the states shown
     summary: dict[str, Any]  # plain numbers of the states, by their names in the schema
 
     @property
@@ -86,6 +87,7 @@ def make_replay(
         growth={name: np.append(np.nan, values) for name, values in growing},
         low=(dataset["low"].values / scale).astype(np.float32),
         high=(dataset["high"].values / scale).astype(np.float32),
+        sampling=measures.sampling(frames[1:]),
         summary=summary,
     )
 
@@ -109,6 +111,7 @@ def first_replay(S: Any, states: int) -> Replay:
         growth=dict.fromkeys(("eta1", "eta2", "eta3"), nothing),
         low=original,
         high=original,
+        sampling=measures.sampling(original[None]),
         summary={
             "mu": S.mu,
             "n": len(S.packing.r),

@@ -1,6 +1,7 @@
 """Measures of states, and statistics over packings: of any arrays, wherever they come from."""
 
 from granforce.measures import statistics
+from granforce.measures.sampling import Sampling, sampling
 from granforce.measures.states import (
     Growth,
     correlation,
@@ -20,6 +21,7 @@ from granforce.measures.states import (
 
 __all__ = [
     "Growth",
+    "Sampling",
     "correlation",
     "correlation_range",
     "distances",
@@ -32,6 +34,7 @@ __all__ = [
     "normal_extent",
     "position_in_interval",
     "principal_axes",
+    "sampling",
     "statistics",
     "undetermined_clusters",
 ]

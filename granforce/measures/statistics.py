@@ -56,13 +56,19 @@ def jackknife(
     items: one per packing. The interval is a function of the data alone, and wants a statistic
     that changes little with any one item. One item has no interval (NaN).
     """
-    items, count = list(items), len(items)
+    items = list(items)
     value = float(statistic(items))
-    if count < 2:
-        return value, float("nan"), float("nan")
-    without = np.array([statistic(items[:k] + items[k + 1 :]) for k in range(count)])
-    reach = stats.t.ppf((1 + level) / 2, count - 1) * np.sqrt((count - 1) * without.var())
+    reach = stats.t.ppf((1 + level) / 2, max(1, len(items) - 1)) * jackknife_error(statistic, items)
     return value, float(value - reach), float(value + reach)
+
+
+def jackknife_error(statistic: Callable[[list[T]], float], items: Sequence[T]) -> float:
+    """Standard error of statistic(items), by leaving out each item once; NaN for one item."""
+    items, count = list(items), len(items)
+    if count < 2:
+        return float("nan")
+    without = np.array([statistic(items[:k] + items[k + 1 :]) for k in range(count)])
+    return float(np.sqrt((count - 1) * without.var()))
 
 
 def grouped(rows: Iterable[Mapping[str, Any]], name: str, by: str = "mu") -> dict[float, Floats]:

@@ -1,0 +1,156 @@
+"""The numbers of the results line and of the status line, each with what it is worth.
+
+`measures`, `packing` and `sampling` are made from what is on screen; how they are laid out is
+`results_line`'s.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from granforce.measures.sampling import FEWEST, MIXED
+
+from ..results.replays import Replay
+from ..results.selection import KINDS, SOLVERS, Selection
+from ..state.app_state import AppState
+
+LEAST_SIZE = 100  # effective size of a uniform sample below which its errors are large
+
+
+class Quantity(NamedTuple):
+    """A quantity in words, and its values as texts; empty where there is none (yet)."""
+
+    key: str  # of the glossary
+    symbol: str
+    words: str
+    seen: str = ""  # over the states, with its standard error where there is one
+    exact: str = ""  # over all of S, or of the packing
+    note: str = ""  # what has to be said of it, e.g. that it grows with the number of states
+
+
+class Sampling(NamedTuple):
+    """How the states were found and whether they can be relied on, in words."""
+
+    sampler: str  # "random walk, nearest admissible state"
+    networks: str  # "1000 of 1000 attempts accepted, 50 kept"
+    mixing: str  # "R̂ 1.01, effective size at least 49"
+    doubt: str  # why they cannot be relied on, "not mixed: …"; empty where they can
+
+    def __str__(self) -> str:
+        return ", ".join(filter(None, (self.sampler, self.networks, self.mixing)))
+
+
+def measures(state: AppState) -> list[Quantity]:
+    """η1, η2, 0.15 η3 and the mean ΔF_n, over the states on screen and over S; [] without any."""
+    replay = state.replay
+    if replay is None:
+        return []
+    summary, worth, possible = replay.summary, replay.sampling, state.possible
+    extent = float((replay.high - replay.low)[:, 0].mean()) if len(replay.low) else math.nan
+    grows = "grows with the number of networks"
+    return [
+        Quantity("eta1", "η₁", "spread", with_error(summary["eta1"], worth.eta1_error)),
+        Quantity("eta2", "η₂", "distance", with_error(summary["eta2"], worth.eta2_error)),
+        Quantity(
+            "eta3", "0.15 η₃", "intervals", short(0.15 * summary["eta3"]),
+            "" if possible is None else short(0.15 * possible["eta3"].item()), grows,
+        ),
+        Quantity("extent", "ΔFₙ", "mean", short(extent), _mean_extent(possible), grows),
+    ]  # fmt: skip
+
+
+def packing(state: AppState, volume: xr.Dataset | None = None) -> list[Quantity]:
+    """z, φ, h and ln V of the packing on screen, exact; volume: as `compute.volume` finds it."""
+    if state.replay is None:
+        return []
+    summary = state.replay.summary
+    unknowns = 2 * summary["contacts"] - summary.get("tangential_unknowns", 0)
+    h = summary["dimension"]
+    found = (
+        ""
+        if volume is None
+        else with_error(volume["log_volume"].item(), volume["log_volume_error"].item())
+    )
+    return [
+        Quantity("z", "z", "contacts per disk", exact=f"{summary['coordination']:.3f}"),
+        Quantity("phi", "φ", "packing fraction", exact=f"{summary['packing_fraction']:.4f}"),
+        Quantity(
+            "h", "h", "free dimensions", exact=f"{h} = {unknowns} − {unknowns - h}",
+            note="forces less independent equations",
+        ),
+        Quantity("volume", "ln V", "volume of S", exact=found),
+    ]  # fmt: skip
+
+
+def sampling(state: AppState) -> Sampling | None:
+    """How the states on screen were found, and whether they have mixed; None without any."""
+    if state.replay is None or state.cell is None:
+        return None
+    selection, replay = state.cell.selection, state.replay
+    name, networks = sampler(selection), _networks(replay)
+    if not replay.summary["dimension"]:
+        return Sampling(name, "", "one network: every force is determined", "")
+    if selection.kind == "uniform":
+        r_hat, size = replay.summary["worst_r_hat"], replay.summary["least_bulk_size"]
+        words = f"worst R̂ {r_hat:.2f}, least effective size {size:.0f}"
+        return Sampling(name, networks, words, "; ".join(_doubts(r_hat, size, LEAST_SIZE)))
+    worth = replay.sampling
+    if math.isnan(worth.r_hat):
+        few = f"{worth.states} networks are too few to say whether the walk has mixed"
+        return Sampling(name, networks, "", few)
+    bound = "at least " if replay.summary["kept"] < replay.summary["states"] else ""
+    words = f"R̂ {worth.r_hat:.2f}, effective size {bound}{worth.effective:.0f}"
+    return Sampling(name, networks, words, "; ".join(_doubts(worth.r_hat, worth.effective, FEWEST)))
+
+
+def sampler(selection: Selection) -> str:
+    """By what states are found, in words."""
+    if selection.kind == "uniform":
+        return "uniform sample of S"
+    return f"{KINDS['walk'].removeprefix('the ')}, {SOLVERS[selection.relax]}"
+
+
+def _networks(replay: Replay) -> str:
+    """How many networks there are, and how many attempts they took."""
+    summary = replay.summary
+    states, kept = summary["states"], summary["kept"]
+    words = f"{states} networks"
+    if "accepted" in summary and not summary.get("skipped"):
+        tried = sum(int(summary[name]) for name in ("accepted", "rejected", "unconverged"))
+        words = f"{int(summary['accepted'])} of {tried} attempts accepted"
+    return f"{words}, {kept} kept" if kept < states else words
+
+
+def _doubts(r_hat: float, size: float, least: float) -> Iterator[str]:
+    if r_hat > MIXED:
+        yield f"not mixed: R̂ = {r_hat:.2f}, more than {MIXED:g}; ask for more networks"
+    if size < least:
+        yield (
+            f"worth {size:.0f} independent networks only, fewer than {least:g}: errors are larger "
+            "than given"
+        )
+
+
+def _mean_extent(possible: xr.Dataset | None) -> str:
+    if possible is None:
+        return ""
+    extent = (possible["high"] - possible["low"]).values[:, 0] / possible["force_scale"].item()
+    return short(float(extent.mean()))
+
+
+def with_error(value: float, error: float) -> str:
+    """A value and its standard error, to two digits of the error: "0.1021 ± 0.0012"."""
+    if not error > 0 or not math.isfinite(error):
+        return short(value)
+    digits = max(0, 1 - int(f"{error:.1e}".partition("e")[2]))
+    return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", "−")
+
+
+def short(value: float) -> str:
+    """A value to four digits, and 0 of what is only rounding."""
+    if not np.isfinite(value):
+        return "–"
+    return "0" if abs(value) < 1e-12 else f"{value:.4g}".replace("-", "−")

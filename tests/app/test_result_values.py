@@ -1,0 +1,54 @@
+"""The numbers of the results line: values with errors, and what they are worth in words."""
+
+import pytest
+from small_store import ROOT
+
+from app.explore import result_values
+from app.explore.result_values import short, with_error
+from app.results.library import Library
+
+
+@pytest.fixture
+def ready(visited, tmp_path):
+    """A page on the walk of 400 disks that ships: 50 of 1000 networks, and exact intervals."""
+    library = Library(ROOT / "data" / "start.zarr", tmp_path / "cache.zarr")
+    return visited("?n=400&seed=1&mu=0.1", library)
+
+
+def by_key(found):
+    return {one.key: one for one in found}
+
+
+def test_values_are_those_of_the_states_with_errors_and_of_s(ready):
+    found, summary = by_key(result_values.measures(ready)), ready.replay.summary
+    for name in ("eta1", "eta2"):
+        value, error = map(float, found[name].seen.split(" ± "))
+        assert value == pytest.approx(summary[name], rel=1e-2) and 0 < error < 0.05 * value
+    assert found["eta3"].seen == short(0.15 * summary["eta3"])
+    assert found["eta3"].exact == short(0.15 * ready.exact["eta3"].item())
+    assert float(found["extent"].exact) > float(found["extent"].seen) > 0
+
+
+def test_free_dimensions_are_derived(ready):
+    h, _, unknowns, _, equations = by_key(result_values.packing(ready))["h"].exact.split()
+    assert int(h) == int(unknowns) - int(equations) == ready.replay.summary["dimension"]
+    assert int(unknowns) == 2 * ready.replay.summary["contacts"]
+
+
+def test_the_walk_says_how_it_was_sampled(ready):
+    told = result_values.sampling(ready)
+    assert str(told).startswith("paper's random walk, nearest admissible state, 1000 of 1000")
+    assert "50 kept" in told.networks and "at least" in told.mixing and not told.doubt
+
+
+def test_a_walk_that_is_short_is_not_said_to_have_mixed(state):
+    told = result_values.sampling(state)
+    assert not told.mixing and "too few" in told.doubt
+    assert "±" not in result_values.measures(state)[0].seen
+
+
+def test_errors_have_two_digits():
+    assert with_error(0.101234, 0.00123) == "0.1012 ± 0.0012"
+    assert with_error(-487.23, 12.7) == "−487 ± 13"
+    assert with_error(0.5, float("nan")) == "0.5"
+    assert short(1e-17) == "0" and short(float("nan")) == "–"
