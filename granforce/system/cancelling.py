@@ -7,12 +7,9 @@ thread, where no signal handler of Python's own can run before a kernel ends.
 import atexit
 import contextvars
 import functools
-import pickle
 import select
 import signal
 import socket
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -32,15 +29,6 @@ T = TypeVar("T")
 _ASK_EVERY = 0.1
 # Seconds that a call of another library gets to end by itself before it is left behind.
 _GRACE = 0.3
-
-
-# What a child process does: it imports what its parent would, and nothing from its own folder.
-_CHILD = """
-import pickle, sys
-sys.path[:], call = pickle.load(sys.stdin.buffer)
-function, arguments = pickle.loads(call)
-pickle.dump(function(*arguments), sys.stdout.buffer)
-"""
 
 
 class _Scope(NamedTuple):
@@ -208,28 +196,3 @@ def _wait_for_left() -> None:
     # Where C++ returns to an interpreter that has ended, the process aborts.
     for thread in left_behind():
         thread.join()
-
-
-def in_child(function: Callable[..., T], *arguments: Any) -> T:
-    """function(*arguments), which holds the interpreter, in a process that is killed if need be.
-
-    The function must stand in a module of its own that imports little, as the child does so, too.
-    """
-    if _scope.get().cancel is None:
-        return function(*arguments)
-    call = pickle.dumps((sys.path, pickle.dumps((function, arguments))))
-    # In a session of its own: Ctrl-C is its parent's.
-    child = subprocess.Popen(
-        [sys.executable, "-P", "-c", _CHILD],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    try:
-        found, _ = apart(child.communicate, call, interrupt=child.kill)
-    finally:
-        child.kill()
-        child.wait()
-    # Where no child can be had, or it failed, the error is met here.
-    return function(*arguments) if child.returncode else pickle.loads(found)

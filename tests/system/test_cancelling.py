@@ -3,7 +3,6 @@
 No test measures a second: the work here would take hours (or for ever), and has ended long before.
 """
 
-import itertools
 import os
 import signal
 import threading
@@ -102,10 +101,6 @@ def endless_call():
     cancelling.apart(time.sleep, 20)  # at the end of the process it is waited for
 
 
-def endless_call_that_holds_the_interpreter():
-    cancelling.in_child(sum, itertools.repeat(0))
-
-
 def long_elimination():
     pairs = np.random.default_rng(0).integers(50_000, size=(150_000, 2))
     elimination.pattern(np.random.default_rng(1).random((50_000, 2)), *pairs.T)
@@ -116,7 +111,7 @@ def long_elimination():
     [
         endless_steps, endless_insertion, endless_sweeps, endless_walk, endless_paths,
         one_endless_path, endless_hits, endless_motion, endless_motions_side_by_side, endless_call,
-        endless_call_that_holds_the_interpreter, long_elimination,
+        long_elimination,
         lambda: long_program("simplex"), lambda: long_program("ipm"),
     ],
 )  # fmt: skip
@@ -192,13 +187,6 @@ def test_an_error_in_cancel_is_told(S):
 
     with pytest.raises(ZeroDivisionError):
         gf.walk(S, 3, 0, cancel=broken)
-
-
-def test_a_child_gives_what_its_parent_would():
-    with cancelling.watched(lambda: False):
-        assert cancelling.in_child(divmod, 7, 2) == (3, 1)
-        with pytest.raises(ZeroDivisionError):
-            cancelling.in_child(divmod, 7, 0)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
