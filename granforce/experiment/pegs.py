@@ -18,7 +18,7 @@ from granforce import notebook
 from granforce.experiment import solved
 from granforce.experiment.listing import Frames, Listing, plain, read_frames
 from granforce.experiment.repair import KINDS, OVERLAP, Account, Finding, repaired, rows_of
-from granforce.experiment.walls import Bodies, bodies, flagged, read_outline, wall_contacts
+from granforce.experiment.walls import Bodies, bad_fit, bodies, flagged, read_outline, wall_contacts
 from granforce.forces.build import ensemble
 from granforce.forces.likeliest import Likeliest, likeliest
 from granforce.numerics import highs
@@ -162,6 +162,9 @@ def read_pegs(
             + ("leave out reverse" if reverse else "--reverse (reverse=True) changes it")
         )
     found = wall_contacts(listing, x, r, at_wall, walls, reach)
+    if found is not None and found.outline is not None:
+        note = bad_fit(found.outline, x, r, at_wall)
+        notes += [] if note is None else [note]
     if wall_forces and found is None:
         raise InputError("a force on a wall needs walls: give the outline, such as --walls box")
     made = None if found is None else bodies(found, x, r, wall_forces or {})

@@ -270,10 +270,7 @@ def fitted(shape: str, x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Out
 def _best_fitted(x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
     inner = np.any(flag[at_wall] < 0)
     some = [fitted(one, x, r, at_wall, flag) for one in ("box", "annulus" if inner else "circle")]
-    off = [
-        np.abs(outline.gaps(x[at_wall], r[at_wall])[0]).min(axis=1).mean() / r.mean()
-        for outline in some
-    ]
+    off = [_misfit(outline, x, r, at_wall) for outline in some]
     best = int(np.argmin(off))
     if not off[best] <= _NEAR:
         raise InputError(
@@ -281,6 +278,26 @@ def _best_fitted(x: Floats, r: Floats, at_wall: Mask, flag: Floats) -> Outline:
             "give the outline with its numbers"
         )
     return some[best]
+
+
+def _misfit(outline: Outline, x: Floats, r: Floats, at_wall: Mask) -> float:
+    """Mean distance of grains at walls from the nearest side, in mean radii."""
+    gap = outline.gaps(x[at_wall], r[at_wall])[0]
+    return float(np.abs(gap).min(axis=1).mean() / r.mean())
+
+
+def bad_fit(outline: Outline, x: Floats, r: Floats, at_wall: Mask) -> str | None:
+    """A note if the grains at walls lie far from the outline, or if there are none."""
+    if not at_wall.any():
+        return f"walls {outline.shape}: no grain lies at these walls; check the numbers"
+    off = _misfit(outline, x, r, at_wall)
+    if off <= _NEAR:
+        return None
+    return (
+        f"walls {outline.shape}: the {at_wall.sum()} grains at walls lie {off:.1f} mean radii from "
+        "the nearest side on average, so the outline probably has another shape; --walls auto "
+        "selects the shape that fits best"
+    )
 
 
 class Bodies(NamedTuple):

@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from granforce.cli.parser import main
 from granforce.experiment.boundary import boundary
 from granforce.experiment.frames import frames_of
 from granforce.experiment.pegs import read_pegs
-from granforce.experiment.walls import fitted, flagged
+from granforce.experiment.walls import bad_fit, fitted, flagged
 from granforce.records import InputError
 
 N = 40
@@ -97,6 +98,31 @@ def test_an_annulus_is_told_from_a_circle(rng, inner):
     assert found.shape == ("annulus" if inner else "circle")
     assert np.allclose(found.numbers[:2], [500, 300], atol=3)
     assert np.allclose(found.numbers[-1], 128, atol=5)
+
+
+def test_an_outline_of_another_shape_is_noted(rng):
+    x = annulus(rng, 0)
+    sides = boundary(x, r := np.full(len(x), 5.0))
+    at_wall = sides != 0
+    box, circle = (fitted(shape, x, r, at_wall, sides) for shape in ("box", "circle"))
+    assert bad_fit(circle, x, r, at_wall) is None
+    note = bad_fit(box, x, r, at_wall)
+    assert f"walls box: the {at_wall.sum()} grains at walls lie 1." in note and "auto" in note
+
+
+@pytest.mark.parametrize(
+    "flag, walls, words",
+    [
+        (1, "circle:0,0,9000", "walls circle: no grain lies at these walls"),
+        (None, "circle:0,0,9000", r"walls circle: the \d+ grains at walls lie \d\d"),
+        (None, "box", None),
+    ],
+)
+def test_numbers_of_walls_elsewhere_are_noted(made, flag, walls, words):
+    grains, rows = made
+    found = read(grains if flag is None else with_flag(grains, flag), rows, walls=walls)
+    notes = found.report.get("notes", [])
+    assert bool(notes) == bool(words) and (not words or re.search(words, notes[-1]))
 
 
 def test_one_flag_for_both_walls_of_an_annulus_is_told_apart(rng):
