@@ -214,14 +214,16 @@ def friction(mu: Any) -> float:
     return float(f"{value:.{MU_DIGITS}g}")
 
 
-def positive(value: Any, name: str, *, or_zero: bool = False) -> float:
-    """The value as a finite float > 0, or ≥ 0 where that is allowed; InputError otherwise."""
+def positive(value: Any, name: str, *, or_zero: bool = False, least: float = 0.0) -> float:
+    """The value as a finite float > 0 (or_zero: ≥ 0) and ≥ least; InputError otherwise."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} must be a number, got {brief(value)}") from None
     if not np.isfinite(number) or number < 0 or (number == 0 and not or_zero):
         raise InputError(f"{name} must be finite and {'≥' if or_zero else '>'} 0, got {number:g}")
+    if number < least:
+        raise InputError(f"{name} must be at least {least:g}, got {number:g}")
     return number
 
 

@@ -92,7 +92,7 @@ COMMANDS = {
         ["-n", "8", "--mu", "0.3", "--accuracy", "0.5"],
         ANY_PACKING
         | {
-            "--accuracy": POSITIVE,
+            "--accuracy": [*POSITIVE, "1e-300"],
             "--volume-seed": SEEDS,
             "--ensemble-mu": FRICTION,
             **CONDITIONS,
@@ -135,7 +135,7 @@ COMMANDS = {
             "--contacts": CONTACTS,
             "--draw-seed": SEEDS,
             "--ensemble-mu": FRICTION,
-            "--precision": POSITIVE,
+            "--precision": [*POSITIVE, "1e-300"],
             "--csv": OUTPUTS,
         },
     ),

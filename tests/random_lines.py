@@ -36,7 +36,6 @@ SMALL = {
 LEFT_OUT = {"app", "docs", "bench", "study", "scan"}
 # Words that are right and cost much.
 DEAR = {
-    *(("accuracy", "1e-300"), ("precision", "1e-300"), ("effective", "1e300")),
     *(("sweeps", "1"), ("sweeps", "2"), ("max_steps", LONG), ("volume_seed", LONG)),
 }
 

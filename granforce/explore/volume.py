@@ -36,6 +36,9 @@ STEP = 0.7
 # Part of independent normal states that lie in S at the top of the ladder; how many are drawn to
 # choose it, and to estimate it.
 _INSIDE, _TRIED, _COUNTED = 0.8, 256, 4096
+# Smallest standard error that can be requested: the top of the ladder alone contributes 0.008,
+# √((1 − _INSIDE)/(_INSIDE _COUNTED)), which more paths do not reduce.
+LEAST_ACCURACY = 0.01
 # Paths on each rung to find the next one, and of them those left out before q is averaged.
 _PILOT, _FORGOTTEN = 48, 16
 # Paths on each rung at first, and batches of them whose scatter tells the error.
@@ -98,11 +101,11 @@ def volume(
     of ⟨f_n⟩; a single point has ln V = 0. workers: threads, which change nothing in the result.
     progress(done, total) counts paths, of as many as seem to be needed.
 
-    Raises InputError for an accuracy that is not above 0 and forces without bounds, NotJammedError
+    Raises InputError for an accuracy below LEAST_ACCURACY and forces without bounds, NotJammedError
     where S is empty.
     """
     begin = time.perf_counter()
-    accuracy, seed = positive(accuracy, "accuracy"), random_seed(seed)
+    accuracy, seed = positive(accuracy, "accuracy", least=LEAST_ACCURACY), random_seed(seed)
     workers = worker_count(workers)
     made = walls(ensemble)
     grains = max(1, len(ensemble.grains))

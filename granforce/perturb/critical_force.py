@@ -41,6 +41,7 @@ from granforce.records import (
     worker_count,
 )
 from granforce.system import cancelling
+from granforce.tolerances import INTERVAL_GAP
 from granforce.types import Cancel, Floats, Integers, Mask
 
 # Part of the way from the last load at rest to the limit load that the next load goes.
@@ -50,6 +51,9 @@ MOST_STEPS = 150
 # What steady motion may still breach Coulomb's law by, relative to the fastest contact, and the
 # steps spent on that.
 STEADY, STEADY_STEPS = 1e-3, 500
+
+# Smallest precision of F_crit, ⟨f_n⟩: limit loads are certified to this.
+LEAST_PRECISION = INTERVAL_GAP
 
 # How loads ended, implicit steps of the flow, and linear systems solved for them.
 COUNTS = ("loads_at_rest", "loads_moving", "loads_undecided", "flow_steps", "linear_systems")
@@ -145,7 +149,8 @@ def critical_forces(
     Raises UndecidedError where a limit load cannot be certified, or is given as NaN.
     """
     S, protocol = ensemble, Protocol(**protocol)
-    precision, rise = positive(protocol.precision, "precision"), positive(protocol.rise, "rise")
+    precision = positive(protocol.precision, "precision", least=LEAST_PRECISION)
+    rise = positive(protocol.rise, "rise")
     if rise > 1:
         raise InputError(f"rise is a part of the way to the limit load, at most 1, got {rise:g}")
     protocol = Protocol(precision, rise, whole(protocol.max_steps, "max_steps", 1))
@@ -283,7 +288,7 @@ def response(
     Raises InputError where the grains come to rest under this load.
     """
     S = packing if isinstance(packing, Ensemble) else ensemble(packing, mu)
-    precision = positive(precision, "precision")
+    precision = positive(precision, "precision", least=LEAST_PRECISION)
     position, scale = S.position(contact), S.force_scale
     if critical is None:
         critical = critical_force(S, contact, precision=precision)

@@ -9,6 +9,7 @@ import xarray as xr
 from granforce.explore.intervals import limit_load_bounds
 from granforce.forces.ensemble import Ensemble
 from granforce.perturb.critical_force import (
+    LEAST_PRECISION,
     MOST_STEPS,
     RISE,
     CriticalForce,
@@ -64,7 +65,7 @@ def _perturbation_parameters(
 
 def _protocol(precision: Any, rise: Any, max_steps: Any) -> Parameters:
     """What names how loads are raised; `rise` and `max_steps` only where they are not the usual."""
-    named = {"precision": positive(precision, "precision")}
+    named = {"precision": positive(precision, "precision", least=LEAST_PRECISION)}
     if rise != RISE:
         named["rise"] = positive(rise, "rise")
         if named["rise"] >= 1:

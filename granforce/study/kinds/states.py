@@ -13,7 +13,7 @@ from granforce.experiment.infer import infer
 from granforce.experiment.informative import informative
 from granforce.explore.random_walk import Walk, walk
 from granforce.explore.uniform import sample_uniform
-from granforce.explore.volume import volume
+from granforce.explore.volume import LEAST_ACCURACY, volume
 from granforce.forces.ensemble import Ensemble
 from granforce.forces.likeliest import UNMEASURED
 from granforce.forces.nearest import nearest
@@ -228,7 +228,8 @@ def _volume_parameters(
     accuracy, seed: as for `volume`. mu: friction coefficient of the ensemble, by default the
     packing's. asked: the conditions.
     """
-    named = {"accuracy": positive(accuracy, "accuracy"), "seed": random_seed(seed)}
+    accuracy = positive(accuracy, "accuracy", least=LEAST_ACCURACY)
+    named = {"accuracy": accuracy, "seed": random_seed(seed)}
     return {**cones_of(packing, mu, **asked), **named}
 
 
