@@ -63,10 +63,9 @@ def of(S):
 def test_results_are_taken_by_what_they_are_of(S, others):
     for function, words, result in of(S):
         function(S, *words, **result)
-        pushed = function is gf.response
-        for other in [others["packing"]] if pushed else others.values():
-            own = (int(other.index[1]),) if pushed else words
-            with pytest.raises(InputError, match=r"another ensemble|networks of this|not of"):
+        for other in others.values():
+            own = (int(other.index[1]),) if function is gf.response else words
+            with pytest.raises(InputError, match=r"another|networks of this|not of|computed at mu"):
                 function(other, *own, **result)
 
 

@@ -63,6 +63,7 @@ class CriticalForce(NamedTuple):
     """Largest force pair on one contact under which grains come to rest, and the motion above."""
 
     contact: int  # its number in the packing
+    mu: float  # friction coefficient of the ensemble
     low: float  # F_crit, force: largest load that ended at rest
     high: float  # least load above that did not, or the limit load if none was tried
     limit_load: float  # force
@@ -215,6 +216,7 @@ def _raised(
     loaded[position, 0] += low
     return CriticalForce(
         contact=contact,
+        mu=S.mu,
         low=low * S.force_scale,
         high=high * S.force_scale,
         limit_load=limit * S.force_scale,
@@ -314,6 +316,10 @@ def _check_its_own(S: Ensemble, critical: CriticalForce, contact: int, position:
     if critical.contact != contact:
         raise InputError(
             f"the critical force is that of contact {critical.contact}, not of {contact}"
+        )
+    if critical.mu != S.mu:
+        raise InputError(
+            f"the critical force was computed at mu = {critical.mu:g}, this ensemble has {S.mu:g}"
         )
     loaded = S.networks(critical.forces, "the critical force").copy()
     loaded[position, 0] += critical.low
