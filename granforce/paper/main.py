@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
+from granforce.packing.compaction import number_of_disks
 from granforce.paper import claims, documents, drawings, findings, tables
 from granforce.paper import plan as plans
 from granforce.paper.plan import Plan, Task
@@ -118,7 +119,8 @@ def plan_of(arguments: argparse.Namespace) -> Plan:
     if arguments.mu is not None:
         plan = _at(plan, _numbers("mu", arguments.mu, friction))
     if arguments.sizes is not None:
-        plan = plan._replace(sizes=_numbers("sizes", arguments.sizes, int))
+        sizes = _numbers("sizes", arguments.sizes, lambda n: number_of_disks(int(n)))
+        plan = plan._replace(sizes=sizes)
     if not plan.frictions:
         raise InputError("--mu: give at least one friction coefficient")
     cells = plan.packings * (len(plan.frictions) + len(plan.sizes))  # at the least

@@ -501,6 +501,7 @@ def test_versions_are_not_mixed(done, table, tmp_path, capsys):
         (["--workers", "0"], "--workers"),
         (["--table", "nowhere.zarr"], "no store"),
         (["--sizes", "many"], "--sizes"),
+        (["--sizes", "9" * 400], "--sizes: a packing of 999"),
         (["--formats", "gif"], "--formats"),
         (["--paper", "--parts", "walk"], "--paper names the parts"),
         (["--reduce", "nowhere.zarr"], "no store"),
